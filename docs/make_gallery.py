@@ -18,8 +18,8 @@ os.environ.setdefault("JAX_DISABLE_MOST_OPTIMIZATIONS", "true")  # each file is 
 
 import jounce as jn
 from jounce import plot
-from jounce.plot.frames import frames, points_at
-from jounce.plot.sketch import draw_scale
+from jounce.plot.drawings.frames import frames, points_at
+from jounce.plot.machine_sketch import draw_scale
 
 ROOT = pathlib.Path(__file__).parents[1]
 EXAMPLES = ROOT / "examples"

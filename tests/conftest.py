@@ -16,12 +16,12 @@ from jax._src import core  # what is private to JAX has no public name
 
 import tests.type_checks  # isort: skip # noqa: F401 - before jounce
 import jounce.forces  # noqa: F401 - or its types would be taken back with those of the test that needs them first
+from jounce.base.private_folder import PrivateFolder
 from jounce.cli import main
 from jounce.cli.compiled_programs import keep_programs
 from jounce.constraints import base
 from jounce.errors import OutputError
 from jounce.execution.background import NAME
-from jounce.private_folder import PrivateFolder
 from tests.precision import watched
 from tests.shares_of_tests import pytest_addoption, pytest_collection_modifyitems  # noqa: F401 - found here by pytest
 

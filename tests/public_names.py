@@ -3,7 +3,7 @@
 import functools
 
 import jounce as jn
-from jounce import moved_names
+from jounce.base import moved_names
 
 
 def offered():

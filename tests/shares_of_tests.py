@@ -15,24 +15,24 @@ import pytest
 
 SLOW_EXAMPLES = frozenset(
     """
-    jounce.design.optimize.optimize
-    jounce.design.tolerance.tolerance
-    jounce.dynamics.inverse.reactions.applied_force
+    jounce.design.optimization.optimize.optimize
+    jounce.design.tolerances.spread.tolerance
+    jounce.dynamics.inverse.outputs.reactions.applied_force
     jounce.integrate.mechanisms.batch.simulate_batch
     jounce.integrate.mechanisms.diffrax_term.ode_term
     jounce.integrate.mechanisms.simulate.simulate
     jounce.io.results.write_parts
-    jounce.kinematics.cams.plate_cam.plate_cam
-    jounce.kinematics.curves.assemblies.assemblies
+    jounce.kinematics.cams.plate_cams.plate_cam
+    jounce.kinematics.curves.assembly_modes.assemblies
     jounce.kinematics.curves.limits.LimitPosition
     jounce.kinematics.families.solve_batch.solve_batch
     jounce.kinematics.position_analysis.solve.solve_in_chunks
     jounce.planning.tool_paths.follow_tool_path.follow_tool_path
-    jounce.plot.bands.draw_bands
+    jounce.plot.charts.bands.draw_bands
     jounce.plot.forces.draw_power
     jounce.robot.closed_loops.closed_loop.mechanism
-    jounce.sweeps.sweep.sweep
-    jounce.trajectory.composed.OutputMotion
+    jounce.sweeps.sweeping.sweep
+    jounce.trajectory.laws.composed.OutputMotion
     jounce.viewer.subjects.cams.cam_mechanism
     jounce.viewer.subjects.slopes.peak_slopes
     """.split()

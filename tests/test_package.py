@@ -10,8 +10,8 @@ import jaxtyping
 import pytest
 
 import jounce
-from jounce import moved_names
-from jounce.interrupts import is_command
+from jounce.base import moved_names
+from jounce.base.interrupts import is_command
 
 HOME = pathlib.Path(jounce.__file__).parent
 HEAVY = ("equinox", "jax", "numpy", "pandas", "pint", "pydantic", "rich.progress", "ruamel", "scipy", "xarray")

@@ -1,6 +1,6 @@
 """Exact time derivatives of any order of mechanisms and robots: jerk, jounce and beyond, torques and their rates.
 
-Importing this package has no side effect but a mark that a process gets when it is forked, see `jounce.interrupts`.
+Importing this package has no side effect but a mark that a process gets when it is forked: `jounce.base.interrupts`.
 The settings of JAX are left alone; everything is computed in double precision all the same, see `jounce.settings`.
 What the package offers stands in the stub beside this file, ``__init__.pyi``, and each name of it is imported when it
 is first used: importing the package alone takes no time, and a command that computes nothing, such as
@@ -17,11 +17,16 @@ import warnings
 from pathlib import Path
 from typing import Any
 
-from jounce import alterations as _alterations, errors as errors, importing as _importing
-from jounce.display import Displayed as _Displayed, show_by as _show_by
-from jounce.interrupts import end_on_signals as _end_on_signals, is_command as _is_command, mark_forks as _mark_forks
-from jounce.jax_options import OPTIONS as _OPTIONS
-from jounce.moved_names import new_name as _new_name
+from jounce import errors as errors
+from jounce.base import alterations as _alterations, importing as _importing
+from jounce.base.display import Displayed as _Displayed, show_by as _show_by
+from jounce.base.interrupts import (
+    end_on_signals as _end_on_signals,
+    is_command as _is_command,
+    mark_forks as _mark_forks,
+)
+from jounce.base.jax_options import OPTIONS as _OPTIONS
+from jounce.base.moved_names import new_name as _new_name
 from jounce.version import __version__ as __version__
 
 if _is_command():

@@ -31,7 +31,7 @@ from jounce.dynamics import (
 from jounce.errors import (
     JounceError as JounceError,
 )
-from jounce.execution.store import (
+from jounce.execution.store.programs import (
     keep_programs as keep_programs,
 )
 from jounce.integrate import (

@@ -20,11 +20,11 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from jounce import alterations
+from jounce.base import alterations
+from jounce.base.interrupts import left_behind
+from jounce.base.jax_internals import config, core
+from jounce.base.jax_options import OPTIONS
 from jounce.errors import UnsupportedError
-from jounce.interrupts import left_behind
-from jounce.jax_internals import config, core
-from jounce.jax_options import OPTIONS
 
 _rooms: list[str] = []  # of which all that they offer computes in double precision
 _modules: set[str] = set()  # of them, whose classes do

@@ -157,7 +157,7 @@ RUN_ELSEWHERE = {  # over the whole grid of their files
     "wolfrom_train epicyclic excavator double_cardan delta_robot delta_pick",
     "tests/integrate/test_published.py": "andrews double_four_bar double_pendulum simple_pendulum flyball_governor "
     "spatial_slider_crank_free stewart_forces",
-    "tests/io/mechanisms/test_writer.py": "six_bar_watt press",
+    "tests/io/mechanisms/writing/test_writer.py": "six_bar_watt press",
     "tests/cli/test_inspect.py": "four_bar_in_space",
     "docs/output_laws.md": "servo_press",
 }

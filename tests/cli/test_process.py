@@ -101,7 +101,7 @@ DEAF = {
 @pytest.mark.parametrize("where", DEAF)
 def test_a_signal_is_heard_where_an_exception_is_not(where, tmp_path):
     program = (
-        "import hashlib, pathlib, time; from jounce.interrupts import end_on_signals, undoing\n"
+        "import hashlib, pathlib, time; from jounce.base.interrupts import end_on_signals, undoing\n"
         "class Deaf:\n def __del__(self):\n  while True: pass\n"
         "begun = pathlib.Path('begun'); begun.touch()\n"
         "with undoing(begun.unlink):\n end_on_signals()\n " + DEAF[where].replace("\n", "\n ")
@@ -115,7 +115,7 @@ def test_a_signal_is_heard_where_an_exception_is_not(where, tmp_path):
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_a_signal_after_the_work_is_done_changes_nothing(number, tmp_path):
     program = (
-        "import pathlib, signal, time; from jounce.interrupts import end_on_signals\n"
+        "import pathlib, signal, time; from jounce.base.interrupts import end_on_signals\n"
         "class Last:\n def __del__(self, touch=pathlib.Path('ending').touch, sleep=time.sleep): touch(); sleep(1)\n"
         "last = Last(); end_on_signals()"
     )

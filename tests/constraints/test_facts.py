@@ -7,13 +7,13 @@ import jounce as jn
 from jounce import planar, spatial
 from jounce.constraints.base import MotionLaw, catalogue
 from jounce.constraints.facts import dimension_of_field, facts_of, symbols
-from jounce.io.mechanisms.keys import file_keys
-from jounce.kinematics.curves.transmission import recognized
+from jounce.io.mechanisms.schema.keys import file_keys
+from jounce.kinematics.transmission import recognized
 from jounce.mechanism import build
-from jounce.mechanism.driver_outputs import is_turning
-from jounce.plot.driver_symbols import DRIVERS_AND_FORCES
-from jounce.plot.geometry import skeleton
-from jounce.plot.joint_symbols import _PLANAR, _SPATIAL
+from jounce.mechanism.laws.driver_outputs import is_turning
+from jounce.plot.drawings.driver_symbols import DRIVERS_AND_FORCES
+from jounce.plot.drawings.geometry import skeleton
+from jounce.plot.drawings.joint_symbols import _PLANAR, _SPATIAL
 
 BOTH = ("one", "two")
 

@@ -9,7 +9,7 @@ import pytest
 import xarray
 
 import jounce as jn
-from jounce.shapes import real_numbers, seconds
+from jounce.base.shapes import real_numbers, seconds
 from tests.problems.small import four_bar
 
 MECHANISM = four_bar()

@@ -21,8 +21,9 @@ import pytest
 import jounce as jn
 from jounce import jet
 from jounce.constraints import MotionLaw
-from jounce.execution import store as programs, translated
+from jounce.execution import translated
 from jounce.execution.backends import VARIABLE
+from jounce.execution.store.programs import programs
 from tests.problems.own_types import taken_back
 
 GROUND = ("ground", "rod")

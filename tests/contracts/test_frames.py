@@ -11,10 +11,10 @@ import jounce as jn
 from jounce import drivers, forces, planar, spatial
 from jounce.constraints.base import ROLES, catalogue, field_kind, value_fields
 from jounce.dynamics import CamForceOutput, CamTorqueOutput, DriverTorqueOutput, GroundTorqueOutput, JointTorqueOutput
-from jounce.io.mechanisms.output_types import output_types
+from jounce.io.mechanisms.schema.output_types import output_types
 from jounce.mechanism import build
-from jounce.mechanism.axis_angles import with_datums
-from jounce.mechanism.starting_guess import pose_at
+from jounce.mechanism.building.starting_guess import pose_at
+from jounce.mechanism.transmissions.axis_angles import with_datums
 from jounce.robot import CoupledJoints, LinkClosure, SlideOutput
 from jounce.testing.samples import group_of, pose_of, random_motion
 from tests.problems.drawings import (
@@ -648,7 +648,7 @@ def test_every_joint_driver_force_and_output_has_its_frames_drawn_otherwise(spac
             for element in elements.values():
                 missing[type(element)] = missing.get(type(element), set()) - forms_of(element)
     # a cam is made of coordinates of other elements, a derivative of other outputs: tests/dynamics/test_cams.py and
-    # tests/mechanism/test_linkage_outputs.py
+    # tests/mechanism/outputs/test_linkage_outputs.py
     for kind in (CamForceOutput, CamTorqueOutput, jn.outputs.DerivativeOutput):
         missing[kind] -= {"without"}
     missing.pop(jn.outputs.SymmetricRollCenterOutput, None)  # its image is in a plane through the origin of the ground

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 import jounce as jn
+from jounce.base.jax_options import OPTIONS
 from jounce.execution.threads import Threads
-from jounce.jax_options import OPTIONS
 from jounce.settings import own_settings, under_own_settings
 
 

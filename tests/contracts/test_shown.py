@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import jounce as jn
-from jounce.design.result import Comparison
-from jounce.display import Displayed
+from jounce.base.display import Displayed
+from jounce.design.optimization.result import Comparison
 from tests import public_names
 from tests.problems.small import four_bar
 

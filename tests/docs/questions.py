@@ -8,8 +8,8 @@ import jounce as jn
 from jounce import drivers, forces, planar, spatial
 from jounce.constraints import Rope
 from jounce.mechanism import build
-from jounce.reporting.facts.freedom_facts import StartingState
-from jounce.reporting.facts.line_facts import line_facts
+from jounce.reporting.facts.mechanism.freedom_facts import StartingState
+from jounce.reporting.facts.mechanism.line_facts import line_facts
 
 O2, O3, X, Y, Z = [0.0, 0.0], [0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]
 RPM = np.pi / 30

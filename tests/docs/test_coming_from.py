@@ -153,7 +153,7 @@ def _(motion):
 
 @row(MATLAB, "Mechanics Explorer")
 def _():
-    from jounce.cli.figures import plot
+    from jounce.cli.mechanism_commands.figures import plot
     from jounce.cli.viewing import view
 
     assert callable(view)

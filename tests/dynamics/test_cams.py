@@ -9,7 +9,7 @@ import pytest
 
 import jounce as jn
 from jounce import drivers, planar
-from jounce.io.mechanisms.writer import write_mechanism
+from jounce.io.mechanisms.writing.writer import write_mechanism
 
 SPRING, LENGTH, MASS, INERTIA, SPEED = 5000.0, 0.03, 1.3, 0.004, 20.0
 FILE = """
@@ -278,7 +278,7 @@ def test_a_law_that_ends_before_its_leader_is_named_before_any_computing(tmp_pat
 
 
 def test_breaks_of_a_cam_are_found_where_its_shaft_passes_them(tmp_path):
-    from jounce.mechanism.law_breaks import breaks_of_laws
+    from jounce.mechanism.laws.law_breaks import breaks_of_laws
 
     text = FILE.replace("w*t + 0.3*sin(5*t)", "w*t")
     found = breaks_of_laws(load(tmp_path, RISES, text=text), 0.0, 0.3, 4)

@@ -10,8 +10,8 @@ import pytest
 import jounce as jn
 from jounce import drivers, forces, planar, spatial
 from jounce.mechanism import build
-from jounce.mechanism.axis_angles import AttitudeHistory, lost_count
-from jounce.reporting.facts.mechanism_facts import inspected
+from jounce.mechanism.transmissions.axis_angles import AttitudeHistory, lost_count
+from jounce.reporting.facts.mechanism.mechanism_facts import inspected
 from jounce.reporting.text.summaries import start_summary
 
 ZERO, X, Y, Z = [0.0, 0.0], [1, 0, 0], [0, 1, 0], [0, 0, 1]

@@ -10,10 +10,10 @@ import pytest
 import jounce as jn
 from jounce import drivers, forces, planar, spatial
 from jounce.dynamics import JointForceOutput, JointTorqueOutput
-from jounce.mechanism.belts import belt_course
-from jounce.mechanism.gear_frames import check_distances
-from jounce.plot.geometry import skeleton
-from jounce.reporting.facts.mechanism_facts import inspected
+from jounce.mechanism.building.belts import belt_course
+from jounce.mechanism.transmissions.gear_frames import check_distances
+from jounce.plot.drawings.geometry import skeleton
+from jounce.reporting.facts.mechanism.mechanism_facts import inspected
 from jounce.reporting.facts.motion_facts import motion_facts
 from jounce.reporting.text.summaries import start_summary
 

@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 
 import jounce as jn
-from jounce.execution import compilation, store as store_
+from jounce.execution import compilation
 from jounce.execution.compilation import Compiled, compiles_anew
+from jounce.execution.store.programs import programs as store_
 from tests.programs import forget
 
 

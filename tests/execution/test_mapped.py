@@ -9,10 +9,11 @@ import pytest
 from scipy.special import digamma
 
 import jounce as jn
-from jounce.execution import backends, mapped, store as store_, translated
+from jounce.execution import backends, mapped, translated
 from jounce.execution.llvm import self_test
 from jounce.execution.llvm.modules import object_file
 from jounce.execution.mapped import Mapped, OnXla
+from jounce.execution.store.programs import programs as store_
 from tests.execution.test_compilation import Shelf
 
 needs_machine_code = pytest.mark.skipif(

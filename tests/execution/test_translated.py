@@ -7,9 +7,10 @@ import pytest
 from scipy.special import digamma
 
 import jounce as jn
-from jounce.execution import backends, store as store_, structure, translated
+from jounce.execution import backends, structure, translated
 from jounce.execution.compilation import Compiled, compiled
 from jounce.execution.llvm import self_test
+from jounce.execution.store.programs import programs as store_
 from tests.execution.test_compilation import Shelf
 
 pytestmark = pytest.mark.skipif(

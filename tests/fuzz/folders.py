@@ -17,7 +17,7 @@ from typing import Any
 
 from jounce.errors import JounceError, OutputError
 from jounce.sweeps import manifest
-from jounce.sweeps.sweep import opened
+from jounce.sweeps.sweeping import opened
 from tests.fuzz.mutations import HOSTILE
 from tests.problems.waves import ROOT, contents, swept
 

@@ -10,7 +10,7 @@ from jounce.execution.mapped import Mapped, OnLlvm
 from jounce.kinematics import Status
 from jounce.kinematics.continuation import continuation_steps
 from jounce.kinematics.continuation.instant_program import advance_instant
-from jounce.mechanism.builder import build
+from jounce.mechanism.building.builder import build
 from tests.linear_algebra.test_frontal import chain
 from tests.problems.small import four_bar, slider_crank
 

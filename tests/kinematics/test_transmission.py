@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import jounce as jn
-from jounce.kinematics.curves.transmission import FourBar, SliderCrank, extremes, recognized
+from jounce.kinematics.transmission import FourBar, SliderCrank, extremes, recognized
 from tests.problems.linkages import FourBar as RandomFourBar, SliderCrank as RandomSliderCrank
 
 TYPES = {

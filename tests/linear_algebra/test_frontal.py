@@ -10,7 +10,8 @@ import jounce as jn
 from jounce.linear_algebra.frontal import FrontalFactor
 from jounce.linear_algebra.fronts import Fronts
 from jounce.linear_algebra.pattern import Pattern
-from jounce.mechanism import build, builder
+from jounce.mechanism import build
+from jounce.mechanism.building import builder
 from tests.problems.small import four_bar
 
 LANES = 5

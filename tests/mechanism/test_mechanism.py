@@ -10,7 +10,7 @@ import pytest
 import jounce as jn
 from jounce import planar, spatial
 from jounce.mechanism import build, time_grid
-from jounce.mechanism.builder import grouped_elements
+from jounce.mechanism.building.builder import grouped_elements
 from jounce.mechanism.time import instants_of, last_step_words
 from tests.problems.small import crank, four_bar
 

@@ -21,8 +21,8 @@ from jounce.papers.negrean_2025 import (
     reproduce,
     segment,
 )
-from jounce.papers.negrean_2025.history import difference, history
 from jounce.papers.negrean_2025.measured_data import given_cases
+from jounce.papers.negrean_2025.motion_history import difference, history
 from tests.oracles import negrean_energies
 
 ROUNDING = 1e-14  # of the largest value over time

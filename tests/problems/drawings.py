@@ -26,7 +26,7 @@ from jounce.dynamics import (
     KineticEnergyOutput,
     PotentialEnergyOutput,
 )
-from jounce.dynamics.inverse.outputs import is_turning
+from jounce.dynamics.inverse.outputs.components import is_turning
 from jounce.forces import AbstractLaw
 from jounce.jet import stack
 from jounce.jet.algebra import total

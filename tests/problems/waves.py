@@ -6,7 +6,7 @@ import numpy as np
 
 from jounce.kinematics import Status
 from jounce.sweeps.problems import Histories, Problem, Quantity
-from jounce.sweeps.sweep import prepare, run
+from jounce.sweeps.sweeping import prepare, run
 
 TIME = np.linspace(0.0, 1.0, 3)
 ROOT = "zarr.json"

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import jounce as jn
-from jounce.activity import Activity, Count, compiling, now
+from jounce.base.activity import Activity, Count, compiling, now
 from jounce.reporting.peaks import Peak, peaks
 from jounce.reporting.progress import Display
 from jounce.reporting.terminal import say, show_peaks

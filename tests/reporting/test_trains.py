@@ -2,8 +2,8 @@
 
 import jounce as jn
 from jounce.mechanism import build
-from jounce.reporting.facts.freedom_facts import StartingState
-from jounce.reporting.facts.gear_facts import train_facts
+from jounce.reporting.facts.mechanism.freedom_facts import StartingState
+from jounce.reporting.facts.mechanism.gear_facts import train_facts
 
 
 def ratios(mechanism):

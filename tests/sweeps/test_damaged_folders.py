@@ -15,7 +15,7 @@ import jounce as jn
 from jounce.errors import JounceError, OutputError
 from jounce.sweeps import layout, manifest
 from jounce.sweeps.store import find
-from jounce.sweeps.sweep import opened, prepare
+from jounce.sweeps.sweeping import opened, prepare
 from tests.problems.waves import ROOT, VARY, Waves, contents, swept
 
 

@@ -17,7 +17,7 @@ import jounce as jn
 from jounce.errors import JounceError, MechanismFileError, OutputError
 from jounce.sweeps import chunks, cluster, manifest
 from jounce.sweeps.problems import Motions
-from jounce.sweeps.sweep import prepare
+from jounce.sweeps.sweeping import prepare
 
 FILE = pathlib.Path("examples/four_bar.yaml").resolve()
 

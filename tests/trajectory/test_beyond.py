@@ -7,7 +7,7 @@ import pytest
 
 import jounce as jn
 from jounce.errors import JounceError
-from jounce.mechanism.law_checks import check_laws
+from jounce.mechanism.laws.law_checks import check_laws
 from jounce.trajectory.sample_errors import derivative_errors
 
 TIMES = np.linspace(0.0, 2.0, 201)

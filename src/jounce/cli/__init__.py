@@ -20,36 +20,36 @@ from inspect import cleandoc
 from pathlib import Path
 from typing import Any, Literal
 
+from jounce.base.interrupts import end_on_signals, is_command
 from jounce.cli.arguments import converted
-from jounce.cli.cams import cam
-from jounce.cli.conversion import convert
-from jounce.cli.curves import trace
-from jounce.cli.designs import optimize
-from jounce.cli.energies import energies
-from jounce.cli.example_files import example
-from jounce.cli.exports import export
-from jounce.cli.feedforward import feedforward
-from jounce.cli.figures import plot, report
+from jounce.cli.design_commands.designs import optimize
+from jounce.cli.design_commands.sweeping import sweep
+from jounce.cli.design_commands.tolerances import tolerance
+from jounce.cli.file_commands.conversion import convert
+from jounce.cli.file_commands.example_files import example
+from jounce.cli.file_commands.exports import export
+from jounce.cli.file_commands.starters import new
 from jounce.cli.file_kinds import is_data_file
 from jounce.cli.inspection import inspect
 from jounce.cli.installation import doctor
-from jounce.cli.mechanisms import run, schema, simulate
+from jounce.cli.mechanism_commands.cams import cam
+from jounce.cli.mechanism_commands.curves import trace
+from jounce.cli.mechanism_commands.energies import energies
+from jounce.cli.mechanism_commands.figures import plot, report
+from jounce.cli.mechanism_commands.mechanisms import run, schema, simulate
+from jounce.cli.mechanism_commands.small_motions import modes
+from jounce.cli.mechanism_commands.written_equations import equations
 from jounce.cli.options import WritingError
 from jounce.cli.papers import reproduce
-from jounce.cli.retiming import retime
-from jounce.cli.robots import check, torques
-from jounce.cli.servo import servo
+from jounce.cli.robot_commands.feedforward import feedforward
+from jounce.cli.robot_commands.retiming import retime
+from jounce.cli.robot_commands.robots import check, torques
+from jounce.cli.robot_commands.servo import servo
+from jounce.cli.robot_commands.smoothing import smooth
 from jounce.cli.shell_completion import complete
-from jounce.cli.small_motions import modes
-from jounce.cli.smoothing import smooth
 from jounce.cli.standard_streams import failsafe_streams
-from jounce.cli.starters import new
-from jounce.cli.sweeping import sweep
-from jounce.cli.tolerances import tolerance
 from jounce.cli.viewing import view
-from jounce.cli.written_equations import equations
 from jounce.errors import JounceError, SolveError
-from jounce.interrupts import end_on_signals, is_command
 from jounce.reporting.progress import Display
 from jounce.reporting.terminal import cautions, complain, detail, unexpected
 
@@ -110,7 +110,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     -------
     int
         0 success, 2 bad input, 1 a solve or a writing that failed or a limit that is broken, 130 interrupted. As a
-        command, the process ends on signals by itself, see `jounce.interrupts`.
+        command, the process ends on signals by itself, see `jounce.base.interrupts`.
     """
     given = list(sys.argv[1:] if arguments is None else arguments)
     if arguments is None:
@@ -225,7 +225,7 @@ def _computing(command: Callable[..., int]) -> Callable[..., int]:
     def computing(*arguments: Any, **keywords: Any) -> int:
         reading = keywords.get("reading")
         if arguments and is_data_file(arguments[0]) and not getattr(reading, "import_", None):
-            from jounce.io.mechanisms.key_check import check_keys
+            from jounce.io.mechanisms.schema.key_check import check_keys
 
             check_keys(arguments[0])
         from jounce.cli.compiled_programs import use_compilation_cache

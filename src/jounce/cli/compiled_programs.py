@@ -5,15 +5,15 @@ from __future__ import annotations
 import sys
 from typing import Any
 
+from jounce.base.private_folder import PrivateFolder
 from jounce.errors import OutputError
-from jounce.execution import store
 from jounce.execution.compilation import ask_before_jax, compiles_anew
-from jounce.execution.program_folder import ProgramFolder, chosen_folder
-from jounce.private_folder import PrivateFolder
+from jounce.execution.store.folder import ProgramFolder, chosen_folder
+from jounce.execution.store.programs import programs as store
 
 
 class JaxProgramFolder(ProgramFolder):
-    """The programs that JAX keeps by itself: those that `jounce.execution.store` does not."""
+    """The programs that JAX keeps by itself: those that `jounce.execution.store.programs` does not."""
 
     def get(self, key: str) -> bytes | None:
         """Return the program of this key, or None, as it is where programs are to be compiled anew."""
@@ -32,7 +32,7 @@ def keep_programs(folder: PrivateFolder) -> bool:
     """
     import jax
 
-    from jounce.jax_internals import use_file_cache
+    from jounce.base.jax_internals import use_file_cache
 
     def file_cache(path: str) -> Any:
         return JaxProgramFolder(folder), path

@@ -57,7 +57,7 @@ def kind_of(path: str | PathLike[str]) -> str | None:
 def _kind_of_data(data: Any) -> str | None:
     from jounce.io.robots.drives import KEYS as OF_DRIVES
     from jounce.io.robots.limits import KEYS
-    from jounce.io.trajectories.messages import is_message
+    from jounce.io.trajectories.ros.messages import is_message
 
     if is_message(data):
         return "trajectory"

@@ -85,7 +85,7 @@ def inspect(
             _show_other_reader(facts["other_reader"])
         say(f"\n{start_summary(facts)}")
         if range_found := facts.get("range"):
-            from jounce.reporting.facts.range_facts import range_words
+            from jounce.reporting.facts.mechanism.range_facts import range_words
 
             say(f"\n{range_words(dict(range_found))}")
     return 0 if facts["ok"] else 1
@@ -114,13 +114,13 @@ def _robot(
 
 def _mechanism(file: Path, reading: MechanismReading, driver: str | None, *, range_: bool) -> dict[str, Any]:
     """Return what is in a mechanism file, and how far a driver goes."""
-    from jounce.reporting.facts.mechanism_facts import inspected
+    from jounce.reporting.facts.mechanism.mechanism_facts import inspected
 
     mechanism = reading.mechanism(file)
     with errors_about(file):
         facts: dict[str, Any] = inspected(mechanism, file)
         if range_ and facts["ok"]:
-            from jounce.reporting.facts.range_facts import range_facts
+            from jounce.reporting.facts.mechanism.range_facts import range_facts
 
             with options_named():
                 facts["range"] = range_facts(mechanism, driver)

@@ -82,9 +82,9 @@ def _machine_code() -> dict[str, str]:
 
 
 def _program_folder() -> dict[str, str]:
+    from jounce.base.private_folder import PrivateFolder
     from jounce.errors import OutputError
-    from jounce.execution.program_folder import ENDING, chosen_folder
-    from jounce.private_folder import PrivateFolder
+    from jounce.execution.store.folder import ENDING, chosen_folder
 
     try:
         path = chosen_folder()

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from jounce.activity import Count
+from jounce.base.activity import Count
 from jounce.errors import JounceError, check_name
 from jounce.reporting.terminal import say
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from jounce.activity import Count
+from jounce.base.activity import Count
 from jounce.cli.options import AMONG_THE_OTHERS, RobotReading, TableOutput, errors_about, spare_inputs
 from jounce.errors import JounceError, RobotError
 from jounce.reporting.terminal import say, show_peaks

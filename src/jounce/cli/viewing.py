@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from jounce.base.interrupts import raising
 from jounce.cli.arguments import check_ending
 from jounce.cli.file_kinds import expecting, kind_of
 from jounce.cli.options import PLAIN_MECHANISM, MechanismReading, allowed, errors_about
 from jounce.errors import JounceError
-from jounce.interrupts import raising
 from jounce.io.files import DATA_FILES, ROBOT_FILES
 from jounce.reporting.terminal import say
 

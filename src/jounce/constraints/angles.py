@@ -14,14 +14,14 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Bool, Float
 
+from jounce.base.modules import Module
+from jounce.base.shapes import Numbers
 from jounce.constraints.planar import length_of
 from jounce.errors import MechanismError
 from jounce.jet import Jet, components, cross, dot, stack, wrap
 from jounce.jet.algebra import total
 from jounce.jet.turns import brought_near, principal
-from jounce.modules import Module
 from jounce.rigid.spatial import SpatialPose, body_axes
-from jounce.shapes import Numbers
 
 SMALLEST_COSINE = 1e-6  # of half the tilt of the axis: below it the tilt is half a turn, and the angle is undefined
 

@@ -11,6 +11,8 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Bool
 
+from jounce.base.modules import Module
+from jounce.base.shapes import Numbers
 from jounce.constraints.facts import (
     USUAL_DIMENSIONS,
     USUAL_SIGNS,
@@ -21,8 +23,6 @@ from jounce.constraints.facts import (
 )
 from jounce.errors import MechanismError, check_choice
 from jounce.jet import Jet, concatenate
-from jounce.modules import Module
-from jounce.shapes import Numbers
 
 Scalar = Annotated[Any, "scalar"]
 Vector = Annotated[Any, "vector"]

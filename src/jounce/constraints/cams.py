@@ -6,12 +6,12 @@ from typing import Any
 
 import equinox as eqx
 
+from jounce.base.modules import is_ours
 from jounce.constraints.base import AbstractConstraint, MotionLaw, Part
 from jounce.constraints.drivers import CoordinateDriver, RotationDriver, SlideDriver, SpatialSlideDriver
 from jounce.constraints.facts import facts_of
 from jounce.errors import MechanismError
 from jounce.jet import Jet, wrap
-from jounce.modules import is_ours
 
 AT_REST = 0.0  # the law of a driver of which the coordinate alone is meant
 

@@ -7,13 +7,13 @@ import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Bool
 
+from jounce.base.shapes import Numbers
 from jounce.constraints.angles import Datum, check_vectors, relative_angle
 from jounce.constraints.base import AbstractConstraint, MotionLaw, Scalar, Vector
 from jounce.constraints.planar import COORDINATES, coordinate_of, slide
 from jounce.jet import Jet, sqrt, wrap
 from jounce.rigid import PlanarPose, SpatialPose
 from jounce.rigid.pose import Pose
-from jounce.shapes import Numbers
 
 
 class CoordinateDriver(AbstractConstraint, type="coordinate", space="planar", role="driver"):

@@ -11,10 +11,10 @@ from typing import Any
 import jax.numpy as jnp
 from jaxtyping import Float
 
+from jounce.base.modules import Module
 from jounce.constraints.base import Scalar
 from jounce.errors import MechanismError
 from jounce.jet import Jet, exp, sqrt
-from jounce.modules import Module
 from jounce.rigid import PlanarPose
 from jounce.rigid.pose import Pose
 

@@ -11,6 +11,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
+from jounce.base.shapes import Numbers
 from jounce.constraints.base import AbstractConstraint, Curve, Flag, Nested, Scalar, Vector, rows
 from jounce.constraints.friction import Velocities, check_friction, relative_turn, relative_velocity
 from jounce.errors import MechanismError
@@ -18,7 +19,6 @@ from jounce.jet import Jet, atan2, cross, dot, sqrt, wrap
 from jounce.jet.turns import brought_near
 from jounce.rigid import PlanarPose
 from jounce.rigid.pose import Pose
-from jounce.shapes import Numbers
 
 COORDINATES = ("angle", "x", "y")
 FAR = 1e300  # a period that is never gone through

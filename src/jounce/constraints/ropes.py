@@ -5,11 +5,11 @@ from typing import Any
 
 import equinox as eqx
 
+from jounce.base.shapes import Numbers
 from jounce.constraints.base import AbstractConstraint, Points, Scalar
 from jounce.errors import MechanismError
 from jounce.jet import Jet, sqrt
 from jounce.jet.algebra import total
-from jounce.shapes import Numbers
 
 
 class Rope(AbstractConstraint, type="rope"):

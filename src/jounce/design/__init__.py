@@ -1,8 +1,8 @@
 """Design: parameters that vary, designs in which something is least, and how tolerances spread."""
 
-from jounce.design.optimize import optimize as optimize
-from jounce.design.result import OptimizedDesign as OptimizedDesign
-from jounce.design.tolerance import tolerance as tolerance
+from jounce.design.optimization.optimize import optimize as optimize
+from jounce.design.optimization.result import OptimizedDesign as OptimizedDesign
+from jounce.design.tolerances.spread import tolerance as tolerance
 from jounce.settings import compute_under_own_settings as _compute_under_own_settings
 
 _compute_under_own_settings(__name__)

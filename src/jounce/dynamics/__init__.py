@@ -31,10 +31,13 @@ from jounce.dynamics.energy.equations import (
 )
 from jounce.dynamics.energy.potential import potential_energy as potential_energy, stored_energy as stored_energy
 from jounce.dynamics.energy.power import power_balance as power_balance
-from jounce.dynamics.inverse.cam_outputs import CamForceOutput as CamForceOutput, CamTorqueOutput as CamTorqueOutput
-from jounce.dynamics.inverse.cam_springs import ContactSpring as ContactSpring, contact_spring as contact_spring
 from jounce.dynamics.inverse.constraint_equations import constraint_equations as constraint_equations
-from jounce.dynamics.inverse.outputs import (
+from jounce.dynamics.inverse.outputs.cam_outputs import (
+    CamForceOutput as CamForceOutput,
+    CamTorqueOutput as CamTorqueOutput,
+)
+from jounce.dynamics.inverse.outputs.cam_springs import ContactSpring as ContactSpring, contact_spring as contact_spring
+from jounce.dynamics.inverse.outputs.components import (
     AppliedForceOutput as AppliedForceOutput,
     AppliedTorqueOutput as AppliedTorqueOutput,
     DriverForceOutput as DriverForceOutput,
@@ -44,7 +47,7 @@ from jounce.dynamics.inverse.outputs import (
     JointForceOutput as JointForceOutput,
     JointTorqueOutput as JointTorqueOutput,
 )
-from jounce.dynamics.inverse.reactions import (
+from jounce.dynamics.inverse.outputs.reactions import (
     Reaction as Reaction,
     applied_force as applied_force,
     driver_force as driver_force,

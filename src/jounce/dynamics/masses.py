@@ -6,12 +6,12 @@ import numpy as np
 from jax.core import Tracer
 from jaxtyping import Float
 
+from jounce.base.shapes import Numbers
 from jounce.errors import MechanismError
 from jounce.mechanism import Mechanism
 from jounce.mechanism.masses import body_mass
 from jounce.mechanism.resolve import along_instances, resolved
 from jounce.mechanism.system import POSITION_COMPONENTS
-from jounce.shapes import Numbers
 
 Gravity = Float[Numbers, "component 1 #batch"]
 """Acceleration of free fall, m/s^2."""

@@ -8,6 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float, Int
 
+from jounce.base.shapes import Numbers
 from jounce.errors import MechanismError
 from jounce.execution.chunks import in_chunks
 from jounce.execution.device import on_processor
@@ -15,7 +16,6 @@ from jounce.jet import Jet
 from jounce.jet.derivatives import plain_derivatives
 from jounce.kinematics import Motion, Status
 from jounce.rigid.pose import Pose
-from jounce.shapes import Numbers
 from jounce.units.shown_units import time_axes
 
 if TYPE_CHECKING:

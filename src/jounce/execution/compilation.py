@@ -19,14 +19,14 @@ import numpy as np
 from jax.core import Tracer
 from jax.experimental import serialize_executable
 
-from jounce.activity import compiling
+from jounce.base.activity import compiling
+from jounce.base.importing import uncollected
+from jounce.base.jax_internals import description_reader, runs_at_once, without_sources
 from jounce.execution.background import ByKey
 from jounce.execution.device import on_processor
-from jounce.execution.store import Descriptions, Store, current_store, is_wanted_soon, packed, unpacked
+from jounce.execution.store.programs import Descriptions, Store, current_store, is_wanted_soon, packed, unpacked
 from jounce.execution.structure import UndescribedError, program_key, settings
 from jounce.execution.translated import Translated, shaped
-from jounce.importing import uncollected
-from jounce.jax_internals import description_reader, runs_at_once, without_sources
 from jounce.settings import check_process, under_own_settings
 
 LARGE = 32  # numbers of an array that stays in memory in machine code of one instant

@@ -16,6 +16,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Int
 
+from jounce.base.shapes import is_traced
 from jounce.execution.backends import LLVM, xla_backend
 from jounce.execution.compilation import Compiled
 from jounce.execution.device import on_processor
@@ -24,7 +25,6 @@ from jounce.execution.llvm.text.scalars import MOST_LINES
 from jounce.execution.threads import Threads
 from jounce.execution.translated import Translated, shaped
 from jounce.settings import under_own_settings
-from jounce.shapes import is_traced
 
 WIDTHS = (8, 256)  # instants that XLA's programs are for: each compiles once
 GPU_WIDTH = 2**15  # the same on a GPU, which they have to fill

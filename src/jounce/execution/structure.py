@@ -23,9 +23,9 @@ from typing import Any
 import jax
 import numpy as np
 
-from jounce.alterations import BEGUN, altered
+from jounce.base.alterations import BEGUN, altered
+from jounce.base.jax_internals import is_missing, trace_settings as settings
 from jounce.execution.llvm import machine
-from jounce.jax_internals import is_missing, trace_settings as settings
 
 PACKAGE = Path(__file__).parents[1]
 LIBRARIES = ("equinox", "jax", "jaxlib", "numpy")  # whose releases decide what is traced and compiled

@@ -10,9 +10,9 @@ from typing import Any, TypeVar
 
 import jax
 
+from jounce.base.shapes import Refused
 from jounce.errors import MechanismError
 from jounce.settings import own_settings
-from jounce.shapes import Refused
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")

@@ -14,14 +14,14 @@ from typing import Any
 import jax
 import numpy as np
 
-from jounce.activity import compiling
+from jounce.base.activity import compiling
 from jounce.execution.backends import is_wanted, tell_missing
 from jounce.execution.background import ByKey
 from jounce.execution.llvm.modules import object_file
 from jounce.execution.llvm.programs import Program, Single
 from jounce.execution.llvm.text.scalars import MOST_LINES
 from jounce.execution.llvm.text.values import NoRuleError, UnsupportedOperationError
-from jounce.execution.store import current_store, made_or_kept
+from jounce.execution.store.programs import current_store, made_or_kept
 from jounce.execution.structure import UndescribedError, program_key, settings
 
 Group = tuple[Sequence[np.ndarray | jax.ShapeDtypeStruct], Any]  # leaves of a tree, or their forms, and its structure

@@ -2,6 +2,7 @@
 
 import equinox as eqx
 
+from jounce.base.shapes import Numbers
 from jounce.constraints.angles import Datum, check_vectors, relative_angle
 from jounce.constraints.base import Vector
 from jounce.constraints.planar import slide
@@ -9,7 +10,6 @@ from jounce.forces.base import AbstractForce, Law, by_law
 from jounce.jet import Jet, sqrt
 from jounce.rigid import PlanarPose, SpatialPose
 from jounce.rigid.pose import Pose
-from jounce.shapes import Numbers
 
 
 def distance(body_i: Pose, body_j: Pose, point_i: Numbers, point_j: Numbers) -> Jet:

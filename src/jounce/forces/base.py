@@ -9,10 +9,10 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 
+from jounce.base.modules import Module
 from jounce.constraints.base import catalogue, check_bodies, check_words, keep_words_static, register
 from jounce.constraints.facts import USUAL_DIMENSIONS, USUAL_SIGNS
 from jounce.jet import Jet
-from jounce.modules import Module
 from jounce.rigid.pose import Pose
 
 Law = Annotated[Any, "law"]

@@ -8,12 +8,12 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 
+from jounce.base.modules import Module, changes_parts, is_ours
 from jounce.jet import Jet, stack
 from jounce.jet.algebra import Quantity
 from jounce.jet.programs.read_methods import ReadObject
-from jounce.modules import Module, changes_parts, is_ours
 from jounce.trajectory import AbstractMotion, Expression
-from jounce.trajectory.user_laws import ORDER, is_users
+from jounce.trajectory.laws.user_laws import ORDER, is_users
 
 
 class AbstractLaw(Module):

@@ -7,13 +7,13 @@ from typing import Any
 
 import numpy as np
 
+from jounce.base.shapes import real_numbers
 from jounce.errors import JounceError, RobotError, no_such
 from jounce.execution.threads import in_callers_context
 from jounce.integrate.results.robot_simulation import RobotSimulation
 from jounce.integrate.simulate_robot import simulate_robot
 from jounce.robot.model.arguments import checked_state
 from jounce.robot.robot import Robot
-from jounce.shapes import real_numbers
 
 RATE, MASS = ".rate", ".mass"
 

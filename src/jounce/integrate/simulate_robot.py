@@ -6,7 +6,8 @@ from typing import Any, TypedDict
 import jax
 import numpy as np
 
-from jounce.activity import Count
+from jounce.base.activity import Count
+from jounce.base.shapes import ArrayLike, is_traced
 from jounce.errors import RobotError, UnsupportedError, check_name, flag
 from jounce.execution.backends import backend_of
 from jounce.integrate.marching.joint_events import JointEvent, JointEventDetector
@@ -25,7 +26,6 @@ from jounce.robot.model.joint_laws import GivenLaws, joint_laws
 from jounce.robot.model.robot_size import robot_size
 from jounce.robot.recursions.tree_equations import TreeEquations
 from jounce.robot.robot import Robot
-from jounce.shapes import ArrayLike, is_traced
 from jounce.trajectory.motion import AbstractMotion
 
 STEPS = 64  # taken between two looks at progress and events

@@ -9,9 +9,9 @@ if TYPE_CHECKING:
     from jounce.io.files.column_units import in_units as in_units
     from jounce.io.mechanisms.cam_files import load_cam as load_cam
     from jounce.io.mechanisms.drive_limits import load_drive_limits as load_drive_limits
-    from jounce.io.mechanisms.json_schema import json_schema as json_schema
     from jounce.io.mechanisms.loader import load as load
-    from jounce.io.mechanisms.writer import write_mechanism as write_mechanism
+    from jounce.io.mechanisms.schema.json_schema import json_schema as json_schema
+    from jounce.io.mechanisms.writing.writer import write_mechanism as write_mechanism
     from jounce.io.result_reading import read as read
     from jounce.io.results import check_writable as check_writable, write as write, write_parts as write_parts
     from jounce.io.robots.drives import load_drives as load_drives
@@ -39,9 +39,9 @@ def _of_mechanisms(name: str) -> ModuleType | None:
         case "load_drive_limits":
             from jounce.io.mechanisms import drive_limits as home
         case "json_schema":
-            from jounce.io.mechanisms import json_schema as home
+            from jounce.io.mechanisms.schema.models import json_schema as home
         case "write_mechanism":
-            from jounce.io.mechanisms import writer as home
+            from jounce.io.mechanisms.writing import writer as home
         case _:
             return None
     return home

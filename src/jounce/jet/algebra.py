@@ -9,6 +9,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from jounce.base.shapes import ArrayLike, Labeled, Numbers, Real, no_numbers, real_derivatives, real_or_traced
 from jounce.jet.coefficients import (
     Coefficient,
     Product,
@@ -27,7 +28,6 @@ from jounce.jet.coefficients import (
     total,
 )
 from jounce.settings import in_full
-from jounce.shapes import ArrayLike, Labeled, Numbers, Real, no_numbers, real_derivatives, real_or_traced
 
 
 @jax.tree_util.register_pytree_node_class

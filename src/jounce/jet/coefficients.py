@@ -13,7 +13,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from jounce.shapes import Real
+from jounce.base.shapes import Real
 
 Coefficient = Real | None
 """A Taylor coefficient, of any shape; None is zero for certain."""

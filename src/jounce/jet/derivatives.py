@@ -5,7 +5,7 @@ import math
 import numpy as np
 from jaxtyping import Float
 
-from jounce.shapes import Numbers
+from jounce.base.shapes import Numbers
 
 
 def taylor_coefficients(derivatives: Float[Numbers, "order *shape"]) -> Float[Numbers, "order *shape"]:

@@ -11,9 +11,9 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 
+from jounce.base.shapes import Real
 from jounce.jet.algebra import Jet, Quantity, exp, log, of_quantities, power, real_power, sqrt
 from jounce.jet.coefficients import Coefficients, multiplied, negated, next_of_chain, sum_of_products
-from jounce.shapes import Real
 
 
 def next_sine_cosine(

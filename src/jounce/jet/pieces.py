@@ -3,7 +3,7 @@
 import jax.numpy as jnp
 from jaxtyping import Float, Int
 
-from jounce.shapes import Numbers
+from jounce.base.shapes import Numbers
 
 
 def last_begun(begins: Float[Numbers, " piece"], instants: Float[Numbers, "*batch"]) -> Int[Numbers, "*batch"]:

@@ -3,9 +3,9 @@
 import jax.numpy as jnp
 from jaxtyping import Bool, Float
 
+from jounce.base.shapes import Numbers, Real
 from jounce.jet.algebra import Jet
 from jounce.jet.coefficients import ranked
-from jounce.shapes import Numbers, Real
 
 ROUNDING = 1e-15  # of a coefficient, relative
 LARGEST_ERROR = 1e-2  # of a coefficient that is returned, in its natural size

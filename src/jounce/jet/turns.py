@@ -8,8 +8,8 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
+from jounce.base.shapes import Real
 from jounce.jet.algebra import Jet, Quantity
-from jounce.shapes import Real
 
 WHOLE_TURN = 2 * math.pi
 

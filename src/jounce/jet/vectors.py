@@ -6,9 +6,9 @@ from typing import Any, overload
 import jax
 import jax.numpy as jnp
 
+from jounce.base.shapes import Numbers
 from jounce.jet.algebra import Jet, Quantity, bilinear, components, concatenate
 from jounce.jet.coefficients import total
-from jounce.shapes import Numbers
 
 
 @overload

@@ -1,5 +1,6 @@
 """Kinematics: assembly, positions, all derivatives from one factorization, diagnosis, and the result."""
 
+from jounce.base.moved_names import renamed as _renamed
 from jounce.kinematics.assembly.mobility import Branch as Branch, Mobility as Mobility, mobility as mobility
 from jounce.kinematics.cams import (
     Extreme as Extreme,
@@ -31,7 +32,6 @@ from jounce.kinematics.position_analysis.solve import (
 )
 from jounce.kinematics.results.motion import Motion as Motion
 from jounce.kinematics.status import Status as Status
-from jounce.moved_names import renamed as _renamed
 from jounce.settings import compute_under_own_settings as _compute_under_own_settings
 
 _compute_under_own_settings(__name__)

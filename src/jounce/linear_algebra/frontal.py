@@ -7,10 +7,10 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
+from jounce.base.modules import Module
+from jounce.base.shapes import Numbers
 from jounce.linear_algebra.fronts import Fronts
 from jounce.linear_algebra.linear import Columns
-from jounce.modules import Module
-from jounce.shapes import Numbers
 
 
 class FrontalFactor(Module):

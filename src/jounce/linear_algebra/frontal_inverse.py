@@ -12,12 +12,12 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float, Int
 
+from jounce.base.modules import Module
+from jounce.base.shapes import Numbers
 from jounce.jet.coefficients import total
 from jounce.linear_algebra.frontal import FrontalFactor
 from jounce.linear_algebra.fronts import Fronts
 from jounce.linear_algebra.linear import Columns
-from jounce.modules import Module
-from jounce.shapes import Numbers
 
 
 class InversePlan(Module):

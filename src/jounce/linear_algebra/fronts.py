@@ -15,9 +15,9 @@ import equinox as eqx
 import numpy as np
 from jaxtyping import Int
 
+from jounce.base.modules import Module
+from jounce.base.shapes import Numbers
 from jounce.linear_algebra.pattern import Pattern
-from jounce.modules import Module
-from jounce.shapes import Numbers
 
 MOST_DENSE = 100  # columns of a matrix with more rows: a dense elimination is dearer, but knows its orientation
 FRONT_COST = 4.0  # of an operation in fronts, by that of one in dense elimination, as measured

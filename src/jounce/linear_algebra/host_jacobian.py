@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from jounce.base.shapes import Numbers
 from jounce.linear_algebra.pattern import Pattern
-from jounce.shapes import Numbers
 
 RANK_TOLERANCE = 1e-9
 SMALL = 1e-6  # of the largest singular value: how small one is next to a singular position

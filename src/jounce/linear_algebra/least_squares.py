@@ -11,9 +11,9 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
+from jounce.base.modules import Module
+from jounce.base.shapes import Numbers
 from jounce.linear_algebra.linear import DenseFactor
-from jounce.modules import Module
-from jounce.shapes import Numbers
 
 Basis = Float[Numbers, "row column batch"]
 Triangle = Float[Numbers, "column column batch"]

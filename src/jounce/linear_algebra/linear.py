@@ -7,8 +7,8 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float, Int
 
-from jounce.modules import Module
-from jounce.shapes import Numbers
+from jounce.base.modules import Module
+from jounce.base.shapes import Numbers
 
 Matrices = Float[Numbers, "row row batch"]
 Columns = Float[Numbers, "row batch"]

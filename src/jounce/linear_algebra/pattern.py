@@ -9,8 +9,8 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float, Int
 
-from jounce.modules import Module
-from jounce.shapes import Numbers
+from jounce.base.modules import Module
+from jounce.base.shapes import Numbers
 
 
 class Pattern(Module):

@@ -6,13 +6,13 @@ from collections.abc import Mapping
 from functools import cached_property
 from typing import Any
 
+from jounce.base.display import Displayed
 from jounce.constraints import AbstractConstraint
-from jounce.display import Displayed
 from jounce.errors import ExpressionError, JounceError, MechanismError, check_choice, check_name
 from jounce.forces import AbstractForce
 from jounce.mechanism.carriages import with_carriages
-from jounce.mechanism.derivative_outputs import bound
-from jounce.mechanism.outputs import AbstractQuantity
+from jounce.mechanism.outputs.base import AbstractQuantity
+from jounce.mechanism.outputs.derivative_outputs import bound
 from jounce.mechanism.redundant_reactions import RedundantReactions, check_redundant_reactions
 from jounce.mechanism.resolve import parameter_value
 from jounce.rigid.inertia import Inertia

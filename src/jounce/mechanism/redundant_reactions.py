@@ -4,9 +4,9 @@ import math
 from collections.abc import Collection, Mapping
 from typing import Any
 
+from jounce.base.shapes import Refused
 from jounce.errors import JounceError, MechanismError, check_name
 from jounce.mechanism.resolve import resolve
-from jounce.shapes import Refused
 
 CHOICES = ("unique", "least_norm")
 STIFFNESSES = {"force": "stiffness", "torque": "torsional stiffness"}

@@ -12,16 +12,16 @@ import jax.numpy as jnp
 import numpy as np
 from jax.core import Tracer
 
+from jounce.base.modules import Module, is_ours, unchecked
+from jounce.base.shapes import real_numbers
 from jounce.constraints.facts import SIGNS, facts_of, field_kinds, has_other_sign, stem_of, value_fields
 from jounce.errors import JounceError, MechanismError
 from jounce.forces import AbstractForce, AbstractLaw, ExpressionLaw, FunctionLaw, TimeLaw, VectorLaw
 from jounce.forces.laws import read_law
 from jounce.jet import Jet
-from jounce.modules import Module, is_ours, unchecked
-from jounce.shapes import real_numbers
 from jounce.trajectory import AbstractMotion, Expression, ExpressionMotion, FunctionMotion, SplineMotion
 from jounce.trajectory.curves import resolve_curve
-from jounce.trajectory.user_laws import read_laws
+from jounce.trajectory.laws.user_laws import read_laws
 
 Element = Module
 """A joint, driver, force or output."""

@@ -9,6 +9,8 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Bool, Float
 
+from jounce.base.modules import Module, unchecked, with_fields
+from jounce.base.shapes import Numbers
 from jounce.errors import UnsupportedError
 from jounce.jet import Jet, concatenate
 from jounce.jet.algebra import stacked
@@ -17,11 +19,9 @@ from jounce.linear_algebra.pattern import Pattern
 from jounce.mechanism.carriages import carriages
 from jounce.mechanism.resolve import along_instances, group_key, resolve_element, stack_elements
 from jounce.mechanism.user_code import READINGS, readings_of, users_class, with_readings
-from jounce.modules import Module, unchecked, with_fields
 from jounce.rigid import SpatialPose
 from jounce.rigid.body_arrays import each_jet
 from jounce.rigid.pose import Pose
-from jounce.shapes import Numbers
 from jounce.trajectory import AbstractMotion
 
 POSITION_COMPONENTS = {"planar": 2, "spatial": 3}

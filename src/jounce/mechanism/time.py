@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float, Int
 
+from jounce.base.shapes import ArrayLike, seconds
 from jounce.errors import MechanismError
 from jounce.mechanism.resolve import resolve
-from jounce.shapes import ArrayLike, seconds
 from jounce.trajectory import Expression
 
 MAX_INSTANTS = 10_000_000

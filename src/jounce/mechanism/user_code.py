@@ -17,6 +17,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax.core import Tracer
 
+from jounce.base.modules import changes_parts, is_ours, unchecked, with_fields
 from jounce.constraints import AbstractConstraint
 from jounce.constraints.base import field_kinds, value_fields
 from jounce.errors import UnsupportedError
@@ -24,13 +25,12 @@ from jounce.forces import AbstractForce
 from jounce.forces.laws import AbstractLaw, ReadLaw, is_users_law
 from jounce.jet import Jet
 from jounce.jet.programs.read_methods import Reading, Verbatim, read_method
-from jounce.mechanism.outputs import AbstractOutput
+from jounce.mechanism.outputs.base import AbstractOutput
 from jounce.mechanism.resolve import stack_elements
-from jounce.modules import changes_parts, is_ours, unchecked, with_fields
 from jounce.rigid import PlanarPose, SpatialPose
 from jounce.rigid.pose import Pose
 from jounce.trajectory import AbstractMotion
-from jounce.trajectory.user_laws import ReadMotion
+from jounce.trajectory.laws.user_laws import ReadMotion
 
 ORDER = 2  # to which methods are compared with what was read off
 READINGS = "readings"  # the field that holds them

@@ -13,15 +13,15 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
+from jounce.base.interrupts import undoing
 from jounce.errors import MechanismError, OutputError
-from jounce.interrupts import undoing
 from jounce.io.files.writing import check_target, replacing
 from jounce.kinematics import Motion
 from jounce.mechanism.time import nearest_instants
-from jounce.plot.drawing import VIEW, View
+from jounce.plot.drawings.drawing import VIEW, View
+from jounce.plot.drawings.scene import scene_of
 from jounce.plot.instants import solved_instants
-from jounce.plot.scene import scene_of
-from jounce.plot.sketch import SketchFigure, check_names, paths_of
+from jounce.plot.machine_sketch import SketchFigure, check_names, paths_of
 from jounce.plot.style import GRAY, style
 
 __all__ = ["ANIMATION_SUFFIXES", "animate", "check_animation", "frame_instants"]

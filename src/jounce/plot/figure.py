@@ -13,7 +13,7 @@ from jaxtyping import Float
 from jounce.errors import MechanismError, check_name
 from jounce.io.files.writing import check_target, replacing
 from jounce.kinematics import Motion
-from jounce.mechanism.outputs import AbstractQuantity
+from jounce.mechanism.outputs.base import AbstractQuantity
 from jounce.plot.instants import unsolved_runs
 from jounce.plot.labels import axis_range, quantity_word, scale_of, symbol, unit_label
 from jounce.plot.style import COLORS, PALE_GRAY, RESOLUTION, blank_figure, set_ticks, shown_name, style

@@ -9,12 +9,12 @@ import numpy as np
 from jaxtyping import Float
 
 from jounce.dynamics import kinetic_energy, potential_energy, power_balance, stored_energy
-from jounce.dynamics.inverse import outputs as loads
+from jounce.dynamics.inverse.outputs.components import components as loads
 from jounce.dynamics.masses import check_loads
 from jounce.errors import MechanismError, check_name
 from jounce.kinematics import Motion
+from jounce.plot.drawings.geometry import skeleton
 from jounce.plot.figure import draw_columns, finish
-from jounce.plot.geometry import skeleton
 from jounce.plot.labels import scale_of, unit_label
 from jounce.plot.style import BLUE, GREEN, ORANGE, VERMILION, blank_figure, style
 

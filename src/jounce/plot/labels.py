@@ -8,7 +8,7 @@ import re
 import numpy as np
 from jaxtyping import Float
 
-from jounce.mechanism.outputs import AbstractQuantity
+from jounce.mechanism.outputs.base import AbstractQuantity
 from jounce.reporting.peaks import rate_name
 from jounce.units.shown_units import derivative_unit
 

@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
+from jounce.base.display import Displayed
 from jounce.design import OptimizedDesign
-from jounce.display import Displayed
 from jounce.dynamics import Equilibrium, LimitReport, Linearization, Modes
 from jounce.errors import JounceError, SampleWarning
 from jounce.integrate import Batch, RobotSimulation
@@ -20,7 +20,7 @@ from jounce.mechanism import Mechanism
 from jounce.planning import Feedforward, JointPoses, ToolPathMotion
 from jounce.reporting.facts.curve_facts import curve_facts, curve_summary, curve_tables
 from jounce.reporting.facts.design_facts import design_facts, design_table, design_words
-from jounce.reporting.facts.mechanism_facts import mechanism_facts
+from jounce.reporting.facts.mechanism.mechanism_facts import mechanism_facts
 from jounce.reporting.facts.modes_facts import equilibrium_facts, equilibrium_tables, equilibrium_words, modes_table
 from jounce.reporting.facts.motion_facts import motion_facts
 from jounce.reporting.facts.robot_facts import robot_facts

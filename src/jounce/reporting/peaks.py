@@ -14,10 +14,10 @@ from jounce.errors import SampleWarning
 from jounce.integrate import Simulation
 from jounce.kinematics import ChunkedMotion, Motion, solve
 from jounce.mechanism import AbstractQuantity
-from jounce.mechanism.law_breaks import breaks_of_laws
+from jounce.mechanism.laws.law_breaks import breaks_of_laws
 from jounce.mechanism.user_code import holds_users_code
 from jounce.reporting.maxima import Curves, Peaks, RunningMaxima, Times, alike
-from jounce.trajectory.breaks import both_sides
+from jounce.trajectory.law_checks.breaks import both_sides
 from jounce.units.shown_units import ShownUnits, derivative_unit
 
 if TYPE_CHECKING:

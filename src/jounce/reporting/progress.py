@@ -10,8 +10,8 @@ import time
 from contextlib import ExitStack
 from typing import Any
 
-from jounce.activity import Activity, now
-from jounce.interrupts import undoing
+from jounce.base.activity import Activity, now
+from jounce.base.interrupts import undoing
 
 __all__ = ["Display", "in_notebook", "pause"]
 

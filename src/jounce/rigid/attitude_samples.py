@@ -4,13 +4,13 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
+from jounce.base.shapes import ArrayLike, Numbers, Real, is_traced, real_numbers, seconds
 from jounce.errors import JounceError, TrajectoryError
 from jounce.jet import Jet, cross, dot, sqrt, stack, transpose
 from jounce.jet.pieces import last_begun
 from jounce.rigid.euler_parameters import from_rotation_matrices
 from jounce.rigid.orientation import angular_velocity, check_rotation
 from jounce.rigid.rotations import rotation_matrix
-from jounce.shapes import ArrayLike, Numbers, Real, is_traced, real_numbers, seconds
 
 HIGHEST_DEGREE = 11
 UNIT = 1e-6  # how far the length of a sampled quaternion may be from one: printed digits, single precision

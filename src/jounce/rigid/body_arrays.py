@@ -8,10 +8,10 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
+from jounce.base.shapes import Numbers, real_or_traced
 from jounce.errors import JounceError
 from jounce.jet import Jet
 from jounce.jet.algebra import JetLike
-from jounce.shapes import Numbers, real_or_traced
 
 
 def each_jet(function: Callable[[Jet], Any], tree: Any) -> Any:

@@ -6,11 +6,11 @@ from typing import Any
 import jax
 from jaxtyping import Float, Int
 
+from jounce.base.shapes import Numbers, Refused, real_or_traced
 from jounce.errors import JounceError
 from jounce.jet import Jet, components, dot, stack, transpose
 from jounce.jet.algebra import JetLike, total
 from jounce.rigid.body_arrays import body_vector
-from jounce.shapes import Numbers, Refused, real_or_traced
 
 
 class AbstractFrame:

@@ -8,9 +8,9 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
+from jounce.base.shapes import ArrayLike, Numbers, Real, Refused, real_numbers
 from jounce.errors import JounceError, RobotError, check_choice, did_you_mean
 from jounce.rigid.solids import SOLIDS, pseudo_parts, solid_moments
-from jounce.shapes import ArrayLike, Numbers, Real, Refused, real_numbers
 
 ROUNDING = 1e-5  # of the largest principal moment: what files with six digits may miss a possible tensor by
 MOST_SHOWN = 9  # numbers in a message

@@ -6,6 +6,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Bool, Float
 
+from jounce.base.shapes import Numbers, is_traced
 from jounce.errors import JounceError, SingularityError, check_choice
 from jounce.jet import Jet, atan2, cos, cross, dot, matvec, sin, sqrt, stack, transpose
 from jounce.jet.algebra import JetLike, total
@@ -18,7 +19,6 @@ from jounce.rigid.rotations import (
     simple_rotations,
     uniform,
 )
-from jounce.shapes import Numbers, is_traced
 
 FRAMES = ("global", "body")
 

@@ -7,11 +7,11 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Float
 
+from jounce.base.shapes import Numbers, Real, Refused, real_or_traced
 from jounce.errors import JounceError
 from jounce.jet import Jet, next_sine_cosine, sine_cosine
 from jounce.jet.algebra import JetLike
 from jounce.rigid.body_arrays import body_vector, each_jet, take_bodies
-from jounce.shapes import Numbers, Real, Refused, real_or_traced
 
 
 @overload

@@ -7,10 +7,10 @@ from typing import Any
 import jax.numpy as jnp
 import numpy as np
 
+from jounce.base.shapes import is_traced, real_or_traced
 from jounce.errors import JounceError, check_choice
 from jounce.jet import Jet, components, cos, matmul, sin, sqrt, stack
 from jounce.jet.algebra import JetLike, total
-from jounce.shapes import is_traced, real_or_traced
 
 AXES = "xyz"
 

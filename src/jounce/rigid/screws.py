@@ -9,11 +9,11 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
+from jounce.base.shapes import ArrayLike, is_traced, real_or_traced
 from jounce.errors import JounceError, check_choice
 from jounce.jet import Jet, concatenate, cross, dot, matmul, sin, stack
 from jounce.jet.algebra import JetLike
 from jounce.rigid.rotations import checked_direction, rotation_about, stacked_if_jets, uniform, unit
-from jounce.shapes import ArrayLike, is_traced, real_or_traced
 
 KINDS = ("revolute", "prismatic")
 

@@ -12,12 +12,12 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Float
 
+from jounce.base.shapes import Numbers, Real, Refused, real_or_traced
 from jounce.errors import JounceError
 from jounce.jet import Jet, components, concatenate, dot, matmul, matvec, stack, transpose
 from jounce.jet.coefficients import minus, plus, sum_of_products, total
 from jounce.rigid.body_arrays import each_jet, take_bodies
 from jounce.rigid.frames import AbstractFrame
-from jounce.shapes import Numbers, Real, Refused, real_or_traced
 
 Triad = tuple[Float[Numbers, "3 *batch"], Float[Numbers, "3 *batch"], Float[Numbers, "3 *batch"]]
 Quadruples = tuple[Float[Numbers, "4 *batch"], Float[Numbers, "4 *batch"], Float[Numbers, "4 *batch"]]

@@ -6,12 +6,12 @@ from typing import Any
 
 import numpy as np
 
+from jounce.base.shapes import ArrayLike
 from jounce.errors import RobotError, check_choice
 from jounce.rigid.inertia import Inertia, finite_numbers
 from jounce.robot.model.links_and_joints import UNLIMITED, Joint, Limits, Link
 from jounce.robot.model.tree import turn_about
 from jounce.robot.robot import Robot
-from jounce.shapes import ArrayLike
 
 CONVENTIONS = ("standard", "modified")
 X, Y, Z = np.eye(3)

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from jounce.design.design_space import Grid, Sobol
+from jounce.design.tolerances.design_space import Grid, Sobol
 from jounce.errors import JounceError, MechanismFileError, OutputError
 from jounce.execution.threads import thread_count
 from jounce.io.files.reading import recording

@@ -10,9 +10,9 @@ from itertools import islice
 from pathlib import Path
 from typing import Any
 
+from jounce.base.interrupts import shielding
 from jounce.errors import JounceError, UnsupportedError
 from jounce.execution.threads import thread_count
-from jounce.interrupts import shielding
 from jounce.sweeps.chunks import Plan, compute_on_worker
 from jounce.sweeps.manifest import versions
 

@@ -8,8 +8,8 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
+from jounce.base.interrupts import undoing
 from jounce.errors import JounceError, OutputError
-from jounce.interrupts import undoing
 from jounce.io.files.reading import read_file, reason_of
 
 ROOT = "zarr.json"

@@ -11,8 +11,8 @@ from typing import Any
 import jax
 import numpy as np
 
-from jounce.design.design_space import Grid, Sobol
-from jounce.design.variations import Values
+from jounce.design.tolerances.design_space import Grid, Sobol
+from jounce.design.tolerances.variations import Values
 from jounce.errors import OutputError, shortened
 from jounce.execution.backends import is_wanted
 from jounce.execution.device import on_processor

@@ -11,7 +11,8 @@ import jax
 import numpy as np
 from jaxtyping import Float, Int
 
-from jounce.design.variations import Reader, reader_of
+from jounce.base.shapes import seconds
+from jounce.design.tolerances.variations import Reader, reader_of
 from jounce.dynamics.limits.trajectories import FollowedTrajectory
 from jounce.errors import MechanismError, RobotError, check_name
 from jounce.integrate import simulate_batch
@@ -31,12 +32,11 @@ from jounce.mechanism import (
     time_grid,
     with_output_drivers,
 )
-from jounce.mechanism.starting_guess import pose_at
+from jounce.mechanism.building.starting_guess import pose_at
 from jounce.rigid.inertia import Inertia
 from jounce.robot.robot import Robot
-from jounce.shapes import seconds
-from jounce.trajectory.breaks import both_sides, law_breaks
 from jounce.trajectory.joint_trajectory import JointTrajectory
+from jounce.trajectory.law_checks.breaks import both_sides, law_breaks
 from jounce.units.values import parse_value
 
 Designs = Mapping[str, Float[np.ndarray, " design"]]

@@ -22,8 +22,8 @@ from typing import Any
 
 import numpy as np
 
+from jounce.base.interrupts import undoing
 from jounce.errors import OutputError
-from jounce.interrupts import undoing
 from jounce.io.files.reading import read_file, reason_of
 from jounce.sweeps.folder_files import (
     LARGEST_ROOT,

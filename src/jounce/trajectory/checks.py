@@ -8,9 +8,9 @@ import numpy as np
 from jaxtyping import Float
 
 from jounce import errors
+from jounce.base.shapes import ArrayLike, real_numbers, seconds
 from jounce.errors import JounceError, TrajectoryError
 from jounce.rigid import inertia
-from jounce.shapes import ArrayLike, real_numbers, seconds
 
 whole_number = partial(errors.whole_number, error=TrajectoryError)
 finite_numbers = partial(inertia.finite_numbers, error=TrajectoryError)

@@ -12,10 +12,10 @@ import numpy as np
 from jax.core import Tracer
 from jaxtyping import Float
 
+from jounce.base.modules import Module
+from jounce.base.shapes import ArrayLike, real_numbers
 from jounce.errors import JounceError, MechanismError, whole_number
 from jounce.jet import Jet, stack
-from jounce.modules import Module
-from jounce.shapes import ArrayLike, real_numbers
 from jounce.trajectory.curve_checks import check_curve, check_points, derivatives_at, refuses_without_ends
 from jounce.trajectory.motion import SplineMotion
 from jounce.units.expression import Expression

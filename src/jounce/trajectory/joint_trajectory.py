@@ -9,17 +9,17 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
-from jounce.display import Displayed
+from jounce.base.display import Displayed
+from jounce.base.shapes import ArrayLike, seconds
 from jounce.errors import JounceError, MechanismError, SampleWarning, TrajectoryError, check_name
 from jounce.jet import Jet
-from jounce.shapes import ArrayLike, seconds
 from jounce.trajectory.checks import check_samples, finite, finite_numbers, finite_row, positive, whole_number
+from jounce.trajectory.laws.profiles import motion_profile
+from jounce.trajectory.laws.stacking import evaluate_laws, law_derivatives
+from jounce.trajectory.laws.trapezoid import LIMITS
 from jounce.trajectory.motion import AbstractMotion, ExpressionMotion, SplineMotion
-from jounce.trajectory.profiles import motion_profile
 from jounce.trajectory.sample_errors import TOLERANCE, unsupported_derivative, unsupported_words
 from jounce.trajectory.splines import HIGHEST_DEGREE
-from jounce.trajectory.stacking import evaluate_laws, law_derivatives
-from jounce.trajectory.trapezoid import LIMITS
 from jounce.units.expression import Expression
 
 MAX_ORDER = 30

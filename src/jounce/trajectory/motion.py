@@ -10,11 +10,11 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
+from jounce.base.modules import Module, Untraced
+from jounce.base.shapes import ArrayLike, Numbers, Real, is_traced
 from jounce.errors import MechanismError, check_choice
 from jounce.jet import Jet, compose
 from jounce.jet.pieces import last_begun
-from jounce.modules import Module, Untraced
-from jounce.shapes import ArrayLike, Numbers, Real, is_traced
 from jounce.trajectory.beyond import check_within, continued
 from jounce.trajectory.sample_errors import derivative_errors
 from jounce.trajectory.splines import spline_through

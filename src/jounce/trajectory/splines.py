@@ -6,9 +6,9 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
+from jounce.base.shapes import ArrayLike
 from jounce.errors import MechanismError
 from jounce.jet.turns import whole_periods
-from jounce.shapes import ArrayLike
 from jounce.trajectory.beyond import CLOSED
 from jounce.trajectory.checks import check_samples, whole_number
 

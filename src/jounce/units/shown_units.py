@@ -15,8 +15,8 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
+from jounce.base.shapes import Numbers
 from jounce.errors import JounceError, UnitError, no_such
-from jounce.shapes import Numbers
 from jounce.units.dimensions import (
     ANGLE,
     FORCE,

@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from jounce.base.shapes import Real, real_numbers
 from jounce.dynamics.inverse.constraint_equations import constraint_equations
 from jounce.errors import MechanismError
 from jounce.kinematics import Motion, Status
-from jounce.shapes import Real, real_numbers
 from jounce.written_equations.joint_forms.latex import source_of
 
 if TYPE_CHECKING:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from jax import lax
 
-from jounce import jax_internals
+from jounce.base import jax_internals
 from jounce.execution.llvm import modules, translation
 from jounce.execution.llvm.text import code
 from jounce.execution.llvm.text.values import Region, UnsupportedOperationError

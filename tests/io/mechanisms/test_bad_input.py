@@ -9,7 +9,7 @@ from ruamel.yaml import YAML
 
 from jounce.errors import MechanismFileError
 from jounce.io import load
-from jounce.io.mechanisms.key_check import check_keys
+from jounce.io.mechanisms.schema.key_check import check_keys
 
 ROOT = pathlib.Path(__file__).resolve().parents[3]
 PLANAR = """\

@@ -11,15 +11,15 @@ import jounce as jn
 from jounce.constraints import catalogue
 from jounce.integrate.mechanisms.batch_equations import ParametricMechanism
 from jounce.io import json_schema
-from jounce.io.mechanisms.inertia_forms import _solid_keys
-from jounce.io.mechanisms.keys import file_keys
-from jounce.io.mechanisms.output_types import output_holder, output_types
 from jounce.io.mechanisms.overrides import override
+from jounce.io.mechanisms.schema.keys import file_keys
+from jounce.io.mechanisms.schema.output_types import output_holder, output_types
+from jounce.io.mechanisms.values.inertia_forms import _solid_keys
 from jounce.mechanism import build, time_grid
+from jounce.mechanism.building.starting_guess import starting_guess
 from jounce.mechanism.masses import body_mass
 from jounce.mechanism.redundant_reactions import resolved_reactions
 from jounce.mechanism.resolve import resolve, resolve_element
-from jounce.mechanism.starting_guess import starting_guess
 from jounce.rigid.solids import SOLIDS
 
 COMPONENTS = {"planar": 2, "spatial": 3}

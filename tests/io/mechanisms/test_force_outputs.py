@@ -8,7 +8,7 @@ import pytest
 import jounce as jn
 from jounce import cli, io
 from jounce.errors import MechanismFileError
-from jounce.io.mechanisms.output_types import output_types
+from jounce.io.mechanisms.schema.output_types import output_types
 from jounce.plot import draw
 from jounce.reporting.peaks import peaks
 

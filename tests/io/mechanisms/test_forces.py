@@ -10,7 +10,7 @@ import jounce as jn
 from jounce.forces import force_catalogue
 from jounce.io import load
 from jounce.io.files.source import read_source
-from jounce.io.mechanisms.keys import file_keys
+from jounce.io.mechanisms.schema.keys import file_keys
 from jounce.mechanism import build
 from jounce.mechanism.masses import body_mass
 

@@ -7,7 +7,7 @@ import pytest
 
 import jounce as jn
 from jounce.constraints import MotionLaw
-from jounce.io.mechanisms.writer import write_mechanism
+from jounce.io.mechanisms.writing.writer import write_mechanism
 from tests.problems.own_types import taken_back
 
 TURNS = """

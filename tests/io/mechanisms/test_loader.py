@@ -17,7 +17,7 @@ from jounce.constraints.drivers import RotationDriver
 from jounce.errors import MechanismFileError
 from jounce.io import load
 from jounce.io.files.source import read_source
-from jounce.io.mechanisms.keys import file_keys
+from jounce.io.mechanisms.schema.keys import file_keys
 from jounce.mechanism import build, time_grid
 from jounce.trajectory import Expression, SplineMotion
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import jounce as jn
-from jounce.io.mechanisms.writer import write_mechanism
+from jounce.io.mechanisms.writing.writer import write_mechanism
 
 FILE = """
 space: planar

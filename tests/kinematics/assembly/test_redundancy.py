@@ -10,7 +10,7 @@ import pytest
 import jounce as jn
 from jounce import Status
 from jounce.kinematics.assembly.redundancy import repetitions
-from jounce.mechanism import builder
+from jounce.mechanism.building import builder
 from tests.problems import overconstrained
 from tests.problems.overconstrained import Z
 

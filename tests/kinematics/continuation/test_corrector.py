@@ -10,7 +10,7 @@ from jounce.jet import Jet
 from jounce.kinematics.assembly.assemble import assemble
 from jounce.kinematics.continuation.corrector import newton_raphson
 from jounce.mechanism import build
-from jounce.mechanism.starting_guess import pose_at
+from jounce.mechanism.building.starting_guess import pose_at
 
 LANES = 5
 TOLERANCE = 1e-12

@@ -7,7 +7,7 @@ import pytest
 
 import jounce as jn
 from jounce.kinematics.families import design_sides
-from jounce.mechanism.law_breaks import breaks_depend_on, breaks_of_laws
+from jounce.mechanism.laws.law_breaks import breaks_depend_on, breaks_of_laws
 
 CRANK = jn.Mechanism(
     space="planar",

@@ -4,6 +4,7 @@ from typing import Any
 
 import jax.numpy as jnp
 
+from jounce.base.shapes import ArrayLike
 from jounce.dynamics.energy.driver_coordinates import balanced
 from jounce.dynamics.energy.energies import error_for
 from jounce.errors import whole_number
@@ -22,7 +23,6 @@ from jounce.robot.recursions.batches import Batched
 from jounce.robot.recursions.kinematics import body_frames
 from jounce.robot.recursions.tree_scan import Series, to_coordinates
 from jounce.robot.robot import Robot
-from jounce.shapes import ArrayLike
 
 
 @Batched

@@ -12,6 +12,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
+from jounce.base.shapes import Numbers
 from jounce.dynamics.energy.slopes import Columns, Form, column_of, slope_values
 from jounce.dynamics.inverse.constraint_equations import COLUMNS
 from jounce.dynamics.masses import Masses, required_masses
@@ -24,7 +25,6 @@ from jounce.kinematics import Motion
 from jounce.kinematics.continuation.change_points import spoiled
 from jounce.mechanism.system import movable
 from jounce.rigid.pose import Pose
-from jounce.shapes import Numbers
 from jounce.units.shown_units import derivative_unit
 
 if TYPE_CHECKING:

@@ -14,6 +14,8 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
+from jounce.base.modules import Module
+from jounce.base.shapes import Numbers
 from jounce.dynamics.energy.slopes import Columns, Form, column_of, slope_values
 from jounce.dynamics.forward.accelerations import Lanes
 from jounce.dynamics.inverse.motion_forces import MotionForces
@@ -26,12 +28,10 @@ from jounce.jet import Jet
 from jounce.kinematics import Motion
 from jounce.kinematics.continuation.change_points import spoiled
 from jounce.kinematics.continuation.jacobian_factors import Factor, factored
-from jounce.mechanism.driver_outputs import is_turning
-from jounce.mechanism.element_indices import element_indices
+from jounce.mechanism.building.element_indices import element_indices
+from jounce.mechanism.laws.driver_outputs import is_turning
 from jounce.mechanism.system import System, movable
-from jounce.modules import Module
 from jounce.rigid.pose import Pose
-from jounce.shapes import Numbers
 from jounce.units.shown_units import derivative_unit
 
 if TYPE_CHECKING:

@@ -14,6 +14,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
+from jounce.base.shapes import ArrayLike, Numbers
 from jounce.dynamics.masses import Masses, required_masses, second_moments
 from jounce.dynamics.motion_values import Coordinates, labeled, pose_of
 from jounce.errors import JounceError, MechanismError, RobotError, flag, whole_number
@@ -33,7 +34,6 @@ from jounce.robot.recursions.drive_forces import ball_spin, tendon_energy
 from jounce.robot.recursions.kinematics import body_frames
 from jounce.robot.recursions.tree_scan import Series
 from jounce.robot.robot import Robot
-from jounce.shapes import ArrayLike, Numbers
 from jounce.units.shown_units import derivative_unit
 
 if TYPE_CHECKING:

@@ -5,6 +5,7 @@ from typing import ClassVar
 
 import equinox as eqx
 
+from jounce.base.shapes import Numbers
 from jounce.constraints.base import Whole
 from jounce.dynamics.energy.energies import energy_coefficients, energy_unit
 from jounce.dynamics.energy.potential import potential_coefficients
@@ -13,7 +14,6 @@ from jounce.errors import MechanismError, check_name, whole_number
 from jounce.kinematics import Motion
 from jounce.kinematics.position_analysis.solve import HIGHEST_ORDER
 from jounce.mechanism import AbstractMotionOutput, Mechanism
-from jounce.shapes import Numbers
 
 
 class AbstractEnergyOutput(AbstractMotionOutput):

@@ -9,6 +9,7 @@ import dataclasses
 import math
 from typing import Any
 
+from jounce.base.shapes import ArrayLike
 from jounce.dynamics.energy.energies import axes_of, differentiated, energies_of, summed
 from jounce.errors import RobotError, check_choice
 from jounce.jet import Jet, cross, dot
@@ -19,7 +20,6 @@ from jounce.rigid.frames import Frames
 from jounce.rigid.planar import perpendicular
 from jounce.rigid.pose import Pose
 from jounce.robot.robot import Robot
-from jounce.shapes import ArrayLike
 
 POINTS = ("center_of_mass", "origin")
 

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any, overload
 
 from jaxtyping import Float
 
+from jounce.base.shapes import ArrayLike, Numbers
 from jounce.dynamics.energy.body_coordinates import in_body_coordinates
 from jounce.dynamics.energy.driver_coordinates import in_driver_coordinates, is_driven
 from jounce.dynamics.energy.energies import error_for, mass_arrays
@@ -28,7 +29,6 @@ from jounce.robot.recursions.batches import Batched
 from jounce.robot.recursions.kinematics import body_frames
 from jounce.robot.recursions.tree_scan import Series, to_coordinates
 from jounce.robot.robot import Robot
-from jounce.shapes import ArrayLike, Numbers
 
 if TYPE_CHECKING:
     import xarray

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 import jax.numpy as jnp
 from jaxtyping import Float
 
+from jounce.base.shapes import Numbers
 from jounce.dynamics.energy.energies import Energies
 from jounce.dynamics.masses import Gravity, gravity_of, required_masses
 from jounce.dynamics.motion_values import Coordinates, check_motion, concrete_values, cut, labeled, pose_of
@@ -15,7 +16,6 @@ from jounce.jet.algebra import stacked
 from jounce.kinematics import Motion
 from jounce.mechanism.system import Group
 from jounce.rigid.pose import Pose
-from jounce.shapes import Numbers
 
 if TYPE_CHECKING:
     import xarray

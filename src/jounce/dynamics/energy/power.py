@@ -7,6 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
+from jounce.base.shapes import Numbers
 from jounce.dynamics.forward.accelerations import Lanes
 from jounce.dynamics.inverse.finite_forces import check_finite_values
 from jounce.dynamics.inverse.motion_forces import MotionForces
@@ -16,11 +17,10 @@ from jounce.execution.compilation import compiled
 from jounce.jet import Jet, dot
 from jounce.jet.algebra import stacked, total
 from jounce.kinematics import Motion
-from jounce.mechanism.axis_angles import at_lanes
 from jounce.mechanism.system import Group
+from jounce.mechanism.transmissions.axis_angles import at_lanes
 from jounce.rigid import PlanarPose
 from jounce.rigid.pose import Pose
-from jounce.shapes import Numbers
 
 if TYPE_CHECKING:
     import xarray

@@ -17,13 +17,13 @@ from typing import Any, NamedTuple
 import jax.numpy as jnp
 from jaxtyping import Float
 
+from jounce.base.shapes import Numbers
 from jounce.dynamics.energy.energies import axes_of
 from jounce.jet import Jet, cross, dot
 from jounce.jet.algebra import stacked, total
 from jounce.rigid import PlanarPose
 from jounce.rigid.frames import Frames
 from jounce.rigid.pose import Pose
-from jounce.shapes import Numbers
 
 Weights = tuple[dict[int, Fraction], ...]
 """For each rate of a form, by the order of the column of the Jacobian, the weights of products of plain derivatives."""

@@ -15,6 +15,8 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Bool, Float, Int
 
+from jounce.base.modules import Module
+from jounce.base.shapes import Numbers
 from jounce.dynamics.forward.ground import turns_with_ground, with_ground
 from jounce.dynamics.forward.loads import inertia_forces, mass_matrices
 from jounce.dynamics.forward.saddle_fronts import SaddleFactor, SaddleFronts, SaddleInverse
@@ -40,13 +42,11 @@ from jounce.jet.algebra import total
 from jounce.jet.programs.series import Recursion
 from jounce.linear_algebra.least_squares import range_basis
 from jounce.linear_algebra.linear import DenseFactor
-from jounce.mechanism.axis_angles import with_turns
 from jounce.mechanism.system import System
-from jounce.modules import Module
+from jounce.mechanism.transmissions.axis_angles import with_turns
 from jounce.rigid import PlanarPose, SpatialPose
 from jounce.rigid.pose import Pose
 from jounce.rigid.spatial import body_axes, quaternion_spins
-from jounce.shapes import Numbers
 
 Instants = Float[Numbers, "1 batch"]
 Lanes = Float[Numbers, " batch"]

@@ -7,7 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
-from jounce.shapes import Numbers
+from jounce.base.shapes import Numbers
 
 __all__ = ["turns_with_ground", "with_ground"]
 

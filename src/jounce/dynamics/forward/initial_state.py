@@ -9,6 +9,8 @@ import jax
 import numpy as np
 from jaxtyping import Bool, Float
 
+from jounce.base.modules import unchecked, with_fields
+from jounce.base.shapes import Numbers
 from jounce.dynamics.forward.accelerations import Equations, Instants, State
 from jounce.dynamics.forward.saddle_fronts import SaddleFronts
 from jounce.dynamics.forward.saddle_point import even_scale
@@ -24,9 +26,7 @@ from jounce.kinematics.curves.choice import chosen
 from jounce.kinematics.status import Status
 from jounce.linear_algebra.host_jacobian import RANK_TOLERANCE, HostJacobian, is_clearly_regular
 from jounce.mechanism import Mechanism, Model, build
-from jounce.mechanism.builder import released, with_reference
-from jounce.modules import unchecked, with_fields
-from jounce.shapes import Numbers
+from jounce.mechanism.building.builder import released, with_reference
 
 TOLERANCE = 1e-12  # of the assembled positions, rad or sizes of the mechanism
 ROUNDING = 1e-15  # of residuals, rad or sizes of the mechanism

@@ -10,6 +10,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Float
 
+from jounce.base.shapes import Numbers
 from jounce.dynamics.forward.saddle_point import BodyMatrices
 from jounce.dynamics.masses import Gravity, Masses
 from jounce.jet import Jet, components, cross
@@ -17,7 +18,6 @@ from jounce.jet.algebra import stacked, total
 from jounce.mechanism.system import System
 from jounce.rigid import PlanarPose
 from jounce.rigid.pose import Pose
-from jounce.shapes import Numbers
 
 
 def inertia_forces(pose: Pose, masses: Masses, gravity: Gravity | float) -> tuple[Jet, Jet]:

@@ -7,18 +7,18 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
+from jounce.base.shapes import real_numbers
 from jounce.dynamics.motion_values import Coordinates, cut
 from jounce.errors import MechanismError, check_choice, check_name
 from jounce.jet.derivatives import taylor_coefficients
 from jounce.kinematics import Motion, Status
 from jounce.kinematics.position_analysis.solve import HIGHEST_ORDER
 from jounce.mechanism import Mechanism, Model, build
-from jounce.mechanism.builder import with_reference
-from jounce.mechanism.law_checks import check_laws
+from jounce.mechanism.building.builder import with_reference
+from jounce.mechanism.laws.law_checks import check_laws
 from jounce.rigid import SpatialPose
 from jounce.rigid.euler_parameters import euler_parameters
 from jounce.rigid.pose import Pose
-from jounce.shapes import real_numbers
 
 
 class MotionAtState(Motion):

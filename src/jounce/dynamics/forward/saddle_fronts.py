@@ -15,13 +15,13 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float, Int
 
+from jounce.base.modules import Module
+from jounce.base.shapes import Numbers
 from jounce.dynamics.forward.saddle_point import BodyMatrices
 from jounce.linear_algebra.frontal import FrontalFactor
 from jounce.linear_algebra.frontal_inverse import FrontalInverse, InversePlan
 from jounce.linear_algebra.fronts import Fronts
 from jounce.linear_algebra.pattern import Pattern
-from jounce.modules import Module
-from jounce.shapes import Numbers
 
 FRONT_COST = 20.0  # of an operation in fronts, by that of one in dense elimination, as measured for one run
 MOST_NEIGHBORS = 16  # of a body; with more, its rows would be long

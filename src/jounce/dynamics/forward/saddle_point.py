@@ -10,10 +10,10 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
+from jounce.base.modules import Module
+from jounce.base.shapes import Numbers
 from jounce.jet.algebra import total
 from jounce.linear_algebra.linear import DenseFactor
-from jounce.modules import Module
-from jounce.shapes import Numbers
 
 ByBody = Float[Numbers, "coordinate body batch"]
 """One number for each coordinate of each body."""

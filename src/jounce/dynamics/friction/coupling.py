@@ -17,6 +17,8 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Float
 
+from jounce.base.modules import Module
+from jounce.base.shapes import Numbers
 from jounce.constraints.friction import displacements, normal_force, slip_velocity
 from jounce.errors import UnsupportedError
 from jounce.jet import Jet
@@ -24,11 +26,9 @@ from jounce.jet.algebra import stacked
 from jounce.kinematics.sensitivity.jacobian_series import Slope, along_displacements
 from jounce.linear_algebra.linear import DenseFactor
 from jounce.mechanism import Mechanism
-from jounce.mechanism.builder import Model, group_rows
+from jounce.mechanism.building.builder import Model, group_rows
 from jounce.mechanism.system import Group, System, movable
-from jounce.modules import Module
 from jounce.rigid.pose import Pose
-from jounce.shapes import Numbers
 
 SHARES = (0.25, 0.5, 0.75, 1.0)  # of friction, at which its matrix is looked at
 STEPS = 30  # of Newton's method, which takes four or five where friction is far from locking

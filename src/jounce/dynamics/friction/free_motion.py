@@ -8,12 +8,12 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Float
 
+from jounce.base.shapes import Numbers
 from jounce.constraints.friction import displacements, slip_velocity
 from jounce.dynamics.friction.coupling import Coupling, pressed, rubs
 from jounce.jet import Jet
 from jounce.mechanism.system import Group, System, movable, with_rows
 from jounce.rigid.pose import Pose
-from jounce.shapes import Numbers
 
 Rows = Float[Numbers, "row batch"]
 

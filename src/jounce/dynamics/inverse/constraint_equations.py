@@ -13,6 +13,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
+from jounce.base.shapes import Numbers
 from jounce.dynamics.forward.accelerations import Lanes, Rows
 from jounce.dynamics.forward.loads import mass_matrices
 from jounce.dynamics.forward.mechanism_state import MotionAtState, at_state
@@ -28,11 +29,10 @@ from jounce.jet.derivatives import plain_derivatives
 from jounce.kinematics import Motion, Status
 from jounce.linear_algebra.host_jacobian import RANK_TOLERANCE
 from jounce.mechanism import Mechanism, Model
-from jounce.mechanism.element_indices import ElementIndex, element_indices
-from jounce.mechanism.preconditions import concrete
+from jounce.mechanism.building.element_indices import ElementIndex, element_indices
+from jounce.mechanism.building.preconditions import concrete
 from jounce.mechanism.system import System
 from jounce.rigid.pose import Pose
-from jounce.shapes import Numbers
 
 if TYPE_CHECKING:
     import xarray

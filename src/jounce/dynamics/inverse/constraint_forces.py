@@ -16,6 +16,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
+from jounce.base.shapes import Numbers
 from jounce.dynamics.forward.saddle_point import (
     BodyMatrices,
     Column,
@@ -32,7 +33,6 @@ from jounce.linear_algebra.frontal import FrontalFactor
 from jounce.linear_algebra.linear import DenseFactor
 from jounce.mechanism.system import LeftOut, System, with_rows
 from jounce.rigid.pose import Pose
-from jounce.shapes import Numbers
 from jounce.trajectory import AbstractMotion
 
 Slopes = Sequence[Sequence[Float[Numbers, "order coordinate _ _ batch"]]]

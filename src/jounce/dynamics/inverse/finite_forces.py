@@ -4,10 +4,10 @@ from typing import Any
 
 import numpy as np
 
+from jounce.base.shapes import Numbers
 from jounce.errors import MechanismError
 from jounce.kinematics import Status
-from jounce.mechanism.element_indices import force_names
-from jounce.shapes import Numbers
+from jounce.mechanism.building.element_indices import force_names
 
 __all__ = ["check_finite_forces", "check_finite_values"]
 

@@ -13,6 +13,8 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
+from jounce.base.modules import with_fields
+from jounce.base.shapes import Numbers
 from jounce.constraints.friction import slip_velocity
 from jounce.dynamics.forward.accelerations import Lanes
 from jounce.dynamics.forward.loads import loads, mass_matrices
@@ -25,16 +27,14 @@ from jounce.dynamics.masses import Gravity, Masses
 from jounce.dynamics.motion_values import Coordinates, in_lots, part_of, pose_of
 from jounce.execution.compilation import compiled
 from jounce.execution.mapped import Mapped, OnLlvm
-from jounce.execution.store import is_wanted_soon
+from jounce.execution.store.programs import is_wanted_soon
 from jounce.jet import Jet, cross
 from jounce.jet.algebra import stacked, total
 from jounce.kinematics.sensitivity.jacobian_series import along_displacements, slopes
 from jounce.linear_algebra.pattern import Pattern
-from jounce.mechanism.axis_angles import with_turns
 from jounce.mechanism.system import Group, System, movable, with_rows
-from jounce.modules import with_fields
+from jounce.mechanism.transmissions.axis_angles import with_turns
 from jounce.rigid.pose import Pose
-from jounce.shapes import Numbers
 
 LARGE = 16  # numbers of an array that stays in memory in machine code of an instant
 LOT = 16  # instants whose dense matrices are factored together

@@ -9,6 +9,8 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
+from jounce.base.modules import Module
+from jounce.base.shapes import Numbers
 from jounce.dynamics.friction.coupling import Coupling, pressed, rubs
 from jounce.dynamics.inverse.constraint_forces import BodyMatrices, Slopes, load_solver, onto_bodies
 from jounce.dynamics.motion_values import Coordinates, pose_of
@@ -16,9 +18,7 @@ from jounce.jet import Jet
 from jounce.jet.algebra import stacked, total
 from jounce.kinematics.sensitivity.jacobian_series import Slope
 from jounce.mechanism.system import Group, System
-from jounce.modules import Module
 from jounce.rigid.pose import Pose
-from jounce.shapes import Numbers
 
 Rubbed = tuple[Sequence[Float[Numbers, "order coordinate _ _ batch"]], Sequence[Coordinates]]
 """Of a group of joints with friction: `friction_slope` for each moving slot, and where the bodies are."""

@@ -4,10 +4,10 @@ from typing import Any
 
 import numpy as np
 
+from jounce.base.shapes import Numbers
 from jounce.constraints.spin_hold import SpinHold
 from jounce.errors import MechanismError
 from jounce.kinematics import Status
-from jounce.shapes import Numbers
 
 NOTHING = 1e-9  # of the largest multiplier: what is less is rounding
 

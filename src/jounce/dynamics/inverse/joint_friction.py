@@ -5,9 +5,9 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
+from jounce.base.shapes import Numbers
 from jounce.dynamics.friction.coupling import rubs
 from jounce.dynamics.inverse import force_programs as programs
-from jounce.shapes import Numbers
 
 __all__ = ["JointFriction"]
 

@@ -5,12 +5,12 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
+from jounce.base.shapes import Numbers
 from jounce.dynamics.friction.coupling import joints_with_friction, rubs
 from jounce.dynamics.inverse.tooth_flanks import listed
 from jounce.errors import MechanismError
 from jounce.kinematics import Motion, Status
 from jounce.mechanism.system import Group, System, holding
-from jounce.shapes import Numbers
 
 NONE = 1e-12  # of the largest normal force: less is rounding
 

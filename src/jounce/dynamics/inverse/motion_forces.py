@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
+from jounce.base.shapes import Numbers
 from jounce.dynamics.friction.coupling import check_unique_pressing
 from jounce.dynamics.inverse import force_programs as programs, idle_torques, tooth_flanks as teeth
 from jounce.dynamics.inverse.finite_forces import check_finite_forces, check_finite_values
@@ -21,11 +22,10 @@ from jounce.errors import MechanismError
 from jounce.jet.algebra import total
 from jounce.kinematics import Motion, Status
 from jounce.kinematics.continuation.change_points import spoiled
-from jounce.mechanism.axis_angles import at_lanes, measures_angle
-from jounce.mechanism.element_indices import ElementIndex, element_indices
+from jounce.mechanism.building.element_indices import ElementIndex, element_indices
 from jounce.mechanism.redundant_reactions import resolved_reactions
 from jounce.mechanism.system import Group, holding, law_left_out
-from jounce.shapes import Numbers
+from jounce.mechanism.transmissions.axis_angles import at_lanes, measures_angle
 
 NOTHING = 1e-9  # of the largest multiplier: what is less is rounding
 

@@ -20,6 +20,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
+from jounce.base.shapes import Numbers
 from jounce.dynamics.forward.saddle_point import as_column, by_body, saddle_point
 from jounce.dynamics.inverse.constraint_forces import Slopes, by_group, jacobian_of, onto_bodies, work_along
 from jounce.errors import MechanismError
@@ -28,7 +29,6 @@ from jounce.linear_algebra.least_squares import range_basis
 from jounce.linear_algebra.linear import DenseFactor
 from jounce.mechanism import Model
 from jounce.mechanism.system import System
-from jounce.shapes import Numbers
 
 RowNumbers = Float[np.ndarray, " row"]
 OPEN = 1e-7  # of the largest force that is open: what is less is none

@@ -14,15 +14,15 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
+from jounce.base.shapes import Numbers
 from jounce.errors import MechanismError
 from jounce.execution.compilation import compiled
 from jounce.jet import Jet
 from jounce.jet.algebra import stacked
 from jounce.kinematics import Motion, Status
 from jounce.mechanism import Model
-from jounce.mechanism.builder import group_rows
+from jounce.mechanism.building.builder import group_rows
 from jounce.mechanism.system import Group, holding
-from jounce.shapes import Numbers
 
 Flanks = Mapping[int, Float[Numbers, "instance time"]]
 """1 or -1 for each pair of teeth, by the index of its group."""

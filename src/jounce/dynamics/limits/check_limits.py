@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
+from jounce.base.shapes import ArrayLike, seconds
 from jounce.dynamics.limits.limit_jumps import Infinite, infinite_quantities, jumps_of
 from jounce.dynamics.limits.limit_report import LimitReport, LimitRow
 from jounce.dynamics.limits.local_maxima import local_maxima
@@ -16,9 +17,8 @@ from jounce.dynamics.limits.trajectories import FollowedTrajectory, why_not
 from jounce.errors import RobotError, SampleWarning, TrajectoryError, flag
 from jounce.robot.model.links_and_joints import Limits
 from jounce.robot.robot import Robot
-from jounce.shapes import ArrayLike, seconds
-from jounce.trajectory.breaks import at_breaks, law_breaks, with_sides
 from jounce.trajectory.joint_trajectory import JointTrajectory
+from jounce.trajectory.law_checks.breaks import at_breaks, law_breaks, with_sides
 
 FIELDS = ("position", "velocity", "acceleration", "jerk", "effort", "effort_rate")
 TURNING = dict(zip(FIELDS, ("rad", "rad/s", "rad/s^2", "rad/s^3", "N m", "N m/s"), strict=True))

@@ -8,9 +8,9 @@ from jaxtyping import Float
 
 from jounce.dynamics.limits.trajectories import BLOCK, FollowedTrajectory
 from jounce.execution.chunks import in_chunks
-from jounce.trajectory.seen_jumps import level_sizes, seen_jumps
-from jounce.trajectory.smoothness import SeenLeaders, known_jumps
-from jounce.trajectory.stacking import law_derivatives
+from jounce.trajectory.law_checks.seen_jumps import level_sizes, seen_jumps
+from jounce.trajectory.law_checks.smoothness import SeenLeaders, known_jumps
+from jounce.trajectory.laws.stacking import law_derivatives
 
 SMALL = 1e-9  # of the largest value of a derivative: a smaller jump is rounding
 NONE = 1e-12  # of the largest torque there: a smaller change is rounding

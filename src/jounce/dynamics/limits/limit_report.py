@@ -6,7 +6,7 @@ from collections.abc import Mapping
 import numpy as np
 from jaxtyping import Float
 
-from jounce.display import Displayed
+from jounce.base.display import Displayed
 from jounce.dynamics.limits.motion_ends import TrajectoryEnd
 
 ROUNDING = 1e-9  # by which a ratio may exceed 1

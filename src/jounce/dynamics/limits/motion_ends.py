@@ -10,7 +10,7 @@ from jounce.dynamics.limits.limit_jumps import Jumps
 from jounce.dynamics.limits.trajectories import FollowedTrajectory
 from jounce.robot.robot import Robot
 from jounce.trajectory import JointTrajectory, SplineMotion
-from jounce.trajectory.seen_jumps import level_sizes
+from jounce.trajectory.law_checks.seen_jumps import level_sizes
 
 ORDER = 3  # up to jerk
 SMALL = 1e-6  # of the size of a derivative: less is rest

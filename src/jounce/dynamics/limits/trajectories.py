@@ -7,15 +7,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from jaxtyping import Float
 
+from jounce.base.shapes import ArrayLike, seconds
 from jounce.errors import RobotError, SampleWarning, TrajectoryError, UnitWarning, flag, no_such
 from jounce.execution.chunks import in_chunks
 from jounce.robot.algorithms.inverse_dynamics import inverse_dynamics
 from jounce.robot.model.arguments import joints_of, whole_number
 from jounce.robot.model.links_and_joints import Limits
 from jounce.robot.robot import Robot
-from jounce.shapes import ArrayLike, seconds
 from jounce.trajectory.joint_trajectory import JointTrajectory
-from jounce.trajectory.unit_doubts import trajectory_doubt
+from jounce.trajectory.law_checks.unit_doubts import trajectory_doubt
 from jounce.units.shown_units import derivatives_of, time_axes
 
 if TYPE_CHECKING:

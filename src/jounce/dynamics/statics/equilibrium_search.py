@@ -7,6 +7,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from jaxtyping import Float
 
+from jounce.base.modules import with_fields
+from jounce.base.shapes import Numbers
 from jounce.dynamics.forward.accelerations import Equations
 from jounce.dynamics.forward.initial_state import TOLERANCE
 from jounce.dynamics.masses import gravity_of, masses_of
@@ -20,12 +22,10 @@ from jounce.kinematics.assembly.gauss_newton import assemble_from_guess
 from jounce.kinematics.assembly.initial_revolutions import Coordinates
 from jounce.linear_algebra.host_jacobian import RANK_TOLERANCE
 from jounce.mechanism import Mechanism, Model
-from jounce.mechanism.builder import with_reference
-from jounce.mechanism.element_indices import force_names
-from jounce.mechanism.starting_guess import pose_at
-from jounce.modules import with_fields
+from jounce.mechanism.building.builder import with_reference
+from jounce.mechanism.building.element_indices import force_names
+from jounce.mechanism.building.starting_guess import pose_at
 from jounce.rigid.pose import Pose
-from jounce.shapes import Numbers
 
 MAX_STEPS = 300
 LONGEST = 0.25  # rad or sizes of the mechanism, of a step

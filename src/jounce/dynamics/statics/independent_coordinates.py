@@ -21,8 +21,8 @@ from jounce.dynamics.statics.variations import (
 from jounce.errors import MechanismError, check_name
 from jounce.linear_algebra.host_jacobian import RANK_TOLERANCE
 from jounce.mechanism import Mechanism
-from jounce.mechanism.driver_outputs import is_turning
-from jounce.mechanism.element_indices import element_indices
+from jounce.mechanism.building.element_indices import element_indices
+from jounce.mechanism.laws.driver_outputs import is_turning
 
 COLUMNS = {"planar": ("x", "y", "angle"), "spatial": ("x", "y", "z", "turn_x", "turn_y", "turn_z")}
 TIE = 0.99  # of the largest: candidates as good as that are taken in the order of the mechanism

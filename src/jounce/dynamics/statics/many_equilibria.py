@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from jounce.base.shapes import Real, Refused
 from jounce.dynamics.forward.initial_state import TOLERANCE
 from jounce.dynamics.statics.equilibrium_search import displaced, rest_point, search
 from jounce.dynamics.statics.independent_coordinates import OperatingPoint
@@ -13,10 +14,9 @@ from jounce.kinematics.assembly.axis_directions import axis_signs
 from jounce.kinematics.assembly.gauss_newton import assemble_from_guess
 from jounce.kinematics.assembly.initial_revolutions import Coordinates
 from jounce.mechanism import Mechanism, build
-from jounce.mechanism.preconditions import concrete
+from jounce.mechanism.building.preconditions import concrete
 from jounce.robot import Robot
 from jounce.robot.closed_loops.closures import GivenCoordinates, given_coordinates
-from jounce.shapes import Real, Refused
 
 SAME = 1e-6  # rad or sizes of the mechanism: positions as near count as one
 

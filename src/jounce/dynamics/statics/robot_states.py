@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
+from jounce.base.shapes import ArrayLike
 from jounce.dynamics.forward.initial_state import TOLERANCE
 from jounce.dynamics.statics.equilibrium_search import driven, rest_point
 from jounce.dynamics.statics.independent_coordinates import OperatingPoint, chosen_outputs
@@ -18,7 +19,6 @@ from jounce.robot import Robot
 from jounce.robot.closed_loops.closures import GivenCoordinates, given_coordinates
 from jounce.robot.closed_loops.mechanism_parts import RobotParts
 from jounce.robot.model.arguments import floats
-from jounce.shapes import ArrayLike
 
 DRIVE = "_drive"
 

@@ -7,10 +7,11 @@ from typing import Any
 
 import numpy as np
 
+from jounce.base.display import Displayed
+from jounce.base.shapes import Real, Refused
 from jounce.constraints import Rope
-from jounce.display import Displayed
 from jounce.dynamics.forward.initial_state import TOLERANCE
-from jounce.dynamics.inverse.outputs import JointForceOutput
+from jounce.dynamics.inverse.outputs.components import JointForceOutput
 from jounce.dynamics.masses import check_loads
 from jounce.dynamics.statics.equilibrium_search import SearchResult, check_forces, remains, rest_point, search
 from jounce.dynamics.statics.independent_coordinates import OperatingPoint, Reduction, reduced
@@ -23,11 +24,10 @@ from jounce.kinematics.assembly.assemble import assemble, freely_moving
 from jounce.kinematics.position_analysis.curve_ends import beyond_end
 from jounce.kinematics.results.pose_outputs import output_values
 from jounce.mechanism import Body, Mechanism, build, check_mechanism, time_grid
-from jounce.mechanism.law_checks import check_laws
-from jounce.mechanism.preconditions import check_holonomic, concrete
+from jounce.mechanism.building.preconditions import check_holonomic, concrete
+from jounce.mechanism.laws.law_checks import check_laws
 from jounce.robot import Robot
 from jounce.robot.closed_loops.closures import GivenCoordinates
-from jounce.shapes import Real, Refused
 
 METHODS = ("settle", "newton")
 SLIGHT = 1e-9  # of the largest tension of a rope: less is rounding

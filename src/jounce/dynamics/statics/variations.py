@@ -13,6 +13,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
+from jounce.base.shapes import Numbers
 from jounce.dynamics.energy.driver_coordinates import with_changes
 from jounce.dynamics.forward.accelerations import Equations, conjugate
 from jounce.dynamics.forward.loads import inertia_forces, mass_matrices
@@ -22,7 +23,6 @@ from jounce.jet import Jet
 from jounce.jet.algebra import stacked
 from jounce.mechanism.system import Group, movable
 from jounce.rigid.pose import Pose
-from jounce.shapes import Numbers
 
 LEVELS = 3  # position, velocity and acceleration
 Changes = Float[Numbers, "level coordinate all lane"]

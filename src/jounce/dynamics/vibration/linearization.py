@@ -7,14 +7,14 @@ from typing import Any, NamedTuple
 import numpy as np
 from jaxtyping import Float
 
-from jounce.display import Displayed
+from jounce.base.display import Displayed
+from jounce.base.shapes import Refused
 from jounce.dynamics.statics.independent_coordinates import Reduction
 from jounce.dynamics.statics.static_equilibrium import Equilibrium
 from jounce.dynamics.statics.variations import reaches
 from jounce.dynamics.vibration.modes import Modes
 from jounce.errors import MechanismError, check_name
 from jounce.mechanism import Mechanism
-from jounce.shapes import Refused
 
 
 class StateSpace(NamedTuple):

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Complex, Float
 
-from jounce.display import Displayed
+from jounce.base.display import Displayed
 from jounce.dynamics.statics.eigenmodes import Eigenmodes, eigenmodes
 from jounce.dynamics.statics.independent_coordinates import COLUMNS, Reduction
 from jounce.dynamics.vibration.mode_motion import checked_amplitude, mode_motion

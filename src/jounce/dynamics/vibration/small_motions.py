@@ -5,6 +5,8 @@ from typing import Any
 
 import numpy as np
 
+from jounce.base.modules import with_fields
+from jounce.base.shapes import Real, Refused
 from jounce.dynamics.forward.accelerations import Equations
 from jounce.dynamics.friction.coupling import check_no_friction
 from jounce.dynamics.masses import gravity_of, masses_of, required_masses
@@ -20,11 +22,9 @@ from jounce.errors import MechanismError, MobilityError, RobotError, check_name,
 from jounce.kinematics import Motion, Status
 from jounce.kinematics.assembly.assemble import freely_moving
 from jounce.mechanism import Mechanism
-from jounce.mechanism.axis_angles import at_lanes
-from jounce.mechanism.preconditions import concrete
-from jounce.modules import with_fields
+from jounce.mechanism.building.preconditions import concrete
+from jounce.mechanism.transmissions.axis_angles import at_lanes
 from jounce.robot import Robot
-from jounce.shapes import Real, Refused
 
 INSTANT = 1e-9  # of the time between the ends of a motion: an instant as near to one of its own is that one
 

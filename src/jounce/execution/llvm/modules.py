@@ -6,6 +6,8 @@ from typing import Any
 import jax
 import numpy as np
 
+from jounce.base.importing import uncollected
+from jounce.base.jax_internals import in_plain_operations, is_tried
 from jounce.execution.llvm import rows as rows_
 from jounce.execution.llvm.machine import compiled, vector_width
 from jounce.execution.llvm.rounds import rounds_text
@@ -16,8 +18,6 @@ from jounce.execution.llvm.text.stored import is_large, put, values_of
 from jounce.execution.llvm.text.values import Region, UnsupportedOperationError, kind_of
 from jounce.execution.llvm.text.views import Array, Stored, contiguous
 from jounce.execution.llvm.translation import translate
-from jounce.importing import uncollected
-from jounce.jax_internals import in_plain_operations, is_tried
 
 MOST_MEMORY = 2**20  # bytes of the stack: threads have little
 MOST_HEAP = 2**30  # bytes elsewhere

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from jax.extend.core import Literal, jaxprs_in_params
 
+from jounce.base.jax_internals import sizes_of_scan
 from jounce.execution.llvm.calls import call
 from jounce.execution.llvm.loop_variables import LoopVariables
 from jounce.execution.llvm.plans import plan_of
@@ -30,7 +31,6 @@ from jounce.execution.llvm.text.stored import (
 )
 from jounce.execution.llvm.text.values import NoRuleError, Region, UnsupportedOperationError, Value, kind_of
 from jounce.execution.llvm.text.views import Array, Deferred, InMemory, Stored, as_read, contiguous, further
-from jounce.jax_internals import sizes_of_scan
 
 MOST_UNROLLED = 4_000  # lines of a loop of known length that is written turn after turn
 MOST_UNROLLED_IN_MEMORY = 1_000  # where arrays may stay in memory

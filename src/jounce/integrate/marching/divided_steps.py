@@ -14,13 +14,13 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from jounce.base.shapes import Numbers
 from jounce.dynamics.forward.accelerations import Equations, State
 from jounce.errors import UnsupportedError
 from jounce.execution.compilation import compiled
 from jounce.integrate.marching.marching import DenseOutput
 from jounce.integrate.marching.smoothness_breaks import Break
 from jounce.integrate.steps.methods import LOWEST_ORDER, evaluated
-from jounce.shapes import Numbers
 
 MOST_STEPS = 2**17
 MOST_DIRECTIONS = 16

@@ -8,6 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from jounce.base.shapes import Numbers
 from jounce.dynamics.forward.accelerations import Equations, Expansion, Flags, Indices, Lanes, State, expand, inverted
 from jounce.execution.compilation import compiled
 from jounce.integrate.steps.energy_balance import (
@@ -31,8 +32,7 @@ from jounce.integrate.steps.lookahead import (
 from jounce.integrate.steps.methods import MARGIN, NEEDED, AbstractMethod, Number, near_singular
 from jounce.integrate.steps.projection import projected
 from jounce.integrate.steps.revolution_counts import AnglesOfForces, followed, measured
-from jounce.mechanism.axis_angles import measures_angle
-from jounce.shapes import Numbers
+from jounce.mechanism.transmissions.axis_angles import measures_angle
 
 SMALLEST_STEP = FINEST / 8.0  # of the span, or of the time itself
 REFUSED = 0.45  # of a step that was refused is tried next: no power of two, or it would end where others have ended

@@ -10,17 +10,17 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Bool, Float, Int
 
+from jounce.base.modules import Module
+from jounce.base.shapes import Numbers
 from jounce.execution.compilation import compiled
 from jounce.integrate.marching.marching import SHORT as UNUSUAL, Outcome
 from jounce.integrate.steps.lookahead import HARMLESS, NEAR, POINTS, RUN_POINTS, SHORTEST, finest, steps_counted
 from jounce.integrate.steps.methods import MARGIN, NEEDED, ROUNDING, Lanes, furthest
 from jounce.jet.programs.series import Recursion
-from jounce.modules import Module
 from jounce.robot.algorithms.motion_series import MotionSeries, motion_series
 from jounce.robot.algorithms.wrench_laws import WrenchLaws
 from jounce.robot.model.joint_laws import AbstractJointLaws
 from jounce.robot.recursions.tree_equations import TreeEquations, TreeState, Unknowns, free_base
-from jounce.shapes import Numbers
 
 STUCK = 64  # steps that hardly move on, one after the other: a force that switches without end
 STUCK_STEP = 10 * SHORTEST  # of the run: joints that stick switch after steps that are little longer than the shortest

@@ -6,11 +6,11 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 
+from jounce.base.modules import changes_parts, is_ours
 from jounce.dynamics.forward.accelerations import Equations, Expansion, Flags, Lanes, State
 from jounce.integrate.marching.marching import IntegratorState
 from jounce.integrate.steps.methods import AbstractMethod, Number, Sizes
 from jounce.jet.programs.captured import Same, read_off, value_key
-from jounce.modules import changes_parts, is_ours
 
 METHODS = ("prepared", "longest_step", "arrive", "polynomial", "error", "expansion_order")
 

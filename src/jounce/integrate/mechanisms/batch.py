@@ -8,6 +8,7 @@ from typing import Any, Unpack
 import jax
 import numpy as np
 
+from jounce.base.shapes import ArrayLike
 from jounce.dynamics.forward.accelerations import Equations, State
 from jounce.dynamics.forward.initial_state import consistent_start, initial_as_drivers
 from jounce.errors import MechanismError
@@ -30,14 +31,13 @@ from jounce.kinematics import Status
 from jounce.kinematics.families.solve_batch import checked_values
 from jounce.kinematics.results.pose_outputs import output_series
 from jounce.mechanism import Mechanism, TimeGrid, build, check_mechanism
-from jounce.mechanism.axis_angles import measures_angle, raw_angles, with_turns
-from jounce.mechanism.builder import with_reference
+from jounce.mechanism.building.builder import with_reference
+from jounce.mechanism.building.preconditions import concrete
 from jounce.mechanism.carriages import check_without_ends
-from jounce.mechanism.law_checks import check_laws
-from jounce.mechanism.preconditions import concrete
-from jounce.mechanism.turn_counting import counted_along
+from jounce.mechanism.laws.law_checks import check_laws
+from jounce.mechanism.transmissions.axis_angles import measures_angle, raw_angles, with_turns
+from jounce.mechanism.transmissions.turn_counting import counted_along
 from jounce.robot.robot import Robot
-from jounce.shapes import ArrayLike
 
 LANES = 64  # runs marched together: more fall out of the cache
 STEPS = 16  # tried before runs that have ended make room for others

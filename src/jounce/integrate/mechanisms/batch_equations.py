@@ -22,9 +22,9 @@ from jounce.jet import Jet
 from jounce.jet.turns import brought_near
 from jounce.kinematics.status import Status
 from jounce.mechanism import Mechanism, Model, build
-from jounce.mechanism.axis_angles import measures_angle, raw_angles
-from jounce.mechanism.starting_guess import starting_guess
+from jounce.mechanism.building.starting_guess import starting_guess
 from jounce.mechanism.system import POSITION_COMPONENTS, Group
+from jounce.mechanism.transmissions.axis_angles import measures_angle, raw_angles
 
 STAGES = 8  # in which parameters go from those of the first run to their own, so that positions follow
 LARGEST_STAGE = 0.5  # rad, by which a driver may turn in a stage: angles about axes count their turns on the way

@@ -9,6 +9,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
+from jounce.base.shapes import ArrayLike, Numbers, seconds
 from jounce.dynamics.forward.accelerations import Equations, State
 from jounce.dynamics.forward.initial_state import ConsistentStart, consistent_start
 from jounce.errors import MechanismError
@@ -18,8 +19,7 @@ from jounce.integrate.steps.projection import normalized
 from jounce.integrate.steps.revolution_counts import measured
 from jounce.jet import Jet
 from jounce.mechanism import Mechanism
-from jounce.mechanism.axis_angles import measures_angle
-from jounce.shapes import ArrayLike, Numbers, seconds
+from jounce.mechanism.transmissions.axis_angles import measures_angle
 
 
 def ode_term(mechanism: Mechanism, time: float = 0.0) -> "OrdinaryEquation":

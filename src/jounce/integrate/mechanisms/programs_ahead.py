@@ -17,7 +17,7 @@ from jounce.integrate.results.simulation import derivatives_of_motion, expansion
 from jounce.integrate.steps.methods import AbstractMethod
 from jounce.kinematics.results.output_programs import prepare_outputs
 from jounce.mechanism import Mechanism, Model
-from jounce.mechanism.builder import released
+from jounce.mechanism.building.builder import released
 
 STEPS = 64  # tried between two looks at progress and events
 

@@ -8,7 +8,8 @@ import jax
 import numpy as np
 from jaxtyping import Bool
 
-from jounce.activity import Count
+from jounce.base.activity import Count
+from jounce.base.shapes import ArrayLike, Numbers
 from jounce.constraints import AbstractConstraint
 from jounce.dynamics.forward.accelerations import Equations, Instants, State
 from jounce.dynamics.forward.ground import with_ground
@@ -18,7 +19,7 @@ from jounce.dynamics.motion_values import Coordinates, cut, pose_of
 from jounce.errors import JounceError, MechanismError, SolveError, did_you_mean
 from jounce.execution.backends import backend_of, joined
 from jounce.execution.compilation import compiled
-from jounce.execution.store import expect
+from jounce.execution.store.programs import expect
 from jounce.integrate.marching.marching import MOVING, STUCK, DenseOutput, IntegratorState, Outcome, march, unexpanded
 from jounce.integrate.mechanisms.programs_ahead import march_arguments, prepare_run
 from jounce.integrate.results.robot_simulation import RobotSimulation
@@ -34,15 +35,14 @@ from jounce.kinematics import Status, raise_for_status
 from jounce.kinematics.position_analysis.curve_ends import beyond_end, ends_of
 from jounce.kinematics.results.motion import check_output, output_group
 from jounce.mechanism import Mechanism, Model, ParameterOutput, ParametersOutput, check_mechanism
-from jounce.mechanism.belts import check_room
-from jounce.mechanism.element_indices import force_names
-from jounce.mechanism.law_checks import check_laws
-from jounce.mechanism.preconditions import concrete_or
+from jounce.mechanism.building.belts import check_room
+from jounce.mechanism.building.element_indices import force_names
+from jounce.mechanism.building.preconditions import concrete_or
+from jounce.mechanism.laws.law_checks import check_laws
 from jounce.mechanism.time import TimeLike
 from jounce.robot import BaseMotion, Robot
 from jounce.robot.algorithms.wrenches import Wrench
 from jounce.robot.model.joint_laws import GivenLaws
-from jounce.shapes import ArrayLike, Numbers
 
 AHEAD = 1e-9  # of the time so far: where steps collapse, what is not finite lies that close
 FEW = 4  # derivatives that are looked at for one that is not finite

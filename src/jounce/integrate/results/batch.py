@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from jaxtyping import Float, Int
 
-from jounce.display import Displayed
+from jounce.base.display import Displayed
 from jounce.kinematics import Status
 from jounce.kinematics.families.labels import labeled_family
 from jounce.mechanism import Mechanism

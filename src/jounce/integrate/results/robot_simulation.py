@@ -12,6 +12,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float, Int
 
+from jounce.base.shapes import ArrayLike, Numbers, seconds
 from jounce.errors import RobotError
 from jounce.execution.backends import joined, xla_backend
 from jounce.execution.chunks import in_chunks
@@ -26,7 +27,6 @@ from jounce.robot.algorithms.inverse_dynamics import inverse_dynamics
 from jounce.robot.algorithms.wrench_laws import WrenchPart
 from jounce.robot.algorithms.wrenches import Wrench
 from jounce.robot.robot import Robot
-from jounce.shapes import ArrayLike, Numbers, seconds
 from jounce.units.shown_units import derivatives_of, time_axes
 
 if TYPE_CHECKING:

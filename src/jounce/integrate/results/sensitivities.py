@@ -22,6 +22,8 @@ from jax.core import Tracer
 from jax.errors import ConcretizationTypeError
 from jaxtyping import Float, Int
 
+from jounce.base.modules import with_fields
+from jounce.base.shapes import Numbers
 from jounce.dynamics.forward.accelerations import Equations, Instants, State, expand
 from jounce.dynamics.forward.initial_state import initial_as_drivers
 from jounce.dynamics.forward.saddle_point import DenseInverse
@@ -45,11 +47,9 @@ from jounce.kinematics.sensitivity.sensitivities import Solved, check_not_redund
 from jounce.kinematics.sensitivity.traced_motion import TracedMotion
 from jounce.kinematics.status import Status
 from jounce.mechanism import Mechanism, Model
-from jounce.mechanism.axis_angles import measures_angle
-from jounce.mechanism.preconditions import check_holonomic
-from jounce.mechanism.traced import Angles, angles_of, template, traced_model, traced_values
-from jounce.modules import with_fields
-from jounce.shapes import Numbers
+from jounce.mechanism.building.preconditions import check_holonomic
+from jounce.mechanism.building.traced import Angles, angles_of, template, traced_model, traced_values
+from jounce.mechanism.transmissions.axis_angles import measures_angle
 
 AT_REST = 1e-12  # m/s and rad/s
 CONVERGED = 1e-13  # what is left out of the series of a change in a step, by the change

@@ -8,6 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
+from jounce.base.shapes import ArrayLike, Numbers, seconds
 from jounce.dynamics.energy.energies import body_energy
 from jounce.dynamics.energy.potential import energy_of_forces
 from jounce.dynamics.forward.accelerations import Equations, Instants, Lanes, State, expand
@@ -18,7 +19,7 @@ from jounce.execution.backends import joined
 from jounce.execution.chunks import in_chunks
 from jounce.execution.compilation import compiled
 from jounce.execution.mapped import OnLlvm, OnXla, mapped
-from jounce.execution.store import is_wanted_soon
+from jounce.execution.store.programs import is_wanted_soon
 from jounce.integrate.marching.marching import DenseOutput
 from jounce.integrate.marching.smoothness_breaks import breaks
 from jounce.integrate.steps.events import WIDTHS, in_pieces, pose_coordinates, series_of
@@ -39,9 +40,8 @@ from jounce.jet.turns import brought_near, counted_by_rates
 from jounce.kinematics import Motion, Status
 from jounce.kinematics.results.pose_outputs import output_series
 from jounce.mechanism import Mechanism
-from jounce.mechanism.axis_angles import AttitudeHistory, measures_angle, with_turns
 from jounce.mechanism.system import Group
-from jounce.shapes import ArrayLike, Numbers, seconds
+from jounce.mechanism.transmissions.axis_angles import AttitudeHistory, measures_angle, with_turns
 
 MUCH_LONGER = (
     1e3  # than the step over a jump or a kink are one of those before and the next; a steep force takes several

@@ -11,6 +11,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from jounce.base.shapes import Numbers
 from jounce.dynamics.energy.energies import body_energy
 from jounce.dynamics.forward.accelerations import Equations, Flags, Instants, Lanes, State
 from jounce.dynamics.friction.coupling import rubs
@@ -20,7 +21,6 @@ from jounce.integrate.steps.lookahead import hiding
 from jounce.jet import Jet, dot
 from jounce.mechanism.system import Group
 from jounce.rigid.pose import Pose
-from jounce.shapes import Numbers
 
 ENERGY_TOLERANCE = (
     1e-8  # of the largest kinetic energy and the largest change of the other: so much changes by rounding at most

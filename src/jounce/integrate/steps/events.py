@@ -10,6 +10,7 @@ import jax
 import numpy as np
 from jaxtyping import Float, Int
 
+from jounce.base.shapes import is_traced
 from jounce.dynamics.forward.accelerations import State
 from jounce.dynamics.forward.ground import turns_with_ground, with_ground
 from jounce.dynamics.motion_values import Coordinates
@@ -20,7 +21,6 @@ from jounce.kinematics.results.pose_outputs import output_series
 from jounce.mechanism import AbstractOutput
 from jounce.mechanism.system import Group
 from jounce.robot.model.arguments import whole_number
-from jounce.shapes import is_traced
 
 _ANGLES = np.pi * (np.arange(20)[::-1] + 0.5) / 20
 NODES = 0.5 + 0.5 * np.cos(_ANGLES)  # of Chebyshev, in a step or a piece of one

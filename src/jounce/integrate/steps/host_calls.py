@@ -7,8 +7,8 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from jounce.base.shapes import Numbers
 from jounce.settings import called_back
-from jounce.shapes import Numbers
 
 Values = tuple[Any, ...]
 

@@ -14,6 +14,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
+from jounce.base.shapes import Numbers
 from jounce.dynamics.forward.accelerations import (
     Equations,
     Flags,
@@ -30,12 +31,11 @@ from jounce.integrate.steps.methods import MARGIN, evaluated
 from jounce.integrate.steps.revolution_counts import Angles
 from jounce.jet import Jet
 from jounce.mechanism import Model
-from jounce.mechanism.axis_angles import with_turns
-from jounce.mechanism.builder import group_rows
-from jounce.mechanism.driver_outputs import is_turning
-from jounce.mechanism.element_indices import force_names
+from jounce.mechanism.building.builder import group_rows
+from jounce.mechanism.building.element_indices import force_names
+from jounce.mechanism.laws.driver_outputs import is_turning
 from jounce.mechanism.system import Group, law_left_out
-from jounce.shapes import Numbers
+from jounce.mechanism.transmissions.axis_angles import with_turns
 
 POINTS = 32  # at which each step is looked at,
 ROUNDS_OF_JOINTS = 4  # times as many where joints are looked at

@@ -10,11 +10,11 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Bool, Float
 
+from jounce.base.modules import Module
+from jounce.base.shapes import Numbers
 from jounce.dynamics.forward.accelerations import Equations, Expansion, Flags, Inverse, Lanes, State
 from jounce.errors import JounceError
 from jounce.execution.translated import is_traced_alone
-from jounce.modules import Module
-from jounce.shapes import Numbers
 
 Number = float | Float[Numbers, ""]
 Sizes = Float[Numbers, "order batch"]

@@ -17,11 +17,11 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
+from jounce.base.shapes import Numbers
 from jounce.dynamics.forward.accelerations import Equations, Expansion, Flags, Lanes, State, expand
 from jounce.errors import JounceError
 from jounce.integrate.steps.methods import ROUNDING, AbstractMethod, Number, Sizes, check_step, evaluated, reach
 from jounce.jet.algebra import total
-from jounce.shapes import Numbers
 
 MOST_ITERATIONS = 80
 CONVERGED = 1e-15  # change in an iteration, rad or sizes of the mechanism

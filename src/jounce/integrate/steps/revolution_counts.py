@@ -11,12 +11,12 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
+from jounce.base.shapes import Numbers
 from jounce.dynamics.forward.accelerations import Equations, Lanes, State
 from jounce.dynamics.forward.ground import turns_with_ground
 from jounce.integrate.steps.methods import evaluated
 from jounce.jet import Jet
-from jounce.mechanism.axis_angles import measures_angle
-from jounce.shapes import Numbers
+from jounce.mechanism.transmissions.axis_angles import measures_angle
 
 POINTS_IN_STEP = 16  # in a step: series carry over about one turn in it at most
 

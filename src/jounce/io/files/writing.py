@@ -15,8 +15,8 @@ from os import PathLike, fspath
 from pathlib import Path
 from typing import Any
 
+from jounce.base.interrupts import undoing
 from jounce.errors import OutputError
-from jounce.interrupts import undoing
 from jounce.io.files.reading import is_input, note_result, reason_of
 
 _scratches: set[Path] = set()

@@ -15,9 +15,9 @@ from jounce.io.files.assignments import assignments
 from jounce.io.files.located_data import Source
 from jounce.io.files.samples import rates, read_samples
 from jounce.io.files.source import read_source
-from jounce.io.mechanisms.motion_values import Samples, motion
+from jounce.io.mechanisms.values.motion_values import Samples, motion
 from jounce.kinematics import OscillatingFollower, PlateCam, TranslatingFollower, plate_cam
-from jounce.kinematics.cams.plate_cam import SIGNS
+from jounce.kinematics.cams.plate_cams import SIGNS
 from jounce.mechanism.resolve import resolve_motion
 from jounce.settings import under_own_settings
 from jounce.trajectory import AbstractMotion, Expression, SplineMotion

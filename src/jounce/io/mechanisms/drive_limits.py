@@ -11,7 +11,7 @@ from jounce.errors import MechanismFileError, no_such
 from jounce.io.files.located_data import Location
 from jounce.io.files.source import read_source
 from jounce.mechanism import Mechanism
-from jounce.mechanism.driver_outputs import is_turning
+from jounce.mechanism.laws.driver_outputs import is_turning
 from jounce.robot.model.links_and_joints import Limits
 from jounce.settings import under_own_settings
 from jounce.units.dimensions import describe_dimension, dimension_of

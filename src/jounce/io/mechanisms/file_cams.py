@@ -12,8 +12,8 @@ from jounce.constraints.cams import coordinate_of_element
 from jounce.constraints.facts import at_coordinate, facts_of
 from jounce.errors import JounceError
 from jounce.io.files.source import Source
-from jounce.io.mechanisms.keys import cam_types, file_keys, is_cam
-from jounce.mechanism.output_drivers import driver_of_output
+from jounce.io.mechanisms.schema.keys import cam_types, file_keys, is_cam
+from jounce.mechanism.laws.output_drivers import driver_of_output
 from jounce.mechanism.system import POSITION_COMPONENTS
 from jounce.trajectory import OutputMotion
 

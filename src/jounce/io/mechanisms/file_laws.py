@@ -7,7 +7,7 @@ from typing import Any
 
 from jounce.io.files.located_data import Location
 from jounce.io.files.source import Source
-from jounce.io.mechanisms.curve_values import CurveOfCam
+from jounce.io.mechanisms.values.curve_values import CurveOfCam
 from jounce.trajectory import (
     AbstractMotion,
     Expression,

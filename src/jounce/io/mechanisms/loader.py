@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from jounce import importing
+from jounce.base import importing
 from jounce.constraints import catalogue
 from jounce.constraints.facts import at_coordinate
 from jounce.errors import JounceError, MechanismFileError, unknown
@@ -16,16 +16,16 @@ from jounce.io.files.located_data import Location, Source
 from jounce.io.files.source import read_source
 from jounce.io.mechanisms.file_cams import CamEntry, coordinates_by_name, with_leaders
 from jounce.io.mechanisms.file_laws import FileLaws
-from jounce.io.mechanisms.key_check import ROLES
-from jounce.io.mechanisms.keys import FileKey, file_keys, location_of
-from jounce.io.mechanisms.unit_hints import warn_of_units
+from jounce.io.mechanisms.schema.key_check import ROLES
+from jounce.io.mechanisms.schema.keys import FileKey, file_keys, location_of
+from jounce.io.mechanisms.schema.unit_hints import warn_of_units
 from jounce.mechanism import Body, Mechanism, TimeGrid, time_grid, with_output_drivers
-from jounce.mechanism.gear_frames import check_distances
+from jounce.mechanism.building.starting_guess import starting_guess
 from jounce.mechanism.masses import body_mass
 from jounce.mechanism.redundant_reactions import resolved_reactions
 from jounce.mechanism.resolve import resolve, resolve_element
-from jounce.mechanism.starting_guess import starting_guess
 from jounce.mechanism.system import POSITION_COMPONENTS
+from jounce.mechanism.transmissions.gear_frames import check_distances
 from jounce.rigid.euler_parameters import euler_parameters
 from jounce.settings import under_own_settings
 from jounce.trajectory import Expression
@@ -104,8 +104,8 @@ def _validate(source: Source, space: str) -> dict[str, Any]:
     with importing.lock:  # all kinds of outputs are known to the schema, and so the rooms that compute them
         from pydantic import ValidationError
 
-        from jounce.io.mechanisms.schema import file_model
-        from jounce.io.mechanisms.schema_errors import first_problem
+        from jounce.io.mechanisms.schema.models import file_model
+        from jounce.io.mechanisms.schema.schema_errors import first_problem
 
     parameters = source.data.get("parameters")
     names = dict.fromkeys(parameters if isinstance(parameters, dict) else ())  # found at once, however many
@@ -193,7 +193,7 @@ def _build(source: Source, space: str, model: dict[str, Any], locations: _Locati
 def _body(source: Source, space: str, name: str, given: dict[str, Any], parameters: dict[str, Any]) -> Body:
     """Build a body; values that depend on parameters stay expressions of them."""
     if isinstance(given["inertia"], dict):
-        from jounce.io.mechanisms.inertia_forms import expanded
+        from jounce.io.mechanisms.values.inertia_forms import expanded
 
         try:
             given |= expanded(given, parameters, planar=space == "planar")
@@ -223,7 +223,7 @@ def _elements(
     laws: FileLaws, space: str, section: str, models: dict[str, Any], locations: _Locations
 ) -> dict[str, Any]:
     """Build joints, drivers, forces or outputs, and note where their fields stand in the file."""
-    from jounce.io.mechanisms.output_types import output_types  # as the schema, which was imported before
+    from jounce.io.mechanisms.schema.output_types import output_types  # as the schema, which was imported before
 
     outputs = {f"{space}_{tag.replace(' ', '_')}": kind for tag, (_, kind) in output_types(space).items()}
     elements = {}

@@ -7,7 +7,7 @@ from collections.abc import Iterable
 
 from jounce.errors import JounceError, MechanismError, check_name
 from jounce.io.files.assignments import assignments
-from jounce.io.mechanisms.unit_hints import warn_of_values
+from jounce.io.mechanisms.schema.unit_hints import warn_of_values
 from jounce.mechanism import Mechanism
 
 

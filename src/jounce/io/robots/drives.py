@@ -12,7 +12,7 @@ from jounce.errors import RobotError, no_such
 from jounce.io.files.located_data import Location, Source
 from jounce.io.files.source import read_source
 from jounce.mechanism import Mechanism
-from jounce.mechanism.driver_outputs import is_turning
+from jounce.mechanism.laws.driver_outputs import is_turning
 from jounce.planning.elastic.drives import Drive
 from jounce.robot.robot import Robot
 from jounce.settings import under_own_settings

@@ -11,11 +11,11 @@ from jounce.errors import RobotFileError
 from jounce.io.files import ROBOT_FILES
 from jounce.io.files.reading import check_allowed
 from jounce.io.robots.closure_files import with_closures
-from jounce.io.robots.faults import MACROS, Faults
-from jounce.io.robots.mjcf import read_mjcf
-from jounce.io.robots.sdf import read_sdf
-from jounce.io.robots.urdf import read_urdf
-from jounce.io.robots.xml_elements import Element, read_markup
+from jounce.io.robots.elements.faults import MACROS, Faults
+from jounce.io.robots.elements.xml_elements import Element, read_markup
+from jounce.io.robots.mjcf.reader import read_mjcf
+from jounce.io.robots.sdf.reader import read_sdf
+from jounce.io.robots.urdf.reader import read_urdf
 from jounce.robot.robot import Robot
 from jounce.settings import under_own_settings
 

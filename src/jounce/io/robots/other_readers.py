@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from jounce.errors import RobotError, RobotFileError, check_choice
-from jounce.io.robots.xml_elements import Element, read_markup
+from jounce.io.robots.elements.xml_elements import Element, read_markup
 from jounce.robot.model.floating_base import floating_joints
 from jounce.robot.model.tree import axes_with_z_along
 from jounce.robot.robot import Robot
@@ -209,7 +209,7 @@ def _of_mjcf(path: str | PathLike[str], robot: Robot) -> Iterator[TheirJoint]:
     """Give the joints of an MJCF file by their number in MuJoCo; what they became stands in the same order."""
     import mujoco as package
 
-    from jounce.io.robots.mjcf_files import quiet_mujoco
+    from jounce.io.robots.mjcf.files import quiet_mujoco
 
     mujoco: Any = package
     with quiet_mujoco(mujoco):

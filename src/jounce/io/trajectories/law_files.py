@@ -7,13 +7,13 @@ from typing import Any
 
 import numpy as np
 
+from jounce.base.shapes import ArrayLike
 from jounce.errors import JounceError, TrajectoryError, no_such, show_value
 from jounce.io.files.located_data import Location, Source
 from jounce.io.files.reading import fault_of_number
 from jounce.io.files.samples import rates, read_columns, read_samples, sampled_dimension
 from jounce.io.trajectories.tables import measured
 from jounce.mechanism import TimeGrid, time_grid
-from jounce.shapes import ArrayLike
 from jounce.trajectory import (
     AbstractMotion,
     Expression,
@@ -22,7 +22,7 @@ from jounce.trajectory import (
     MeasuredMotion,
     SplineMotion,
 )  # fmt: skip
-from jounce.trajectory.trapezoid import LIMITS
+from jounce.trajectory.laws.trapezoid import LIMITS
 from jounce.units.dimensions import TIME, Dimension, describe_dimension, is_rate, per_power
 from jounce.units.expression import check_parameter_name
 

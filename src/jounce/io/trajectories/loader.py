@@ -10,11 +10,11 @@ from pathlib import Path
 from jounce.errors import TrajectoryError, check_name
 from jounce.io.files import DATA_FILES
 from jounce.io.files.source import read_source
-from jounce.io.trajectories.bags import SUFFIXES, is_bag, read_bag
 from jounce.io.trajectories.law_files import LawFile
-from jounce.io.trajectories.messages import is_message, read_messages
 from jounce.io.trajectories.recorded_trajectories import trajectory_of
 from jounce.io.trajectories.recordings import Recording
+from jounce.io.trajectories.ros.bags import SUFFIXES, is_bag, read_bag
+from jounce.io.trajectories.ros.messages import is_message, read_messages
 from jounce.io.trajectories.tables import read_recording
 from jounce.robot import Robot
 from jounce.settings import under_own_settings

@@ -15,12 +15,12 @@ import jax.numpy as jnp
 import numpy as np
 from jax.extend.core import JaxprEqn
 
+from jounce.base.modules import Module
 from jounce.jet.algebra import Jet, bilinear
 from jounce.jet.elementary import FUNCTIONS, erf, tanh
 from jounce.jet.programs.captured import Program, read_off
 from jounce.jet.programs.operations import COMPOSED, REARRANGING, STEPWISE
 from jounce.jet.programs.reader import ProgramReader, inner_program
-from jounce.modules import Module
 
 
 def compose(function: Callable[[Any], Any], x: Jet) -> Jet:

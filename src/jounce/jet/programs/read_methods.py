@@ -17,11 +17,11 @@ import jax.numpy as jnp
 import numpy as np
 from jax.extend.core import ClosedJaxpr
 
+from jounce.base.modules import Module, Untraced
 from jounce.jet.algebra import Jet
 from jounce.jet.programs.captured import Program, Same, known_as, may_be_old, read_off, value_key
 from jounce.jet.programs.composition import has_rules, on_jets as run
 from jounce.jet.programs.same_programs import is_same
-from jounce.modules import Module, Untraced
 
 
 class ReadMethod(Module):

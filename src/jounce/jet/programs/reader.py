@@ -8,7 +8,7 @@ import jax
 import jax.numpy as jnp
 from jax.extend.core import JaxprEqn, Literal
 
-from jounce.jax_internals import sizes_of_scan
+from jounce.base.jax_internals import sizes_of_scan
 from jounce.jet.programs.operations import ADDITIVE, REARRANGING
 
 

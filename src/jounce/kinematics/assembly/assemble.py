@@ -6,6 +6,7 @@ import warnings
 import numpy as np
 from jaxtyping import Float
 
+from jounce.base.modules import with_fields
 from jounce.constraints.facts import facts_of
 from jounce.errors import AssemblyError, AssemblyWarning, MobilityError
 from jounce.execution.device import resident
@@ -30,11 +31,10 @@ from jounce.kinematics.assembly.loose_bodies import missing_joint_words
 from jounce.kinematics.assembly.redundancy import Redundancy, redundancy
 from jounce.kinematics.status import Status
 from jounce.mechanism import Model
-from jounce.mechanism.axis_angles import measures_angle, with_angles, with_datums
-from jounce.mechanism.builder import group_rows, with_reference
+from jounce.mechanism.building.builder import group_rows, with_reference
 from jounce.mechanism.carriages import ENDING
-from jounce.mechanism.gear_checks import check_gears, check_wheels
-from jounce.modules import with_fields
+from jounce.mechanism.transmissions.axis_angles import measures_angle, with_angles, with_datums
+from jounce.mechanism.transmissions.gear_checks import check_gears, check_wheels
 from jounce.trajectory import AbstractMotion
 
 MAX_DATUMS = 100

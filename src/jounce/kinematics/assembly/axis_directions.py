@@ -11,6 +11,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from jounce.base.modules import Module
 from jounce.constraints.angles import perpendiculars
 from jounce.constraints.base import rows
 from jounce.constraints.facts import facts_of
@@ -18,10 +19,9 @@ from jounce.jet import Jet
 from jounce.kinematics.assembly.gauss_newton import AssemblyAttempt, assemble_from_guess
 from jounce.kinematics.assembly.initial_revolutions import Coordinates
 from jounce.mechanism import Model
-from jounce.mechanism.axis_angles import turned
-from jounce.mechanism.builder import group_rows, model_of
+from jounce.mechanism.building.builder import group_rows, model_of
 from jounce.mechanism.system import Group, System
-from jounce.modules import Module
+from jounce.mechanism.transmissions.axis_angles import turned
 from jounce.rigid.pose import Pose
 
 DRAWN_OPPOSITE = -0.9  # cosine: directions as far apart in the starting guess are meant to point opposite ways

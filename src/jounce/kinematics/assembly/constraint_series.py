@@ -15,15 +15,15 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Bool, Float
 
+from jounce.base.modules import with_fields
+from jounce.base.shapes import Numbers
 from jounce.execution.compilation import compiled
 from jounce.jet import Jet
 from jounce.kinematics.assembly.initial_revolutions import Coordinates
 from jounce.mechanism import Model
-from jounce.mechanism.starting_guess import pose_at
+from jounce.mechanism.building.starting_guess import pose_at
 from jounce.mechanism.system import System
-from jounce.modules import with_fields
 from jounce.rigid.pose import Pose
-from jounce.shapes import Numbers
 
 LANES = 32  # series that are followed side by side
 FULFILLED = 1e-7  # of what the terms of an order are: less is rounding, and what a position is known to

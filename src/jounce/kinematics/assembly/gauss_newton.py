@@ -8,17 +8,17 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from jounce.base.modules import with_fields
+from jounce.base.shapes import Numbers
 from jounce.execution.compilation import compiled
 from jounce.jet import Jet
 from jounce.kinematics.assembly.initial_revolutions import Coordinates, Displaced, DriverLag
 from jounce.linear_algebra.host_jacobian import HostJacobian
 from jounce.linear_algebra.linear import DenseFactor
 from jounce.mechanism import Model
-from jounce.mechanism.starting_guess import pose_at
+from jounce.mechanism.building.starting_guess import pose_at
 from jounce.mechanism.system import System
-from jounce.modules import with_fields
 from jounce.rigid.pose import Pose
-from jounce.shapes import Numbers
 
 MAX_STEPS = 100
 NEXT_STEP = 1e-3  # of the tolerance: a step that would be this short, as residuals fall, is left out

@@ -13,7 +13,7 @@ from jaxtyping import Float
 from jounce.kinematics.assembly.initial_revolutions import Coordinates, Displace
 from jounce.kinematics.assembly.redundancy import Redundancy
 from jounce.mechanism import Model
-from jounce.mechanism.axis_angles import turned
+from jounce.mechanism.transmissions.axis_angles import turned
 
 TURNS = (0.9, -2.3)  # rad, by which bodies are spun
 RELATED = 1e-6  # part of a velocity: less is rounding

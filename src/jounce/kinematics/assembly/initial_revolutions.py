@@ -16,8 +16,8 @@ from jounce.constraints.facts import dimension_of_field
 from jounce.jet.turns import WHOLE_TURN, principal, whole_periods
 from jounce.linear_algebra.host_jacobian import HostJacobian
 from jounce.mechanism import Model
-from jounce.mechanism.axis_angles import AttitudeHistory, measures_angle
-from jounce.mechanism.builder import prescribed_by_drivers
+from jounce.mechanism.building.builder import prescribed_by_drivers
+from jounce.mechanism.transmissions.axis_angles import AttitudeHistory, measures_angle
 
 STEPS_A_TURN = 64
 MOST_TURNS = 4  # followed one by one; beyond, each further turn does what the last one did

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 from jounce.mechanism import Model
-from jounce.mechanism.builder import group_rows
+from jounce.mechanism.building.builder import group_rows
 from jounce.mechanism.mechanism import GROUND
 
 OF_A_HINGE = {2: 2, 3: 5}  # equations, by the components of positions

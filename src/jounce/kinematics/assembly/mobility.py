@@ -11,6 +11,7 @@ from typing import Any, Literal
 import numpy as np
 from jaxtyping import Float
 
+from jounce.base.modules import with_fields
 from jounce.errors import MechanismError, whole_number
 from jounce.kinematics.assembly.assemble import check_assembled, find_assembly, redundancy_of
 from jounce.kinematics.assembly.constraint_series import SINGULAR, ReducedConstraints
@@ -20,9 +21,8 @@ from jounce.kinematics.assembly.redundancy import Repetition, closed_nearby
 from jounce.kinematics.assembly.tangent_cone import LocalCurve, curves
 from jounce.linear_algebra.host_jacobian import HostJacobian
 from jounce.mechanism import Mechanism, Model, build, check_mechanism, time_grid
-from jounce.mechanism.builder import with_reference
-from jounce.mechanism.preconditions import check_holonomic, concrete
-from jounce.modules import with_fields
+from jounce.mechanism.building.builder import with_reference
+from jounce.mechanism.building.preconditions import check_holonomic, concrete
 
 Kind = Literal["regular", "rigid", "shaky", "cusp", "singular", "change point"]
 HIGHEST_ORDER = 20

@@ -12,6 +12,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from jounce.base.shapes import Numbers
 from jounce.execution.compilation import compiled
 from jounce.execution.mapped import called
 from jounce.kinematics.continuation.correct_and_differentiate import SolvedState, StepResult, advance, predictor
@@ -28,7 +29,6 @@ from jounce.kinematics.continuation.step_control import (
 )
 from jounce.mechanism.system import System
 from jounce.rigid.pose import Pose
-from jounce.shapes import Numbers
 
 Number = Float[Numbers, ""]
 

@@ -15,6 +15,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from jounce.base.shapes import Numbers, Real
 from jounce.jet import Jet
 from jounce.jet.algebra import stacked
 from jounce.jet.turns import brought_near
@@ -29,10 +30,9 @@ from jounce.kinematics.continuation.predictor import (
 from jounce.kinematics.continuation.singularity_distance import det_rate_of
 from jounce.kinematics.status import Status
 from jounce.linear_algebra.least_squares import LeastSquaresFactor
-from jounce.mechanism.axis_angles import measures_angle
 from jounce.mechanism.system import Group, System
+from jounce.mechanism.transmissions.axis_angles import measures_angle
 from jounce.rigid.pose import Pose
-from jounce.shapes import Numbers, Real
 
 Lanes = Float[Numbers, " batch"]
 Truths = Bool[Numbers, " batch"]

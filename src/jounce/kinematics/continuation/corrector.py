@@ -14,12 +14,12 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from jounce.base.shapes import Numbers
 from jounce.jet import Jet
 from jounce.kinematics.continuation.jacobian_factors import Factor, blank_factor, refactored
 from jounce.kinematics.continuation.predictor import SMALLEST_DEPARTURE
 from jounce.mechanism.system import System
 from jounce.rigid.pose import Pose
-from jounce.shapes import Numbers
 
 MAX_ITERATIONS = 30
 LARGEST_CONTRACTION = 0.25  # of the first simplified Newton corrections: Deuflhard 2011, section 5.1

@@ -7,13 +7,13 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 
+from jounce.base.modules import with_fields
 from jounce.execution.device import on_processor
 from jounce.execution.mapped import GPU_WIDTH, mapped
 from jounce.kinematics.continuation.correct_and_differentiate import StepResult, advance, solved_batch
 from jounce.kinematics.continuation.predictor import hidden_by_laws
 from jounce.kinematics.continuation.singularity_distance import det_rates_of
 from jounce.mechanism.system import System
-from jounce.modules import with_fields
 from jounce.rigid.pose import Pose
 
 WIDTHS = 128, 512  # instants that XLA solves side by side: as many as the cache holds, within these bounds

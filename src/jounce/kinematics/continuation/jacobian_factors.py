@@ -7,6 +7,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Bool
 
+from jounce.base.shapes import Numbers
 from jounce.jet import Jet
 from jounce.linear_algebra.frontal import FrontalFactor
 from jounce.linear_algebra.least_squares import LeastSquaresFactor
@@ -14,7 +15,6 @@ from jounce.linear_algebra.linear import DenseFactor
 from jounce.linear_algebra.reflections import ReflectedFactor
 from jounce.mechanism.system import System
 from jounce.rigid.pose import Pose
-from jounce.shapes import Numbers
 
 Factor = DenseFactor | ReflectedFactor | FrontalFactor | LeastSquaresFactor
 STALE = 1e-9  # part by which solutions may be off before they are refined, which squares it

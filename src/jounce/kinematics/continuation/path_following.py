@@ -22,7 +22,7 @@ from jounce.kinematics.continuation.correct_and_differentiate import SolvedState
 from jounce.kinematics.continuation.solver import NO_GRID, Solver
 from jounce.kinematics.continuation.step_control import ExpansionPoint, StopReason
 from jounce.kinematics.status import Status
-from jounce.mechanism.axis_angles import AttitudeHistory
+from jounce.mechanism.transmissions.axis_angles import AttitudeHistory
 
 PASSABLE = (Status.OK, Status.UNDEFINED)
 SMALLEST_STEP = 1e-10  # of the span

@@ -8,11 +8,11 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Bool, Float
 
+from jounce.base.shapes import Numbers
 from jounce.jet import Jet
 from jounce.jet.algebra import total
 from jounce.kinematics.status import Status
 from jounce.mechanism.system import System
-from jounce.shapes import Numbers
 
 Lanes = Float[Numbers, " batch"]
 

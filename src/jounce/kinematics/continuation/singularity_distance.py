@@ -14,12 +14,12 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
+from jounce.base.shapes import Numbers, Real
 from jounce.jet import Jet
 from jounce.kinematics.continuation.jacobian_factors import Factor, factored
 from jounce.linear_algebra.frontal import FrontalFactor
 from jounce.mechanism.system import System
 from jounce.rigid.pose import Pose
-from jounce.shapes import Numbers, Real
 
 SQUARINGS = 4  # of the matrix of which the largest eigenvalue is sought
 PROBES = 8  # vectors by which the norm of a power of a large matrix is estimated

@@ -14,10 +14,10 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from jounce.base.shapes import Numbers
 from jounce.execution.mapped import mapped
 from jounce.kinematics.continuation.correct_and_differentiate import SAFE_FRACTION
 from jounce.kinematics.status import Status
-from jounce.shapes import Numbers
 
 LARGEST_DET_RATE = 1.0  # of the Jacobian over a step, seen from its end; from its start, SAFE_FRACTION
 PASSAGE = 3e-3  # of the radius of the series: so near a singular position it is seen whether the motion is smooth there

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from jounce.errors import AssemblyError
-from jounce.kinematics.curves.assemblies import Assemblies, Assembly, assemblies
+from jounce.kinematics.curves.assembly_modes import Assemblies, Assembly, assemblies
 from jounce.mechanism import Mechanism, build
 from jounce.mechanism.mechanism import NEAREST, SIDES
 from jounce.rigid.planar import PlanarPose

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from jaxtyping import Float
 
-from jounce.display import Displayed
+from jounce.base.display import Displayed
 from jounce.errors import MechanismError
 from jounce.jet.turns import WHOLE_TURN
 from jounce.kinematics.curves.crossings import ChangePoint, departed
@@ -22,8 +22,8 @@ from jounce.kinematics.results.motion import Motion
 from jounce.kinematics.results.pose_outputs import output_values
 from jounce.kinematics.status import Status
 from jounce.mechanism import AbstractOutput, Mechanism
-from jounce.mechanism.axis_angles import AttitudeHistory
-from jounce.mechanism.outputs import AbstractMotionOutput
+from jounce.mechanism.outputs.base import AbstractMotionOutput
+from jounce.mechanism.transmissions.axis_angles import AttitudeHistory
 
 if TYPE_CHECKING:
     import xarray

@@ -7,11 +7,11 @@ from typing import Any
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from jounce.base.shapes import Numbers
 from jounce.jet.turns import principal
 from jounce.kinematics.curves.series import CurvePoints, curve_points, second_order
 from jounce.mechanism import Model
 from jounce.rigid import PlanarPose
-from jounce.shapes import Numbers
 
 ORDER = 20
 LANES = 8  # points solved side by side: a number compiles once

@@ -12,17 +12,17 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from jounce.base.shapes import Numbers
 from jounce.execution.compilation import compiled
 from jounce.jet import Jet
 from jounce.jet.algebra import total
 from jounce.jet.programs.series import Recursion
 from jounce.linear_algebra.linear import DenseFactor
-from jounce.mechanism.starting_guess import pose_at
+from jounce.mechanism.building.starting_guess import pose_at
 from jounce.mechanism.system import System
 from jounce.rigid import PlanarPose, SpatialPose
 from jounce.rigid.pose import Pose
 from jounce.rigid.spatial import body_axes, quaternion_spins
-from jounce.shapes import Numbers
 
 MAX_CORRECTIONS = 10
 ROUNDING = 4e-15  # a correction this small leaves the Jacobian as good as new

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
+from jounce.base.modules import with_fields
 from jounce.constraints.facts import dimension_of_field, field_kinds
 from jounce.errors import MechanismError, MobilityError, SingularityError, check_name
 from jounce.execution.device import resident
@@ -13,7 +14,6 @@ from jounce.jet import Jet
 from jounce.kinematics.assembly.assemble import check_assembled, find_assembly, freely_moving
 from jounce.kinematics.curves.path_tracker import CurvePoint, PathTracker
 from jounce.mechanism import Mechanism, build, time_grid
-from jounce.modules import with_fields
 from jounce.trajectory import ExpressionMotion
 
 TIME = "time"

@@ -7,16 +7,16 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Bool, Float
 
+from jounce.base.modules import with_fields
+from jounce.base.shapes import Numbers
 from jounce.execution.mapped import mapped
 from jounce.jet import Jet
 from jounce.kinematics.assembly.gauss_newton import LONGEST_STEP, MAX_STEPS
 from jounce.kinematics.continuation.instant_program import of_design
 from jounce.kinematics.continuation.jacobian_factors import factored
-from jounce.mechanism.starting_guess import pose_at
+from jounce.mechanism.building.starting_guess import pose_at
 from jounce.mechanism.system import System
-from jounce.modules import with_fields
 from jounce.rigid.pose import Pose
-from jounce.shapes import Numbers
 
 HALVINGS = 12
 CLEARLY_REGULAR = 1e-6  # smallest pivot over the largest of a Jacobian that is looked at no closer

@@ -35,8 +35,8 @@ from jounce.kinematics.families.design_assembly import Coordinates
 from jounce.kinematics.families.design_values import Designs
 from jounce.kinematics.position_analysis.solve_buffers import SolveBuffer, solve_in_buffers
 from jounce.kinematics.status import Status
-from jounce.mechanism.axis_angles import measures_angle, raw_angles
-from jounce.mechanism.turn_counting import counted_along
+from jounce.mechanism.transmissions.axis_angles import measures_angle, raw_angles
+from jounce.mechanism.transmissions.turn_counting import counted_along
 
 MOST_STEPS = 10_000  # of a design; one that needs more is left to be solved alone
 TOGETHER = 512  # designs that are followed together

@@ -8,9 +8,9 @@ from jaxtyping import Float
 
 from jounce.errors import JounceError
 from jounce.mechanism import Mechanism
-from jounce.mechanism.law_breaks import breaks_depend_on, breaks_of_laws, laws_may_break
+from jounce.mechanism.laws.law_breaks import breaks_depend_on, breaks_of_laws, laws_may_break
 from jounce.settings import under_own_settings
-from jounce.trajectory.breaks import both_sides
+from jounce.trajectory.law_checks.breaks import both_sides
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

@@ -11,13 +11,13 @@ import numpy as np
 from jax.core import Tracer
 from jaxtyping import Bool, Float, Int
 
+from jounce.base.modules import with_fields
 from jounce.constraints.facts import facts_of, field_kinds, has_other_sign
 from jounce.kinematics.families.design_assembly import Trials, assemble_from_guess
 from jounce.mechanism import Mechanism, Model
-from jounce.mechanism.starting_guess import starting_guess
+from jounce.mechanism.building.starting_guess import starting_guess
+from jounce.mechanism.building.traced import traced_model
 from jounce.mechanism.system import POSITION_COMPONENTS, System
-from jounce.mechanism.traced import traced_model
-from jounce.modules import with_fields
 
 
 class Designs:

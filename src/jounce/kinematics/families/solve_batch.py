@@ -9,7 +9,8 @@ import numpy as np
 from jax.core import Tracer
 from jaxtyping import Float, Int
 
-from jounce.activity import Count
+from jounce.base.activity import Count
+from jounce.base.shapes import ArrayLike, real_numbers
 from jounce.errors import AssemblyError, JounceError, MechanismError, MobilityError, SolveError, check_name
 from jounce.execution.threads import thread_count
 from jounce.kinematics.assembly.assemble import assemble
@@ -31,14 +32,13 @@ from jounce.mechanism import (
     time_grid,
     with_output_drivers,
 )
-from jounce.mechanism.axis_angles import measures_angle
+from jounce.mechanism.building.preconditions import concrete
 from jounce.mechanism.carriages import has_ends
-from jounce.mechanism.law_breaks import laws_may_break, laws_of
-from jounce.mechanism.law_checks import check_laws
-from jounce.mechanism.preconditions import concrete
+from jounce.mechanism.laws.law_breaks import laws_may_break, laws_of
+from jounce.mechanism.laws.law_checks import check_laws
 from jounce.mechanism.time import TimeLike
+from jounce.mechanism.transmissions.axis_angles import measures_angle
 from jounce.settings import under_own_settings
-from jounce.shapes import ArrayLike, real_numbers
 from jounce.trajectory.motion import SplineMotion
 
 if TYPE_CHECKING:

@@ -13,7 +13,7 @@ from jounce.kinematics.results.actuation import actuated
 from jounce.kinematics.results.motion import Motion
 from jounce.kinematics.status import Status
 from jounce.mechanism import Mechanism
-from jounce.mechanism.belts import check_room
+from jounce.mechanism.building.belts import check_room
 from jounce.mechanism.time import Instants, instants_of
 
 

@@ -9,7 +9,7 @@ from jaxtyping import Float
 
 from jounce.kinematics.continuation.path_following import FollowedPath, attitudes_between
 from jounce.kinematics.status import Status
-from jounce.mechanism.builder import Model
+from jounce.mechanism.building.builder import Model
 from jounce.mechanism.carriages import joint_of
 from jounce.trajectory.curves import CurveLaw
 

@@ -21,7 +21,7 @@ from jounce.kinematics.assembly.idle_motions import IdleMotions
 from jounce.kinematics.results.motion import Motion
 from jounce.kinematics.status import Status
 from jounce.mechanism import AbstractQuantity, Mechanism, build, with_output_drivers
-from jounce.mechanism.preconditions import holds_tracer
+from jounce.mechanism.building.preconditions import holds_tracer
 from jounce.mechanism.time import instants_of
 
 P = ParamSpec("P")

@@ -11,7 +11,7 @@ from jounce.kinematics.curves.start import TIME, law_values
 from jounce.kinematics.results.motion import Motion
 from jounce.kinematics.status import Status
 from jounce.mechanism import with_output_drivers
-from jounce.mechanism.output_drivers import output_laws
+from jounce.mechanism.laws.output_drivers import output_laws
 
 ENDS = (Status.SINGULAR, Status.NOT_CONVERGED, Status.COLLAPSED)
 LENGTH = 40.0  # of the curve, looked at for where the other branch leads

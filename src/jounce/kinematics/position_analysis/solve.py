@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 from jax.errors import ConcretizationTypeError
 
-from jounce.activity import Count
+from jounce.base.activity import Count
 from jounce.errors import AssemblyError, MechanismError, MobilityError, SolveError, UnsupportedError
 from jounce.execution.backends import joined
 from jounce.execution.background import prepare_later
-from jounce.execution.store import expect, is_wanted_soon
+from jounce.execution.store.programs import expect, is_wanted_soon
 from jounce.execution.threads import thread_count
 from jounce.kinematics.assembly.assemble import assemble
 from jounce.kinematics.continuation.path_following import FollowedPath, follow
@@ -38,13 +38,13 @@ from jounce.mechanism import (
     time_grid,
     with_output_drivers,
 )
-from jounce.mechanism.axis_angles import AttitudeHistory, lost_count
-from jounce.mechanism.belts import check_room
-from jounce.mechanism.builder import group_rows
-from jounce.mechanism.law_checks import check_laws
-from jounce.mechanism.output_drivers import output_laws
-from jounce.mechanism.preconditions import check_holonomic, concrete, concrete_or
+from jounce.mechanism.building.belts import check_room
+from jounce.mechanism.building.builder import group_rows
+from jounce.mechanism.building.preconditions import check_holonomic, concrete, concrete_or
+from jounce.mechanism.laws.law_checks import check_laws
+from jounce.mechanism.laws.output_drivers import output_laws
 from jounce.mechanism.time import Instants, TimeLike, instants_of
+from jounce.mechanism.transmissions.axis_angles import AttitudeHistory, lost_count
 
 LOWEST_ORDER = 4  # of the jets inside: predictions need some, also where the user wants positions only
 HIGHEST_ORDER = 30  # of derivatives of outputs

@@ -5,14 +5,14 @@ import dataclasses
 import numpy as np
 from jaxtyping import Float
 
+from jounce.base.modules import with_fields
 from jounce.jet.derivatives import plain_derivatives
 from jounce.kinematics.assembly.gauss_newton import Displacements
 from jounce.kinematics.results.motion import Motion
 from jounce.kinematics.status import Status
 from jounce.mechanism import Mechanism, Model, build
-from jounce.mechanism.builder import counted_as_in
-from jounce.mechanism.output_drivers import output_laws, without_output_laws
-from jounce.modules import with_fields
+from jounce.mechanism.building.builder import counted_as_in
+from jounce.mechanism.laws.output_drivers import output_laws, without_output_laws
 from jounce.trajectory import HermiteMotion
 
 

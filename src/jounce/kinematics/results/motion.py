@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from jaxtyping import Float
 
+from jounce.base.modules import with_fields
+from jounce.base.shapes import ArrayLike, Numbers
 from jounce.constraints import AbstractConstraint
 from jounce.errors import MechanismError, check_name
 from jounce.execution.backends import xla_backend
@@ -32,15 +34,13 @@ from jounce.mechanism import (
     Model,
     PointOutput,
 )
-from jounce.mechanism.attitude_outputs import continued, euler_angles_of
-from jounce.mechanism.axis_angles import AttitudeHistory, at_lanes, attitudes_of, measures_angle
-from jounce.mechanism.builder import counted_as_in
-from jounce.mechanism.derivative_outputs import bound_alone
-from jounce.mechanism.driver_outputs import is_turning
+from jounce.mechanism.building.builder import counted_as_in
+from jounce.mechanism.laws.driver_outputs import is_turning
 from jounce.mechanism.mechanism import GROUND
+from jounce.mechanism.outputs.attitude_outputs import continued, euler_angles_of
+from jounce.mechanism.outputs.derivative_outputs import bound_alone
 from jounce.mechanism.system import POSITION_COMPONENTS, Group, group_elements
-from jounce.modules import with_fields
-from jounce.shapes import ArrayLike, Numbers
+from jounce.mechanism.transmissions.axis_angles import AttitudeHistory, at_lanes, attitudes_of, measures_angle
 from jounce.trajectory import HermiteMotion
 from jounce.units.shown_units import derivatives_of, time_axes
 

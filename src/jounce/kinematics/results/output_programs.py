@@ -5,8 +5,8 @@ import numpy as np
 from jounce.execution.background import prepare_later
 from jounce.kinematics.results.motion import Motion
 from jounce.mechanism import AbstractMotionOutput, Mechanism, Model
-from jounce.mechanism.axis_angles import AttitudeHistory
-from jounce.mechanism.output_drivers import output_laws
+from jounce.mechanism.laws.output_drivers import output_laws
+from jounce.mechanism.transmissions.axis_angles import AttitudeHistory
 
 
 def prepare_outputs(mechanism: Mechanism, model: Model, order: int) -> None:

@@ -5,12 +5,12 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
+from jounce.base.shapes import Numbers
 from jounce.execution.compilation import compiled
 from jounce.jet import Jet
 from jounce.jet.algebra import stacked
 from jounce.jet.derivatives import plain_derivatives
 from jounce.mechanism.system import Group
-from jounce.shapes import Numbers
 
 
 @compiled("pose_type")

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from jaxtyping import Float
 
-from jounce.display import Displayed
+from jounce.base.display import Displayed
 from jounce.errors import MechanismError, check_choice
 from jounce.units.shown_units import derivative_unit
 

@@ -11,6 +11,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
+from jounce.base.shapes import Numbers
 from jounce.constraints import AbstractConstraint
 from jounce.jet import Jet
 from jounce.jet.algebra import stacked
@@ -18,7 +19,6 @@ from jounce.linear_algebra.frontal import FrontalFactor
 from jounce.linear_algebra.linear import DenseFactor
 from jounce.mechanism.system import System, movable, with_rows
 from jounce.rigid.pose import Pose
-from jounce.shapes import Numbers
 
 Slope = Float[Numbers, "order coordinate row instance batch"]
 """Taylor coefficients of how the residuals of a group change with the coordinates of the bodies in a slot."""

@@ -20,6 +20,8 @@ import numpy as np
 from jax.core import Tracer
 from jaxtyping import Float
 
+from jounce.base.modules import with_fields
+from jounce.base.shapes import Numbers
 from jounce.errors import AssemblyError, MechanismError, MobilityError, SolveError
 from jounce.execution.compilation import Compiled, compiled
 from jounce.jet import Jet
@@ -28,17 +30,15 @@ from jounce.kinematics.results.motion import Motion
 from jounce.kinematics.sensitivity.jacobian_series import jacobian_series, solved_series
 from jounce.kinematics.status import Status
 from jounce.mechanism import Mechanism, Model, with_output_drivers
-from jounce.mechanism.axis_angles import measures_angle
-from jounce.mechanism.builder import grouped_elements
-from jounce.mechanism.output_drivers import output_laws, without_output_laws
+from jounce.mechanism.building.builder import grouped_elements
+from jounce.mechanism.building.traced import Angles, Part, angles_of, template, traced_model, traced_values
+from jounce.mechanism.laws.output_drivers import output_laws, without_output_laws
 from jounce.mechanism.system import System, movable
-from jounce.mechanism.traced import Angles, Part, angles_of, template, traced_model, traced_values
+from jounce.mechanism.transmissions.axis_angles import measures_angle
 from jounce.mechanism.user_code import holds_users_code, users_code
-from jounce.modules import with_fields
 from jounce.rigid import PlanarPose, SpatialPose
 from jounce.rigid.pose import Pose
 from jounce.settings import called_back
-from jounce.shapes import Numbers
 from jounce.trajectory import Expression
 
 Solve = Callable[[Mechanism, bool], Motion]

@@ -8,6 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Bool, Float
 
+from jounce.base.shapes import Numbers
 from jounce.errors import UnsupportedError
 from jounce.execution.compilation import compiled
 from jounce.jet.derivatives import plain_derivatives
@@ -17,9 +18,8 @@ from jounce.kinematics.results.pose_outputs import output_series
 from jounce.kinematics.sensitivity.sensitivities import Solved
 from jounce.kinematics.status import Status
 from jounce.mechanism import AbstractMotionOutput, AbstractOutput, Mechanism, Model
-from jounce.mechanism.output_drivers import output_laws
+from jounce.mechanism.laws.output_drivers import output_laws
 from jounce.mechanism.system import Group
-from jounce.shapes import Numbers
 
 if TYPE_CHECKING:
     import xarray

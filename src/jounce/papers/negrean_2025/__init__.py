@@ -12,8 +12,8 @@ from jounce.papers.negrean_2025.case import (
     sudden_stop as sudden_stop,
 )
 from jounce.papers.negrean_2025.closed_forms import energies as energies, torques as torques
-from jounce.papers.negrean_2025.history import History as History, history as history
-from jounce.papers.negrean_2025.reproduce import reproduce as reproduce
+from jounce.papers.negrean_2025.motion_history import History as History, history as history
+from jounce.papers.negrean_2025.reproduction import reproduce as reproduce
 from jounce.papers.negrean_2025.segment import POLYNOMIALS as POLYNOMIALS, Check as Check, check as check
 from jounce.settings import compute_under_own_settings as _compute_under_own_settings
 

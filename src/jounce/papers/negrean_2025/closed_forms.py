@@ -3,8 +3,8 @@
 import numpy as np
 from jaxtyping import Float
 
+from jounce.base.shapes import ArrayLike
 from jounce.jet import Jet, sine_cosine
-from jounce.shapes import ArrayLike
 
 
 def energies(inertia: float, motion: ArrayLike) -> Float[np.ndarray, "*batch 3"]:

@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Float
 
 from jounce.papers.negrean_2025 import case as chosen, segment
-from jounce.papers.negrean_2025.history import STEPS, History, difference
+from jounce.papers.negrean_2025.motion_history import STEPS, History, difference
 from jounce.papers.output import markdown_table, page
 
 ENERGIES = {"E_1 (141)": "kg m^2/s^4", "E_2 (142)": "kg m^2/s^6", "E_3 (143)": "kg m^2/s^8"}

@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 
 from jounce.papers.figures import legend_below, panels
 from jounce.papers.negrean_2025.case import STAND_IN, Case
-from jounce.papers.negrean_2025.history import STEPS, History
+from jounce.papers.negrean_2025.motion_history import STEPS, History
 from jounce.plot.style import BLUE, GRAY, GREEN, PALE_GRAY, VERMILION
 
 TORQUES = (

@@ -15,9 +15,9 @@ from jounce.papers.sommer_2024.differences import (
     backward_difference as backward_difference,
     central_difference as central_difference,
 )
-from jounce.papers.sommer_2024.measure import Results as Results, measure as measure
+from jounce.papers.sommer_2024.measurement import Results as Results, measure as measure
 from jounce.papers.sommer_2024.phase_lag import Lag as Lag, lags as lags
-from jounce.papers.sommer_2024.reproduce import reproduce as reproduce
+from jounce.papers.sommer_2024.reproduction import reproduce as reproduce
 from jounce.settings import compute_under_own_settings as _compute_under_own_settings
 
 _compute_under_own_settings(__name__)

@@ -6,7 +6,7 @@ import numpy as np
 
 from jounce.papers.output import markdown_table, page
 from jounce.papers.sommer_2024 import cases
-from jounce.papers.sommer_2024.measure import Results
+from jounce.papers.sommer_2024.measurement import Results
 
 PRINTED = {  # root-mean-square errors in the text of the paper, sections 4 and 6
     ("four_bar", "jerk"): 1.07e-13,

@@ -14,9 +14,9 @@ from matplotlib.figure import Figure
 
 from jounce.papers.figures import panels
 from jounce.papers.sommer_2024.cases import VALIDATION_CASES
-from jounce.plot.drawing import View
-from jounce.plot.scene import Scene, drawing_of
-from jounce.plot.sketch import SketchFigure, draw_scale
+from jounce.plot.drawings.drawing import View
+from jounce.plot.drawings.scene import Scene, drawing_of
+from jounce.plot.machine_sketch import SketchFigure, draw_scale
 from jounce.plot.style import GRAY, PALE_GRAY
 
 ARC = 7.0  # radius of the arc of an angle, in halves of a pin

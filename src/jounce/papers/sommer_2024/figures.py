@@ -15,7 +15,7 @@ from matplotlib.ticker import LogLocator, NullFormatter
 from jounce.papers.figures import legend_below, panels
 from jounce.papers.sommer_2024 import cases, drawings
 from jounce.papers.sommer_2024.comparison import STANDS_IN
-from jounce.papers.sommer_2024.measure import Results
+from jounce.papers.sommer_2024.measurement import Results
 from jounce.plot.style import BLUE, GRAY, GREEN, PURPLE, VERMILION
 
 LINE_STYLES = {

@@ -15,6 +15,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
+from jounce.base.shapes import Numbers
 from jounce.dynamics.motion_values import Coordinates, cut, pose_of
 from jounce.execution.compilation import compiled
 from jounce.io import load
@@ -27,7 +28,6 @@ from jounce.mechanism import Mechanism
 from jounce.mechanism.system import System
 from jounce.papers.sommer_2024.cases import MECHANISMS, QUANTITIES, ValidationCase, nominal_time, normalized_rmse
 from jounce.rigid.pose import Pose
-from jounce.shapes import Numbers
 
 MOST = 10  # corrections; rounding keeps residuals above the least tolerances
 

@@ -10,7 +10,8 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
-from jounce.dynamics.inverse.reactions import driver_force
+from jounce.base.shapes import Numbers
+from jounce.dynamics.inverse.outputs.reactions import driver_force
 from jounce.dynamics.limits.trajectories import FollowedTrajectory
 from jounce.errors import MechanismError, RobotError, SampleWarning
 from jounce.execution.chunks import in_chunks
@@ -18,14 +19,13 @@ from jounce.jet import Jet
 from jounce.jet.algebra import stacked
 from jounce.kinematics.position_analysis.solve import solve
 from jounce.mechanism import Mechanism, time_grid
-from jounce.mechanism.driver_outputs import is_turning
+from jounce.mechanism.laws.driver_outputs import is_turning
 from jounce.planning.elastic.drives import Drive, DriveArrays
 from jounce.robot.algorithms.inverse_dynamics import inverse_dynamics
 from jounce.robot.model.tree import Tree
 from jounce.robot.recursions.batches import Batched
 from jounce.robot.recursions.drive_forces import passive_forces
 from jounce.robot.robot import Robot
-from jounce.shapes import Numbers
 from jounce.trajectory.joint_trajectory import JointTrajectory
 
 BLOCK = 2048  # instants at once, always as many, so that all is compiled once

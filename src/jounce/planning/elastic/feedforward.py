@@ -5,6 +5,7 @@ from typing import overload
 
 import numpy as np
 
+from jounce.base.shapes import ArrayLike, seconds
 from jounce.errors import JounceError, RobotError, TrajectoryError
 from jounce.mechanism import Mechanism, TimeGrid, check_mechanism
 from jounce.planning.elastic.driven_systems import DrivenMechanism, DrivenRobot, DrivenSystem, link_forces, robot_drives
@@ -13,7 +14,6 @@ from jounce.planning.elastic.motor_motion import Feedforward, MotorMotion, motor
 from jounce.planning.elastic.spring_deflection import SpringDeflection
 from jounce.robot.model.arguments import checked_coordinates, whole_number
 from jounce.robot.robot import Robot
-from jounce.shapes import ArrayLike, seconds
 from jounce.trajectory.joint_trajectory import JointTrajectory
 
 MOST_RATES = 24  # of motor torques: the highest derivative of a law is 30

@@ -11,6 +11,7 @@ from typing import Any, ClassVar
 import equinox as eqx
 import numpy as np
 
+from jounce.base.shapes import real_numbers
 from jounce.constraints import Scalar, Vector, drivers, planar, spatial
 from jounce.errors import MechanismError, RobotError, UnsupportedError
 from jounce.forces import AbstractForce
@@ -25,7 +26,6 @@ from jounce.mechanism.time import TimeLike
 from jounce.planning.elastic.driven_systems import DrivenMechanism
 from jounce.planning.elastic.drives import Drive, DriveArrays
 from jounce.planning.elastic.motor_torques import MOTOR, torques_of
-from jounce.shapes import real_numbers
 from jounce.trajectory import AbstractMotion
 
 

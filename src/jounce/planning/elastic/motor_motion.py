@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from jaxtyping import Float
 
-from jounce.display import Displayed
+from jounce.base.display import Displayed
+from jounce.base.shapes import ArrayLike, seconds
 from jounce.dynamics.limits.check_limits import worst_instants
 from jounce.dynamics.limits.limit_report import LimitRow, LimitRows
 from jounce.errors import TrajectoryError
@@ -15,7 +16,6 @@ from jounce.planning.elastic.driven_systems import DrivenSystem
 from jounce.planning.elastic.drives import DriveArrays
 from jounce.planning.elastic.pieces import resolved
 from jounce.planning.elastic.spring_deflection import SpringDeflection
-from jounce.shapes import ArrayLike, seconds
 from jounce.trajectory.motion import AbstractMotion
 from jounce.units.shown_units import derivatives_of, time_axes
 

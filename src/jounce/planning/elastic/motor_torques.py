@@ -8,7 +8,7 @@ import numpy as np
 from jounce.errors import RobotError, check_name
 from jounce.planning.elastic.drives import DriveArrays
 from jounce.trajectory import AbstractMotion, ExpressionMotion
-from jounce.trajectory.user_laws import read_laws
+from jounce.trajectory.laws.user_laws import read_laws
 
 MOTOR = "_motor"  # what the joint or body of a rotor is called after what it moves
 

@@ -13,6 +13,7 @@ import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 
+from jounce.base.shapes import real_numbers
 from jounce.errors import RobotError
 from jounce.integrate import RobotSimulation, simulate
 from jounce.integrate.steps.options import SimulationOptions
@@ -23,7 +24,6 @@ from jounce.planning.elastic.drives import Drive, DriveArrays
 from jounce.planning.elastic.motor_torques import MOTOR, torques_of
 from jounce.robot import Joint, Link, Robot
 from jounce.robot.model.joint_laws import AbstractJointLaws
-from jounce.shapes import real_numbers
 from jounce.trajectory import AbstractMotion
 
 

@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from typing import Unpack, overload
 
+from jounce.base.shapes import ArrayLike
 from jounce.errors import JounceError
 from jounce.integrate import RobotSimulation, Simulation
 from jounce.integrate.steps.options import SimulationOptions
@@ -12,7 +13,6 @@ from jounce.planning.elastic.drives import Drive
 from jounce.planning.elastic.mechanism import simulate_elastic_mechanism
 from jounce.planning.elastic.robot import simulate_elastic_robot
 from jounce.robot import Robot
-from jounce.shapes import ArrayLike
 
 OWN = ("torque", "state", "driven", "drives", "base", "initial")  # what this simulation sets itself
 

@@ -7,11 +7,11 @@ from math import perm
 import numpy as np
 from jaxtyping import Float
 
+from jounce.base.shapes import ArrayLike, real_numbers
 from jounce.errors import TrajectoryError
 from jounce.planning.paths.path import Path
 from jounce.planning.pieces import JoinedPieces
 from jounce.robot.model.links_and_joints import Limits
-from jounce.shapes import ArrayLike, real_numbers
 from jounce.trajectory import ExpressionMotion, FollowingMotion, PiecewiseMotion
 
 FIELDS = ("velocity", "acceleration", "jerk")

@@ -10,7 +10,7 @@ from jaxtyping import Float
 
 from jounce.execution.chunks import in_chunks
 from jounce.trajectory import AbstractMotion
-from jounce.trajectory.stacking import law_derivatives
+from jounce.trajectory.laws.stacking import law_derivatives
 
 BLOCK = 2048  # places evaluated at once
 

@@ -9,16 +9,16 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
+from jounce.base.shapes import ArrayLike, real_numbers
 from jounce.errors import JounceError, TrajectoryError, whole_number
 from jounce.jet import Jet
 from jounce.planning.paths.path import Path
 from jounce.planning.paths.sampled_paths import lines_along, path_of_samples
 from jounce.planning.paths.straight_lines import Lines, polynomials_at, rounded
-from jounce.shapes import ArrayLike, real_numbers
 from jounce.trajectory import AbstractMotion, Expression, JointTrajectory, PiecewiseMotion, SplineMotion
 from jounce.trajectory.checks import finite, finite_row, positive
 from jounce.trajectory.knots import knot_jumps
-from jounce.trajectory.seen_jumps import level_sizes, unexplained
+from jounce.trajectory.law_checks.seen_jumps import level_sizes, unexplained
 from jounce.trajectory.splines import HIGHEST_DEGREE
 
 DEGREE = 5  # of the splines through waypoints

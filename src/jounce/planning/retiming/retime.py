@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from jounce.base.shapes import ArrayLike
 from jounce.dynamics.limits.trajectories import FollowedTrajectory, warn_of_degrees
 from jounce.errors import JounceError, SolveError, TrajectoryError, flag, whole_number
 from jounce.mechanism import Mechanism
@@ -27,7 +28,6 @@ from jounce.planning.retiming.search import Search
 from jounce.planning.solver import require_solver
 from jounce.robot.model.links_and_joints import Limits
 from jounce.robot.robot import Robot
-from jounce.shapes import ArrayLike
 from jounce.trajectory import FollowingMotion, JointTrajectory
 from jounce.trajectory.checks import positive
 

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from jounce.base.shapes import ArrayLike
 from jounce.errors import JounceError, RobotError, SingularityError, check_name
 from jounce.jet.derivatives import taylor_coefficients
 from jounce.kinematics import Status
@@ -17,7 +18,6 @@ from jounce.planning.tool_paths.tool_path_motion import ToolPathMotion
 from jounce.planning.tool_paths.tool_tasks import tool_of
 from jounce.robot.model.arguments import floats
 from jounce.robot.robot import Robot
-from jounce.shapes import ArrayLike
 from jounce.trajectory.joint_trajectory import JointTrajectory
 
 REACHED = 1e-10  # rad, or sizes of the robot

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from jaxtyping import Float
 
+from jounce.base.shapes import ArrayLike
 from jounce.errors import RobotError
 from jounce.kinematics import Status
 from jounce.planning.tool_paths.joint_poses import JointPoses
@@ -21,7 +22,6 @@ from jounce.robot.model.abstract_robot import AbstractRobot
 from jounce.robot.model.arguments import checked_position, floats, whole_number
 from jounce.robot.recursions.kinematics import forward_kinematics
 from jounce.robot.robot import Robot
-from jounce.shapes import ArrayLike
 
 if TYPE_CHECKING:
     from scipy.spatial.transform import Rotation

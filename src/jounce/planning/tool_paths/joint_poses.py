@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from jounce.display import Displayed
+from jounce.base.display import Displayed
 from jounce.kinematics import Status
 from jounce.planning.tool_paths.task_rank import losing_joints
 

@@ -7,11 +7,11 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Float
 
+from jounce.base.modules import Module
+from jounce.base.shapes import Numbers
 from jounce.linear_algebra.linear import DenseFactor
-from jounce.modules import Module
 from jounce.planning.tool_paths.tool_tasks import Tool, columns_of, task_rows
 from jounce.robot.model.tree import Tree
-from jounce.shapes import Numbers
 
 MOST = 12  # corrections
 CLOSE = 1e-7  # of a correction, rad, or sizes of the robot: the next one leaves rounding only

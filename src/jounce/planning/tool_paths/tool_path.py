@@ -7,7 +7,8 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
-from jounce.display import Displayed
+from jounce.base.display import Displayed
+from jounce.base.shapes import ArrayLike, seconds
 from jounce.dynamics.limits.local_maxima import local_maxima
 from jounce.errors import JounceError, TrajectoryError
 from jounce.jet import Jet, dot, sqrt
@@ -16,11 +17,10 @@ from jounce.jet.derivatives import plain_derivatives
 from jounce.planning.tool_paths.tool_tasks import Goal, rotation_matrices
 from jounce.rigid.attitude_samples import AttitudeSamples
 from jounce.rigid.rotations import check_sequence, rotation_matrix
-from jounce.shapes import ArrayLike, seconds
 from jounce.trajectory import SplineMotion
 from jounce.trajectory.checks import check_samples
 from jounce.trajectory.joint_trajectory import MAX_ORDER, JointTrajectory
-from jounce.trajectory.smoothness import knots
+from jounce.trajectory.law_checks.smoothness import knots
 
 if TYPE_CHECKING:
     from scipy.spatial.transform import Rotation

@@ -7,7 +7,8 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float, Int
 
-from jounce.display import Displayed
+from jounce.base.display import Displayed
+from jounce.base.shapes import ArrayLike, seconds
 from jounce.errors import TrajectoryError
 from jounce.execution.chunks import in_chunks
 from jounce.jet.derivatives import plain_derivatives
@@ -23,7 +24,6 @@ from jounce.robot.model.arguments import whole_number
 from jounce.robot.model.tree import Tree
 from jounce.robot.recursions.batches import Batched
 from jounce.robot.robot import Robot
-from jounce.shapes import ArrayLike, seconds
 from jounce.trajectory import HermiteMotion
 from jounce.trajectory.joint_trajectory import MAX_ORDER, JointTrajectory
 

@@ -7,6 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
+from jounce.base.shapes import ArrayLike, Numbers
 from jounce.errors import RobotError, check_name
 from jounce.jet import Jet, concatenate, cross, dot
 from jounce.jet.algebra import stacked, total
@@ -17,7 +18,6 @@ from jounce.robot.model.arguments import floats, joints_of
 from jounce.robot.model.robot_size import robot_size
 from jounce.robot.model.tree import Frame, Tree, axes_with_z_along
 from jounce.robot.recursions.kinematics import frame_at, link_frame
-from jounce.shapes import ArrayLike, Numbers
 
 if TYPE_CHECKING:
     from scipy.spatial.transform import Rotation

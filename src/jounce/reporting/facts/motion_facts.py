@@ -7,7 +7,7 @@ from typing import Any, Literal
 import numpy as np
 from typing_extensions import TypedDict
 
-from jounce.dynamics.inverse.outputs import slack_ropes
+from jounce.dynamics.inverse.outputs.components import slack_ropes
 from jounce.integrate import Simulation
 from jounce.kinematics import ChunkedMotion, Motion, Status
 from jounce.mechanism import AbstractMotionOutput, build, with_output_drivers

@@ -14,7 +14,7 @@ from jounce.dynamics.limits.motion_ends import TrajectoryEnd
 from jounce.dynamics.limits.trajectories import drives_note
 from jounce.errors import UNSET, JounceError, show_value
 from jounce.kinematics import ChunkedMotion, Motion
-from jounce.reporting.facts.mechanism_facts import grid_facts
+from jounce.reporting.facts.mechanism.mechanism_facts import grid_facts
 from jounce.reporting.facts.motion_facts import motion_facts
 from jounce.reporting.motion_ends import between_facts, ends_facts
 from jounce.reporting.peaks import Peak, peaks

@@ -6,7 +6,7 @@ from typing import Literal
 
 from typing_extensions import TypedDict
 
-from jounce.reporting.facts.mechanism_facts import Grid
+from jounce.reporting.facts.mechanism.mechanism_facts import Grid
 from jounce.reporting.json.schema_parts import Result, TorquePeak
 
 

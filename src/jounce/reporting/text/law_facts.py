@@ -10,8 +10,8 @@ import equinox as eqx
 from typing_extensions import TypedDict
 
 from jounce.mechanism import Mechanism
-from jounce.mechanism.driver_outputs import is_turning
-from jounce.mechanism.output_drivers import output_laws, with_output_drivers
+from jounce.mechanism.laws.driver_outputs import is_turning
+from jounce.mechanism.laws.output_drivers import output_laws, with_output_drivers
 from jounce.mechanism.resolve import resolve_motion
 from jounce.reporting.peaks import derivative_name
 from jounce.settings import under_own_settings

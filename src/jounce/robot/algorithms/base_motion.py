@@ -9,6 +9,7 @@ import numpy as np
 from jax.core import Tracer
 from jaxtyping import Float
 
+from jounce.base.shapes import Numbers
 from jounce.errors import RobotError
 from jounce.jet import Jet, cross
 from jounce.jet.algebra import stacked
@@ -17,7 +18,6 @@ from jounce.rigid.spatial import body_axes
 from jounce.robot.model.abstract_robot import AbstractRobot
 from jounce.robot.model.arguments import floats
 from jounce.robot.recursions.tree_equations import BaseBody
-from jounce.shapes import Numbers
 
 UNIT = 1e-6  # by which the length of a quaternion may differ from one: rounding of files; it is then divided by it
 TwistSeries = Float[Numbers, "levels 6 batch"]

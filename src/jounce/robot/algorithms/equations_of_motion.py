@@ -13,6 +13,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
+from jounce.base.shapes import ArrayLike, Numbers
 from jounce.errors import RobotError, check_choice, flag
 from jounce.jet import Jet, components, cross, dot
 from jounce.jet.algebra import stacked, total
@@ -24,7 +25,6 @@ from jounce.robot.recursions.drive_forces import armature_matrix, inertial_force
 from jounce.robot.recursions.kinematics import body_frames
 from jounce.robot.recursions.tree_scan import BodySeries, Series, joint_coordinates, to_coordinates
 from jounce.robot.robot import Robot
-from jounce.shapes import ArrayLike, Numbers
 
 PARTS = ("coriolis", "centrifugal", "gravity")
 ABREAST = 8  # coordinates by which the mass matrix is differentiated side by side

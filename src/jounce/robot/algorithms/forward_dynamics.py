@@ -9,6 +9,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
+from jounce.base.shapes import ArrayLike, Numbers, is_traced
 from jounce.errors import RobotError, SingularityError, check_name, flag
 from jounce.robot.algorithms.base_motion import BaseMotion, base_arrays, base_body
 from jounce.robot.algorithms.motion_series import MotionSeries, motion_series
@@ -20,7 +21,6 @@ from jounce.robot.recursions.batches import Batched
 from jounce.robot.recursions.kinematics import frame_at
 from jounce.robot.recursions.tree_equations import TreeEquations, Unknowns, free_base
 from jounce.robot.robot import Robot
-from jounce.shapes import ArrayLike, Numbers, is_traced
 
 MOST_UNROLLED = 5  # orders, each with code of its own
 WIDE = 32  # samples side by side where there are rates: their histories shall stay in the cache

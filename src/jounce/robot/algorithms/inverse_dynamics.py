@@ -7,6 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
+from jounce.base.shapes import ArrayLike, Numbers
 from jounce.errors import RobotError, check_choice, flag
 from jounce.jet import Jet, concatenate, cross, matvec
 from jounce.jet.algebra import stacked, total
@@ -20,7 +21,6 @@ from jounce.robot.recursions.kinematics import body_frames, frame_at
 from jounce.robot.recursions.newton_euler import BodyWrenches, inertial_wrench, recursive_newton_euler
 from jounce.robot.recursions.tree_scan import of_one_body, to_coordinates
 from jounce.robot.robot import Robot
-from jounce.shapes import ArrayLike, Numbers
 
 
 @stacked_arguments(2, "jn.inverse_dynamics(robot, np.stack([q, v, a])) for pin.rnea(model, data, q, v, a)")

@@ -6,6 +6,7 @@ from typing import Any
 import jax.numpy as jnp
 from jaxtyping import Float
 
+from jounce.base.shapes import ArrayLike, Numbers
 from jounce.errors import RobotError, whole_number
 from jounce.jet import Jet, concatenate, cross
 from jounce.jet.algebra import stacked
@@ -15,7 +16,6 @@ from jounce.robot.recursions.batches import Batched
 from jounce.robot.recursions.kinematics import body_frames, frame_at, link_frame
 from jounce.robot.recursions.tree_scan import Series
 from jounce.robot.robot import Robot
-from jounce.shapes import ArrayLike, Numbers
 
 
 def jacobian_jet(tree: Tree, q: Series, frame: Frame) -> Jet:

@@ -10,6 +10,7 @@ import numpy as np
 from jax.core import Tracer
 from jaxtyping import Bool, Float
 
+from jounce.base.shapes import ArrayLike, Numbers
 from jounce.errors import RobotError, SingularityError, check_choice
 from jounce.jet.algebra import stacked
 from jounce.linear_algebra.linear import singular_values
@@ -20,7 +21,6 @@ from jounce.robot.model.tree import Tree
 from jounce.robot.recursions.batches import Batched
 from jounce.robot.recursions.kinematics import frame_at
 from jounce.robot.robot import Robot
-from jounce.shapes import ArrayLike, Numbers
 
 TASKS = {"pose": (0, 1, 2, 3, 4, 5), "position": (0, 1, 2), "orientation": (3, 4, 5)}
 

@@ -8,9 +8,9 @@ import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 
+from jounce.base.modules import Module
 from jounce.errors import RobotError
 from jounce.jet.programs.composition import OfSample
-from jounce.modules import Module
 from jounce.robot.algorithms.wrenches import Wrench, check_wrenches
 from jounce.robot.model.arguments import floats
 from jounce.robot.model.tree import Frame

@@ -9,12 +9,12 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from jounce.base.shapes import ArrayLike, Refused, is_traced, seconds
 from jounce.errors import RobotError, check_choice, check_name
 from jounce.jet import Jet, compose
 from jounce.rigid.inertia import finite_numbers
 from jounce.robot.model.arguments import floats
 from jounce.robot.robot import Robot
-from jounce.shapes import ArrayLike, Refused, is_traced, seconds
 
 FRAMES = ("base", "link")
 

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from jounce.base.shapes import ArrayLike
 from jounce.errors import JounceError, RobotError, check_name, flag
 from jounce.forces import AbstractForce
 from jounce.jet import Jet
@@ -17,7 +18,6 @@ from jounce.rigid.inertia import finite_numbers
 from jounce.robot.closed_loops.closures import GivenCoordinates, Loops, given_coordinates
 from jounce.robot.closed_loops.mechanism_parts import RobotParts, on_body
 from jounce.robot.model.abstract_robot import AbstractRobot
-from jounce.shapes import ArrayLike
 from jounce.trajectory.joint_trajectory import JointTrajectory
 
 DRIVE, START = "_drive", "_start"

@@ -14,6 +14,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
+from jounce.base.shapes import ArrayLike, Numbers
 from jounce.constraints import AbstractConstraint, Scalar, Vector
 from jounce.constraints.base import Wrenches
 from jounce.errors import MechanismError, RobotError
@@ -27,7 +28,6 @@ from jounce.robot.model.tree import Frame, Tree, axes_with_z_along
 from jounce.robot.recursions.batches import Batched
 from jounce.robot.recursions.kinematics import body_frames, frame_at
 from jounce.robot.recursions.tree_scan import Series
-from jounce.shapes import ArrayLike, Numbers
 
 GivenCoordinates = Mapping[str, float] | ArrayLike | None
 """Coordinates in order, or by name of the joint; those not given are zero."""

@@ -7,6 +7,7 @@ from typing import Any
 import equinox as eqx
 import jax.numpy as jnp
 
+from jounce.base.shapes import Numbers
 from jounce.constraints import AbstractConstraint, Scalar, Vector
 from jounce.constraints.angles import relative_angle
 from jounce.constraints.planar import slide
@@ -15,7 +16,6 @@ from jounce.jet import Jet, wrap
 from jounce.jet.turns import WHOLE_TURN
 from jounce.mechanism import AbstractOutput
 from jounce.rigid import PlanarPose, SpatialPose
-from jounce.shapes import Numbers
 
 KINDS = ("turn-turn", "turn-slide", "slide-turn", "slide-slide")
 ROLES = "ijmn"

@@ -8,14 +8,14 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from jounce.display import Displayed
+from jounce.base.display import Displayed
+from jounce.base.shapes import ArrayLike, Real, is_traced
 from jounce.errors import RobotError, check_name, did_you_mean
 from jounce.rigid.inertia import Inertia, TracedInertia, finite_numbers
 from jounce.robot.model.couplings import BallDrive, Coupling, Tendon, check_coupling
 from jounce.robot.model.floating_base import floating_joints
 from jounce.robot.model.links_and_joints import Closure, Joint, Limits, Link, limits_with_followers
 from jounce.robot.model.tree import Tree, arrange, ordered, turn_about
-from jounce.shapes import ArrayLike, Real, is_traced
 
 Made = TypeVar("Made", bound="AbstractRobot")
 

@@ -8,9 +8,9 @@ import numpy as np
 from jaxtyping import Float
 
 from jounce import errors
+from jounce.base.shapes import Numbers, is_real, real_numbers
 from jounce.errors import RobotError
 from jounce.robot.model.abstract_robot import AbstractRobot
-from jounce.shapes import Numbers, is_real, real_numbers
 from jounce.trajectory.joint_trajectory import MAX_ORDER
 
 P = ParamSpec("P")

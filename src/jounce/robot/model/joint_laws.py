@@ -9,15 +9,15 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
+from jounce.base.modules import Module
+from jounce.base.shapes import ArrayLike, Numbers
 from jounce.errors import JounceError, RobotError, check_name
 from jounce.jet import Jet
 from jounce.jet.programs.composition import OfSample
-from jounce.modules import Module
 from jounce.robot.model.arguments import floats
-from jounce.shapes import ArrayLike, Numbers
 from jounce.trajectory.joint_trajectory import JointTrajectory
+from jounce.trajectory.laws.user_laws import read_laws
 from jounce.trajectory.motion import AbstractMotion
-from jounce.trajectory.user_laws import read_laws
 from jounce.units.expression import Expression
 
 RATE = "_d1"  # as columns of files name rates

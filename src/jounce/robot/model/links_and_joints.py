@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
+from jounce.base.shapes import ArrayLike, real_numbers
 from jounce.errors import RobotError, check_name
 from jounce.rigid.inertia import Inertia, finite_numbers, unchanging
-from jounce.shapes import ArrayLike, real_numbers
 
 MOVING = ("revolute", "continuous", "prismatic")
 TYPES = (*MOVING, "fixed")

@@ -10,14 +10,14 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Float
 
+from jounce.base.modules import Module
+from jounce.base.shapes import Numbers
 from jounce.jet import cross
 from jounce.jet.algebra import total
 from jounce.linear_algebra.linear import DenseFactor
-from jounce.modules import Module
 from jounce.robot.model.tree import Tree
 from jounce.robot.recursions.tree_scan import fill_slots, materialised, read_slot, write_slot
 from jounce.robot.recursions.tree_sums import BaseVector, BodyVectors
-from jounce.shapes import Numbers
 
 Joints = Float[Numbers, "body batch"]
 """One number for each moving body, or its joint."""

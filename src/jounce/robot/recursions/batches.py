@@ -13,12 +13,12 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from jounce.base.shapes import is_traced
 from jounce.execution.mapped import SIDE_BY_SIDE, Mapped
 from jounce.execution.threads import thread_count
 from jounce.jet.derivatives import plain_derivatives, taylor_coefficients
 from jounce.robot.model.abstract_robot import AbstractRobot
 from jounce.settings import check_process
-from jounce.shapes import is_traced
 
 LEAST_THREADED = 2**12  # samples of a thread: fewer are done before threads are started
 MOST_LINES = 40_000  # of machine code's text: it is compiled in four seconds, XLA's programs for all widths in as many

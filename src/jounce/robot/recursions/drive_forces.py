@@ -8,10 +8,10 @@ from typing import Any
 import jax.numpy as jnp
 from jaxtyping import Float
 
+from jounce.base.shapes import Numbers
 from jounce.jet import Jet, cos, sin
 from jounce.jet.algebra import stacked, total
 from jounce.robot.model.tree import Tree
-from jounce.shapes import Numbers
 
 
 def passive_forces(tree: Tree, q: Jet, rate: Jet, order: int) -> Jet:

@@ -9,6 +9,7 @@ import numpy as np
 from jax.core import Tracer
 from jaxtyping import Float
 
+from jounce.base.shapes import ArrayLike, Numbers
 from jounce.errors import RobotError, check_name
 from jounce.jet import Jet, sine_cosine
 from jounce.jet.algebra import stacked, total
@@ -27,7 +28,6 @@ from jounce.robot.recursions.tree_scan import (
     read_slot,
     write_slot,
 )
-from jounce.shapes import ArrayLike, Numbers
 
 
 def body_frames(tree: Tree, q: Series) -> Frames:

@@ -14,6 +14,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
+from jounce.base.shapes import Numbers
 from jounce.jet import Jet, components, concatenate, cross, matvec, next_sine_cosine
 from jounce.jet.algebra import bilinear, stacked, total
 from jounce.robot.model.tree import Tree
@@ -26,7 +27,6 @@ from jounce.robot.recursions.tree_scan import (
     read_slot,
     write_slot,
 )
-from jounce.shapes import Numbers
 
 BodyWrenches = Float[Numbers, "levels body 6 batch"]
 """Taylor coefficients of a force and a moment about the origin of each body, in its frame."""

@@ -12,10 +12,11 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Float
 
+from jounce.base.modules import Module
+from jounce.base.shapes import Numbers
 from jounce.jet import Jet, cross
 from jounce.jet.algebra import total
 from jounce.linear_algebra.linear import DenseFactor
-from jounce.modules import Module
 from jounce.rigid.spatial import body_axes, quaternion_spins
 from jounce.robot.model.tree import Frame, Tree
 from jounce.robot.recursions.articulated_bodies import ArticulatedBodies, RigidInertia
@@ -29,7 +30,6 @@ from jounce.robot.recursions.drive_forces import (
 from jounce.robot.recursions.newton_euler import Turn
 from jounce.robot.recursions.tree_scan import fill_slots, of_one_body, read_slot, to_coordinates, write_slot
 from jounce.robot.recursions.tree_sums import sums_at_parents, totals
-from jounce.shapes import Numbers
 
 Coordinates = Float[Numbers, "coordinate batch"]
 Wrenches = tuple[Float[Numbers, "6 batch"], ...]

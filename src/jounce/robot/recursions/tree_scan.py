@@ -7,8 +7,8 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Float
 
+from jounce.base.shapes import Numbers
 from jounce.robot.model.tree import Tree
-from jounce.shapes import Numbers
 
 Series = Float[Numbers, "order coordinate batch"]
 """Taylor coefficients of the coordinates of a robot, or of what belongs to them."""

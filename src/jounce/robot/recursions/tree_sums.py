@@ -6,9 +6,9 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Float
 
+from jounce.base.shapes import Numbers
 from jounce.robot.model.tree import Tree
 from jounce.robot.recursions.tree_scan import fill_slots, read_slot, write_slot
-from jounce.shapes import Numbers
 
 BodyVectors = Float[Numbers, "component body batch"]
 """One vector for each moving body."""

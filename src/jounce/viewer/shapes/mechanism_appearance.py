@@ -9,11 +9,11 @@ import numpy as np
 
 from jounce.kinematics import Motion
 from jounce.mechanism import Mechanism, PointOutput
-from jounce.mechanism.belts import belt_course, belt_outline
+from jounce.mechanism.building.belts import belt_course, belt_outline
 from jounce.mechanism.mechanism import GROUND
 from jounce.mechanism.resolve import resolve
-from jounce.plot.frames import frames, points_at
-from jounce.plot.geometry import Skeleton, skeleton
+from jounce.plot.drawings.frames import frames, points_at
+from jounce.plot.drawings.geometry import Skeleton, skeleton
 from jounce.viewer.shapes.appearance import (
     BODY_COLORS,
     DARK,

@@ -11,9 +11,9 @@ from trimesh import Trimesh
 
 from jounce.kinematics import Motion
 from jounce.mechanism.mechanism import GROUND
-from jounce.plot.curve_lines import shown
-from jounce.plot.frames import frames, points_at, within
-from jounce.plot.geometry import Point, Skeleton, Symbol, Wheel
+from jounce.plot.drawings.curve_lines import shown
+from jounce.plot.drawings.frames import frames, points_at, within
+from jounce.plot.drawings.geometry import Point, Skeleton, Symbol, Wheel
 from jounce.viewer.shapes.appearance import DARK, GRAY, Color
 from jounce.viewer.shapes.meshes import (
     box,

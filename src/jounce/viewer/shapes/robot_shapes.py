@@ -15,9 +15,9 @@ from jaxtyping import Float
 from trimesh import Trimesh
 
 from jounce.errors import RobotFileError
-from jounce.io.robots.mjcf import names_of_bodies
-from jounce.io.robots.mjcf_files import check_assets, included, quiet_mujoco
-from jounce.io.robots.xml_elements import Element, read_markup
+from jounce.io.robots.elements.xml_elements import Element, read_markup
+from jounce.io.robots.mjcf.files import check_assets, included, quiet_mujoco
+from jounce.io.robots.mjcf.reader import names_of_bodies
 from jounce.viewer.shapes.appearance import ColoredMesh
 from jounce.viewer.shapes.mesh_files import MeshFiles, Rgba
 from jounce.viewer.shapes.meshes import box, cylinder, sphere, transformed

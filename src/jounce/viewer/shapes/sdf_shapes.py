@@ -9,10 +9,10 @@ from shapely.geometry import Polygon
 from trimesh import Trimesh
 
 from jounce.errors import RobotFileError
-from jounce.io.robots.faults import Faults
-from jounce.io.robots.sdf_models import chosen_model, named
-from jounce.io.robots.sdf_poses import FramePose, Frames, number_of, pose_of, text_of
-from jounce.io.robots.xml_elements import Element
+from jounce.io.robots.elements.faults import Faults
+from jounce.io.robots.elements.xml_elements import Element
+from jounce.io.robots.sdf.models import chosen_model, named
+from jounce.io.robots.sdf.poses import FramePose, Frames, number_of, pose_of, text_of
 from jounce.viewer.shapes.appearance import ColoredMesh
 from jounce.viewer.shapes.mesh_files import MeshFiles, Rgba
 from jounce.viewer.shapes.meshes import box, cylinder, extruded, sphere, transformed

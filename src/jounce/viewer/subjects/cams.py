@@ -12,7 +12,7 @@ from trimesh import Trimesh
 from jounce.constraints.drivers import CoordinateDriver
 from jounce.constraints.planar import Prismatic, Revolute
 from jounce.kinematics import OscillatingFollower, PlateCam, solve
-from jounce.kinematics.cams.plate_cam import SIGNS
+from jounce.kinematics.cams.plate_cams import SIGNS
 from jounce.mechanism import AngleOutput, Body, Mechanism, PointOutput
 from jounce.mechanism.mechanism import GROUND
 from jounce.viewer.shapes.appearance import BODY_COLORS, Appearance, ColoredMesh

@@ -11,8 +11,8 @@ from jounce.dynamics import applied_force, joint_reaction
 from jounce.errors import JounceError
 from jounce.kinematics import Motion
 from jounce.mechanism import Mechanism
-from jounce.plot.frames import Frame, frames, points_at
-from jounce.plot.geometry import Symbol, skeleton
+from jounce.plot.drawings.frames import Frame, frames, points_at
+from jounce.plot.drawings.geometry import Symbol, skeleton
 from jounce.viewer.shapes.recording import Load, Vectors, spatial_vectors
 
 __all__ = ["has_loads", "mechanism_loads"]

@@ -16,7 +16,7 @@ from jounce.kinematics import Motion, Status, raise_for_status, solve
 from jounce.mechanism import AngularVelocityOutput, Mechanism, time_grid
 from jounce.mechanism.mechanism import GROUND
 from jounce.plot.labels import quantity_word
-from jounce.reporting.facts.mechanism_facts import parameter_facts
+from jounce.reporting.facts.mechanism.mechanism_facts import parameter_facts
 from jounce.trajectory import Expression
 from jounce.viewer.shapes.appearance import Appearance, Position
 from jounce.viewer.shapes.mechanism_appearance import mechanism_appearance

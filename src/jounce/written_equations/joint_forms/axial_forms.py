@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
+from jounce.base.modules import with_fields
 from jounce.constraints.facts import field_kinds, value_fields
 from jounce.jet import Jet
 from jounce.mechanism.system import Group, with_rows
-from jounce.modules import with_fields
 from jounce.written_equations.joint_forms.component_forms import component_jacobian
 from jounce.written_equations.joint_forms.latex_words import Words
 from jounce.written_equations.joint_forms.polynomials import Atom, Polynomial

@@ -11,7 +11,7 @@ from jounce.constraints.facts import value_fields
 from jounce.errors import MechanismError, check_name
 from jounce.kinematics import Motion
 from jounce.mechanism import Mechanism, Model
-from jounce.mechanism.builder import group_rows
+from jounce.mechanism.building.builder import group_rows
 from jounce.mechanism.system import Group
 from jounce.version import __version__
 from jounce.written_equations.joint_forms.axial_forms import PREMISE, axial_equations, is_axial

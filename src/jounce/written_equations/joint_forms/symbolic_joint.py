@@ -10,10 +10,10 @@ import numpy as np
 from jax.ad_checkpoint import checkpoint_name
 from jax.extend.core import JaxprEqn
 
+from jounce.base.modules import with_fields
 from jounce.constraints.facts import field_kinds, value_fields
 from jounce.jet import Jet
 from jounce.mechanism.system import Group, with_rows
-from jounce.modules import with_fields
 from jounce.rigid import PlanarPose, SpatialPose
 from jounce.rigid.spatial import quaternion_spins
 from jounce.trajectory import AbstractMotion

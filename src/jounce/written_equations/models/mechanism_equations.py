@@ -13,11 +13,11 @@ from jounce.kinematics.assembly.assemble import assemble
 from jounce.kinematics.curves.choice import chosen
 from jounce.linear_algebra.pattern import Pattern
 from jounce.mechanism import Mechanism, Model, build
-from jounce.mechanism.axis_angles import measures_angle
-from jounce.mechanism.builder import group_rows
-from jounce.mechanism.output_drivers import with_output_drivers
+from jounce.mechanism.building.builder import group_rows
+from jounce.mechanism.laws.output_drivers import with_output_drivers
 from jounce.mechanism.system import Group, System
 from jounce.mechanism.time import time_grid
+from jounce.mechanism.transmissions.axis_angles import measures_angle
 from jounce.written_equations.models.inputs import Inputs
 from jounce.written_equations.models.mechanism_forces import force_functions, output_function
 from jounce.written_equations.operations.functions import Code, Function

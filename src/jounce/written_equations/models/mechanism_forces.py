@@ -15,7 +15,7 @@ from jounce.dynamics.motion_values import pose_of
 from jounce.errors import MechanismError
 from jounce.jet import Jet
 from jounce.mechanism import Mechanism, Model
-from jounce.mechanism.outputs import AbstractMotionOutput
+from jounce.mechanism.outputs.base import AbstractMotionOutput
 from jounce.written_equations.models.inputs import Inputs
 from jounce.written_equations.operations.functions import Argument, Function
 from jounce.written_equations.operations.reading import Entries, GraphReader, NotWrittenError

@@ -18,8 +18,8 @@ from jounce.errors import MechanismError, check_name
 from jounce.jet import Jet
 from jounce.kinematics import Motion, solve
 from jounce.mechanism import Mechanism
-from jounce.mechanism.angle_laws import settle
-from jounce.mechanism.driver_outputs import is_turning
+from jounce.mechanism.laws.angle_laws import settle
+from jounce.mechanism.laws.driver_outputs import is_turning
 from jounce.mechanism.time import instants_of
 from jounce.planning.paths.path import Path
 from jounce.planning.retiming.quantities.path_quantities import Labels, PathQuantities, Quantity

@@ -20,7 +20,7 @@ from jounce.planning.retiming.quantities.robot_quantities import RobotQuantities
 from jounce.robot.model.links_and_joints import Limits
 from jounce.robot.robot import Robot
 from jounce.trajectory import JointTrajectory
-from jounce.trajectory.breaks import at_breaks, law_breaks, with_sides
+from jounce.trajectory.law_checks.breaks import at_breaks, law_breaks, with_sides
 
 EVEN = np.array([1.0, 0.0, 0.0, 0.0])  # z and its derivatives where the parameter is the time
 ZOOM, ZOOMS = 9, 8

@@ -8,10 +8,10 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
+from jounce.base.shapes import ArrayLike
 from jounce.errors import TrajectoryError
 from jounce.jet import Jet
 from jounce.jet.pieces import last_begun
-from jounce.shapes import ArrayLike
 from jounce.trajectory import AbstractMotion
 from jounce.trajectory.beyond import SLACK
 

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
-from jounce.shapes import ArrayLike
+from jounce.base.shapes import ArrayLike
 from jounce.trajectory import SplineMotion
 from jounce.trajectory.splines import local_powers
 

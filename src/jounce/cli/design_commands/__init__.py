@@ -1,0 +1,1 @@
+"""Commands for many designs: optimize, sweep, tolerance."""

@@ -1,0 +1,1 @@
+"""Commands that make files: new, example, convert, export."""

@@ -1,0 +1,1 @@
+"""Commands for mechanisms: run, simulate, trace, plot, modes, energies, equations."""

@@ -1,0 +1,163 @@
+"""The command for energies: kinetic and acceleration energies of robots and mechanisms, with their rates."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from jounce.cli.arguments import check_ending
+from jounce.cli.file_kinds import expecting
+from jounce.cli.options import MechanismReading, RobotReading, errors_about, spare_inputs, tell, written
+from jounce.errors import JounceError
+from jounce.io.files import DATA_FILES, ROBOT_FILES
+from jounce.reporting.terminal import say
+
+if TYPE_CHECKING:
+    import xarray
+
+MOST = 28  # of the order and the rates together: the highest derivative is 30
+
+
+def energies(
+    file: Path,
+    trajectory: Path | None = None,
+    /,
+    *,
+    order: int = 1,
+    rates: int = 2,
+    no_drives: bool = False,
+    set_: list[str] | None = None,
+    import_: list[Path] | None = None,
+    allow: list[Path] | None = None,
+    out: Path | None = None,
+    json: bool = False,
+    overwrite: bool = False,
+) -> int:
+    r"""Compute acceleration energies of any order, and their rates.
+
+    Order 0 is the kinetic energy, order 1 Gibbs' energy of accelerations.
+    Negrean 2025, equations 65-122.
+
+    Parameters
+    ----------
+    file
+        Robot file, .urdf, .xml or .sdf; or a mechanism file with masses.
+    trajectory
+        Motion of a robot: samples (.csv) or laws (.yaml, .toml, .json).
+    order
+        Order p of the energy: of the derivatives of order p + 1.
+    rates
+        Highest rate of the energies.
+    no_drives
+        Omit the rotors of a robot.
+    set_
+        NAME=VALUE of a parameter of a mechanism, with a unit; repeatable.
+    import_
+        Python file with your own joints and forces; repeatable.
+    allow
+        Another folder from which the file may read others; repeatable.
+    out
+        Write all values to this .csv or .nc (NetCDF) file.
+    json
+        Print extreme values as JSON instead, SI.
+    overwrite
+        Let --out replace a file that is read here.
+
+    Examples
+    --------
+      jounce energies examples/robots/panda.urdf \
+        examples/trajectories/panda_wave.yaml --order 2 --rates 1
+      jounce energies examples/double_pendulum.yaml --order 1 --out energies.csv
+    """
+    from jounce.io import check_writable, write
+    from jounce.reporting.facts.mechanism.mechanism_facts import grid_facts
+    from jounce.units.shown_units import derivative_unit
+
+    for name, value in (("--order", order), ("--rates", rates)):
+        if not 0 <= value <= MOST - (order if name == "--rates" else 0):
+            most = MOST - (order if name == "--rates" else 0)
+            raise JounceError(f"must be a whole number from 0 to {most}", name=name, value=value)
+    with expecting(file, "mechanism", "robot"):
+        check_ending(file, (*DATA_FILES, *ROBOT_FILES))
+    if out is not None:
+        check_writable(out, overwrite=overwrite)
+    if file.suffix.lower() in ROBOT_FILES:
+        dataset = _of_robot(RobotReading(allow=allow), file, trajectory, order, rates, drives=not no_drives)
+    elif trajectory is not None:
+        raise JounceError("is for robots; a mechanism file has its motion", name="trajectory", path=trajectory)
+    else:
+        reading = MechanismReading(set_=set_, import_=import_, allow=allow)
+        dataset = _of_mechanism(reading, file, order, rates)
+    spare_inputs(out, overwrite=overwrite)
+    if out is not None:
+        written(lambda: write(dataset, out, overwrite=overwrite))
+    if not json:
+        times = dataset["time"].values
+        what = "Kinetic energy" if order == 0 else f"Acceleration energy of order {order}"
+        say(f"{what}, t = {times[0]:g} to {times[-1]:g} s")
+        for k, values in enumerate(dataset["energy"].values.T):
+            unit = derivative_unit("J", 2 * order + k)
+            say(f"  {'energy' if k == 0 else f'rate {k}'}: from {values.min():.9g} to {values.max():.9g} {unit}")
+    facts = {"file": str(file), "trajectory": None if trajectory is None else str(trajectory)}
+    facts |= {"order": order, "rates": rates, "time": grid_facts(dataset["time"].values)}
+    tell("energies", lambda: {**facts, "peaks": _peaks(dataset, order), "written": out}, out, json=json)
+    return 0
+
+
+def _peaks(dataset: xarray.Dataset, order: int) -> list[dict[str, Any]]:
+    """Return the extreme values of the energies of all bodies together and of each, and of their rates."""
+    import numpy as np
+
+    from jounce.units.shown_units import derivative_unit
+
+    times, arrays = dataset["time"].values, []
+    for name, variable in dataset.data_vars.items():
+        body = None if name == "energy" else str(name).removeprefix("energy_of_")
+        for k, values in enumerate(variable.values.T):
+            row: dict[str, Any] = {"body": body, "rate": k, "unit": derivative_unit("J", 2 * order + k)}
+            for word, place in (("minimum", np.argmin(values)), ("maximum", np.argmax(values))):
+                row |= {word: float(values[place]), f"{word}_at": float(times[place])}
+            arrays.append(row)
+    return arrays
+
+
+def _of_robot(
+    reading: RobotReading, file: Path, trajectory: Path | None, order: int, rates: int, *, drives: bool
+) -> xarray.Dataset:
+    from jounce.dynamics.energy.energies import acceleration_energy
+    from jounce.dynamics.limits.trajectories import FollowedTrajectory
+
+    robot = reading.robot(file)
+    if trajectory is None:
+        raise JounceError("a robot needs a trajectory: name it after the robot", name="trajectory", path=file)
+    motion = reading.trajectory(trajectory, robot)
+    with errors_about(trajectory, file):
+        q = FollowedTrajectory(robot, motion).coordinates(motion.times, order + 1 + rates)
+        energy = acceleration_energy(robot, q, order=order, drives=drives)
+    return _dataset(motion.times, energy)
+
+
+def _of_mechanism(reading: MechanismReading, file: Path, order: int, rates: int) -> xarray.Dataset:
+    from jounce.cli.mechanism_commands.mechanisms import moved
+    from jounce.dynamics.energy.energies import acceleration_energy
+    from jounce.kinematics import raise_for_status
+
+    motion = moved(reading.mechanism(file), file, order + 1 + rates)
+    with errors_about(file):
+        raise_for_status(motion)
+        energy = acceleration_energy(motion, order=order)
+    return _dataset(motion.time, energy)
+
+
+def _dataset(times: Any, energy: Any) -> xarray.Dataset:
+    """Return the energy of all bodies, and that of each, with rates."""
+    import numpy as np
+    import xarray
+
+    from jounce.dynamics.energy.energies import energy_unit
+
+    parts = np.asarray(energy.translation) + np.asarray(energy.rotation)
+    arrays = {"energy": parts.sum(axis=-1)} | {f"energy_of_{n}": parts[..., k] for k, n in enumerate(energy.bodies)}
+    units = {"units": energy_unit(energy.order)}
+    variables = {name: (("time", "derivative"), values, units) for name, values in arrays.items()}
+    return xarray.Dataset(variables, {"time": times, "derivative": np.arange(parts.shape[-2])})

@@ -1,0 +1,281 @@
+"""The commands for mechanism files: solved and simulated; and their schema."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+from jounce.base.activity import Count
+from jounce.cli.options import (
+    NO_TABLE,
+    PLAIN,
+    PLAIN_MECHANISM,
+    Heading,
+    MechanismReading,
+    TableOutput,
+    errors_about,
+    spare_inputs,
+)
+from jounce.cli.robot_motion import RobotRun, simulate_robot_file
+from jounce.errors import JounceError
+from jounce.io.files import ROBOT_FILES
+from jounce.reporting.terminal import say, show_peaks
+
+if TYPE_CHECKING:
+    from jounce.integrate import AbstractMethod
+    from jounce.kinematics import ChunkedMotion, Motion
+    from jounce.mechanism import Mechanism
+
+PLAIN_RUN = RobotRun()
+
+
+def run(
+    file: Path,
+    /,
+    *,
+    order: int = 4,
+    tolerance: float = 1e-12,
+    no_refine: bool = False,
+    reading: MechanismReading = PLAIN_MECHANISM,
+    heading: Heading = PLAIN,
+    output: TableOutput = NO_TABLE,
+) -> int:
+    """Solve a mechanism file and print peak values, position to jounce.
+
+    Parameters
+    ----------
+    file
+        Mechanism file: .yaml, .yml, .toml or .json.
+    order
+        Highest derivative, 0 to 30; 3 is jerk, 4 jounce.
+    tolerance
+        Tolerance of positions, rad or sizes of the mechanism.
+    no_refine
+        Search peaks at the instants only, not between them.
+
+    Examples
+    --------
+      jounce run examples/four_bar.yaml
+      jounce run examples/rsur.yaml --order 8 --out motion.nc
+      jounce run examples/four_bar.yaml --set "BC=15 cm" --set tau=3
+      jounce run examples/four_bar.yaml --units angle=deg,length=mm
+    """
+    output.check()
+    units = heading.units
+    mechanism = reading.mechanism(file)
+    spare_inputs(output.out, overwrite=output.overwrite)
+    refine = not no_refine
+    if _is_long(mechanism, file):
+        motion = _streamed(mechanism, file, order, tolerance, output, refine=refine, heading=units)
+        return _write_result("run", motion, file, output, refine=refine)
+    motion = solved(mechanism, file, order, tolerance)
+    return _finished("run", motion, file, output, refine=refine, heading=units)
+
+
+def simulate(
+    file: Path,
+    /,
+    *,
+    order: int = 4,
+    method: str = "taylor",
+    tolerance: float = 1e-15,
+    step: float | None = None,
+    longest_step: float = math.inf,
+    no_refine: bool = False,
+    reading: MechanismReading = PLAIN_MECHANISM,
+    robot: RobotRun = PLAIN_RUN,
+    heading: Heading = PLAIN,
+    output: TableOutput = NO_TABLE,
+) -> int:
+    r"""Simulate a mechanism or robot that moves under forces.
+
+    Parameters
+    ----------
+    file
+        Mechanism file with masses, or robot file: .urdf, .xml or .sdf.
+    order
+        Highest derivative, 0 to 30; 3 is jerk, 4 jounce.
+    method
+        taylor, obreshkov-4, obreshkov-6 or obreshkov-8.
+    tolerance
+        Tolerance of the error per step, rad or mechanism sizes.
+    step
+        Fixed step length, s, instead of error control.
+    longest_step
+        Largest step, s; each step is checked at 32 points or more.
+    no_refine
+        Search peaks at the instants only, not between them.
+
+    Examples
+    --------
+      jounce simulate examples/andrews.yaml
+      jounce simulate examples/double_pendulum.yaml --order 2 --out pendulum.nc
+      jounce simulate examples/flyball_governor.yaml \
+        --method obreshkov-6 --tolerance 1e-9
+      jounce simulate examples/robots/scara.urdf --until "2 s" \
+        --start "elbow=30 deg" --torque "shoulder=5*sin(t)"
+    """
+    output.check()
+    if file.suffix.lower() in ROBOT_FILES:
+        _refuse_options(file, reading)
+        control: Any = {"method": method_of(method, step), "tolerance": tolerance, "longest_step": longest_step}
+        return simulate_robot_file(file, order, robot, reading.allow, output, **control)
+    for name in robot.given():
+        option = f"--{name.replace('_', '-')}"
+        raise JounceError("is for robot files; a mechanism file has its own time and forces", name=option, path=file)
+    units = heading.units
+    mechanism = reading.mechanism(file)
+    chosen = method_of(method, step)  # a file of --import may have registered it
+    spare_inputs(output.out, overwrite=output.overwrite)
+    motion = simulated(mechanism, file, order, method=chosen, tolerance=tolerance, longest_step=longest_step)
+    return _finished("simulate", motion, file, output, refine=not no_refine, heading=units)
+
+
+def _refuse_options(file: Path, reading: MechanismReading) -> None:
+    """Refuse options of mechanism files for a robot file."""
+    given = {"--set": reading.set_, "--import": reading.import_, "--units": reading.units}
+    given["--redundant-reactions"] = reading.redundant_reactions
+    for name, value in given.items():
+        if value:
+            raise JounceError("is for mechanism files; results for robots are in SI units", name=name, path=file)
+
+
+def _is_long(mechanism: Mechanism, file: Path) -> bool:
+    from jounce.kinematics import needs_chunks
+
+    with errors_about(file):
+        return needs_chunks(mechanism)
+
+
+def _streamed(
+    mechanism: Mechanism,
+    file: Path,
+    order: int,
+    tolerance: float,
+    output: TableOutput,
+    *,
+    refine: bool,
+    heading: bool | None,
+) -> ChunkedMotion:
+    """Solve chunk by chunk, and write each before the next is solved."""
+    from jounce.io import in_units
+    from jounce.kinematics import solve_in_chunks
+    from jounce.reporting.peaks import parts_with_peaks
+
+    with Count("solving") as bar:
+        with errors_about(file):
+            motion = solve_in_chunks(mechanism, order=order, tolerance=tolerance, progress=bar)
+        parts = (in_units(part.dataset, mechanism.shown_units) for part in parts_with_peaks(motion, refine=refine))
+        output.write_parts(parts, len(motion.time), header_units=heading)
+    return motion
+
+
+def _finished(
+    command: str,
+    motion: Motion,
+    file: Path,
+    output: TableOutput,
+    *,
+    refine: bool,
+    heading: bool | None,
+) -> int:
+    """Print and write the results of a motion, and return the exit status."""
+
+    def write() -> None:
+        from jounce.io import in_units
+
+        output.write(lambda: in_units(motion.dataset, motion.mechanism.shown_units), header_units=heading)
+
+    return _write_result(command, motion, file, output, refine=refine, write=write)
+
+
+def _write_result(
+    command: str,
+    motion: Motion | ChunkedMotion,
+    file: Path,
+    output: TableOutput,
+    *,
+    refine: bool,
+    write: Callable[[], None] = lambda: None,
+) -> int:
+    """Print what there is to tell of a motion, write it, and return the exit status."""
+    from jounce.reporting.facts.motion_facts import motion_facts
+    from jounce.reporting.json.results import motion_result
+    from jounce.reporting.peaks import peaks, shown_peaks
+    from jounce.reporting.text.summaries import motion_summary
+
+    if not output.json:
+        say(motion_summary(motion_facts(motion), file.name))
+        show_peaks(shown_peaks(peaks(motion, refine=refine), motion.mechanism.shown_units))
+    write()
+    output.tell(command, lambda: motion_result(motion, file, output.out, refine))
+    return outcome(motion, file)
+
+
+def method_of(name: str, step: float | None) -> AbstractMethod:
+    """Return the integration method of a name."""
+    from jounce.integrate import method_named
+
+    try:
+        return method_named(name, step)
+    except JounceError as error:
+        error.name = "--method" if error.name == "method" else "--step"
+        raise
+
+
+def schema(of: Literal["mechanism", "results"] = "mechanism", /) -> int:
+    """Print the JSON Schema of mechanism files, or of results.
+
+    Editors use it to complete and check files.
+
+    Parameters
+    ----------
+    of
+        mechanism: files; results: what the commands print with --json.
+
+    Examples
+    --------
+      jounce schema > mechanism.schema.json
+      jounce schema results
+    """
+    import json
+
+    if of == "results":
+        from jounce.reporting.json.result_schema import result_schema as schema_function
+    else:
+        from jounce.io import json_schema as schema_function
+
+    say(json.dumps(schema_function(), indent=1))
+    return 0
+
+
+def solved(mechanism: Mechanism, file: Path, order: int, tolerance: float = 1e-12) -> Motion:
+    """Solve at all instants of the file; those that fail are NaN."""
+    from jounce.kinematics import solve
+
+    with errors_about(file), Count("solving") as bar:
+        return solve(mechanism, order=order, tolerance=tolerance, strict=False, progress=bar)
+
+
+def simulated(mechanism: Mechanism, file: Path, order: int, **options: Any) -> Motion:
+    """Simulate to all instants of the file; those that are not reached are NaN."""
+    from jounce.integrate import simulate as integrate
+
+    with errors_about(file), Count("simulating") as bar:
+        return integrate(mechanism, order=order, strict=False, progress=bar, **options)
+
+
+def moved(mechanism: Mechanism, file: Path, order: int) -> Motion:
+    """Solve a mechanism that is driven; simulate one that has initial conditions."""
+    return simulated(mechanism, file, order) if mechanism.initial else solved(mechanism, file, order)
+
+
+def outcome(motion: Motion | ChunkedMotion, file: Path) -> int:
+    """Return 0, or raise for the first instant that failed."""
+    from jounce.kinematics import raise_for_status
+
+    with errors_about(file):
+        raise_for_status(motion)
+    return 0

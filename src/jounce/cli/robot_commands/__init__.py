@@ -1,0 +1,1 @@
+"""Commands for robots: check, torques, smooth, retime, feedforward, servo."""

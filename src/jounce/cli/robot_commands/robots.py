@@ -1,0 +1,195 @@
+"""The commands for robots: a trajectory compared with limits, and the torques that it needs."""
+
+from __future__ import annotations
+
+import warnings
+from pathlib import Path
+from typing import Any
+
+from jounce.cli.file_kinds import expecting
+from jounce.cli.options import (
+    NO_TABLE,
+    PLAIN_ROBOT,
+    RobotReading,
+    TableOutput,
+    errors_about,
+    spare_inputs,
+    tell,
+    written,
+)
+from jounce.errors import JounceError, SampleWarning
+from jounce.reporting.terminal import recorded_cautions, say, show_peaks, show_table
+
+MOST_RATES = 28  # of torques: the highest derivative of a law is 30
+
+
+def check(
+    robot: Path,
+    trajectory: Path,
+    /,
+    *,
+    limits: Path | None = None,
+    hand_over: bool = False,
+    out: Path | None = None,
+    deviation: str | None = None,
+    reading: RobotReading = PLAIN_ROBOT,
+    overwrite: bool = False,
+    json: bool = False,
+) -> int:
+    r"""Compare a trajectory with the limits of a robot, to torque rate.
+
+    The exit status is 0 if all limits are kept, and 1 if one is broken,
+    also by a jump from rest at the start or to rest at the stop.
+
+    Parameters
+    ----------
+    robot
+        Robot file: URDF (.urdf), MJCF (.xml) or SDF (.sdf).
+    trajectory
+        Samples (.csv), laws or a motion (.yaml, .toml, .json).
+    limits
+        File of limits, which override those of the robot file.
+    hand_over
+        The robot moves before the start and after the stop.
+    out
+        Draw each quantity as a share of its limit: .png, .svg or .pdf.
+    deviation
+        Smooth the samples first, within this deviation: 0.01deg.
+    overwrite
+        Let --out replace a file that is read here.
+    json
+        Print the result as JSON.
+
+    Examples
+    --------
+      jounce check examples/robots/panda.urdf examples/trajectories/panda_good.csv
+      jounce check examples/robots/panda.urdf \
+        examples/trajectories/panda_pick.yaml --out pick.png \
+        --limits examples/limits/franka_panda.yaml
+      jounce check examples/robots/panda.urdf \
+        examples/trajectories/panda_wave.yaml --payload "panda_hand=3 kg"
+    """
+    from jounce.io import load_motion_limits
+    from jounce.planning.retiming.quantities.limits import limits_of
+    from jounce.planning.retiming.quantities.motion_limits_check import check_motion
+    from jounce.reporting.json.results import limits_result
+    from jounce.reporting.text.summaries import limits_summary, verdict
+    from jounce.reporting.text.tables import limits_table
+
+    if out is not None:
+        from jounce.plot import check_figure
+
+        check_figure(out, overwrite=overwrite)
+    model = reading.robot(robot)
+    bounds = limits_of(model, None)
+    if limits is not None:
+        with expecting(limits, "limits"):
+            bounds = load_motion_limits(limits, model)
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always", SampleWarning)
+        motion = _smoothed(reading.trajectory(trajectory, model), deviation, trajectory)
+        with errors_about(trajectory, robot):
+            spare_inputs(out, overwrite=overwrite)
+            report = check_motion(model, motion, bounds, hand_over=hand_over)
+    if report.worst is None:
+        raise JounceError("there are no limits to compare with; give a file of limits with --limits", path=robot)
+    if not json:
+        say(limits_summary(report, motion, robot, trajectory))
+        show_table(limits_table(report), "bold red")
+    recorded_cautions(caught, json=json)
+    if not json:
+        say(f"\n{verdict(report)}")
+    if out is not None:
+        from jounce.plot import draw_limits, save
+
+        written(lambda: save(draw_limits(report, f"{report.robot}: {trajectory.name}"), out, overwrite=overwrite))
+    tell("check", lambda: limits_result(report, robot, trajectory, out, motion), out, json=json)
+    return 0 if report.kept else 1
+
+
+def torques(
+    robot: Path,
+    trajectory: Path,
+    /,
+    *,
+    rates: int = 2,
+    no_drives: bool = False,
+    deviation: str | None = None,
+    reading: RobotReading = PLAIN_ROBOT,
+    output: TableOutput = NO_TABLE,
+) -> int:
+    r"""Compute the joint torques of a trajectory, and their rates.
+
+    The command prints the peaks at the instants of the trajectory and
+    on both sides of jumps and kinks of its laws.
+
+    Parameters
+    ----------
+    robot
+        Robot file: URDF (.urdf), MJCF (.xml) or SDF (.sdf).
+    trajectory
+        Samples (.csv), laws or a motion (.yaml, .toml, .json).
+    rates
+        Highest rate of the torques, 0 to 28.
+    no_drives
+        Omit armature, damping and friction.
+    deviation
+        Smooth the samples first, within this deviation: 0.01deg.
+
+    Examples
+    --------
+      jounce torques examples/robots/panda.urdf \
+        examples/trajectories/panda_good.csv --rates 2 --out tau.csv
+      jounce torques examples/robots/panda.urdf \
+        examples/trajectories/panda_wave.yaml --payload "panda_hand=3 kg"
+    """
+    from jounce.dynamics.limits.motion_ends import trajectory_ends
+    from jounce.dynamics.limits.trajectories import trajectory_torques
+    from jounce.reporting.json.results import torques_result
+    from jounce.reporting.peaks import table_peaks
+    from jounce.reporting.text.summaries import torques_summary
+
+    if not 0 <= rates <= MOST_RATES:
+        raise JounceError(f"must be a whole number from 0 to {MOST_RATES}", name="--rates", value=rates)
+    output.check()
+    model = reading.robot(robot)
+    motion = _smoothed(reading.trajectory(trajectory, model), deviation, trajectory)
+    spare_inputs(output.out, overwrite=output.overwrite)
+    with errors_about(trajectory, robot):
+        dataset = trajectory_torques(model, motion, rates, drives=not no_drives)
+        ends = trajectory_ends(model, motion)
+        one_sided = _torques_at_breaks(model, motion, rates, drives=not no_drives)
+    largest = table_peaks(dataset, one_sided)
+    if not output.json:
+        say(torques_summary(dataset, motion, ends, robot, trajectory))
+        show_peaks(largest)
+    output.write(lambda: dataset)
+    output.tell("torques", lambda: torques_result(dataset, largest, motion, ends, (robot, trajectory), output.out))
+    return 0
+
+
+def _torques_at_breaks(robot: Any, motion: Any, rates: int, *, drives: bool) -> Any:
+    """Return the torques on both sides of where laws jump or bend, at the instants of these; None without any."""
+    from jounce.dynamics.limits.trajectories import trajectory_torques
+    from jounce.trajectory.law_checks.breaks import both_sides, law_breaks
+
+    first, last = float(motion.times[0]), float(motion.times[-1])
+    breaks = law_breaks(motion.laws.values(), first, last, rates + 2)
+    sides, which = both_sides(breaks, first, last)
+    if not len(sides):
+        return None
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", SampleWarning)  # the message covers all instants
+        torques_there = trajectory_torques(robot, motion, rates, times=sides, drives=drives)
+    return torques_there.assign_coords(time=breaks[which])
+
+
+def _smoothed(motion: Any, deviation: str | None, file: Path) -> Any:
+    """Return a motion within a deviation of the samples of another, where one is given."""
+    if deviation is None:
+        return motion
+    from jounce.cli.robot_commands.retiming import deviation_of
+    from jounce.planning import smooth
+
+    with errors_about(file):
+        return smooth(motion, deviation_of(deviation))

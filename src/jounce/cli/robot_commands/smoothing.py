@@ -1,0 +1,103 @@
+"""The command that makes a smooth motion within a deviation of noisy samples."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from jounce.cli.options import NO_TABLE, PLAIN_ROBOT, RobotReading, TableOutput, errors_about, spare_inputs, written
+from jounce.cli.robot_commands.retiming import ROWS, deviation_of
+from jounce.cli.robot_commands.servo import frequency_of
+from jounce.errors import SampleWarning
+from jounce.reporting.terminal import say, show_table
+
+BLOCK = 50_000  # rows at once
+
+
+def smooth(
+    robot: Path,
+    trajectory: Path,
+    /,
+    *,
+    deviation: str,
+    rate: str = "1kHz",
+    figure: Path | None = None,
+    reading: RobotReading = PLAIN_ROBOT,
+    output: TableOutput = NO_TABLE,
+) -> int:
+    r"""Fit a smooth motion to noisy samples within a deviation.
+
+    Its derivatives to the sixth are continuous, it stands still where the
+    samples do, and its jerk is that of the motion, not of the noise. With
+    --out, positions to jerk are written. Needs Clarabel: pip install
+    'jounce[planning]'.
+
+    Parameters
+    ----------
+    robot
+        Robot file: URDF (.urdf), MJCF (.xml) or SDF (.sdf).
+    trajectory
+        A log: samples (.csv), joint states (.yaml), a bag.
+    deviation
+        From each sample, as 0.01deg, 1mm; a plain number is in rad or m.
+    rate
+        Of the rows, as 1kHz, 500Hz; a plain number is in Hz.
+    figure
+        Draw distances from the samples, and jerk: .png, .svg or .pdf.
+
+    Examples
+    --------
+      jounce smooth examples/robots/panda.urdf \
+        examples/trajectories/panda_good.csv --deviation 0.001deg \
+        --out smooth.csv --figure smooth.png
+    """
+    from jounce.mechanism import TimeGrid, time_grid
+    from jounce.planning import smooth as find
+    from jounce.reporting.smoothing_facts import smoothing_result, smoothing_table, smoothing_words
+
+    output.check()
+    if figure is not None:
+        from jounce.plot import check_figure
+
+        check_figure(figure, overwrite=output.overwrite)
+    frequency, allowed = frequency_of(rate), deviation_of(deviation)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", SampleWarning)
+        given = reading.trajectory(trajectory, reading.robot(robot), samples=True)
+        for file in (output.out, figure):
+            spare_inputs(file, overwrite=output.overwrite)
+        with errors_about(trajectory, robot):
+            motion = find(given, allowed)
+    times = time_grid(TimeGrid(motion.start, motion.stop, 1 / frequency), {})
+    if not output.json:
+        rows = "" if output.out is None else f"{len(times)} rows "
+        say(f"{rows}from {motion.start:g} s to {motion.stop:g} s, within {allowed:.3g} rad or m of each sample")
+        show_table(smoothing_table(motion))
+        if words := smoothing_words(motion):
+            say(words)
+    if output.out is not None:
+        output.write_parts(_parts(motion, times), len(times))
+    if figure is not None:
+        from jounce.plot import save
+        from jounce.plot.charts.smoothing import draw_smoothing
+
+        drawn = draw_smoothing(given, motion, f"{trajectory.name} within {allowed:.3g} rad or m")
+        written(lambda: save(drawn, figure, overwrite=output.overwrite))
+    files = (output.out, figure)
+    output.tell("smooth", lambda: smoothing_result(motion, (robot, trajectory), len(times), files))
+    return 0
+
+
+def _parts(motion: Any, times: Any) -> Iterator[Any]:
+    """Yield positions of the joints, and their derivatives to jerk, some instants at a time."""
+    import xarray
+
+    from jounce.units.shown_units import time_axes
+
+    for first in range(0, len(times), BLOCK):
+        some = times[first : first + BLOCK]
+        values = motion.derivatives(some, ROWS)
+        variables = {name: (("time", "derivative"), values[:, :, k]) for k, name in enumerate(motion.names)}
+        yield xarray.Dataset(variables, coords=time_axes(some, ROWS + 1), attrs={"source": "jounce"})

@@ -1,0 +1,1 @@
+"""Objectives and constraints of a design: expressions of outputs, measures, dimensions."""

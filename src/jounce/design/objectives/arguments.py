@@ -1,0 +1,76 @@
+"""What measures are told besides their quantity: derivatives, instants and windows of time."""
+
+from collections.abc import Mapping, Sequence
+
+from jounce.design.objectives.language import EXERTED, MEASURES, Node, operated
+from jounce.errors import ExpressionError
+from jounce.kinematics.position_analysis.solve import HIGHEST_ORDER
+
+MAX_DERIVATIVE = HIGHEST_ORDER - 2  # that goals may ask for: its rate and how that bends are needed, too
+
+
+class Arguments:
+    """Reads the arguments of measures, which are the same in all designs.
+
+    Parameters
+    ----------
+    fixed : dict of str to float
+        Parameters that do not vary.
+    interval : tuple of float
+        First and last instant of the motion, s.
+
+    Attributes
+    ----------
+    asked : list of float
+        Instants that were asked for, s.
+    """
+
+    def __init__(self, fixed: Mapping[str, float], interval: tuple[float, float]):
+        self.fixed, self.interval = fixed, interval
+        self.asked: list[float] = []
+
+    def constant(self, node: Node) -> float | None:
+        """Return the value of a number that is the same in all designs, None for one that may not be."""
+        if node.kind == "number":
+            return float(node.word)
+        if node.kind == "name":
+            return self.fixed.get(node.word)
+        if node.word in MEASURES or node.word in EXERTED:
+            return None
+        parts = [self.constant(part) for part in node.parts]
+        return None if None in parts else float(operated(node.word, parts))
+
+    def argument(self, node: Node, what: str) -> float:
+        """Return a number that must be the same in all designs."""
+        value = self.constant(node)
+        if value is None:
+            message = f"{what} '{node.text}' must be a number that is the same in all designs"
+            raise ExpressionError(message)
+        return value
+
+    def derivative(self, node: Node) -> int:
+        """Return the order of a derivative."""
+        order = self.argument(node, "the derivative")
+        if order != int(order) or not 0 <= order <= MAX_DERIVATIVE:
+            message = f"the derivative must be a whole number from 0 to {MAX_DERIVATIVE}, got {order:g}"
+            raise ExpressionError(message)
+        return int(order)
+
+    def instant(self, node: Node) -> float:
+        """Return an instant of the motion, s, and remember that it is asked for."""
+        instant = self.argument(node, "the instant")
+        first, last = self.interval
+        if not first <= instant <= last:
+            message = f"the instant {instant:g} s is not within the motion, which is from {first:g} to {last:g} s"
+            raise ExpressionError(message)
+        self.asked.append(instant)
+        return instant
+
+    def window(self, rest: Sequence[Node]) -> tuple[float | None, float | None]:
+        """Return from when to when a measure counts, which two arguments after the derivative tell."""
+        if len(rest) < 3:
+            return None, None
+        start, stop = self.instant(rest[1]), self.instant(rest[2])
+        if not start < stop:
+            raise ExpressionError(f"the window must end after it begins, got {start:g} to {stop:g} s")
+        return start, stop

@@ -1,0 +1,224 @@
+"""What makes one number of a quantity that changes in time: its largest value, its mean, its distance from points.
+
+A motion is known as a Taylor series about each instant of a grid, so that it is known between instants too: every
+instant has a cell, up to halfway to its neighbors, in which its series stands for the quantity. The largest value in a
+cell is a smooth function of a design, by the envelope theorem: its slope is that of the value, at the instant held.
+"""
+
+import dataclasses
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from jounce.base.shapes import Numbers
+from jounce.jet import Jet
+from jounce.trajectory.law_checks.breaks import with_sides
+
+SAMPLES = 9  # of a cell, in which its largest value is looked for
+ROUNDS = 6  # of Newton's method from the best of them
+
+NO_KNOTS = np.zeros(0)
+NEAR = 1e-9  # of a span of time: instants so near to each other are one
+
+Series = Float[Numbers, "order *cell"]
+"""Taylor coefficients about the instants of a grid."""
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Cells:
+    """Which stretch of time the series about each instant stands for.
+
+    Parameters
+    ----------
+    instants : array of shape (time,)
+        s.
+    index : array of int of shape (cells,)
+        Of those instants that have a part of the window.
+    low, high : array of shape (cells,)
+        Its ends, as seen from the instant, s.
+    """
+
+    instants: Float[np.ndarray, " time"]
+    index: Int[np.ndarray, " cell"]
+    low: Float[np.ndarray, " cell"]
+    high: Float[np.ndarray, " cell"]
+
+    @classmethod
+    def of(
+        cls,
+        instants: Float[np.ndarray, " time"],
+        start: float | None = None,
+        stop: float | None = None,
+    ) -> "Cells":
+        """Return the cells of a grid within a window, all of it unless given.
+
+        Those of the two instants on both sides of a knot of a motion law meet at the knot.
+        """
+        middles, pairs = (instants[1:] + instants[:-1]) / 2, np.diff(instants) < NEAR * (instants[-1] - instants[0])
+        if pairs.any():  # a knot at an end is that end
+            middles[0] = instants[0] if pairs[0] else middles[0]
+            middles[-1] = instants[-1] if pairs[-1] else middles[-1]
+        first, last = instants[0] if start is None else start, instants[-1] if stop is None else stop
+        low = np.maximum(np.concatenate([instants[:1], middles]), first)
+        high = np.minimum(np.concatenate([middles, instants[-1:]]), last)
+        (index,) = np.nonzero((high - low > NEAR * (instants[-1] - instants[0])) | ((high == low) & (first == last)))
+        if not index.size:  # a window of one instant, at which two cells meet
+            index = np.array([int(np.argmin(np.abs(instants - first)))])
+            low[index] = high[index] = first
+        return cls(instants, index, low[index] - instants[index], high[index] - instants[index])
+
+    def at(self, time: float) -> tuple[int, float]:
+        """Return the nearest instant, and how far a time is from it, s."""
+        nearest = int(np.argmin(np.abs(self.instants - time)))
+        duration = float(self.instants[-1] - self.instants[0])
+        if (
+            np.diff(self.instants[nearest : nearest + 2]).min(initial=np.inf) < NEAR * duration
+        ):  # from the right, at a knot
+            nearest += 1
+        return nearest, float(time - self.instants[nearest])
+
+
+def derivative(jet: Jet, order: int) -> Series:
+    """Return the Taylor coefficients of a derivative of a quantity, the order first."""
+    coefficients = jnp.stack(jet.dense().coefficients)
+    count = len(coefficients) - order
+    scale = np.array([math.factorial(k + order) / math.factorial(k) for k in range(count)])
+    return coefficients[order:] * scale[:, None]
+
+
+def value(series: Series, shift: Any) -> Any:
+    """Return the values of series at times seen from their instants."""
+    result = jnp.zeros_like(series[-1] * shift)
+    for coefficient in series[::-1]:
+        result = result * shift + coefficient
+    return result
+
+
+def slope_of(series: Series) -> Float[Numbers, "lower *cell"]:
+    """Return the series of the rate."""
+    if len(series) == 1:
+        return jnp.zeros_like(series)
+    return series[1:] * np.arange(1.0, len(series))[:, None]
+
+
+def top(series: Float[Numbers, "order cell"], cells: Cells) -> Float[Numbers, " cell"]:
+    """Return when, seen from its instant, each series is largest in its cell; nothing is differentiated."""
+    series = jax.lax.stop_gradient(series)
+    share = np.linspace(0.0, 1.0, SAMPLES)[:, None]
+    width = cells.high - cells.low
+    positions = cells.low[None] + share * width[None]
+    best = jnp.argmax(value(series[:, None], jnp.asarray(positions)), axis=0)
+    spacing = width / (SAMPLES - 1)
+    start = jnp.asarray(cells.low) + best.astype(float) * spacing
+    low, high = jnp.maximum(start - spacing, cells.low), jnp.minimum(start + spacing, cells.high)
+    rate, bend = slope_of(series), slope_of(slope_of(series))
+    shift = start
+    for _ in range(ROUNDS):
+        curvature = value(bend, shift)
+        step = value(rate, shift) / jnp.where(curvature < 0, curvature, -jnp.inf)
+        shift = jnp.clip(shift - step, low, high)
+    return jnp.where(value(series, shift) >= value(series, start), shift, start)
+
+
+def largest(series: Float[Numbers, "order time"], cells: Cells) -> Float[Numbers, " cell"]:
+    """Return the largest value of each series in its cell."""
+    inside = series[:, cells.index]
+    return value(inside, top(inside, cells))
+
+
+def integral(series: Series, cells: Cells) -> Any:
+    """Return the integral over all cells."""
+    inside = series[:, cells.index]
+    powers = np.arange(1.0, len(series) + 1)[:, None]
+    weights = (cells.high[None] ** powers - cells.low[None] ** powers) / powers
+    return jnp.sum(inside * weights)
+
+
+def square(series: Series) -> Series:
+    """Return the series of the square, to the same order."""
+    orders = range(len(series))
+    return jnp.stack(
+        [sum((series[j] * series[k - j] for j in range(k + 1)), jnp.zeros_like(series[0])) for k in orders]
+    )
+
+
+def safe_root(square: Any) -> Any:
+    """Return a square root whose slope is zero, not infinite, where it is zero."""
+    positive = square > 0
+    return jnp.where(positive, jnp.sqrt(jnp.where(positive, square, 1.0)), 0.0)
+
+
+def gaps(
+    series: Float[Numbers, "order component time"],
+    points: Float[np.ndarray, "point component"],
+    times: Float[np.ndarray, " point"] | None,
+    cells: Cells,
+) -> Float[Numbers, "component point"]:
+    """Return how far points are from where a point of the motion is at their times, or comes nearest."""
+    if times is not None:
+        positions = [cells.at(float(time)) for time in times]
+        index, shift = np.array([k for k, _ in positions]), np.array([h for _, h in positions])
+        there = value(series[:, :, index], jnp.asarray(shift)[None])
+        return there - points.T
+    fixed = jax.lax.stop_gradient(series)
+
+    def nearest(point: Any) -> tuple[Any, Any]:
+        gap = jnp.concatenate([fixed[:1] - point[None, :, None], fixed[1:]])
+        squared_distance = sum((square(gap[:, k]) for k in range(1, gap.shape[1])), square(gap[:, 0]))
+        shift = top(-squared_distance[:, cells.index], cells)
+        least = value(squared_distance[:, cells.index], shift)
+        nearest_index = jnp.argmin(least)
+        return jnp.asarray(cells.index)[nearest_index], shift[nearest_index]
+
+    index, shift = jax.vmap(nearest)(jnp.asarray(points))
+    there = value(series[:, :, index], shift[None])
+    return there - points.T
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class PrescribedPath:
+    """Points that a point of a mechanism is to pass, in an order or at times.
+
+    Parameters
+    ----------
+    points : array of shape (points, components)
+        m.
+    times : array of shape (points,), optional
+        When it is to be there, s; at any time unless given.
+    """
+
+    points: Float[np.ndarray, "point component"]
+    times: Float[np.ndarray, " point"] | None = None
+
+
+def environment(
+    instants: Float[np.ndarray, " time"], parameters: Mapping[str, Any], series: Mapping[str, Any], order: int
+) -> dict[str, Any]:
+    """Return what names mean: time, to an order, and quantities are jets along the grid, parameters are numbers."""
+    return {**parameters, "t": Jet.variable(instants, order), **{name: Jet(tuple(x)) for name, x in series.items()}}
+
+
+def at_instants(
+    values: Sequence[float], instants: Float[np.ndarray, " given"], knots: Float[np.ndarray, " knots"] = NO_KNOTS
+) -> Float[np.ndarray, " time"]:
+    """Return a grid that has the instants at which something is asked, and those on both sides of the knots of laws."""
+    merged = np.unique(np.concatenate([instants, np.asarray(values, float)]))
+    gaps = np.diff(merged)
+    close = np.concatenate([[False], gaps < NEAR * (merged[-1] - merged[0] or 1.0)])
+    merged = merged[~close]
+    distinct = ~_near(merged, knots, merged)
+    distinct[[0, -1]] = True
+    return with_sides(merged[distinct], knots)
+
+
+def _near(
+    some: Float[np.ndarray, " some"], others: Float[np.ndarray, " others"], grid: Float[np.ndarray, " time"]
+) -> Bool[np.ndarray, " some"]:
+    """Tell which instants are one with one of some others."""
+    distances = np.abs(some[:, None] - others).min(axis=1, initial=np.inf)
+    return distances < NEAR * (grid[-1] - grid[0] or 1.0)

@@ -1,0 +1,1 @@
+"""The search for the design in which an objective is least."""

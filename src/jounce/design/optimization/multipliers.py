@@ -1,0 +1,107 @@
+"""Multipliers of what holds as an equality at a design, and how far it is from one that no other is better than."""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from jounce.design.optimization.problem import Evaluation
+
+ACTIVE = 1e-6  # distance from a bound, relative
+
+Vector = Float[np.ndarray, " _"]
+
+
+class Known(NamedTuple):
+    """What multipliers are asked of.
+
+    Attributes
+    ----------
+    bounded : array of int
+        Extremes that have a number of their own.
+    equal : array of bool of shape (conditions,)
+        Which conditions are equalities.
+    sizes : array of shape (conditions,)
+    extreme_sizes : array of shape (extremes,)
+    owner : array of int of shape (rows,)
+        Of which extreme each row is.
+    clearance : float
+        Bound of the smallest singular value.
+    scale : float
+        Size of the objective.
+    """
+
+    bounded: Int[np.ndarray, " bounded"]
+    equal: Bool[np.ndarray, " condition"]
+    sizes: Vector
+    extreme_sizes: Vector
+    owner: Int[np.ndarray, " row"]
+    clearance: float
+    scale: float
+
+
+class Multipliers:
+    """Multipliers of what holds as an equality at a design, by least squares with the signs that they must have."""
+
+    def __init__(
+        self, known: Known, here: Evaluation, numbers: Vector, slopes: list[Any], extremes: Vector, chosen: Any
+    ):
+        self.known, self.here, self.numbers, self.extremes = known, here, numbers, extremes
+        by_parameter, by_extreme, by_smooth = slopes
+        self.by_extreme, self.chosen = by_extreme, chosen
+        self.fixed = by_parameter + by_smooth @ here.smooth_slopes
+        free = np.setdiff1d(np.arange(len(extremes)), known.bounded)
+        self.fixed = self.fixed + by_extreme[:, free] @ here.row_slopes[chosen[free]]
+
+    def solved(self) -> tuple[float, Vector, Vector, float]:
+        """Return the residual, and the multipliers of conditions, of bounds and of the smallest singular value."""
+        from scipy.optimize import nnls  # here, to start quickly
+
+        count, extra = len(self.here.point), len(self.known.bounded)
+        target = -np.concatenate([self.fixed[0], self.by_extreme[0, self.known.bounded]])
+        parts = [*self._conditions(), *self._rows(extra), *self._bounds(count + extra), *self._singular(extra)]
+        columns = np.stack([slope for slope, _, _ in parts], axis=1) if parts else np.zeros((len(target), 0))
+        norms = np.linalg.norm(columns, axis=0)
+        norms[norms == 0] = 1.0
+        weights = nnls(columns / norms, target)[0] / norms if parts else np.zeros(0)
+        multipliers = {"condition": np.zeros(len(self.known.equal)), "bound": np.zeros(count), "singular": np.zeros(1)}
+        for (_, kind, signed_index), weight in zip(parts, weights, strict=True):
+            if kind:
+                sign = -1.0 if signed_index < 0 else 1.0
+                multipliers[kind][abs(signed_index) - 1] += sign * weight
+        size = max(float(np.linalg.norm(target)), self.known.scale)
+        residual = float(np.linalg.norm(columns @ weights - target)) / size
+        return residual, multipliers["condition"], multipliers["bound"], float(multipliers["singular"][0])
+
+    def _conditions(self) -> list[tuple[Vector, str, int]]:
+        """Return the slopes of active conditions, both signs of those that are equalities."""
+        rows, known = [], self.known
+        for k, number in enumerate(self.numbers[1:]):
+            slope = np.concatenate([self.fixed[k + 1], self.by_extreme[k + 1, known.bounded]])
+            if known.equal[k] or number > -ACTIVE * known.sizes[k]:
+                rows.append((slope, "condition", k + 1))
+            if known.equal[k]:
+                rows.append((-slope, "condition", -k - 1))
+        return rows
+
+    def _rows(self, extra: int) -> list[tuple[Vector, str, int]]:
+        """Return the slopes of the values that are the largest, less those of the numbers in their places."""
+        known, here = self.known, self.here
+        rows = []
+        for k, extreme in enumerate(known.bounded):
+            close = known.owner == extreme
+            close &= here.rows > self.extremes[extreme] - ACTIVE * known.extreme_sizes[extreme]
+            rows += [(np.concatenate([row, -np.eye(extra)[k]]), "", 1) for row in here.row_slopes[close]]
+        return rows
+
+    def _bounds(self, size: int) -> list[tuple[Vector, str, int]]:
+        """Return the slopes of the bounds that are reached."""
+        point = self.here.point
+        lower = [(-np.eye(size)[k], "bound", int(k) + 1) for k in np.flatnonzero(point <= ACTIVE)]
+        return lower + [(np.eye(size)[k], "bound", -int(k) - 1) for k in np.flatnonzero(point >= 1.0 - ACTIVE)]
+
+    def _singular(self, extra: int) -> list[tuple[Vector, str, int]]:
+        """Return the slopes of the smallest singular values that are at their bound."""
+        bound = self.known.clearance**2 * (1 + 1e-4)
+        rows = self.here.margin_slopes[self.here.margins < bound]
+        return [(np.concatenate([-slope, np.zeros(extra)]), "singular", 1) for slope in rows]

@@ -1,0 +1,219 @@
+"""From a mechanism and a wish to the design that fulfills it best."""
+
+import dataclasses
+import math
+import numbers
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float
+
+from jounce.base.activity import Count
+from jounce.base.moved_names import old_keyword
+from jounce.base.shapes import ArrayLike, real_numbers, seconds
+from jounce.design.objectives.measures import PrescribedPath
+from jounce.design.optimization.result import OptimizedDesign
+from jounce.design.optimization.study import Asked, Study
+from jounce.errors import DesignError, JounceError, MechanismError, check_name, whole_number
+from jounce.kinematics import assemblies as all_assemblies
+from jounce.mechanism import Mechanism, build, check_mechanism, time_grid, with_output_drivers
+from jounce.mechanism.building.preconditions import concrete
+from jounce.mechanism.time import TimeLike
+
+
+@concrete
+@old_keyword("minimise", "minimize")
+def optimize(
+    mechanism: Mechanism,
+    minimize: str,
+    vary: Mapping[str, Any],
+    subject_to: Sequence[str] = (),
+    *,
+    time: TimeLike | None = None,
+    curves: Mapping[str, ArrayLike | tuple[ArrayLike, ArrayLike]] | None = None,
+    assemblies: str | Sequence[int] | None = None,
+    starts: int = 8,
+    samples: int | None = None,
+    seed: int = 0,
+    clearance: float = 1e-2,
+    iterations: int = 100,
+    progress: Callable[[int, int, float], None] | None = None,
+) -> OptimizedDesign:
+    """Return the design of a mechanism in which something is least, and conditions hold.
+
+    What is asked for are expressions of measures: ``peak(psi, 4)`` is the largest magnitude of jounce of the output
+    ``psi``; ``maximum``, ``minimum``, ``span``, ``mean`` and ``rms`` take the same arguments, a quantity, a derivative
+    (0 unless given) and two instants between which it counts; ``at(psi, 1, 0.5)`` is a rate at 0.5 s. Quantities are
+    outputs, components ``C_x``, derivatives ``psi_d2``, ``torque(DRIVER)``, ``force(DRIVER)``, ``force_x(JOINT)``,
+    parameters, ``t``, and expressions of these. ``path_error(C, NAME)`` is the root of the mean square distance of
+    points from the path of an output, ``path_deviation(C, NAME)`` the largest. Peaks are those between instants, too.
+
+    The designs of a low-discrepancy sample are solved side by side; from the best of them and from the mechanism as it
+    is, SciPy's SLSQP searches with exact slopes. In the place of an extreme that goals grow with it has a number that
+    no value may exceed, so that nothing jumps where the instant of the largest does.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+        As for `jounce.solve`; constraints must not be redundant.
+    minimize : str
+        What is to be least; what is to be largest has a minus before it, as ``"-span(psi)"``.
+    vary : dict of str to (low, high)
+        Bounds of the parameters that may be changed, SI or text with a unit; ``"12cm:16cm"`` holds both.
+    subject_to : sequence of str, optional
+        Conditions by ``<=``, ``>=`` and ``==``, such as ``"span(psi) == 60 deg"``; a number may have a unit.
+    time : array_like of shape (time,), optional
+        Instants, s, held in all designs; those of the mechanism unless given.
+    curves : dict of str to array_like, optional
+        Points for paths, (points, components), m; or pairs of times (points,), s, and points.
+    assemblies : sequence of int, or "all", optional
+        Which ways of putting the mechanism together are tried, as `jounce.assemblies` counts those of the mechanism
+        as it is; that of the mechanism unless given.
+    starts : int, default 8
+        Searches, one of them from the mechanism as it is.
+    samples : int, optional
+        Designs that starts are chosen from, rounded up to a power of two; 64, or 16 for each parameter, unless given.
+    seed : int, default 0
+        Of the sample.
+    clearance : float, default 1e-2
+        Smallest singular value of the scaled Jacobian that a design may have at any instant; it vanishes where one
+        locks. Zero lifts the bound.
+    iterations : int, default 100
+        Of one search between two changes of its region, at most.
+    progress : callable, optional
+        Called with the number of searches done, their total, and the least objective so far.
+
+    Returns
+    -------
+    OptimizedDesign
+        The best design found, compared with the first one, on a finer grid, too.
+
+    Raises
+    ------
+    MechanismError, ExpressionError, UnitError
+        If a name does not exist, bounds are not two increasing numbers, a parameter cannot have one of them, an
+        expression cannot be read, or instants would differ from design to design.
+    DesignError
+        If no design can be put together and moved, or conditions cannot be met: it says which, and by how much; it
+        holds the design that is nearest to meeting them.
+
+    References
+    ----------
+    Kraft, D. (1988). A software package for sequential quadratic programming. DFVLR-FB 88-28.
+
+    Examples
+    --------
+    >>> import jounce as jn
+    >>> mechanism = jn.load("examples/four_bar.yaml")
+    >>> found = jn.optimize(mechanism, "peak(psi, 2)", {"BC": (0.13, 0.15)}, starts=1, time=[0.0, 0.1, 0.2])
+    >>> found.status, round(found.parameters["BC"], 4)
+    ('optimal', 0.15)
+    """
+    check_mechanism(mechanism)
+    bounds = _bounds(mechanism, vary)
+    starts = whole_number("starts", starts, 1, error=MechanismError)
+    seed = whole_number("seed", seed, 0, error=MechanismError)
+    iterations = whole_number("iterations", iterations, 1, error=MechanismError)
+    if not (isinstance(clearance, numbers.Real) and 0 <= clearance < math.inf):
+        raise MechanismError("must be a number, zero or greater", name="clearance", value=clearance)
+    instants = _instants(mechanism, time, bounds)
+    targets = {name: _curve(name, given) for name, given in (curves or {}).items()}
+    if isinstance(subject_to, str):
+        raise MechanismError("must be a list of conditions", name="subject_to", value=subject_to)
+    asked = Asked(minimize, tuple(subject_to), bounds, targets, instants)
+    best, first_error = None, None
+    chosen = _assemblies(mechanism, assemblies)
+    with Count("optimizing", report=progress) as tell:
+        for number, variant in chosen:
+            study = Study(variant, asked, clearance, iterations, seed, tell)
+            try:
+                best_result = study.best(starts, samples)
+            except DesignError as error:
+                if len(chosen) == 1:
+                    raise
+                first_error = first_error or error
+                continue
+            whole = study.result(mechanism, best_result, assembly=number)
+            if best is None or (whole.success, -whole.objective) > (best.success, -best.objective):
+                best = whole
+    if best is None:
+        assert first_error is not None
+        raise first_error
+    return best
+
+
+def _bounds(mechanism: Mechanism, vary: Mapping[str, Any]) -> dict[str, tuple[float, float]]:
+    """Return the bounds of parameters as numbers.
+
+    Raises
+    ------
+    MechanismError, UnitError, ExpressionError
+        If a parameter does not exist, its bounds are not two increasing numbers, or it cannot have one of them.
+    """
+    if not isinstance(vary, Mapping) or not vary:
+        raise MechanismError("a design differs in at least one parameter", name="vary", value=vary)
+    bounds = {}
+    for name, given in vary.items():
+        check_name("parameter", name, mechanism.parameters, MechanismError, name="vary")
+        try:
+            low, high = (_bound(mechanism, name, x) for x in (given.split(":") if isinstance(given, str) else given))
+        except (TypeError, ValueError):
+            raise MechanismError("must be a lower and an upper bound", name=f"vary.{name}", value=given) from None
+        if not (math.isfinite(low) and math.isfinite(high) and low < high):
+            message = "bounds must be two finite numbers, the lower one first"
+            raise MechanismError(message, name=f"vary.{name}", value=given)
+        bounds[name] = low, high
+    return bounds
+
+
+def _bound(mechanism: Mechanism, name: str, given: Any) -> float:
+    """Return a bound of a parameter, which a mechanism must be able to have."""
+    try:
+        changed = mechanism.with_parameters(**{name: given})
+        value = float(changed.parameter_values[name])
+        build(with_output_drivers(changed))
+    except JounceError as error:
+        message = f"no mechanism can have this bound: {error}"
+        raise type(error)(message, name=f"vary.{name}", value=given) from None
+    return value
+
+
+def _instants(
+    mechanism: Mechanism, time: TimeLike | None, bounds: Mapping[str, tuple[float, float]]
+) -> Float[np.ndarray, " time"]:
+    """Return the instants, which must be the same in all designs."""
+    given = mechanism.time if time is None else time
+    instants = time_grid(given, mechanism.parameter_values)
+    for name, pair in bounds.items():
+        for bound in pair:
+            other = time_grid(given, mechanism.with_parameters(**{name: bound}).parameter_values)
+            if other.shape != instants.shape or (other != instants).any():
+                message = "the instants depend on this parameter, and must be the same in all designs; give time"
+                raise MechanismError(message, name=f"vary.{name}", value=pair)
+    if len(instants) < 2:
+        raise MechanismError("an optimization needs at least two instants", name="time", value=given)
+    return instants
+
+
+def _curve(name: str, given: Any) -> PrescribedPath:
+    """Return points, and their times where they have some."""
+    timed = isinstance(given, tuple) and len(given) == 2 and np.ndim(given[0]) == 1 and np.ndim(given[1]) == 2
+    location, expected = f"curves.{name}", "points, (points, components), or a pair of times and points, all finite"
+    times = seconds(location, given[0], MechanismError, expected) if timed else None
+    points = real_numbers(location, given[1] if timed else given, MechanismError, expected)
+    whole = points.ndim == 2 and len(points) and np.isfinite(points).all()
+    if not whole or (times is not None and (times.shape != points.shape[:1] or not np.isfinite(times).all())):
+        raise MechanismError(f"must be {expected}", name=location, value=given)
+    return PrescribedPath(points, times)
+
+
+def _assemblies(mechanism: Mechanism, selection: Any) -> list[tuple[int | None, Mechanism]]:
+    """Return the assemblies to try, each with its number, as the starting guess of a mechanism."""
+    if selection is None:
+        return [(None, mechanism)]
+    assemblies = all_assemblies(mechanism, circuits=False)
+    numbers = range(1, len(assemblies) + 1) if selection == "all" else selection
+    if isinstance(numbers, str) or not all(isinstance(n, int) for n in numbers) or not numbers:
+        raise MechanismError("must be numbers of assemblies, or 'all'", name="assemblies", value=selection)
+    return [(n, dataclasses.replace(assemblies.number(n).mechanism, assembly=None)) for n in numbers]

@@ -1,0 +1,254 @@
+"""A design problem in numbers: goals and their slopes at a design, by one solve; what locks is told, not guessed at."""
+
+import dataclasses
+from collections.abc import Mapping
+from functools import partial
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Float, Int
+
+from jounce.base.modules import with_fields
+from jounce.design.objectives.objectives import Goals
+from jounce.dynamics.motion_values import cut, pose_of
+from jounce.errors import AssemblyError, MobilityError, SolveError
+from jounce.jet import Jet
+from jounce.kinematics import Status, solve
+from jounce.mechanism import Mechanism
+from jounce.mechanism.system import System
+
+ON_BOUND = 1e-12  # of the way between bounds: what is so near to one is on it
+LOCKS = (AssemblyError, MobilityError, SolveError)
+
+
+class Locked(Exception):  # noqa: N818 - no error of a user's
+    """A design cannot be put together, or locks."""
+
+    def __init__(self, point: Float[np.ndarray, " parameter"], error: Exception):
+        super().__init__(str(error))
+        self.point, self.error = point, error
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Evaluation:
+    """A design, and how all that goals depend on changes with its parameters.
+
+    Attributes
+    ----------
+    point : array of shape (parameters,)
+        From 0 to 1 between the bounds.
+    rows, smooth : array
+        As `Goals.measured` gives them, all rows in one array.
+    row_slopes, smooth_slopes : array of shape (rows, parameters), (measures, parameters)
+        By the place.
+    margins : array of shape (time,)
+        Squares of the smallest singular values of the scaled Jacobian.
+    margin_slopes : array of shape (time, parameters)
+    """
+
+    point: Float[np.ndarray, " parameter"]
+    rows: Float[np.ndarray, " row"]
+    smooth: Float[np.ndarray, " measure"]
+    row_slopes: Float[np.ndarray, "row parameter"]
+    smooth_slopes: Float[np.ndarray, "measure parameter"]
+    margins: Float[np.ndarray, " time"]
+    margin_slopes: Float[np.ndarray, "time parameter"]
+
+
+class Problem:
+    """Goals as functions of the place of a design between its bounds.
+
+    Parameters
+    ----------
+    goals : Goals
+    bounds : dict of str to (low, high)
+        Of the parameters that are varied, SI.
+
+    Attributes
+    ----------
+    names : tuple of str
+    low, high, width : array of shape (parameters,)
+    owner : array of int of shape (rows,)
+        Of which extreme each row is; of the last evaluation.
+    evaluations : int
+        How many designs were solved.
+    """
+
+    def __init__(self, goals: Goals, bounds: Mapping[str, tuple[float, float]]):
+        self.goals, self.names = goals, tuple(bounds)
+        self.low, self.high = (np.array([pair[k] for pair in bounds.values()]) for k in (0, 1))
+        self.width = self.high - self.low
+        self.evaluations = 0
+        self.owner = np.zeros(0, int)
+        self._cached: dict[bytes, Evaluation] = {}
+        self._scale: np.ndarray | None = None
+        self._compile()
+
+    def _compile(self) -> None:
+        """Compile what follows from a motion, for the grid of the goals."""
+        self._cached.clear()
+        # as functions of their own: JAX takes a method for the same as before, whatever its object holds by now
+        self._measured = jax.jit(lambda *known: self._with_slopes(*known))
+        self._numbers = jax.jit(lambda *known: self._goals_with_slopes(*known))
+        self._each = jax.jit(jax.vmap(self._one_design))
+
+    def set_instants(self, instants: Float[np.ndarray, " time"]) -> None:
+        """Take another grid."""
+        self.goals.set_instants(instants)
+        self._compile()
+
+    def values(self, point: Float[np.ndarray, " parameter"]) -> dict[str, float]:
+        """Return the parameters at a point, SI; those on a bound to the bit."""
+        parameters = np.where(point >= 1.0 - ON_BOUND, self.high, self.low + self.width * point)
+        parameters = np.where(point <= ON_BOUND, self.low, parameters)
+        return dict(zip(self.names, parameters.tolist(), strict=True))
+
+    def point_of(self, values: Mapping[str, float]) -> Float[np.ndarray, " parameter"]:
+        """Return where parameters are between their bounds, from 0 to 1."""
+        given = np.array([values[name] for name in self.names])
+        return np.clip((given - self.low) / self.width, 0.0, 1.0)
+
+    def design(self, point: Float[np.ndarray, " parameter"]) -> Mechanism:
+        """Return the mechanism at a point, with the outputs that goals need."""
+        return self.goals.mechanism.with_parameters(**self.values(point))
+
+    def evaluate(self, point: Float[np.ndarray, " parameter"]) -> Evaluation:
+        """Return a design's measures and their slopes.
+
+        Raises
+        ------
+        Locked
+            The design cannot be put together, or locks.
+        """
+        key = point.tobytes()
+        if key not in self._cached:
+            if len(self._cached) > 64:
+                self._cached.clear()
+            self._cached[key] = self._evaluated(point)
+        return self._cached[key]
+
+    def _evaluated(self, point: Float[np.ndarray, " parameter"]) -> Evaluation:
+        self.evaluations += 1
+        values = jnp.asarray(list(self.values(point).values()))
+
+        def moved(values: Any) -> Any:
+            given = dict(zip(self.names, values, strict=True))
+            goals = self.goals
+            motion = solve(goals.mechanism.with_parameters(**given), goals.instants, goals.order, strict=False)
+            pose_type, coordinates = motion.poses
+            matrix = _jacobian(
+                _bare(motion.solved_model.system), cut(coordinates, 0), jnp.asarray(motion.time), pose_type=pose_type
+            )
+            result = dict(motion.outputs), matrix
+            return result, (*result, motion.status)
+
+        try:
+            slopes, (outputs, matrix, status) = jax.jacfwd(moved, has_aux=True)(values)
+        except LOCKS as error:
+            raise Locked(point, error) from None
+        if (failed := np.flatnonzero(np.asarray(status))).size:
+            outcome = Status(int(status[failed[0]]))
+            message = f"at t = {self.goals.instants[failed[0]]:g} s {outcome.advice}"
+            raise Locked(point, SolveError(message, status=outcome))
+        output_slopes, matrix_slopes = jax.tree.map(lambda x: jnp.moveaxis(x, -1, 0) * _along(self.width, x), slopes)
+        (rows, smooth), (row_slopes, smooth_slopes) = self._measured(values, outputs, output_slopes)
+        if not all(np.isfinite(x).all() for x in (*rows, smooth, *row_slopes, smooth_slopes)):
+            raise Locked(point, SolveError(Status.UNDEFINED.advice, status=Status.UNDEFINED))
+        self.owner = np.repeat(np.arange(len(rows)), [len(x) for x in rows])
+        margins, margin_slopes = _margins(np.asarray(matrix), np.asarray(matrix_slopes), self._row_scale(matrix))
+        none = np.zeros(0), np.zeros((0, len(point)))
+        return Evaluation(
+            np.array(point),
+            np.concatenate([*map(np.asarray, rows), none[0]]),
+            np.asarray(smooth),
+            np.concatenate([*(np.asarray(x).T for x in row_slopes), none[1]]),
+            np.asarray(smooth_slopes).T,
+            margins,
+            margin_slopes,
+        )
+
+    def _row_scale(self, matrix: Any) -> Float[np.ndarray, " row"]:
+        """Return what makes the largest entry of each row one, in the first design: the same for all, or slopes err."""
+        if self._scale is None:
+            sizes = np.abs(np.asarray(matrix)).max(axis=(1, 2), initial=0.0)
+            self._scale = 1.0 / np.where(sizes > 0, sizes, 1.0)
+        return self._scale
+
+    def extremes(self, evaluation: Evaluation) -> tuple[Float[np.ndarray, " extreme"], Int[np.ndarray, " extreme"]]:
+        """Return the extremes of a design, and which of its rows each of them is."""
+        count = len(self.goals.bounded)
+        values, chosen = np.zeros(count), np.zeros(count, int)
+        for k in range(count):
+            (mine,) = np.nonzero(self.owner == k)
+            chosen[k] = mine[np.argmax(evaluation.rows[mine])]
+            values[k] = evaluation.rows[chosen[k]]
+        return values, chosen
+
+    def numbers(self, point: Any, extremes: Any, smooth: Any) -> tuple[np.ndarray, list[np.ndarray]]:
+        """Return objective and conditions, and their slopes by the parameters, extremes and smooth measures."""
+        values = jnp.asarray(list(self.values(point).values()))
+        goals, slopes = self._numbers(values, jnp.asarray(extremes), jnp.asarray(smooth))
+        by_parameter, *others = (np.asarray(x) for x in slopes)
+        return np.asarray(goals), [by_parameter * self.width, *others]
+
+    def asked(self, point: Any, evaluation: Evaluation) -> tuple[float, np.ndarray, list[tuple[float, float]]]:
+        """Return the objective as it was asked for, the conditions as numbers, and both sides of each condition."""
+        values, smooth = self.values(point), jnp.asarray(evaluation.smooth)
+        extremes = jnp.asarray(self.extremes(evaluation)[0])
+        numbers = np.asarray(self.goals.numbers(values, extremes, smooth, as_asked=True))
+        return float(numbers[0]), numbers[1:], self.goals.sides(values, extremes, smooth)
+
+    def sampled(self, rows: Any, outputs: Mapping[str, Any]) -> Float[np.ndarray, "design goal"]:
+        """Return objective and conditions of many designs, from their outputs, the design first."""
+        return np.asarray(self._each(jnp.asarray(rows), {name: jnp.asarray(x) for name, x in outputs.items()}))
+
+    def _one_design(self, values: Any, outputs: Any) -> Any:
+        given = dict(zip(self.names, values, strict=True))
+        rows, smooth = self.goals.measured(given, outputs)
+        extremes = jnp.stack([jnp.max(x) for x in rows]) if rows else jnp.zeros(0)
+        return self.goals.numbers(given, extremes, smooth)
+
+    def _with_slopes(self, values: Any, outputs: Any, output_slopes: Any) -> Any:
+        def measured(values: Any, outputs: Any) -> Any:
+            return self.goals.measured(dict(zip(self.names, values, strict=True)), outputs)
+
+        def along(direction: Any, change: Any) -> Any:
+            return jax.jvp(measured, (values, outputs), (direction, change))[1]
+
+        return measured(values, outputs), jax.vmap(along)(jnp.diag(jnp.asarray(self.width)), output_slopes)
+
+    def _goals_with_slopes(self, values: Any, extremes: Any, smooth: Any) -> Any:
+        def numbers(values: Any, extremes: Any, smooth: Any) -> Any:
+            return self.goals.numbers(dict(zip(self.names, values, strict=True)), extremes, smooth)
+
+        slopes = jax.jacrev(numbers, argnums=(0, 1, 2))(values, extremes, smooth)
+        return numbers(values, extremes, smooth), slopes
+
+
+def _along(width: Float[np.ndarray, " parameter"], like: Any) -> Any:
+    return jnp.asarray(width).reshape(-1, *[1] * (like.ndim - 1))
+
+
+def _bare(system: System) -> System:
+    """Return a system without what no Jacobian needs."""
+    return with_fields(system, forces=(), outputs=())
+
+
+@partial(jax.jit, static_argnames=("pose_type",))
+def _jacobian(system: System, coordinates: Any, instants: Any, *, pose_type: type) -> Float[Any, "row column time"]:
+    """Return the Jacobian at all instants; its columns are scaled by the size of the mechanism, its rows are not."""
+    return system.jacobian(pose_of(coordinates, pose_type), Jet((instants[None],)))
+
+
+def _margins(
+    matrix: Float[np.ndarray, "row column time"],
+    slopes: Float[np.ndarray, "parameter row column time"],
+    scale: Float[np.ndarray, " row"],
+) -> tuple[Float[np.ndarray, " time"], Float[np.ndarray, "time parameter"]]:
+    """Return squares of the smallest singular values, which are smooth up to where a design locks, and their slopes."""
+    left, values, right = np.linalg.svd(np.moveaxis(matrix * scale[:, None, None], -1, 0))
+    least = values[:, -1]
+    u, v = left[:, :, -1] * scale, right[:, -1]
+    return least**2, 2 * least[:, None] * np.einsum("tr,prct,tc->tp", u, slopes, v)

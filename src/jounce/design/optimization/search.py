@@ -1,0 +1,375 @@
+"""One search from one start: sequential quadratic programming with exact slopes, in regions that no design locks in.
+
+SciPy's SLSQP works on the parameters and on one number for each extreme that a goal grows with, which none of the
+values in the cells of time may exceed. A step that leads to a design that locks is not taken: the search goes on from
+the best design so far, in a smaller region, and is kept away from there by a barrier: the smallest singular value of
+the Jacobian, which vanishes where a mechanism locks, stays above a bound at every instant.
+"""
+
+import dataclasses
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float
+
+from jounce.design.optimization.multipliers import ACTIVE, Known, Multipliers, Vector
+from jounce.design.optimization.problem import Evaluation, Locked, Problem
+
+ACCURACY = 1e-13  # of SLSQP, relative
+EACH = 2  # designs evaluated for each iteration that is allowed, at most
+ROUNDS = 12  # regions that are tried, at most
+SMALLEST_REGION = 1e-7  # of the width between bounds
+CONDITION_TOLERANCE = 1e-7  # by which a condition may be broken, relative to its size
+SMALL = 1e-6  # of the first objective, below which one counts as zero
+FITTED = 1e-6  # of the residual of the first-order conditions after least squares
+LOCKED = 1e3  # what SLSQP is told of a design that locks, relative: its line search then goes back
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class SearchResult:
+    """Where a search ended.
+
+    Attributes
+    ----------
+    point : array of shape (parameters,)
+        From 0 to 1 between the bounds.
+    evaluation : Evaluation
+    objective : float
+        As an optimizer has it.
+    broken : array of shape (conditions,)
+        By how much each condition is broken, relative to its size.
+    near_singular : float
+        How far the smallest singular value is below its bound, relative.
+    residual : float
+        Of the conditions of Karush, Kuhn and Tucker, relative to the slope of the objective.
+    multipliers : array of shape (conditions,)
+        Slope of the objective by each condition.
+    bound_multipliers : array of shape (parameters,)
+        Slope of the objective by a lower bound (positive) or an upper one (negative), by the point.
+    singular_multiplier : float
+    """
+
+    point: Vector
+    evaluation: Evaluation
+    objective: float
+    broken: Vector
+    near_singular: float
+    residual: float
+    multipliers: Vector
+    bound_multipliers: Vector
+    singular_multiplier: float
+
+    @property
+    def feasible(self) -> bool:
+        """Whether all conditions hold."""
+        return bool(
+            np.isfinite(self.objective)
+            and (self.broken <= CONDITION_TOLERANCE).all()
+            and self.near_singular <= CONDITION_TOLERANCE
+        )
+
+
+class _Enough(Exception):  # noqa: N818 - no error of a user's
+    """A run has evaluated as many designs as it may."""
+
+
+class Search:
+    """A search in a problem.
+
+    Parameters
+    ----------
+    problem : Problem
+    clearance : float
+        Bound of the smallest singular value.
+    iterations : int
+        Of SLSQP in one region, at most.
+    watch : callable, optional
+        Called at every design that is evaluated, with its objective and the worst broken condition.
+    """
+
+    def __init__(
+        self,
+        problem: Problem,
+        clearance: float,
+        iterations: int,
+        watch: Callable[[float, float], None] | None = None,
+    ):
+        self.problem, self.clearance, self.iterations, self.watch = problem, clearance, iterations, watch
+        self.bounded = np.flatnonzero(problem.goals.bounded)
+        self.equal = np.array([c.relation.equal for c in problem.goals.conditions], bool)
+        self.sizes = np.ones(len(self.equal))
+        self.scale = self.asked_scale = 1.0
+
+    def from_point(self, point: Vector, *, elastic: bool = False) -> SearchResult:
+        """Search from a point that does not lock.
+
+        Parameters
+        ----------
+        elastic : bool, default False
+            Make the worst broken condition least, instead of the objective.
+        """
+        here = self.problem.evaluate(point)
+        self._set_scales(here)
+        best, radius = point, 1.0
+        if self.problem.goals.gaps is not None and not elastic:
+            fitted = self.result_at(self._fitted(point))
+            if fitted.feasible and (fitted.residual <= FITTED or fitted.objective <= ACCURACY * self.scale):
+                return fitted
+            best = fitted.point
+        for _ in range(ROUNDS):
+            run = _Run(self, best, radius, elastic=elastic)
+            locked, inside = run.run()
+            moved = float(np.abs(run.best - best).max(initial=0.0))
+            better, best = run.merit_of(run.best) < run.merit_of(best), run.best
+            if locked is not None:
+                radius = min(radius / 4, max(float(np.abs(locked.point - best).max()) / 2, SMALLEST_REGION))
+                if radius <= SMALLEST_REGION:
+                    break
+            elif inside or (not better and moved < ACTIVE):
+                if elastic or radius <= SMALLEST_REGION or self.result_at(best).residual <= FITTED:
+                    break
+                radius /= 4  # no optimum: from here on in shorter steps, which lock less
+            else:
+                radius *= 4
+        return self.result_at(best)
+
+    def _fitted(self, point: Vector) -> Vector:
+        """Return a better point by least squares, which knows more of distances from points than their sum."""
+        from scipy.optimize import least_squares  # here, to start quickly
+
+        chosen = np.array(self.problem.goals.gaps)
+
+        def gaps(point: Vector) -> Vector:
+            try:
+                here = self.problem.evaluate(point)
+            except Locked:
+                return np.full(len(chosen), LOCKED * np.sqrt(self.scale))
+            if self.watch is not None:
+                self.watch(self.problem.asked(point, here)[0], 0.0)
+            return here.smooth[chosen]
+
+        def slopes(point: Vector) -> Float[np.ndarray, "gap parameter"]:
+            return self.problem.evaluate(point).smooth_slopes[chosen]
+
+        tolerances: Any = {"xtol": ACCURACY, "ftol": ACCURACY, "gtol": ACCURACY, "jac": slopes}
+        start = np.clip(point, 1e-10, 1 - 1e-10)
+        fit = least_squares(gaps, start, bounds=(0.0, 1.0), max_nfev=self.iterations, **tolerances)
+        near = np.where(fit.x < ACTIVE, 0.0, np.where(fit.x > 1 - ACTIVE, 1.0, fit.x))
+        return min((point, fit.x, near), key=self._fitness)
+
+    def _fitness(self, point: Vector) -> tuple[float, float]:
+        """Return by what points are compared: how near they are to a singular position, then the objective."""
+        try:
+            here = self.problem.evaluate(point)
+        except Locked:
+            return np.inf, np.inf
+        numbers, _ = self.problem.numbers(point, self.problem.extremes(here)[0], here.smooth)
+        worst = max(self.near_singular(here), float(self.broken(numbers[1:]).max(initial=0.0)))
+        return (worst if worst > CONDITION_TOLERANCE else 0.0), float(numbers[0])
+
+    def result_at(self, point: Vector) -> SearchResult:
+        """Return what is known of a point: values, broken conditions, multipliers."""
+        here = self.problem.evaluate(point)
+        extremes, chosen = self.problem.extremes(here)
+        numbers, slopes = self.problem.numbers(point, extremes, here.smooth)
+        broken = self.broken(numbers[1:], self._sizes_at(here))
+        near = self.near_singular(here)
+        kkt = Multipliers(self._known(float(numbers[0])), here, numbers, slopes, extremes, chosen)
+        residual, conditions, bounds, singular = kkt.solved()
+        return SearchResult(point, here, float(numbers[0]), broken, near, residual, conditions, bounds, singular)
+
+    def _known(self, objective: float) -> Known:
+        goals, size = self.problem.goals, abs(objective)
+        if goals.objective is not goals.objective_value:  # a square, whose slope is as the root
+            size = float(np.sqrt(size * self.scale))
+        scales = self.clearance, max(size, SMALL * self.scale)
+        return Known(self.bounded, self.equal, self.sizes, self.extreme_sizes, self.problem.owner, *scales)
+
+    def broken(self, numbers: Vector, sizes: Vector | None = None) -> Vector:
+        """Return by how much conditions are broken, relative to their sizes, those of the start unless given."""
+        excess = np.where(self.equal, np.abs(numbers), np.maximum(numbers, 0.0))
+        return excess / (self.sizes if sizes is None else sizes)
+
+    def _sizes_at(self, here: Evaluation) -> Vector:
+        """Return the sizes of conditions at a design; where one side is zero, those of the start tell of them."""
+        pairs = np.abs(np.array(self.problem.asked(here.point, here)[2])).reshape(-1, 2)
+        return np.where((pairs > 0).all(axis=1), np.minimum(pairs.max(axis=1, initial=0.0), self.sizes), self.sizes)
+
+    def near_singular(self, here: Evaluation) -> float:
+        """Return how far the smallest singular value is below its bound, relative."""
+        least = float(np.sqrt(here.margins.min(initial=np.inf)))
+        return max(0.0, 1.0 - least / self.clearance) if self.clearance else 0.0
+
+    def _set_scales(self, here: Evaluation) -> None:
+        extremes, _ = self.problem.extremes(here)
+        objective, _, sides = self.problem.asked(here.point, here)
+        numbers, _ = self.problem.numbers(here.point, extremes, here.smooth)
+        self.scale = abs(float(numbers[0])) or abs(objective) or 1.0
+        self.asked_scale = abs(objective) or self.scale
+        self.sizes = np.array([max(map(abs, pair)) or 1.0 for pair in sides])
+        self.extreme_sizes = np.array([_size(here.rows[self.problem.owner == k]) for k in range(len(extremes))])
+
+
+def _size(rows: Vector) -> float:
+    return float(np.abs(rows).max(initial=0.0)) or 1.0
+
+
+class _Run:
+    """SLSQP in one region: variables are the place, and one number for each extreme that has a bound of its own."""
+
+    def __init__(self, search: Search, start: Vector, radius: float, *, elastic: bool):
+        self.search, self.problem, self.start, self.radius, self.elastic = (
+            search,
+            search.problem,
+            start,
+            radius,
+            elastic,
+        )
+        self.count = len(start)
+        self.low, self.high = np.maximum(start - radius, 0.0), np.minimum(start + radius, 1.0)
+        here = self.problem.evaluate(start)
+        self.extremes = search.bounded
+        numbers = self._extremes(here)[self.extremes] / search.extreme_sizes[self.extremes]
+        worst = self.merit_parts(here)[1] if elastic else 0.0
+        self.first = np.concatenate([start, numbers, [worst] * elastic])
+        self.best, self._best_merit = start, self.merit_of(start)
+        self.evaluations = 0
+        self._last = self._inequalities(self.first)[0]
+
+    def run(self) -> tuple[Locked | None, bool]:
+        """Return the design that locked, if one did, and whether the end is free of the region's bounds."""
+        from scipy.optimize import minimize  # here, to start quickly
+
+        bounds = [*zip(self.low, self.high, strict=True)] + [(None, None)] * (len(self.first) - self.count)
+        constraints: list[Any] = [{"type": "ineq", "fun": self._above, "jac": self._above_slopes}]
+        if self.search.equal.any() and not self.elastic:
+            constraints.append({"type": "eq", "fun": self._zero, "jac": self._zero_slopes})
+        options = {"maxiter": self.search.iterations, "ftol": ACCURACY}
+        try:
+            minimize(
+                self._objective,
+                self.first,
+                jac=self._objective_slopes,
+                bounds=bounds,
+                constraints=constraints,
+                method="SLSQP",
+                options=options,
+            )
+        except Locked as locked:
+            return locked, False
+        except _Enough:
+            return None, True
+        free = (self.best > self.low + ACTIVE * self.radius) | (self.low <= 0.0)
+        free &= (self.best < self.high - ACTIVE * self.radius) | (self.high >= 1.0)
+        return None, bool(free.all())
+
+    # designs compared
+
+    def merit_parts(self, here: Evaluation) -> tuple[float, float]:
+        """Return the objective and the worst broken condition, both relative."""
+        numbers, _ = self.problem.numbers(here.point, self._extremes(here), here.smooth)
+        broken = self.search.broken(numbers[1:])
+        worst = max(float(broken.max(initial=0.0)), self.search.near_singular(here))
+        return float(numbers[0]) / self.search.scale, worst
+
+    def merit_of(self, point: Vector) -> tuple[float, float]:
+        """Return by what designs are compared: how far conditions are broken, then the objective."""
+        objective, worst = self.merit_parts(self.problem.evaluate(point))
+        return (worst, 0.0) if self.elastic else (worst if worst > CONDITION_TOLERANCE / 2 else 0.0, objective)
+
+    def _locks(self, variables: Vector) -> bool:
+        """Tell whether a design locks, of which no slopes are there."""
+        try:
+            self._split(variables)
+        except Locked:
+            return True
+        return False
+
+    def _seen(self, point: Vector) -> Evaluation:
+        before = self.problem.evaluations
+        here = self.problem.evaluate(point)
+        if self.problem.evaluations != before:
+            self.evaluations += 1
+            if self.evaluations > EACH * self.search.iterations:
+                raise _Enough
+            merit = self.merit_of(point)
+            if merit < self._best_merit:
+                self.best, self._best_merit = np.array(point), merit
+            if self.search.watch is not None:
+                self.search.watch(self.problem.asked(here.point, here)[0], self.merit_parts(here)[1])
+        return here
+
+    # what SLSQP asks
+
+    def _extremes(self, here: Evaluation) -> Vector:
+        return self.problem.extremes(here)[0]
+
+    def _split(self, variables: Vector) -> tuple[Evaluation, Vector]:
+        """Return the design, and the extremes: those with a number of their own have that."""
+        here = self._seen(np.clip(variables[: self.count], self.low, self.high))
+        extremes = self._extremes(here)
+        own = variables[self.count : self.count + len(self.extremes)]
+        extremes[self.extremes] = own * self.search.extreme_sizes[self.extremes]
+        return here, extremes
+
+    def _goals(self, variables: Vector) -> tuple[Vector, Float[np.ndarray, "goal variable"]]:
+        """Return objective and conditions, and their slopes by the variables."""
+        here, extremes = self._split(variables)
+        numbers, (by_parameter, by_extreme, by_smooth) = self.problem.numbers(here.point, extremes, here.smooth)
+        slopes = by_parameter + by_smooth @ here.smooth_slopes
+        _, chosen = self.problem.extremes(here)
+        free = np.setdiff1d(np.arange(len(extremes)), self.extremes)
+        slopes = slopes + by_extreme[:, free] @ here.row_slopes[chosen[free]]
+        own = by_extreme[:, self.extremes] * self.search.extreme_sizes[self.extremes]
+        return numbers, np.concatenate([slopes, own, np.zeros((len(numbers), int(self.elastic)))], axis=1)
+
+    def _objective(self, variables: Vector) -> float:
+        if self._locks(variables):
+            return LOCKED
+        return float(variables[-1]) if self.elastic else float(self._goals(variables)[0][0] / self.search.scale)
+
+    def _objective_slopes(self, variables: Vector) -> Vector:
+        if self.elastic:
+            return np.eye(len(variables))[-1]
+        return self._goals(variables)[1][0] / self.search.scale
+
+    def _inequalities(self, variables: Vector) -> tuple[Vector, Float[np.ndarray, "row variable"]]:
+        """Return what must not be negative: conditions, own numbers of extremes over rows, singular values."""
+        search, here = self.search, self._split(variables)[0]
+        numbers, slopes = self._goals(variables)
+        scaled, scaled_slopes = numbers[1:] / search.sizes, slopes[1:] / search.sizes[:, None]
+        unequal = ~search.equal
+        parts = [(-scaled[unequal], -scaled_slopes[unequal])]
+        if self.elastic:  # an equality is two inequalities here
+            parts += [(-scaled[search.equal], -scaled_slopes[search.equal])]
+            parts += [(scaled[search.equal], scaled_slopes[search.equal])]
+            parts = [(v + variables[-1], np.concatenate([s[:, :-1], np.ones((len(v), 1))], axis=1)) for v, s in parts]
+        for k, extreme in enumerate(self.extremes):
+            mine, size = self.problem.owner == extreme, search.extreme_sizes[extreme]
+            rows = np.zeros((int(mine.sum()), len(variables)))
+            rows[:, : self.count] = -here.row_slopes[mine] / size
+            rows[:, self.count + k] = 1.0
+            parts.append((variables[self.count + k] - here.rows[mine] / size, rows))
+        if search.clearance:
+            padding = np.zeros((len(here.margins), len(variables) - self.count))
+            slack, slope = here.margins - search.clearance**2, here.margin_slopes
+            parts.append((slack, np.concatenate([slope, padding], axis=1)))
+        return np.concatenate([v for v, _ in parts]), np.concatenate([s for _, s in parts])
+
+    def _above(self, variables: Vector) -> Vector:
+        if self._locks(variables):
+            return np.full_like(self._last, -LOCKED)
+        self._last = self._inequalities(variables)[0]
+        return self._last
+
+    def _above_slopes(self, variables: Vector) -> Float[np.ndarray, "row variable"]:
+        return self._inequalities(variables)[1]
+
+    def _zero(self, variables: Vector) -> Vector:
+        if self._locks(variables):
+            return np.full(int(self.search.equal.sum()), LOCKED)
+        return (self._goals(variables)[0][1:] / self.search.sizes)[self.search.equal]
+
+    def _zero_slopes(self, variables: Vector) -> Float[np.ndarray, "row variable"]:
+        return (self._goals(variables)[1][1:] / self.search.sizes[:, None])[self.search.equal]

@@ -1,0 +1,333 @@
+"""The search for the best design of one assembly: starts, searches, conditions that cannot be met, finer grids."""
+
+import dataclasses
+import math
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any
+
+import jax
+import numpy as np
+from jaxtyping import Float
+
+from jounce.design.objectives.measures import PrescribedPath
+from jounce.design.objectives.objectives import Goals
+from jounce.design.optimization.law_knots import law_knots
+from jounce.design.optimization.problem import LOCKS, Locked, Problem
+from jounce.design.optimization.result import Comparison, OptimizedDesign
+from jounce.design.optimization.samples import Samples, sampled
+from jounce.design.optimization.search import CONDITION_TOLERANCE, SMALL, Search, SearchResult
+from jounce.errors import DesignError, SolveError
+from jounce.kinematics import Motion, Status, assemblies as all_assemblies, solve
+from jounce.mechanism import Mechanism
+from jounce.mechanism.laws.output_drivers import with_outputs
+
+GRID = 121  # instants that a search works with at first, at most
+FINER = 4  # times as many, on which its end is looked at
+AGREED = 1e-6  # of objective and conditions on both grids, relative
+REFINEMENTS = 3
+OPTIMAL = 1e-5  # of the residual of the first-order conditions
+SAME_POSITION = 1e-6  # of the spread of the bodies, or rad
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Asked:
+    """What was asked for."""
+
+    minimize: str
+    subject_to: tuple[str, ...]
+    bounds: dict[str, tuple[float, float]]
+    curves: dict[str, PrescribedPath]
+    instants: Float[np.ndarray, " time"]
+
+
+class Study:
+    """The search for the best design of one assembly."""
+
+    def __init__(
+        self,
+        mechanism: Mechanism,
+        asked: Asked,
+        clearance: float,
+        iterations: int,
+        seed: int,
+        progress: Callable[[int, int, float], None] | None,
+    ):
+        self.mechanism, self.asked, self.seed, self.progress = mechanism, asked, seed, progress
+        self.all_instants = asked.instants
+        arguments = asked.minimize, asked.subject_to, tuple(asked.bounds), asked.curves
+        knots = law_knots(mechanism, asked.bounds, float(asked.instants[0]), float(asked.instants[-1]))
+        self.goals = Goals(mechanism, *arguments, _thinned(asked.instants, GRID), knots)
+        self.problem = Problem(self.goals, asked.bounds)
+        self.search = Search(self.problem, clearance, iterations, self._watch)
+        self.done, self.total, self.least = 0, 1, math.inf
+        self.size = math.inf  # of the objective, as searches begin with it
+        self.notes: list[str] = []
+        self.searches: list[float] = []
+
+    def _watch(self, objective: float, broken: float) -> None:
+        """Tell of a design that was evaluated, with the objective as it was asked for."""
+        if broken <= CONDITION_TOLERANCE:
+            self.least = min(self.least, objective)
+        if self.progress is not None:
+            self.progress(self.done, self.total, self.least)
+
+    @property
+    def here(self) -> Float[np.ndarray, " parameter"]:
+        """The mechanism as it is, within the bounds."""
+        values = self.mechanism.parameter_values
+        return self.problem.point_of({name: values[name] for name in self.problem.names})
+
+    def best(self, starts: int, samples: int | None) -> SearchResult:
+        """Return the best design that searches from several starts end with.
+
+        Raises
+        ------
+        DesignError
+            If none can be put together and moved, or conditions cannot be met.
+        """
+        self._note_bounds()
+        points, lock = [self.here], None
+        try:
+            self.problem.evaluate(self.here)
+        except Locked as error:
+            points, lock = [], error
+        if starts > 1 or not points:
+            taken = sampled(self.problem, samples, self.seed)
+            self.notes += taken.notes(self.asked.bounds)
+            points += taken.best(starts - len(points))
+            if not points:
+                raise _nothing_moves(lock, taken)
+        if lock is not None:
+            self.notes.append(f"the mechanism as it is cannot be moved: {lock}")
+        self.total = len(points)
+        ends = list(self._ends(points))
+        if not ends:
+            raise DesignError("every search began at a design that locks; give a starting guess within the bounds")
+        feasible = [end for end in ends if end.feasible]
+        if not feasible:
+            feasible = self._made_feasible(ends)
+        result = min(feasible, key=lambda end: end.objective)
+        return self._refined(result)
+
+    def _ends(self, points: Sequence[Any]) -> Iterator[SearchResult]:
+        for point in points:
+            try:
+                end = self.search.from_point(point)
+            except Locked:  # a sample that moves may be one of another assembly when it is solved alone
+                continue
+            self.size = min(self.size, self.search.asked_scale)
+            objective = self.problem.asked(end.point, end.evaluation)[0]
+            self.searches.append(objective if end.feasible else math.nan)
+            self.done += 1
+            if self.progress is not None:
+                self.progress(self.done, self.total, self.least)
+            yield end
+
+    def _made_feasible(self, ends: Sequence[SearchResult]) -> list[SearchResult]:
+        """Return designs that meet the conditions, found by meeting them first.
+
+        Raises
+        ------
+        DesignError
+            If none is found: the worst condition is as little broken as it can be.
+        """
+        nearest = sorted(ends, key=lambda end: max(float(end.broken.max(initial=0.0)), end.near_singular))[:3]
+        met = [self.search.from_point(end.point, elastic=True) for end in nearest]
+        ends = [self.search.from_point(end.point) for end in met if end.feasible]
+        feasible = [end for end in (*ends, *met) if end.feasible]
+        if feasible:
+            return feasible
+        least = min(met, key=lambda end: max(float(end.broken.max(initial=0.0)), end.near_singular))
+        design = self.result(self.mechanism, least, infeasible=True)
+        raise DesignError(f"no design within the bounds was found that {self._unmet(least)}", design=design)
+
+    def _unmet(self, least: SearchResult) -> str:
+        """Word which conditions the design breaks that breaks the worst of them least."""
+        _, numbers, sides = self.problem.asked(least.point, least.evaluation)
+        words = []
+        for condition, number, broken, (left, right) in zip(
+            self.goals.conditions, numbers, least.broken, sides, strict=True
+        ):
+            if broken > CONDITION_TOLERANCE:
+                text, near, bound = condition.relation.text, left, right
+                if condition.relation.bound_left:
+                    near, bound = right, left
+                words.append(f"meets '{text}': nearest is {near:.6g} against {bound:.6g}, off by {abs(number):.3g}")
+        if least.near_singular > CONDITION_TOLERANCE:
+            words.append("stays clear of a singular position at all instants")
+        where = ", ".join(f"{name} = {x:.6g}" for name, x in self.problem.values(least.point).items())
+        return f"{'; and none that '.join(words)} (SI, at {where}); widen the bounds or ease the conditions"
+
+    def _refined(self, result: SearchResult) -> SearchResult:
+        """Search on, on finer grids, until what is found does not depend on the grid."""
+        for _ in range(REFINEMENTS):
+            if self.grid_error(result) <= AGREED:
+                break
+            self.problem.set_instants(_split(self.problem.goals.instants, 2))
+            result = self.search.from_point(result.point)
+        return result
+
+    def grid_error(self, result: SearchResult) -> float:
+        """Return by how much objective and conditions differ on a finer grid, relative; infinite if that one locks."""
+        coarse, numbers, _ = self.problem.asked(result.point, result.evaluation)
+        values = self.problem.values(result.point)
+        try:
+            objective, fine, _ = self._on(_split(self.goals.instants, FINER), self.goals.mechanism, values)
+        except LOCKS:
+            return math.inf
+        scale = abs(coarse) if abs(coarse) > SMALL * self.size else self.size  # what is zero has no size of its own
+        errors = [abs(objective - coarse) / scale, *(np.abs(fine - numbers) / self.search.sizes)]
+        return float(max(errors))
+
+    def _on(
+        self, instants: Any, mechanism: Mechanism, values: dict[str, float]
+    ) -> tuple[float, np.ndarray, list[tuple[float, float]]]:
+        """Return objective and conditions of a design of a mechanism, with the outputs of the goals, on another grid.
+
+        Raises
+        ------
+        AssemblyError, MobilityError, SolveError
+            The design cannot be put together, or locks.
+        """
+        goals, previous = self.goals, self.goals.instants
+        try:
+            goals.set_instants(instants)
+            motion = solve(mechanism.with_parameters(**values), goals.instants, goals.order, strict=False)
+            if (failed := motion.status[motion.status != Status.OK]).size:
+                raise SolveError(Status(int(failed[0])).advice, status=Status(int(failed[0])))
+            outputs = {name: np.asarray(x) for name, x in motion.outputs.items()}
+            rows, smooth = jax.jit(lambda *known: goals.measured(*known))(values, outputs)
+            extremes = np.array([float(np.max(x)) for x in rows])
+            numbers = np.asarray(goals.numbers(values, extremes, np.asarray(smooth), as_asked=True))
+            return float(numbers[0]), numbers[1:], goals.sides(values, extremes, np.asarray(smooth))
+        finally:
+            goals.set_instants(previous)
+
+    def _note_bounds(self) -> None:
+        """Note what was given outside the bounds."""
+        values = self.mechanism.parameter_values
+        for name, (low, high) in self.asked.bounds.items():
+            if not low <= values[name] <= high:
+                self.notes.append(f"{name} is {values[name]:.6g} in the mechanism, outside of its bounds")
+
+    def result(
+        self, original: Mechanism, end: SearchResult, *, assembly: int | None = None, infeasible: bool = False
+    ) -> OptimizedDesign:
+        """Return what was found, compared with the mechanism as it is, on a finer grid."""
+        fine = _split(self.goals.instants, FINER)
+        error = self.grid_error(end)
+        parameters = self.problem.values(end.point)
+        mechanism = self._assembled(original.with_parameters(**parameters), end, assembly)
+        status, message = self._judged(end, error, infeasible=infeasible)
+        try:
+            after = self._on(fine, self.goals.mechanism, parameters)
+        except LOCKS:
+            after = self.problem.asked(end.point, end.evaluation)
+        return OptimizedDesign(
+            mechanism,
+            parameters,
+            after[0],
+            status,
+            message,
+            tuple(self._comparisons(original, end, after)),
+            float(np.sqrt(end.evaluation.margins.min(initial=np.inf))),
+            end.residual,
+            error,
+            tuple(self.searches),
+            self.problem.evaluations,
+            tuple(self.notes),
+        )
+
+    def _judged(self, end: SearchResult, error: float, *, infeasible: bool) -> tuple[str, str]:
+        """Return the status of a design, and what it means."""
+        if infeasible or not end.feasible:
+            return "infeasible", "conditions do not hold"
+        if not error <= AGREED:
+            return "feasible", (
+                f"objective and conditions differ by {error:.1e} on a finer grid; motion laws or forces may not be "
+                "smooth, or too few instants are given"
+            )
+        if not end.residual <= OPTIMAL:
+            return "feasible", (
+                f"the search ended before no better design was near (first-order residual {end.residual:.1e}); "
+                "take more iterations or starts"
+            )
+        where = f"; the best of {len(self.searches)} searches" if len(self.searches) > 1 else ""
+        return "optimal", f"no design nearby is better, and all conditions hold{where}"
+
+    def _comparisons(
+        self, original: Mechanism, end: SearchResult, after: tuple[float, np.ndarray, list[Any]]
+    ) -> Iterator[Comparison]:
+        """Return objective, conditions and parameters, of the mechanism as it was given and of what was found."""
+        known = original.parameter_values  # also outside of the bounds
+        given = {name: float(known[name]) for name in self.problem.names}
+        as_given = with_outputs(original, self.goals.mechanism.outputs)  # put together as it is, not as this study does
+        try:
+            before = self._on(_split(self.goals.instants, FINER), as_given, given)
+        except LOCKS:
+            nothing = [(math.nan, math.nan)] * len(self.goals.conditions)
+            before = math.nan, np.full(len(self.goals.conditions), math.nan), nothing
+        root = end.objective and after[0] and self.goals.objective is not self.goals.objective_value
+        factor = 0.5 / after[0] if root else 1.0  # of the slopes of a root, by those of its square
+        yield Comparison("objective", self.asked.minimize, before[0], after[0])
+        rows = zip(self.goals.conditions, before[2], after[2], end.multipliers, strict=True)
+        for condition, first, last, multiplier in rows:
+            relation = condition.relation
+            fixed_left = relation.bound_left
+            measure, bound = (1, last[0]) if fixed_left else (0, last[1])
+            low = bound if relation.equal or fixed_left else None
+            high = bound if relation.equal or not fixed_left else None
+            slope = float(multiplier * factor * (1.0 if fixed_left else -1.0))
+            yield Comparison("condition", relation.text, first[measure], last[measure], low, high, slope)
+        values = self.problem.values(end.point)
+        for k, (name, (low, high)) in enumerate(self.asked.bounds.items()):
+            slope = float(end.bound_multipliers[k]) * factor / float(self.problem.width[k])
+            yield Comparison("parameter", name, given[name], values[name], low, high, slope)
+
+    def _assembled(self, mechanism: Mechanism, end: SearchResult, assembly: int | None) -> Mechanism:
+        """Return a mechanism that asks for the assembly that was optimized, by its number in the design found."""
+        if assembly is None:
+            return mechanism
+        first = self.goals.instants[:1]
+        target = _configuration(solve(self.problem.design(end.point), first, 0))
+        for each in all_assemblies(mechanism, float(first[0]), circuits=False):
+            chosen = dataclasses.replace(mechanism, assembly=each.number)
+            if np.abs(_configuration(solve(chosen, first, 0)) - target).max() <= SAME_POSITION:
+                return chosen
+        message = "the assembly of the best design was not found again among the assemblies of that design"
+        raise DesignError(message, name="assemblies", value=assembly)
+
+
+def _nothing_moves(lock: Locked | None, taken: Samples) -> DesignError:
+    """Return the error where no design can be put together and moved."""
+    why = "" if lock is None else f"; the mechanism as it is: {lock}"
+    bounds = "give bounds within which it can be, or a starting guess nearer to them"
+    return DesignError(f"none of {taken.count} designs within the bounds can be put together and moved; {bounds}{why}")
+
+
+def _configuration(motion: Motion) -> Float[np.ndarray, " entry"]:
+    """Return where all bodies of a motion are at first: positions by their spread, and attitudes without their turns.
+
+    Bodies on fixed pivots have the same position in all assemblies.
+    """
+    coordinates = {name: np.asarray(x[0]) for name, x in motion.poses[1].items()}
+    if "angle" in coordinates:
+        attitude = np.stack([np.cos(coordinates["angle"]), np.sin(coordinates["angle"])])
+    else:  # a quaternion and its negative are one attitude
+        attitude = coordinates["quaternion"][:, None] * coordinates["quaternion"]
+    position = coordinates["position"]
+    return np.concatenate([position.ravel() / (np.ptp(position) or 1.0), attitude.ravel()])
+
+
+def _thinned(instants: Float[np.ndarray, " given"], most: int) -> Float[np.ndarray, " time"]:
+    """Return at most so many of the instants, evenly taken, with both ends."""
+    if len(instants) <= most:
+        return instants
+    return instants[np.unique(np.linspace(0, len(instants) - 1, most).round().astype(int))]
+
+
+def _split(instants: Float[np.ndarray, " given"], parts: int) -> Float[np.ndarray, " time"]:
+    """Return the instants, and others evenly between each two of them."""
+    share = np.arange(parts) / parts
+    between = instants[:-1, None] + np.diff(instants)[:, None] * share
+    return np.concatenate([between.ravel(), instants[-1:]])

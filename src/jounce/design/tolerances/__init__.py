@@ -1,0 +1,1 @@
+"""The spread of outputs where parameters deviate."""

@@ -1,0 +1,362 @@
+"""Tolerances: how far every output and derivative spreads when parameters deviate, and which parameter matters."""
+
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Float
+
+from jounce.base.activity import Count
+from jounce.design.tolerances.design_space import Sobol
+from jounce.design.tolerances.variations import Variation, read_variations, reader_of, spreads
+from jounce.errors import MechanismError, UnsupportedError, check_name, no_such, whole_number
+from jounce.jet.turns import whole_periods
+from jounce.kinematics import Motion, Status, solve
+from jounce.kinematics.families.design_sides import Sides
+from jounce.kinematics.families.solve_batch import solve_with_sides
+from jounce.mechanism import Mechanism, check_mechanism, time_grid
+from jounce.mechanism.building.preconditions import concrete
+from jounce.mechanism.laws.law_breaks import laws_may_break
+from jounce.mechanism.laws.output_drivers import with_outputs
+from jounce.mechanism.time import TimeLike
+
+if TYPE_CHECKING:
+    import xarray
+
+TOGETHER = 256  # designs that are solved in one program
+MOST_NUMBERS = 100_000_000  # of the histories of all samples: 0.8 GB
+PERCENTILES = (2.5, 97.5)
+BAND = {"low": PERCENTILES[0], "high": PERCENTILES[1]}
+
+Progress = Callable[[int, int], None]
+Histories = dict[str, Float[np.ndarray, "sample time derivative *axes"]]
+
+
+@concrete
+def tolerance(
+    mechanism: Mechanism,
+    vary: Mapping[str, Any],
+    time: TimeLike | None = None,
+    order: int = 4,
+    *,
+    of: Sequence[str] | None = None,
+    samples: int = 1024,
+    linear: bool = True,
+    indices: bool = False,
+    progress: Progress | None = None,
+) -> "xarray.Dataset":
+    """Return how far outputs and their derivatives spread where parameters deviate independently of one another.
+
+    Twice: to first order, by exact gradients; and by a Monte Carlo method on a scrambled Sobol sequence with a fixed
+    seed, in which every design is solved, so that what is not linear shows.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+        The nominal design.
+    vary : dict of str to object
+        Parameters by name: ``"normal:0.1mm"`` (a standard deviation), ``"uniform:0.1mm"`` (a half-width), both about
+        the nominal value, or the ends of a range, ``"14.1cm:14.3cm"`` or (0.141, 0.143), in which all values are
+        equally likely.
+    time : array_like of shape (time,), optional
+        Instants, s; those of the mechanism unless given.
+    order : int, default 4
+        Highest derivative, unless `of` says.
+    of : sequence of str, optional
+        What is looked at, by the names of columns: ``"psi"``, ``"psi_d3"``, ``"C_x_d2"``; all unless given.
+    samples : int, default 1024
+        Designs that are solved; powers of two fill the ranges best. 0 leaves the Monte Carlo method out.
+    linear : bool, default True
+        Whether gradients are computed.
+    indices : bool, default False
+        Whether Sobol's indices of the peaks are estimated by SALib, with ``samples * (parameters + 2)`` designs more.
+    progress : callable, optional
+        Called with the number of designs done and their total.
+
+    Returns
+    -------
+    xarray.Dataset
+        For each output NAME, of the dimensions time and derivative (and component), SI: NAME itself, of the nominal
+        design; NAME_linear_std, a standard deviation to first order; NAME_mean, NAME_std, NAME_low and NAME_high, the
+        mean, the standard deviation, and the percentiles 2.5 and 97.5 of the samples. NAME_gradient (parameter, ...)
+        has its derivatives by the parameters, NAME_share (parameter, ...) the part of the variance that each causes to
+        first order. NAME_peak, NAME_peak_mean, and so on tell of the largest magnitude at the instants; with indices
+        NAME_peak_first_order and NAME_peak_total_order (Saltelli 2010). ``solved`` (time) is how many samples were
+        solved: the others, which lock or cannot be put together, are left out of means.
+
+    Raises
+    ------
+    MechanismError
+        If a parameter or an output does not exist, or the samples would not fit into memory.
+    SolveError
+        If the nominal design is not solved at all instants.
+    UnsupportedError
+        SALib is not installed.
+
+    Notes
+    -----
+    Saltelli et al. 2010, Computer Physics Communications 181, 259-270; Owen 1998, ACM TOMACS 8, 71-102.
+
+    Examples
+    --------
+    >>> import jounce as jn
+    >>> four_bar = jn.load("examples/four_bar.yaml")
+    >>> spread = jn.tolerance(four_bar, {"BC": "normal:0.1mm"}, [0.0, 0.5], of=["psi_d1"], samples=0)
+    >>> spread["psi_share"].sel(parameter="BC", derivative=1).values.tolist()
+    [1.0, 1.0]
+    """
+    check_mechanism(mechanism)
+    variations = read_variations(vary, reader_of(mechanism))
+    for name in variations:
+        check_name("parameter", name, mechanism.parameters, MechanismError, name="vary")
+    spreads(variations)
+    samples = whole_number("samples", samples, 0, error=MechanismError)
+    if indices:
+        check_salib(samples)
+    selected = tuple(mechanism.outputs)
+    if of is not None:
+        chosen = [column_of(mechanism, name) for name in of]
+        order = max((atom[2] for atom in chosen), default=0)
+        outputs = {name: output for name, output in mechanism.outputs.items() if name in {c[0] for c in chosen}}
+        selected, mechanism = tuple(outputs), with_outputs(mechanism, outputs)
+    if not mechanism.outputs:
+        raise MechanismError("there is no output whose spread could be computed", name="outputs")
+    instants = time_grid(mechanism.time if time is None else time, mechanism.parameter_values)
+    nominal = solve(mechanism, instants, order)
+    atom = _Spread(nominal, variations, selected)
+    if linear:
+        atom.add_gradients()
+    with Count("solving", "designs", progress) as tell:
+        if samples:
+            atom.add_samples(samples, tell)
+        if indices:
+            atom.add_indices(samples, tell)
+    return atom.dataset()
+
+
+def column_of(mechanism: Mechanism, name: str) -> tuple[str, str, int]:
+    """Return the output, the component (or nothing), and the derivative that the name of a column means.
+
+    Raises
+    ------
+    MechanismError
+        There is no such column.
+
+    Examples
+    --------
+    >>> import jounce as jn
+    >>> column_of(jn.load("examples/four_bar.yaml"), "C_x_d3")
+    ('C', 'x', 3)
+    """
+    stem, _, digits = name.rpartition("_d")
+    plain, order = (stem, int(digits)) if stem and digits.isdecimal() and len(digits) < 3 else (name, 0)
+    for output, quantity in mechanism.outputs.items():
+        if plain == output:
+            return output, "", order
+        if plain.startswith(f"{output}_") and plain[len(output) + 1 :] in quantity.component_labels(mechanism):
+            return output, plain[len(output) + 1 :], order
+    message = f"{no_such('output', plain, mechanism.outputs)}; components and derivatives as in C_x_d3"
+    raise MechanismError(message, name="of", value=name)
+
+
+def check_salib(samples: int) -> None:
+    """Raise an error unless Sobol's indices can be estimated."""
+    from importlib.util import find_spec
+
+    if find_spec("SALib") is None:
+        message = "Sobol's indices need SALib, which is not installed; install it with: pip install SALib"
+        raise UnsupportedError(message, name="indices")
+    if samples < 2 or samples & (samples - 1):
+        message = "Sobol's indices need a power of two of samples, 2 or more"
+        raise MechanismError(message, name="samples", value=samples)
+
+
+class _Spread:
+    """What is known of the spread of the outputs of a mechanism about its nominal motion."""
+
+    def __init__(self, nominal: Motion, variations: Mapping[str, Variation], selected: tuple[str, ...]):
+        self.nominal, self.mechanism = nominal, nominal.mechanism
+        self.names, self.variations = tuple(variations), spreads(variations)
+        self.space = dict(self.mechanism.parameter_values)
+        self.deviations = np.array([variation.deviation() for variation in self.variations.values()])
+        whole = nominal.dataset
+        whole = whole.drop_vars([name for name in self.mechanism.outputs if name not in selected])
+        self._variables: dict[str, Any] = {str(name): whole[name].variable for name in whole.data_vars}
+        self._outputs = selected
+        self._solved: np.ndarray | None = None
+        sides, own = Sides(np.zeros((1, 0)), {}), {name: [self.space[name]] for name in self.names}
+        if laws_may_break(self.mechanism):
+            sides = solve_with_sides(self.mechanism, own, nominal.time, nominal.order)[1]
+        for name in self._outputs:
+            dims, values = whole[name].dims[1:], whole[name].values
+            peak = self._peaks(name, values[None], sides)[0]
+            self._put(f"{name}_peak", dims, peak, name, "largest magnitude of {} at the instants and breaks of laws")
+
+    def add_gradients(self) -> None:
+        """Differentiate by the parameters, all in one pass forward."""
+        start = jnp.array([self.space[name] for name in self.names])
+
+        def outputs(values: Any) -> dict[str, Any]:
+            changed = self.mechanism.with_parameters(**dict(zip(self.names, values, strict=True)))
+            solved = solve(changed, self.nominal.time, self.nominal.order).outputs
+            return {name: solved[name] for name in self._outputs}
+
+        for name, gradient in jax.jacfwd(outputs)(start).items():
+            dims = self._variables[name].dims
+            slope = np.moveaxis(np.asarray(gradient), -1, 0)
+            slope = slope.reshape(len(self.names), *self._variables[name].shape)
+            parts = (slope * self.deviations.reshape(-1, *[1] * (slope.ndim - 1))) ** 2
+            variance = parts.sum(axis=0)
+            share = np.divide(parts, variance, out=np.zeros_like(parts), where=variance > 0)
+            self._put(f"{name}_gradient", ("parameter", *dims), slope, name, "derivative of {} by the parameter")
+            self._put(f"{name}_linear_std", dims, np.sqrt(variance), name, "standard deviation of {}, first order")
+            self._put(f"{name}_share", ("parameter", *dims), share, "", "part of the variance of {}", name)
+
+    def add_samples(self, count: int, progress: Progress | None) -> None:
+        """Solve designs that are drawn from the distributions."""
+        shapes = [self._variables[name].shape for name in self._outputs]
+        numbers = count * sum(math.prod(shape) for shape in shapes)
+        if numbers > MOST_NUMBERS:
+            message = (
+                f"so many samples are {numbers:.3g} numbers in memory, at most {MOST_NUMBERS:.3g} are kept; ask for "
+                "fewer samples, instants or outputs, or sweep them (jn.sweep), which keeps peaks only"
+            )
+            raise MechanismError(message, name="samples", value=count)
+        space = Sobol(self.variations, self.space, count)
+        whole: Histories = {n: np.full((count, *s), np.nan) for n, s in zip(self._outputs, shapes, strict=True)}
+        peaks = {name: np.full((count, *s[1:]), np.nan) for name, s in zip(self._outputs, shapes, strict=True)}
+        solved = np.zeros((count, len(self.nominal.time)), bool)
+        for start, stop in _batches(count, progress):
+            batch, sides = self._solved_designs(space.values(start, stop))
+            solved[start:stop] = batch["status"].values == Status.OK
+            for name in self._outputs:
+                if name in batch:
+                    whole[name][start:stop] = self._near_nominal(name, batch[name].values)
+                    peaks[name][start:stop] = self._peaks(name, whole[name][start:stop], sides)
+        self._solved = solved.sum(axis=0)
+        for name, values in whole.items():
+            dims = self._variables[name].dims
+            self._add_statistics(name, "", dims, values)
+            self._add_statistics(f"{name}_peak", name, dims[1:], peaks[name][solved.all(axis=1)])
+
+    def add_indices(self, count: int, progress: Progress | None) -> None:
+        """Estimate how much of the variance of the peaks each parameter causes, alone and with others."""
+        from SALib.analyze import sobol as analyze
+        from SALib.sample import sobol as sample
+
+        bounds = [[0.0, 1.0]] * len(self.names)
+        problem = {"num_vars": len(self.names), "names": list(self.names), "bounds": bounds}
+        shares = np.asarray(sample.sample(problem, count, calc_second_order=False, seed=1))
+        shares = np.clip(shares, 2.0**-31, 1 - 2.0**-31)
+        values = {
+            name: variation.quantile(shares[:, k], self.space[name])
+            for k, (name, variation) in enumerate(self.variations.items())
+        }
+        peaks: dict[str, list[np.ndarray]] = {name: [] for name in self._outputs}
+        for start, stop in _batches(len(shares), progress):
+            solved, sides = self._solved_designs({name: x[start:stop] for name, x in values.items()})
+            bad = (solved["status"].values != Status.OK).any(axis=1)
+            if bad.any():
+                share = f"{int(bad.sum())} of {stop - start} designs lock or cannot be put together"
+                message = f"{share}, and indices need all of them; narrow the spread"
+                raise MechanismError(message, name="indices")
+            for name in self._outputs:
+                peaks[name].append(self._peaks(name, self._near_nominal(name, solved[name].values), sides))
+        for name, parts in peaks.items():
+            whole = np.concatenate(parts)
+            flat = whole.reshape(len(whole), -1)
+            first, total = np.full((2, len(self.names), flat.shape[1]), np.nan)
+            for k in np.flatnonzero(flat.std(axis=0) > 1e-12 * np.abs(flat).max(axis=0)):
+                settings = {"calc_second_order": False, "print_to_console": False, "seed": 1}
+                indices = analyze.analyze(problem, flat[:, k], **settings)
+                first[:, k], total[:, k] = indices["S1"], indices["ST"]
+            dims, shape = self._variables[f"{name}_peak"].dims, (len(self.names), *whole.shape[1:])
+            for kind, x, words in (("first", first, "alone"), ("total", total, "alone and with others")):
+                indices = f"part of the variance of the peak of {{}} by the parameter {words}"
+                self._put(f"{name}_peak_{kind}_order", ("parameter", *dims), x.reshape(shape), "", indices, name)
+
+    def dataset(self) -> Any:
+        """Return all that was found, labeled."""
+        import xarray
+
+        whole = self.nominal.dataset
+        coordinates = {str(name): x for name, x in whole.coords.items()} | {"parameter": list(self.names)}
+        coordinates["deviation"] = ("parameter", self.deviations, {"long_name": "standard deviation of the parameter"})
+        variables = dict(self._variables)
+        if self._solved is not None:
+            variables["solved"] = ("time", self._solved, {"long_name": "samples solved"})
+        return xarray.Dataset(variables, coordinates, {"title": whole.attrs.get("title", ""), "source": "jounce"})
+
+    def _solved_designs(self, values: Mapping[str, np.ndarray]) -> tuple[Any, Sides]:
+        """Return designs solved side by side, always as many, so that all is compiled once."""
+        count = len(next(iter(values.values())))
+        filled = {name: np.concatenate([x, np.repeat(x[-1:], TOGETHER - count)]) for name, x in values.items()}
+        solved, sides = solve_with_sides(self.mechanism, filled, self.nominal.time, self.nominal.order)
+        return solved.isel(design=slice(count)), sides
+
+    def _peaks(
+        self, name: str, values: Float[np.ndarray, "sample time derivative *axes"], sides: Sides
+    ) -> Float[np.ndarray, "sample derivative *axes"]:
+        """Return the largest magnitudes of samples of an output, at the instants and beside the breaks of laws."""
+        peaks = np.abs(values).max(axis=1)
+        one_sided = sides.values.get(name)
+        if one_sided is None or not one_sided.shape[1]:
+            return peaks
+        one_sided = np.abs(one_sided[: len(values)].reshape(len(values), -1, *values.shape[2:]))
+        if np.any(getattr(self.mechanism.outputs[name], "wraps", ())):
+            one_sided[:, :, 0] = np.nan  # no derivative, and counted from where the motion begins
+        return np.where(np.isnan(peaks), peaks, np.fmax(peaks, np.fmax.reduce(one_sided, axis=1)))
+
+    def _near_nominal(
+        self, name: str, values: Float[np.ndarray, "sample time derivative *axes"]
+    ) -> Float[np.ndarray, "sample time derivative *axes"]:
+        """Return samples of an output with the whole turns that begin nearest to the nominal motion.
+
+        Euler angles begin within half a turn of zero in every design, so that next to half a turn both signs occur.
+        """
+        wraps = np.array(getattr(self.mechanism.outputs[name], "wraps", ()))
+        if wraps.any():
+            away = values[:, 0, 0] - self._variables[name].values[0, 0]
+            values[:, :, 0] -= (whole_periods(away) * wraps)[:, None]
+        return values
+
+    def _add_statistics(self, name: str, of: str, dims: tuple[str, ...], values: np.ndarray) -> None:
+        """Keep the statistics of samples, those that are not known left out."""
+        import warnings
+
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", RuntimeWarning)  # where no sample is known: NaN
+            statistics = {"mean": np.nanmean(values, axis=0), "std": np.nanstd(values, axis=0, ddof=1)}
+            bounds = (
+                np.nanpercentile(values, PERCENTILES, axis=0)
+                if len(values)
+                else np.full((2, *values.shape[1:]), np.nan)
+            )
+        statistics |= dict(zip(BAND, bounds, strict=True))
+        words = {"mean": "mean", "std": "standard deviation", "low": "percentile 2.5", "high": "percentile 97.5"}
+        for kind, x in statistics.items():
+            long_name = f"{words[kind]} of {'the peak of ' if of else ''}{{}} over the samples"
+            self._put(f"{name}_{kind}", dims, x, of or name, long_name)
+
+    def _put(
+        self, name: str, dims: tuple[Any, ...], values: np.ndarray, units_of: str, words: str, of: str = ""
+    ) -> None:
+        if name in self._variables:
+            message = f"two arrays of the result would be called {name}; give the output another name"
+            raise MechanismError(message, name=f"outputs.{name}")
+        units = self.mechanism.outputs[units_of].unit if units_of else "1"
+        from xarray import Variable
+
+        self._variables[name] = Variable(dims, values, {"units": units, "long_name": words.format(of or units_of)})
+
+
+def _batches(count: int, progress: Progress | None) -> Iterator[tuple[int, int]]:
+    """Yield the bounds of designs that are solved together, and tell how many are done."""
+    for start in range(0, count, TOGETHER):
+        stop = min(start + TOGETHER, count)
+        yield start, stop
+        if progress is not None:
+            progress(stop, count)

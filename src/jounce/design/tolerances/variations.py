@@ -1,0 +1,251 @@
+"""What varies in a design, and how: forms such as ``3cm:5cm:101``, ``12cm:16cm`` and ``normal:0.1mm``."""
+
+import dataclasses
+import math
+from collections.abc import Callable, Iterable, Mapping
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float
+
+from jounce.base.shapes import real_numbers
+from jounce.errors import ExpressionError, JounceError, MechanismError, check_name, did_you_mean
+from jounce.mechanism import Mechanism
+
+FORMS = "LOW:HIGH, LOW:HIGH:COUNT, normal:SIGMA or uniform:HALFWIDTH"
+MOST_VALUES = 10_000_000  # of one parameter
+
+Reader = Callable[[str, str], float]
+"""Reads one value of a parameter, given the name of the parameter and a text with or without a unit; SI."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Interval:
+    """All values between two bounds, or evenly spaced ones with both ends.
+
+    Parameters
+    ----------
+    low, high : float
+        SI.
+    count : int, optional
+        How many values there are; without it any value is meant.
+    """
+
+    low: float
+    high: float
+    count: int | None = None
+
+    @property
+    def values(self) -> Float[np.ndarray, " value"]:
+        """The values of an interval with a count."""
+        assert self.count is not None
+        return np.linspace(self.low, self.high, self.count)
+
+    def quantile(self, share: Float[np.ndarray, "*batch"], nominal: float) -> Float[np.ndarray, "*batch"]:
+        """Return the values below which shares of all values are."""
+        del nominal
+        return self.low + (self.high - self.low) * share
+
+    def deviation(self) -> float:
+        """Return the standard deviation of a value anywhere in the interval, all being equally likely."""
+        return (self.high - self.low) / math.sqrt(12)
+
+
+@dataclasses.dataclass(frozen=True)
+class Uniform:
+    """Values within a half-width of the nominal one, all equally likely."""
+
+    halfwidth: float
+
+    def quantile(self, share: Float[np.ndarray, "*batch"], nominal: float) -> Float[np.ndarray, "*batch"]:
+        """Return the values below which shares of all values are."""
+        return nominal + self.halfwidth * (2 * share - 1)
+
+    def deviation(self) -> float:
+        """Return the standard deviation."""
+        return self.halfwidth / math.sqrt(3)
+
+
+@dataclasses.dataclass(frozen=True)
+class Normal:
+    """Values normally distributed about the nominal one."""
+
+    sigma: float
+
+    def quantile(self, share: Float[np.ndarray, "*batch"], nominal: float) -> Float[np.ndarray, "*batch"]:
+        """Return the values below which shares of all values are."""
+        from scipy.special import ndtri
+
+        return nominal + self.sigma * ndtri(share)
+
+    def deviation(self) -> float:
+        """Return the standard deviation."""
+        return self.sigma
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Values:
+    """Values given one by one."""
+
+    values: Float[np.ndarray, " value"]
+
+    @property
+    def count(self) -> int:
+        """How many values there are."""
+        return len(self.values)
+
+
+Variation = Interval | Uniform | Normal | Values
+
+
+def read_variations(given: Any, read: Reader, option: str = "vary") -> dict[str, Variation]:
+    """Return how parameters vary.
+
+    Parameters
+    ----------
+    given : dict of str to object
+        For each parameter, by name: a text of one of the forms, a pair of bounds, bounds and a count, or a list or an
+        array of values; numbers SI.
+    read : callable
+        Reads one value of a parameter from a text, and refuses names that there are not.
+    option : str
+        What they are given by, for messages.
+
+    Raises
+    ------
+    JounceError
+        There is none, a form or a value cannot be read, or bounds are reversed.
+    """
+    if not isinstance(given, Mapping) or not given:
+        raise MechanismError(f"say what varies, as {FORMS} for each parameter", name=option, value=given)
+    return {name: _variation(str(name), form, read, option) for name, form in given.items()}
+
+
+def named_forms(texts: Iterable[str]) -> dict[str, str]:
+    """Return forms by the names of their parameters, from texts such as ``BC=12cm:16cm``.
+
+    Raises
+    ------
+    MechanismError
+        A text has no name or no form, or a name is given twice.
+
+    Examples
+    --------
+    >>> named_forms(["BC=12cm:16cm", "AB = normal:0.1mm"])
+    {'BC': '12cm:16cm', 'AB': 'normal:0.1mm'}
+    """
+    forms: dict[str, str] = {}
+    for text in texts:
+        name, _, form = (part.strip() for part in text.partition("="))
+        if not name or not form:
+            raise MechanismError(f"a parameter varies by NAME=FORM, where FORM is {FORMS}", name="--vary", value=text)
+        if name in forms:
+            raise MechanismError(f"is given more than once, as {forms[name]} and as {form}", name=f"--vary {name}")
+        forms[name] = form
+    return forms
+
+
+def reader_of(mechanism: Mechanism) -> Reader:
+    """Return what reads values of the parameters of a mechanism, with the units that they may have.
+
+    Examples
+    --------
+    >>> import jounce as jn
+    >>> reader_of(jn.load("examples/four_bar.yaml"))("BC", "14 cm")
+    0.14
+    """
+
+    def read(name: str, text: str) -> float:
+        check_name("parameter", name, mechanism.parameters, MechanismError, name="vary")
+        return float(mechanism.with_parameters(**{name: text}).parameter_values[name])
+
+    return read
+
+
+def _variation(name: str, form: Any, read: Reader, option: str) -> Variation:
+    location = f"{option} {name}"
+    if isinstance(form, Interval | Uniform | Normal | Values):
+        return form
+    try:
+        return _from_text(name, form, read) if isinstance(form, str) else _from_numbers(form)
+    except JounceError as error:
+        if error.name is not None and not error.name.startswith("parameters."):
+            raise
+        raise type(error)(error.message, name=location, value=form if error.value is None else error.value) from None
+
+
+def _from_text(name: str, text: str, read: Reader) -> Variation:
+    first, *others = (part.strip() for part in text.split(":"))
+    spreads = {"normal": Normal, "uniform": Uniform}
+    if first in spreads:
+        if len(others) != 1 or not others[0]:
+            raise MechanismError(f"must be {first}:SIZE, such as {first}:0.1mm", value=text)
+        size = _value(name, others[0], read)
+        if size <= 0:
+            raise MechanismError("the spread must be above zero", value=others[0])
+        return spreads[first](size)
+    if len(others) not in (1, 2) or not all((first, *others)):
+        hint = f"; {did_you_mean(first, spreads)}" if first.isalpha() and others else ""
+        raise MechanismError(f"must be {FORMS}{hint}", value=text)
+    return _interval(_value(name, first, read), _value(name, others[0], read), *others[1:])
+
+
+def _value(name: str, text: str, read: Reader) -> float:
+    try:
+        return read(name, text)
+    except ExpressionError as error:
+        if text.isidentifier():
+            raise MechanismError(f"must be {FORMS}", value=text) from None
+        raise error
+
+
+def _from_numbers(form: Any) -> Variation:
+    if isinstance(form, tuple):
+        if len(form) not in (2, 3):
+            raise MechanismError("must be (low, high), (low, high, count), or a list of values", value=form)
+        return _interval(*(_number(bound) for bound in form[:2]), *form[2:])
+    expected = "(low, high), (low, high, count), or a list of finite numbers"
+    values = np.array(real_numbers(None, form, MechanismError, expected))
+    if values.ndim != 1 or not values.size or not np.isfinite(values).all():
+        raise MechanismError(f"must be {expected}", value=form)
+    return Values(values)
+
+
+def _number(value: Any) -> float:
+    number = real_numbers(None, value, MechanismError, "a finite number")
+    if number.ndim or not np.isfinite(number):
+        raise MechanismError("a bound must be a finite number", value=value)
+    return float(number)
+
+
+def _interval(low: float, high: float, count: Any = None) -> Interval:
+    if count is None:
+        if not low < high:
+            raise MechanismError("the lower bound must be below the upper one", value=[low, high])
+        return Interval(low, high)
+    text = str(count).strip()
+    number = int(text) if text.isdecimal() and len(text) < 12 else 0
+    if not 1 <= number <= MOST_VALUES or isinstance(count, bool):
+        raise MechanismError(f"the count must be a whole number from 1 to {MOST_VALUES}", value=count)
+    if not (low < high or (low == high and number == 1)):
+        raise MechanismError("the lower bound must be below the upper one", value=[low, high])
+    if number == 1 and low != high:
+        raise MechanismError("one value has one bound, not two; give both the same, or a count of 2 or more", value=1)
+    return Interval(low, high, number)
+
+
+def spreads(variations: Mapping[str, Variation]) -> dict[str, Normal | Uniform | Interval]:
+    """Return variations that say how likely values are.
+
+    Raises
+    ------
+    MechanismError
+        One is a list of values, or has a count.
+    """
+    distributions: dict[str, Normal | Uniform | Interval] = {}
+    for name, variation in variations.items():
+        if isinstance(variation, Values) or getattr(variation, "count", None) is not None:
+            message = "is drawn from a range, not a list: LOW:HIGH without COUNT, normal:SIGMA or uniform:HALFWIDTH"
+            raise MechanismError(message, name=f"vary {name}")
+        distributions[name] = variation
+    return distributions

@@ -1,0 +1,1 @@
+"""Forces, torques and reactions as outputs."""

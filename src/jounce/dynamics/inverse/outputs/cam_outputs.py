@@ -1,0 +1,52 @@
+"""What cams press their followers with, as outputs: along the coordinate of the follower, with rates and sign."""
+
+from typing import Any
+
+import equinox as eqx
+import numpy as np
+
+from jounce.base.shapes import Numbers
+from jounce.constraints import Cam
+from jounce.dynamics.inverse.motion_forces import MotionForces
+from jounce.dynamics.inverse.outputs.components import RATES, AbstractForceOutput
+from jounce.dynamics.inverse.outputs.output_words import lift_off_words
+from jounce.errors import MechanismError
+from jounce.kinematics import Motion
+from jounce.mechanism.laws.driver_outputs import is_turning
+
+
+class _CamOutput(AbstractForceOutput):
+    joint: str = eqx.field(static=True)
+
+    source = "joint"
+
+    def _check_named(self, element: Any) -> None:
+        if not isinstance(element, Cam):
+            message = "is no cam, which alone has a contact force; take its reaction"
+            raise MechanismError(message, name="joint", value=self.joint)
+        if is_turning(element.follower) != (self.unit == "N*m"):
+            kind, word = ("turns", "contact_torque") if self.unit == "N" else ("slides", "contact")
+            raise MechanismError(f"the follower of this cam {kind}; take its {word}", name="quantity")
+
+    def coefficients(self, motion: Motion) -> Numbers:
+        """Return the Taylor coefficients of what the cam exerts on its follower, (levels, 1, time)."""
+        size = motion.model.length if self.unit == "N*m" else 1.0
+        return MotionForces.of(motion).unique(lambda forces: forces.driver_force(self.joint), size)
+
+    def remark(self, motion: Motion, values: np.ndarray) -> str:
+        """Return why values are NaN, or where the follower lifts off."""
+        return super().remark(motion, values) or lift_off_words(motion.time, values[:, 0])
+
+
+class CamForceOutput(_CamOutput):
+    """Force of a cam on its follower along the coordinate that follows, N; positive where it makes that larger."""
+
+    unit = "N"
+    rate_names = ("force", *RATES)
+
+
+class CamTorqueOutput(_CamOutput):
+    """Torque of a cam on its follower about the angle that follows, N m; positive where it makes that larger."""
+
+    unit = "N*m"
+    rate_names = ("torque", *RATES)

@@ -1,0 +1,343 @@
+"""Forces as outputs: of drivers along what they prescribe, of joints on their bodies, and applied ones, with rates."""
+
+from collections.abc import Iterable
+from typing import Any, ClassVar
+
+import equinox as eqx
+import numpy as np
+
+from jounce.base.shapes import ArrayLike, Numbers
+from jounce.constraints import Cam, Rope
+from jounce.constraints.base import Vector, by_ratio_alone
+from jounce.constraints.planar import Belt
+from jounce.dynamics.inverse.locked_friction import passing_words
+from jounce.dynamics.inverse.motion_forces import MotionForces
+from jounce.dynamics.inverse.outputs.output_words import (
+    belt_words,
+    cam_words,
+    following,
+    lift_off_words,
+    ratio_words,
+    signal_words,
+    slack_words,
+)
+from jounce.dynamics.inverse.tooth_flanks import flank_words
+from jounce.dynamics.masses import check_loads
+from jounce.errors import MechanismError, check_choice, check_name, did_you_mean
+from jounce.forces import AbstractForce
+from jounce.kinematics import Motion, Status
+from jounce.mechanism import AbstractMotionOutput, Mechanism
+from jounce.mechanism.laws.driver_outputs import is_turning
+from jounce.mechanism.mechanism import GROUND
+from jounce.mechanism.resolve import resolve_element
+from jounce.mechanism.system import POSITION_COMPONENTS
+from jounce.trajectory import FollowingMotion
+
+RATES = ("yank", "second rate", "third rate", "fourth rate")
+
+
+class AbstractForceOutput(AbstractMotionOutput):
+    """A force or torque in a mechanism: two derivatives shorter than the motion, as accelerations are."""
+
+    lost_orders = 2
+    of_forces = True
+    source: ClassVar[str] = ""  # the field that names what exerts it: driver, joint or force
+
+    def check(self, mechanism: Mechanism) -> None:
+        """Raise MechanismError unless the mechanism has what is named, and masses or applied forces."""
+        kinds = {"driver": ("drivers",), "joint": ("joints", "drivers", "forces"), "force": ("forces",)}[self.source]
+        known = {name: element for kind in kinds for name, element in getattr(mechanism, kind).items()}
+        name = getattr(self, self.source)
+        check_name(self.source, name, known, MechanismError, name=self.source)
+        check_loads(mechanism, self.source)
+        self._check_named(known[name])
+
+    def prepare(self, motion: Motion) -> None:
+        """Make the program of the balance of forces."""
+        MotionForces.of(motion).prepare()
+
+    def _check_named(self, element: Any) -> None:
+        """Raise MechanismError unless the quantity is one of what is named."""
+
+    def remark(self, motion: Motion, values: np.ndarray) -> str:
+        """Return why values are NaN at instants that were solved: redundant constraints leave them open."""
+        forces = MotionForces.of(motion)
+        solved = motion.status == Status.OK
+        if np.isfinite(values[solved]).all():
+            return ""
+        if forces.loose is None:
+            return passing_words(forces)
+        return (
+            f"not unique, as constraints are redundant: {forces.open.words}; redundant_reactions chooses by least "
+            "norm or by stiffnesses"
+        )
+
+
+class _DriverOutput(AbstractForceOutput):
+    driver: str = eqx.field(static=True)
+
+    source = "driver"
+
+    def coefficients(self, motion: Motion) -> Numbers:
+        """Return the Taylor coefficients of what the driver exerts, (levels, 1, time)."""
+        size = motion.model.length if self.unit == "N*m" else 1.0
+        return MotionForces.of(motion).unique(lambda forces: forces.driver_force(self.driver), size)
+
+    def remark(self, motion: Motion, values: np.ndarray) -> str:
+        """Return why values are NaN, or where the force of a cam on its follower changes its sign."""
+        if why := super().remark(motion, values):
+            return why
+        if isinstance(getattr(motion.mechanism.drivers[self.driver], "motion", None), FollowingMotion):
+            return lift_off_words(motion.time, values[:, 0])
+        return signal_words(following(motion.mechanism, self.driver))
+
+
+class DriverForceOutput(_DriverOutput):
+    """Force of a driver along the length that it prescribes, N; its product with the rate of the law is the power."""
+
+    unit = "N"
+    rate_names = ("force", *RATES)
+
+    def _check_named(self, element):
+        if is_turning(element):
+            raise MechanismError("this driver prescribes an angle, so that it exerts a torque", name="quantity")
+
+
+class DriverTorqueOutput(_DriverOutput):
+    """Torque of a driver about the angle that it prescribes, N m; its product with the rate of the law is the power."""
+
+    unit = "N*m"
+    rate_names = ("torque", *RATES)
+
+    def _check_named(self, element):
+        if not is_turning(element):
+            raise MechanismError("this driver prescribes a length, so that it exerts a force", name="quantity")
+
+
+class _Reaction(AbstractForceOutput):
+    def is_vector(self, mechanism: Mechanism) -> bool:
+        """Tell whether the reaction has components: a torque has in space."""
+        return self.unit == "N" or mechanism.space == "spatial"
+
+
+class _JointOutput(_Reaction):
+    joint: str = eqx.field(static=True)
+    body: str | None = eqx.field(
+        static=True, default=None
+    )  # on which it acts; the second one of the joint unless given
+    frame: str = eqx.field(static=True, default="global")  # global, body, or the name of a body of the joint
+
+    source = "joint"
+
+    def check(self, mechanism: Mechanism) -> None:
+        """Raise MechanismError unless the mechanism has the joint, its body and masses or applied forces."""
+        super().check(mechanism)
+        element = _exerting(mechanism, self.joint)
+        felt = element.bodies if _is_load(element) else (*element.bodies, GROUND)
+        if self.body is not None and self.body not in felt:
+            message = f"is not joined by '{self.joint}'; {did_you_mean(self.body, felt)}"
+            raise MechanismError(message, name="body", value=self.body)
+        check_choice("frame", self.frame, ("global", "body", *dict.fromkeys(felt)), MechanismError)
+
+    def remark(self, motion: Motion, values: np.ndarray) -> str:
+        """Return why values are NaN, which gears load no bearing of their bodies, and where loads change flanks."""
+        joints = motion.mechanism.joints
+        bodies = {*_exerting(motion.mechanism, self.joint).bodies} - {GROUND}
+        gears = [name for name, x in joints.items() if by_ratio_alone(x) and bodies & {*x.bodies}]
+        cams = [
+            name for name, x in joints.items() if isinstance(x, Cam) and name != self.joint and bodies & {*x.bodies}
+        ]
+        belts = [name for name, x in joints.items() if isinstance(x, Belt) and bodies & {*x.bodies}]
+        forces = MotionForces.of(motion)
+        loaded, pressed, pulled = ([x for x in names if forces.is_loaded(x)] for names in (gears, cams, belts))
+        told = ratio_words(loaded), cam_words(pressed), belt_words(pulled), flank_words(forces, bodies)
+        words = super().remark(motion, values), *told
+        return "; ".join(filter(None, words))
+
+    def _values(self, motion: Motion, point: ArrayLike | None, part: int, size: float) -> Numbers:
+        """Return force or moment about a point of the body, with rates; about that of the joint unless given."""
+        mechanism, forces = motion.mechanism, MotionForces.of(motion)
+        element = _exerting(mechanism, self.joint)
+        body = element.bodies[min(1, len(element.bodies) - 1)] if self.body is None else self.body
+        index = [GROUND, *mechanism.bodies].index
+        frame = {"global": None, "body": body}.get(self.frame, self.frame)
+        about: Any = forces.point_of(self.joint, index(body)) if point is None else point
+
+        def values_of(forces: MotionForces) -> Numbers:
+            return forces.reaction(self.joint, index(body), None if frame is None else index(frame), about)[part]
+
+        return values_of(forces) if isinstance(element, AbstractForce) else forces.unique(values_of, size)
+
+
+def _exerting(mechanism: Mechanism, name: str) -> Any:
+    """Return the joint or driver of a name, or the applied force if there is none."""
+    return {**mechanism.forces, **mechanism.joints, **mechanism.drivers}[name]
+
+
+def _is_load(element: Any) -> bool:
+    """Tell whether a force comes from outside: it acts on one body, and on nothing else in turn."""
+    return isinstance(element, AbstractForce) and len(element.bodies) == 1
+
+
+def _along_line(forces: MotionForces, name: str) -> Numbers:
+    """Return the tension of a rope, or the pull of a belt, as Taylor coefficients, (levels, 1, time)."""
+    index = forces.indices[name]
+    factor = forces.model.system.groups[index.group].element.line_force()
+    return forces.multipliers[:, list(index.own_rows)] * (factor if np.ndim(factor) == 0 else factor[index.instance])
+
+
+class JointForceOutput(_JointOutput):
+    """Reaction force of a joint, driver or force between bodies on one of its bodies, or on the ground, N.
+
+    Of a rope, unless the body is given, it is the tension; of a belt, the pull of the strand on the left of the line
+    of centers, seen from the first pulley to the second where it leaves that, less the pull of the other strand.
+    """
+
+    unit = "N"
+    rate_names = ("force", *RATES)
+
+    def _is_line(self, mechanism: Mechanism) -> bool:
+        return self.body is None and hasattr(mechanism.joints.get(self.joint), "line_force")
+
+    def is_vector(self, mechanism: Mechanism) -> bool:
+        """Tell whether the force has components: that along a rope or a belt has none."""
+        return not self._is_line(mechanism)
+
+    def check(self, mechanism: Mechanism) -> None:
+        """Raise MechanismError unless the mechanism has the joint, its body and masses or applied forces."""
+        super().check(mechanism)
+        if self._is_line(mechanism) and self.frame != "global":
+            message = "a force along a rope or a belt has no frame; give the body for the force on it"
+            raise MechanismError(message, name="frame", value=self.frame)
+
+    def coefficients(self, motion: Motion) -> Numbers:
+        """Return the Taylor coefficients of the force, (levels, components, time)."""
+        if self._is_line(motion.mechanism):
+            return MotionForces.of(motion).unique(lambda forces: _along_line(forces, self.joint))
+        return self._values(motion, None, 0, 1.0)
+
+    def remark(self, motion: Motion, values: np.ndarray) -> str:
+        """Return why values are NaN, what they leave out, and where a rope is slack."""
+        if not self._is_line(motion.mechanism):
+            return super().remark(motion, values)
+        rope = isinstance(motion.mechanism.joints[self.joint], Rope)
+        slack = slack_words(motion.time, values[:, 0]) if rope else ""
+        return "; ".join(filter(None, [AbstractForceOutput.remark(self, motion, values), slack]))
+
+
+def slack_ropes(motion: Motion) -> dict[str, str]:
+    """Return of each rope that has no output of its tension where it is slack in a motion; nothing where none is.
+
+    What rests on a rope that would have to push is wrong there, whatever is asked for. Nothing is told of a mechanism
+    without masses and applied forces, nor of a motion without accelerations.
+    """
+    mechanism, found = motion.mechanism, {}
+    ropes = [name for name, joint in mechanism.joints.items() if isinstance(joint, Rope)]
+    told = {x.joint for x in mechanism.outputs.values() if isinstance(x, JointForceOutput) and x.body is None}
+    loaded = mechanism.forces or any(body.mass is not None for body in mechanism.rigid_bodies.values())
+    if not loaded or len(motion.poses[1]["position"]) < 3:
+        return {}
+    for name in (name for name in ropes if name not in told):
+        tension = JointForceOutput(name).coefficients(motion)
+        if words := slack_words(motion.time, np.asarray(tension)[0, 0]):
+            found[name] = f"its tension {words}"
+    return found
+
+
+class JointTorqueOutput(_JointOutput):
+    """Reaction torque of a joint, driver or force on one of its bodies, or the ground, about a point of that body, N m.
+
+    The point is that of the joint unless given, or the origin of the body where the joint has none there.
+    """
+
+    point: Vector = None  # m, in the frame of the body
+
+    unit = "N*m"
+    rate_names = ("torque", *RATES)
+
+    def coefficients(self, motion: Motion) -> Numbers:
+        """Return the Taylor coefficients of the torque, (levels, components, time)."""
+        mechanism = motion.mechanism
+        components = POSITION_COMPONENTS[mechanism.space]
+        values = resolve_element(self, mechanism.parameter_values, components, f"outputs.{self.joint}")
+        return self._values(motion, values["point"], 1, motion.model.length)
+
+
+class _GroundOutput(_Reaction):
+    source = "mechanism"  # the key of a file that says what it is of
+
+    def check(self, mechanism: Mechanism) -> None:
+        """Raise MechanismError unless there are masses or applied forces."""
+        check_loads(mechanism, self.source)
+
+    def _values(self, motion: Motion, point: ArrayLike, part: int, size: float) -> Numbers:
+        """Return total force or moment about a point of the ground, with rates."""
+        mechanism, forces, about = motion.mechanism, MotionForces.of(motion), np.asarray(point)
+        between = [name for name, force in mechanism.forces.items() if not _is_load(force)]
+
+        def values_of(forces: MotionForces, names: Iterable[str]) -> Numbers:
+            start = np.zeros((forces.levels, (forces.pose_type.shifts, forces.pose_type.turns)[part], len(motion.time)))
+            return sum((forces.reaction(name, 0, None, about)[part] for name in names), start)
+
+        constraints = (*mechanism.joints, *mechanism.drivers)
+        return forces.unique(lambda f: values_of(f, constraints), size) + values_of(forces, between)
+
+
+class GroundForceOutput(_GroundOutput):
+    """Total force of a mechanism on the ground, N: of all joints, drivers and forces between bodies (shaking force)."""
+
+    unit = "N"
+    rate_names = ("force", *RATES)
+
+    def coefficients(self, motion: Motion) -> Numbers:
+        """Return the Taylor coefficients of the force, (levels, components, time)."""
+        return self._values(motion, np.zeros(len(self.component_labels(motion.mechanism))), 0, 1.0)
+
+
+class GroundTorqueOutput(_GroundOutput):
+    """Total torque of a mechanism on the ground about one of its points, N m (shaking moment)."""
+
+    point: Vector = None  # m; the origin unless given
+
+    unit = "N*m"
+    rate_names = ("torque", *RATES)
+
+    def coefficients(self, motion: Motion) -> Numbers:
+        """Return the Taylor coefficients of the torque, (levels, components, time)."""
+        mechanism = motion.mechanism
+        components = POSITION_COMPONENTS[mechanism.space]
+        point = resolve_element(self, mechanism.parameter_values, components, "outputs.ground")["point"]
+        return self._values(motion, np.zeros(components) if point is None else point, 1, motion.model.length)
+
+
+class _AppliedOutput(AbstractForceOutput):
+    force: str = eqx.field(static=True)
+
+    source = "force"
+
+    def is_vector(self, mechanism: Mechanism) -> bool:
+        """Tell whether the applied force has several components."""
+        return len(mechanism.forces[self.force].velocity_names) > 1
+
+    def coefficients(self, motion: Motion) -> Numbers:
+        """Return the Taylor coefficients of the force, (levels, components, time)."""
+        return MotionForces.of(motion).applied_force(self.force)
+
+    def _check_named(self, element):
+        if element.unit != self.unit:
+            kind, other = ("force", "torque") if element.unit == "N" else ("torque", "force")
+            raise MechanismError(f"this is a {kind}, no {other}", name="quantity")
+
+
+class AppliedForceOutput(_AppliedOutput):
+    """Applied force along its displacement, or with its components, N; it drives a growing displacement if positive."""
+
+    unit = "N"
+    rate_names = ("force", *RATES)
+
+
+class AppliedTorqueOutput(_AppliedOutput):
+    """Applied torque about its angle, or with its components, N m; it drives a growing angle if positive."""
+
+    unit = "N*m"
+    rate_names = ("torque", *RATES)

@@ -1,0 +1,1 @@
+"""Compiled programs, stored in a folder for later processes."""

@@ -1,0 +1,256 @@
+"""Values without a unit that are likely meant in another one than SI: degrees for radians, millimeters for meters."""
+
+from __future__ import annotations
+
+import math
+import warnings
+from bisect import bisect_left
+from collections.abc import Iterable, Iterator
+from typing import Any
+
+import numpy as np
+
+from jounce.constraints import catalogue
+from jounce.constraints.facts import at_coordinate
+from jounce.errors import JounceError, UnitWarning
+from jounce.io.files.located_data import Location, Source, dotted
+from jounce.io.files.samples import sampled_dimension
+from jounce.io.mechanisms.schema.key_check import ROLES
+from jounce.io.mechanisms.schema.keys import file_keys, is_cam
+from jounce.mechanism import Mechanism
+from jounce.mechanism.laws.angle_laws import (
+    IN_SI,
+    AngleLaw,
+    degrees_doubt,
+    laws_of_angles,
+    names_angle,
+    number_doubt,
+    settle,
+)
+from jounce.mechanism.resolve import resolve
+from jounce.mechanism.time import instants_of
+from jounce.trajectory.law_checks.unit_doubts import values_of
+from jounce.units import Expression
+from jounce.units.dimensions import ANGLE, LENGTH, Dimension
+from jounce.units.values import parse_value
+
+FAR_OFF = 100.0  # times the other lengths
+ALIKE = 30.0  # within which a thousandth of a length must be to them
+TO_COMPARE = 3  # lengths, at least
+LARGE = 5.0  # m, from which on a machine may be one in millimeters
+FAST = 120.0  # m/s, which nothing so large reaches
+LIGHT = 0.1  # kg/m, less than which nothing so large has
+SLENDER = 1e-5  # of the mass by the square of the size, less than which no body's inertia is
+
+
+def warn_of_units(source: Source, mechanism: Mechanism) -> None:
+    """Warn of angles that are likely in degrees, laws over the run among them, and of lengths likely in millimeters.
+
+    Warns
+    -----
+    UnitWarning
+        With the file, the line, the name and what may be meant.
+    """
+    warned = set()
+    for location, value in _angles(source.data, mechanism):
+        if why := number_doubt(value):
+            warned.add(location[:3])
+            _warn(source, location, why)
+    run, laws = _run(mechanism), list(laws_of_angles(mechanism))
+    angles = frozenset(name for name, dimensions in mechanism.dimensions.items() if ANGLE in dimensions)
+    for law in laws:
+        at: Location = ("drivers", law.name, "motion")
+        why = degrees_doubt(law.law, *run)
+        if at in warned or why:
+            settle(law.driver)  # warned of now, or known to be meant as it is
+        if why and at not in warned and not names_angle(law, angles) and not _has_unit(source, at):
+            _warn(source, at, why)
+    _warn_of_lengths(source, mechanism, laws)
+
+
+def warn_of_values(before: Mechanism, after: Mechanism, given: Iterable[str], option: str) -> None:
+    """Warn of parameters that were given as plain numbers, likely in degrees or millimeters, by the values before.
+
+    Parameters
+    ----------
+    before, after : Mechanism
+        With the values of a file, and with those given.
+    given : iterable of str
+        Names of parameters whose values are plain numbers.
+    option : str
+        By which they were given.
+
+    Warns
+    -----
+    UnitWarning
+    """
+    old, new, warned = before.parameter_values, after.parameter_values, False
+    for name in given:
+        dimensions, value = after.dimensions.get(name, ()), float(new[name])
+        was = abs(float(old[name]))
+        if ANGLE in dimensions and (hint := number_doubt(value)):
+            pass
+        elif LENGTH in dimensions and was and _is_thousandfold(abs(value), was):
+            hint = f"{value:g} m is {float(f'{abs(value) / was:.1g}'):g} times what it was: {value:g} mm?"
+        else:
+            continue
+        warned = True
+        warnings.warn(UnitWarning(f"{option} {name}: {hint} {IN_SI}"), stacklevel=3)
+    run = _run(before)
+    known = {law.name for law in laws_of_angles(before) if degrees_doubt(law.law, *run)}
+    run = _run(after)
+    for law in laws_of_angles(after):
+        if not (why := degrees_doubt(law.law, *run)):
+            continue
+        settle(law.driver)
+        if not warned and law.name not in known:
+            warnings.warn(UnitWarning(f"{option}: now the law of drivers.{law.name} {why} {IN_SI}"), stacklevel=3)
+
+
+def _is_thousandfold(value: float, usual: float) -> bool:
+    """Tell whether a length is far larger than usual, and a usual one where it is in millimeters."""
+    return value > FAR_OFF * usual and usual / ALIKE < value / 1000 < ALIKE * usual
+
+
+def _run(mechanism: Mechanism) -> tuple[float, float]:
+    """Return the first and the last instant of a mechanism, s; of one that has none, those of a second."""
+    try:
+        instants = None if mechanism.time is None else instants_of(mechanism.time, mechanism.parameter_values)
+    except JounceError:  # their use raises it
+        instants = None
+    return (0.0, 1.0) if instants is None else (float(instants[0]), float(instants[-1]))
+
+
+def _has_unit(source: Source, at: Location) -> bool:
+    """Tell whether the samples of a law say their unit."""
+    raw = source.at(at)
+    if not isinstance(raw, dict) or not isinstance(raw.get("samples"), str):
+        return False
+    columns = {key: raw[key] for key in ("time", "value") if key in raw}
+    try:
+        return bool(source.read_named(raw["samples"], at, lambda path: sampled_dimension(path, **columns)))
+    except JounceError:
+        return False
+
+
+def _warn_of_lengths(source: Source, mechanism: Mechanism, laws: Iterable[AngleLaw]) -> None:
+    lengths = [(location, abs(value), plain) for location, value, plain in _lengths(source.data, mechanism) if value]
+    in_order = sorted(value for _, value, _ in lengths)
+    for location, value, plain in lengths:
+        if not plain or len(lengths) <= TO_COMPARE:
+            continue
+        usual = _median_of_others(in_order, value)
+        if _is_thousandfold(value, usual):
+            times = float(f"{value / usual:.1g}")
+            _warn(source, location, f"{value:g} m is {times:g} times the others: {value:g} mm?")
+    if len(lengths) < TO_COMPARE or in_order[-1] < LARGE or not all(plain for *_, plain in lengths):
+        return
+    if (why := _too_large(mechanism, in_order[-1], laws)) and not _any_unit(source.data, mechanism):
+        location = max(lengths, key=lambda x: x[1])[0]
+        _warn(source, location, f"the lengths of this file go up to {in_order[-1]:g} m, {why}: millimeters?")
+
+
+def _too_large(mechanism: Mechanism, size: float, laws: Iterable[AngleLaw]) -> str:
+    """Word why no mechanism of this one's motion or masses is of a size, m; nothing if there may be one."""
+    first, last = _run(mechanism)
+    for law in laws:
+        values = values_of(law.law, first, last)
+        if values is not None and last > first:
+            fastest = float(np.abs(np.diff(values)).max()) * (len(values) - 1) / (last - first)
+            if fastest * size > FAST:
+                return f"which would move at {fastest * size:.3g} m/s"
+    parameters = mechanism.parameter_values
+    masses = {name: body.mass for name, body in mechanism.bodies.items() if body.mass is not None}
+    heaviest = max((abs(float(resolve(mass, parameters))) for mass in masses.values()), default=math.nan)
+    if heaviest < LIGHT * size:
+        return f"of masses up to {heaviest:g} kg"
+    for name, mass in masses.items():
+        inertia = mechanism.bodies[name].inertia
+        if inertia is not None:
+            most = float(np.abs(np.asarray(resolve(inertia, parameters), float)).max())
+            if 0 < most < SLENDER * float(resolve(mass, parameters)) * size**2:
+                return f"of a body with an inertia of {most:g} kg m^2"
+    return ""
+
+
+def _any_unit(data: dict[str, Any], mechanism: Mechanism) -> bool:
+    """Tell whether any length of a file has a unit."""
+    names = dict.fromkeys(mechanism.parameters)
+    given = [raw for _, quantity, raw in _fields(data, mechanism) if quantity == "length"]
+    for raw in [*(raw for _, raw in _parameters(data, mechanism, LENGTH)), *given]:
+        try:
+            if isinstance(raw, str) and parse_value(raw, "any", names).dimension == LENGTH:
+                return True
+        except JounceError:
+            continue
+    return False
+
+
+def _median_of_others(in_order: list[float], value: float) -> float:
+    """Return the median of numbers in order without one of them."""
+    own, count = bisect_left(in_order, value), len(in_order) - 1
+    low, high = (in_order[k + (k >= own)] for k in ((count - 1) // 2, count // 2))
+    return (low + high) / 2
+
+
+def _warn(source: Source, location: Location, hint: str) -> None:
+    line = source.line(location)
+    words = f"{source.path}, line {line}, {dotted(location)}: {hint} {IN_SI}"
+    warnings.warn(UnitWarning(words), stacklevel=4)
+
+
+def _fields(data: dict[str, Any], mechanism: Mechanism) -> Iterator[tuple[Location, str, Any]]:
+    """Return the values of elements and bodies as the file has them, with their kind."""
+    for section, role in ROLES.items():
+        for name, given in (data.get(section) or {}).items():
+            own = "driver" if section == "joints" and is_cam(mechanism.space, given) else role
+            for key in file_keys(catalogue(mechanism.space, own)[given["type"]]):
+                quantity = at_coordinate(key.quantity, given.get("coordinate"))
+                yield from _leaves((section, name, key.key), quantity, given.get(key.key))
+    for name, given in (data.get("bodies") or {}).items():
+        for key in ("position", "center_of_mass"):
+            yield from _leaves(("bodies", name, key), "length", (given or {}).get(key))
+        yield from _leaves(("bodies", name, "angle"), "angle", (given or {}).get("angle"))
+        turn = (given or {}).get("orientation") or {}
+        for key in ("angle", "angles"):
+            yield from _leaves(("bodies", name, "orientation", key), "angle", turn.get(key))
+
+
+def _leaves(location: Location, quantity: str, value: Any) -> Iterator[tuple[Location, str, Any]]:
+    if isinstance(value, (list, tuple)):
+        for index, entry in enumerate(value):
+            yield from _leaves((*location, index), quantity, entry)
+    elif isinstance(value, dict) and "expression" in value:
+        yield (*location, "expression"), quantity, value["expression"]
+    elif value is not None and not isinstance(value, dict):
+        yield location, quantity, value
+
+
+def _parameters(data: dict[str, Any], mechanism: Mechanism, dimension: Dimension) -> Iterator[tuple[Location, Any]]:
+    for name, raw in (data.get("parameters") or {}).items():
+        if dimension in mechanism.dimensions.get(name, ()):
+            yield ("parameters", name), raw
+
+
+def _angles(data: dict[str, Any], mechanism: Mechanism) -> Iterator[tuple[Location, float]]:
+    """Return angles that stand without a unit, laws at time zero."""
+    given = [(location, raw) for location, quantity, raw in _fields(data, mechanism) if quantity == "angle"]
+    for location, raw in [*given, *_parameters(data, mechanism, ANGLE)]:
+        text = str(raw)
+        if "deg" in text or "pi" in text:
+            continue
+        try:
+            formula = Expression(text, ["t"])
+            yield location, float(formula.evaluate({"t": 0.0}))
+        except JounceError:  # it has a unit, or depends on parameters
+            continue
+
+
+def _lengths(data: dict[str, Any], mechanism: Mechanism) -> Iterator[tuple[Location, float, bool]]:
+    """Return lengths in m, and whether they stand without a unit."""
+    values = mechanism.parameter_values
+    for location, raw in _parameters(data, mechanism, LENGTH):
+        yield location, float(values[str(location[-1])]), isinstance(raw, int | float)
+    for location, quantity, raw in _fields(data, mechanism):
+        if quantity == "length" and isinstance(raw, int | float):
+            yield location, float(raw), True

@@ -1,0 +1,1 @@
+"""Values of mechanism files: expressions, units, laws of motion, curves and inertias."""

@@ -1,0 +1,326 @@
+"""Motion laws of segments and of pieces as files hold them, and laws of the coordinate of another driver."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import Any
+
+from jounce.constraints.facts import at_coordinate
+from jounce.errors import UNSET, TrajectoryError, no_such, show_value, unknown
+from jounce.io.mechanisms.values.expressions import ANY_VALUE, defined, list_schema, object_schema, parse, problem
+from jounce.trajectory import (
+    AbstractMotion,
+    Expression,
+    FollowingMotion,
+    IntegratedMotion,
+    PiecewiseMotion,
+    Segment,
+    SegmentedMotion,
+)
+from jounce.trajectory.laws.integrated import HIGHEST
+from jounce.trajectory.laws.piecewise import BEYOND as BEYOND_PIECES
+from jounce.trajectory.laws.segment_pieces import SEGMENT_PROFILES
+from jounce.trajectory.laws.segments import BEYOND, MOST_CONDITIONS
+from jounce.units.dimensions import ANGLE, LENGTH, TIME, Dimension, is_rate, per_power
+
+EXPRESSION_KEYS = ("expression", "of", "derivative", "initial", "start")
+PROFILE_KEYS = ("profile", "initial", "start", "beyond", "of", "derivative")
+SEGMENT_KEYS = tuple(field.name for field in dataclasses.fields(Segment))
+PIECEWISE_KEYS = ("piecewise", "start", "beyond", "of", "derivative", "initial")
+LAPSES = {"time": "s", "angle": "rad", "length": "m"}
+"""What a law may be of, and its unit."""
+LEADER_SCHEMA = {
+    "description": "name of a driver, or an expression of t: its coordinate takes the place of the time",
+    "type": "string",
+    "minLength": 1,
+}
+DERIVATIVE_SCHEMA = {
+    "description": "which derivative of the driven quantity is given: 1 velocity, 2 acceleration",
+    "type": "integer",
+    "minimum": 0,
+    "maximum": HIGHEST,
+}
+INITIAL_SCHEMA = {"type": "array", "items": {"anyOf": ANY_VALUE}, "maxItems": HIGHEST + 1}
+_DIMENSIONS = {"time": TIME, "angle": ANGLE, "length": LENGTH}
+
+
+@dataclasses.dataclass(frozen=True)
+class LedMotion:
+    """A law of the coordinate of another driver, which has a name only until all drivers are read."""
+
+    law: Any
+    driver: str
+
+
+def leader(raw: dict[str, Any], info: Any) -> str | Expression | None:
+    """Return the name of a driver, or an expression, whose value takes the place of the time, or None."""
+    given = raw.get("of")
+    if given is None:
+        return None
+    if not isinstance(given, str):
+        raise problem("must be the name of a driver, or an expression of t", "of", value=given)
+    context = info.context or {}
+    known = context.get("drivers", ())
+    if given in known:
+        return given
+    if known is context.get("leaders", ...):
+        words = no_such("leader", given, known, "coordinate")
+        raise problem(f"must be the name of a driver, a joint, or an output; {words}", "of", value=given)
+    if given in context.get("leaders", ()) and given not in context.get("names", ()):
+        words = "is no driver: what moves by itself leads a cam, which is a joint; write this law under joints"
+        raise problem(words, "of", value=given)
+    value = parse(given, "any", info, "of", variables={"t": None}).value
+    if not isinstance(value, Expression):
+        raise problem("must be the name of a driver, or an expression of t", "of", value=given)
+    return value
+
+
+def led(law: Any, by: str | Expression | None) -> Any:
+    """Return a law as one of the coordinate of a driver, of an expression, or of the time."""
+    if by is None:
+        return law
+    law = law if isinstance(law, AbstractMotion | Expression) else Expression(repr(law))
+    return LedMotion(law, by) if isinstance(by, str) else FollowingMotion(law, by)
+
+
+def segmented(raw: dict[str, Any], quantity: str, info: Any) -> AbstractMotion | LedMotion:
+    """Return the law of a profile of segments."""
+    entries, by = raw["profile"], leader(raw, info)
+    if not isinstance(entries, list | tuple) or not entries:
+        raise problem("must be a list of segments, such as {profile: cycloidal, duration: 1 s, to: 20 mm}", "profile")
+    lapse, level = _lapse(by, info), order_of(raw)
+    segments = [_segment(entry, k, quantity, lapse, level, info) for k, entry in enumerate(entries)]
+    begun = initial_values(raw, level + 1, quantity, lapse, info) if level else []
+    if level:
+        initial = begun.pop() if len(begun) > level else 0.0
+    else:
+        initial = parse(raw.get("initial", 0.0), quantity, info, "initial").value
+    start = parse(raw.get("start", 0.0), lapse, info, "start").value
+    beyond = raw.get("beyond", BEYOND[0])
+    if beyond not in BEYOND:
+        raise problem(unknown("way", beyond, BEYOND), "beyond", value=beyond)
+    try:
+        law: AbstractMotion = SegmentedMotion(segments, initial, start, beyond)
+        return led(IntegratedMotion(law, level, begun, start) if level else law, by)
+    except TrajectoryError as error:
+        raise problem(error.message, *_place(error.name), value=UNSET if error.value is None else error.value) from None
+
+
+def order_of(raw: dict[str, Any]) -> int:
+    """Return which derivative a law gives, 0 for the law itself."""
+    level = raw.get("derivative", 0)
+    if isinstance(level, bool) or not isinstance(level, int) or not 0 <= level <= HIGHEST:
+        words = f"must be a whole number from 0 to {HIGHEST}; 0 is the value itself, 1 the velocity"
+        raise problem(words, "derivative", value=level)
+    return level
+
+
+def initial_values(raw: dict[str, Any], most: int, quantity: str, lapse: str, info: Any) -> list[Any]:
+    """Return the values with which a law begins of which a derivative is given, lowest first."""
+    given = raw.get("initial", [])
+    if not isinstance(given, list | tuple) or len(given) > most:
+        words = f"must be a list of at most {most} values: the law and its derivatives below the one that is given"
+        raise problem(words, "initial", value=given)
+    return [rate(x, order, quantity, info, "initial", order, by=lapse) for order, x in enumerate(given)]
+
+
+def _integrated(law: Any, raw: dict[str, Any], quantity: str, lapse: str, info: Any, start: Any = None) -> Any:
+    """Return a law of which the entry gives a derivative; the law that it gives where it is none."""
+    level = order_of(raw)
+    if not level:
+        for key in ("initial", *(("start",) if start is None else ())):
+            if key in raw:
+                raise problem("goes with a derivative that is given", key, value=UNSET)
+        return law
+    values = initial_values(raw, level, quantity, lapse, info)
+    if start is None:
+        start = parse(raw.get("start", 0.0), lapse, info, "start").value
+    law = law if isinstance(law, AbstractMotion | Expression) else Expression(repr(law))
+    try:
+        return IntegratedMotion(law, level, values, start)
+    except TrajectoryError as error:
+        raise problem(error.message, *_place(error.name), value=UNSET if error.value is None else error.value) from None
+
+
+def expressed(raw: dict[str, Any], quantity: str, info: Any, variables: dict[str, Dimension | None]) -> Any:
+    """Return the law of an expression, also of the coordinate of a driver, or one of which it is a derivative."""
+    for key in ("beyond", "until"):
+        if key in raw:
+            words = "an expression has no end; write it as a piece: piecewise: [{until: ..., expression: ...}]"
+            raise problem(words, key, value=UNSET)
+    if set(variables) != {"t"} and len(raw) > 1:
+        raise problem("goes with laws of t alone", next(key for key in raw if key != "expression"), value=UNSET)
+    by = leader(raw, info)
+    lapse = _lapse(by, info)
+    if by is not None:
+        variables = {"t": _DIMENSIONS.get(lapse)}
+    law = _rate_law(raw["expression"], order_of(raw), quantity, info, "expression", by=lapse, variables=variables)
+    return led(_integrated(law, raw, quantity, lapse, info), by)
+
+
+def _rate_law(
+    raw: object,
+    order: int,
+    quantity: str,
+    info: Any,
+    *at: str | int,
+    by: str,
+    variables: dict[str, Dimension | None],
+) -> Any:
+    """Return an expression of t that is a derivative of a driven quantity, or the quantity itself."""
+    if not order:
+        return parse(raw, quantity, info, *at, variables=variables).value
+    return rate(raw, order, quantity, info, *at, by=by, variables=variables)
+
+
+def _place(name: str | None) -> tuple[str | int, ...]:
+    """Return where in the entry a name such as ``segments[2].to`` stands."""
+    if not name or not name.startswith("segments"):
+        return (name,) if name else ()
+    index, _, key = name.removeprefix("segments").partition("].")
+    number = index.strip("[]")
+    return ("profile", *([int(number)] if number else []), *([key] if key else []))
+
+
+def _lapse(by: str | Expression | None, info: Any) -> str:
+    """Return what a law is of: the time, unless it is that of a cam or of the coordinate of a driver."""
+    context = info.context or {}
+    if by is None:
+        return context.get("lapse", "time")
+    return context["drivers"][by] if isinstance(by, str) else "any"
+
+
+def _segment(entry: object, k: int, quantity: str, lapse: str, level: int, info: Any) -> Segment:
+    if not isinstance(entry, dict):
+        raise problem("must be a segment, such as {profile: dwell, duration: 1 s}", "profile", k, value=entry)
+    for key in entry.keys() - set(SEGMENT_KEYS):
+        words = unknown(f"key {show_value(key)}", key, SEGMENT_KEYS)
+        raise problem(words, "profile", k, key, value=UNSET)
+    profile = entry.get("profile")
+    if not isinstance(profile, str) or profile not in SEGMENT_PROFILES:
+        words = unknown("profile", profile, SEGMENT_PROFILES) if isinstance(profile, str) else "is missing"
+        raise problem(words, "profile", k, "profile", value=UNSET if profile is None else profile)
+    values: dict[str, Any] = {"profile": profile}
+    if "duration" in entry:
+        values["duration"] = parse(entry["duration"], lapse, info, "profile", k, "duration").value
+    for key in ("to", "by"):
+        if key in entry:
+            values[key] = rate(entry[key], level, quantity, info, "profile", k, key, by=lapse)
+    for key in ("begin", "end", "limits"):
+        if key in entry:
+            if not isinstance(entry[key], list | tuple):
+                raise problem("must be a list of values", "profile", k, key, value=entry[key])
+            orders = enumerate(entry[key])
+            values[key] = [rate(x, level + n + 1, quantity, info, "profile", k, key, n, by=lapse) for n, x in orders]
+    return Segment(**values)
+
+
+def piecewise(raw: dict[str, Any], quantity: str, info: Any, variables: dict[str, Dimension | None]) -> Any:
+    """Return the law of expressions that follow each other."""
+    entries, by, level = raw["piecewise"], leader(raw, info), order_of(raw)
+    if not isinstance(entries, list | tuple) or not entries:
+        raise problem("must be a list such as [{until: 1 s, expression: t**2}, {expression: 1}]", "piecewise")
+    if set(variables) != {"t"}:
+        raise problem("a law of other variables than t is given by one expression", "piecewise", value=UNSET)
+    lapse = _lapse(by, info)
+    if by is not None:
+        variables = {"t": _DIMENSIONS.get(lapse)}
+    laws, ends = [], []
+    for k, entry in enumerate(entries):
+        last = k + 1 == len(entries)
+        valid = ({"expression", "until"}, {"expression"}) if last else ({"expression", "until"},)
+        if not isinstance(entry, dict) or entry.keys() not in valid:
+            words = "must have the keys expression and until" if not last else "must have the key expression"
+            advice = "; where the last piece ends may be left out" if not last else ", and may say until when it goes"
+            raise problem(words + advice, "piecewise", k, value=entry)
+        at = ("piecewise", k, "expression")
+        law = _rate_law(entry["expression"], level, quantity, info, *at, by=lapse, variables=variables)
+        laws.append(law if isinstance(law, Expression) else Expression(repr(law)))
+        if "until" in entry:
+            ends.append(parse(entry["until"], lapse, info, "piecewise", k, "until").value)
+    start = parse(raw["start"], lapse, info, "start").value if "start" in raw else None
+    beyond = raw.get("beyond", BEYOND_PIECES[0])
+    if beyond not in BEYOND_PIECES:
+        raise problem(unknown("way", beyond, BEYOND_PIECES), "beyond", value=beyond)
+    if len(ends) < len(laws):
+        for key in ("beyond", "start"):
+            if key in raw and not (key == "start" and level):
+                words = "the last piece has no end, so that nothing is beyond it; say until when it goes"
+                raise problem(words, key, value=UNSET)
+    try:
+        law = PiecewiseMotion(laws, ends, start if len(ends) == len(laws) else None, beyond)
+    except TrajectoryError as error:
+        key = str(error.name).partition("[")[0]
+        number = str(error.name)[len(key) + 1 : -1]
+        at = ("piecewise", int(number), key) if number else ("start",) if key == "start" else ("piecewise",)
+        raise problem(error.message, *at, value=UNSET if error.value is None else error.value) from None
+    return led(_integrated(law, raw, quantity, lapse, info, 0.0 if start is None else start), by)
+
+
+def rate(
+    raw: object,
+    order: int,
+    quantity: str,
+    info: Any,
+    *at: str | int,
+    by: str = "time",
+    variables: dict[str, Dimension | None] | None = None,
+) -> float | Expression:
+    """Return a derivative of a driven quantity by the time or another one, in SI units."""
+    value = parse(raw, quantity if order == 0 else "any", info, *at, variables=variables)
+    if order and value.dimension:
+        known, lapses = bases(quantity, info), [by] if by in LAPSES else LAPSES
+        if not any(is_rate(value.dimension, known, order, lapse) for lapse in lapses):
+            per = " or".join(per_power(order, LAPSES[lapse]) for lapse in lapses)
+            raise problem(f"must be {' or '.join(known) or 'a number'}{per}", *at, value=raw)
+    return value.value
+
+
+def bases(quantity: str, info: Any) -> list[str]:
+    """Return the dimensions that a driven quantity may have; none of what is no coordinate, such as a force."""
+    quantity = at_coordinate(quantity, info.data.get("coordinate"))
+    return [quantity] if quantity in ("length", "angle") else ["angle", "length"] if quantity == "any" else []
+
+
+def segmented_schema() -> dict[str, Any]:
+    """Return the JSON Schema of a profile of segments."""
+    value = {"anyOf": ANY_VALUE}
+    rates = {"type": "array", "items": value, "maxItems": MOST_CONDITIONS}
+    segment = {
+        "profile": {"enum": list(SEGMENT_PROFILES)},
+        **dict.fromkeys(("duration", "to", "by"), value),
+        "begin": rates,
+        "end": rates,
+        "limits": list_schema(value, 3),
+    }
+    whole = {
+        "profile": {"type": "array", "items": object_schema(segment, ["profile"]), "minItems": 1},
+        "initial": value,
+        "start": value,
+        "beyond": {"enum": list(BEYOND)},
+        "of": LEADER_SCHEMA,
+        "derivative": DERIVATIVE_SCHEMA,
+    }
+    whole["initial"] = {"anyOf": [*ANY_VALUE, INITIAL_SCHEMA]}
+    return defined("segmented_law", object_schema(whole, ["profile"]))
+
+
+def piecewise_schema(law: dict[str, Any]) -> dict[str, Any]:
+    """Return the JSON Schema of expressions that follow each other; of the law itself, `law`."""
+    value = {"anyOf": ANY_VALUE}
+    piece = object_schema({"expression": law, "until": value}, ["expression"])
+    whole = {
+        "piecewise": {"type": "array", "items": piece, "minItems": 1},
+        "start": value,
+        "beyond": {"enum": list(BEYOND_PIECES)},
+        "of": LEADER_SCHEMA,
+        "derivative": DERIVATIVE_SCHEMA,
+        "initial": INITIAL_SCHEMA,
+    }
+    return object_schema(whole, ["piecewise"])
+
+
+def expression_schema(law: dict[str, Any]) -> dict[str, Any]:
+    """Return the JSON Schema of a law by one expression, `law`."""
+    rest = {"of": LEADER_SCHEMA, "derivative": DERIVATIVE_SCHEMA, "initial": INITIAL_SCHEMA}
+    return object_schema({"expression": law, **rest, "start": {"anyOf": ANY_VALUE}}, ["expression"])

@@ -1,0 +1,1 @@
+"""Writing a mechanism as a file."""

@@ -1,0 +1,269 @@
+"""XML read into plain elements that know their lines, so that every message about a robot file can name one."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field
+from typing import Any
+from xml.parsers import expat
+
+from jounce.errors import RobotFileError, did_you_mean
+from jounce.io.files.located_data import dotted
+from jounce.io.files.reading import LARGEST_NUMBER, fault_of_number, read_file
+from jounce.io.robots.elements.faults import NOT_XML, UNKNOWN, Faults
+
+MAX_DEPTH = 2000
+
+
+@dataclass(eq=False)
+class Element:
+    """One element of an XML file: its tag, attributes, children and text, and the line where it begins."""
+
+    tag: str
+    attributes: dict[str, str]
+    path: str
+    line: int
+    children: list[Element] = field(default_factory=list)
+    pieces: list[str] = field(default_factory=list)  # of the text within, but for that of the children
+    faults: Faults | None = None  # of the file, which take elements that nobody knows
+
+    @property
+    def content(self) -> str:
+        """The text within, but for that of the children."""
+        return "".join(self.pieces)
+
+    def first(self, tag: str) -> Element | None:
+        """Return the first child of a tag, None if there is none."""
+        return next((child for child in self.children if child.tag == tag), None)
+
+    def every(self, tag: str) -> list[Element]:
+        """Return all children of a tag."""
+        return [child for child in self.children if child.tag == tag]
+
+    def walk(self) -> Iterator[Element]:
+        """Give the element and all within it, in the order of the file."""
+        waiting: list[Element] = [self]
+        while waiting:
+            element = waiting.pop()
+            yield element
+            waiting.extend(reversed(element.children))
+
+    def error(self, message: str, *name: str, **value: Any) -> RobotFileError:
+        """Return an error at the line of the element, about the entry whose name is given in steps."""
+        return RobotFileError(message, path=self.path, line=self.line, name=dotted(name) or None, **value)
+
+    def text(self, key: str, *name: str) -> str:
+        """Return an attribute that must be there and not be blank."""
+        value = self.attributes.get(key)
+        if value is None:
+            raise self.error(f"<{self.tag}> has no attribute {key}", *name)
+        if not value.strip():
+            raise self.error(f"the attribute {key} of <{self.tag}> is empty", *name, value=value)
+        return value
+
+    def number(self, key: str, *name: str, default: float | None = None) -> float:
+        """Return the finite number in an attribute, which must be there unless there is a default."""
+        if default is None:
+            self.text(key, *name)
+        numbers = self.numbers(key, 1, *name)
+        return numbers[0] if numbers else float(default or 0.0)
+
+    def numbers(self, key: str, count: int, *name: str, infinite: bool = False) -> list[float] | None:
+        """Return the finite numbers in an attribute, None if it is not there."""
+        text = self.attributes.get(key)
+        if text is None:
+            return None
+        return self._parsed(text, f"{key} must be", count, name, infinite)
+
+    def content_numbers(self, count: int, *name: str, infinite: bool = False) -> list[float]:
+        """Return the finite numbers that an element holds as its text."""
+        return self._parsed(self.content.strip(), f"<{self.tag}> must hold", count, name, infinite)
+
+    def _parsed(self, text: str, words: str, count: int, name: tuple[str, ...], infinite: bool) -> list[float]:
+        what = "a finite number" if count == 1 else f"{count} finite numbers"
+        try:
+            values = [float(word) for word in text.split()]
+        except ValueError:
+            values = []
+        usable = infinite or not any(map(fault_of_number, values))
+        if len(values) != count or not usable or any(map(math.isnan, values)) or "_" in text:
+            most = (
+                f" of at most {LARGEST_NUMBER:g}" if values and all(map(math.isfinite, values)) and not usable else ""
+            )
+            raise self.error(f"{words} {what}{most}", *name, value=text)
+        return values
+
+    def check_children(self, known: Iterable[str], *name: str) -> None:
+        """Note a child whose tag is nearly a known one: what it holds is left out.
+
+        Raises
+        ------
+        RobotFileError
+            If the faults of the file are errors.
+        """
+        valid = set(known)
+        for child in self.children:
+            near = "" if child.tag in valid else did_you_mean(child.tag, valid, limit=0)
+            if near and abs(len(child.tag) - len(near.split("'")[1])) <= 1:
+                child.leave_out_unknown(f"unknown element; {near}", *name)
+
+    def leave_out_unknown(self, message: str, *name: str) -> None:
+        """Note the element as one that its format does not have.
+
+        Raises
+        ------
+        RobotFileError
+            If the faults of the file are errors.
+        """
+        shown = f"<{self.tag}> of {name[1]}" if len(name) > 1 else f"<{self.tag}>"
+        self.leave_out(UNKNOWN, shown, message, *name)
+
+    def leave_out(self, heading: str, shown: str, message: str, *name: str) -> None:
+        """Note under a heading that the element is left out.
+
+        Raises
+        ------
+        RobotFileError
+            If the faults of the file are errors.
+        """
+        error = self.error(message, *name, value=f"<{self.tag}>")
+        if self.faults is None:
+            raise error
+        self.faults.leave_out(heading, shown, error)
+
+
+def read_markup(path: str, faults: Faults | None = None) -> Element:
+    """Read an XML file of at most 10 MB.
+
+    What the readers of other programs let pass is read as they do, and noted: a declaration after blank lines or
+    comments, two hyphens within a comment, zero bytes or other text at the end.
+
+    Parameters
+    ----------
+    path : str
+        The file.
+    faults : Faults, optional
+        Take what is read though it is not XML, and elements that nobody knows.
+
+    Returns
+    -------
+    Element
+        The root.
+
+    Raises
+    ------
+    RobotFileError
+        The file cannot be read, is empty, or is not well-formed XML: the message has line and column, and what the
+        parser says.
+    """
+    content = read_file(path, error=RobotFileError)
+    if not content.strip():
+        raise RobotFileError("the file is empty", path=path)
+    wide = content.startswith((b"\xff\xfe", b"\xfe\xff"))
+    noted: list[tuple[str, int]] = []
+    if not wide and content.endswith(b"\0"):
+        content = content.rstrip(b"\0")
+        noted.append(("zero bytes at the end", content.count(b"\n") + 1))
+    if b"\0" in content and not wide:
+        line = content.count(b"\n", 0, content.index(b"\0")) + 1
+        raise RobotFileError(
+            "is not a text file: robots are read from URDF, MJCF and SDF, all XML", path=path, line=line
+        )
+    reader = _Reader(path, faults)
+    try:
+        root = reader.read(content)
+    except RobotFileError as error:
+        tolerated, more = (content, []) if wide else _tolerated(content)
+        if more:
+            root = _Reader(path, faults).read(tolerated)
+        elif (whole := reader.complete(content)) is not None:
+            root, more = whole, [("text after the end of its root element", error.line or whole.line)]
+        else:
+            raise
+        noted += more
+    if faults is None:
+        return root
+    for words, line in noted:
+        error = RobotFileError(f"has {words}, which XML does not allow; take them out", path=path, line=line)
+        faults.leave_out(NOT_XML, words, error)
+    return root
+
+
+def _tolerated(content: bytes) -> tuple[bytes, list[tuple[str, int]]]:
+    """Return text without what other readers let pass, all in its line, and what that is, with the line of each."""
+    noted: list[tuple[str, int]] = []
+
+    def blank(match: re.Match[bytes]) -> bytes:
+        return re.sub(rb"[^\n\r]", b" ", match[0])
+
+    def comment(match: re.Match[bytes]) -> bytes:
+        if b"--" in match[1] or match[1].endswith(b"-"):
+            noted.append(("two hyphens within a comment", content.count(b"\n", 0, match.start()) + 1))
+        return blank(match)
+
+    content = re.sub(rb"<!--(.*?)-->", comment, content, flags=re.DOTALL)
+    if late := re.match(rb"(?:\xef\xbb\xbf)?(\s+)<\?xml\s[^>]*\?>", content):
+        noted.append(("lines before the declaration <?xml", content.count(b"\n", 0, late.end(1)) + 1))
+        declaration = content[late.end(1) : late.end()]
+        content = declaration.replace(b"\n", b" ") + late[1] + content[late.end() :]
+    return content, noted
+
+
+class _Reader:
+    """Builds elements from the events of the parser."""
+
+    def __init__(self, path: str, faults: Faults | None):
+        self.path, self.faults = path, faults
+        self.open: list[Element] = []
+        self.root: Element | None = None
+        self.parser = expat.ParserCreate()
+        self.parser.StartElementHandler = self.start
+        self.parser.EndElementHandler = self.end
+        self.parser.CharacterDataHandler = self.characters
+        self.parser.buffer_text = True
+        self.parser.EntityDeclHandler = self.entity
+
+    def read(self, content: bytes) -> Element:
+        try:
+            self.parser.Parse(content, True)
+        except expat.ExpatError as error:
+            says = expat.ErrorString(error.code)
+            message = f"is not well-formed XML: {says} at column {error.offset + 1}{self.unclosed()}"
+            raise RobotFileError(message, path=self.path, line=error.lineno) from None
+        except (LookupError, ValueError) as error:
+            raise RobotFileError(f"is in no encoding that can be read: {error}", path=self.path) from None
+        assert self.root is not None  # the parser refuses a file without elements
+        return self.root
+
+    def complete(self, content: bytes) -> Element | None:
+        """Return the root where it had ended before the parser stopped, and no other element begins after it."""
+        rest = content[self.parser.ErrorByteIndex :]
+        return None if self.open or re.search(rb"<[^/!?]", rest) else self.root
+
+    def unclosed(self) -> str:
+        if not self.open:
+            return ""
+        last = self.open[-1]
+        return f"; <{last.tag[:40]}> of line {last.line} is still open there"
+
+    def start(self, tag: str, attributes: dict[str, str]) -> None:
+        element = Element(tag, attributes, self.path, self.parser.CurrentLineNumber, faults=self.faults)
+        if len(self.open) >= MAX_DEPTH:
+            raise element.error(f"nested more than {MAX_DEPTH} deep")
+        if self.open:
+            self.open[-1].children.append(element)
+        else:
+            self.root = element
+        self.open.append(element)
+
+    def end(self, _tag: str) -> None:
+        self.open.pop()
+
+    def characters(self, text: str) -> None:
+        self.open[-1].pieces.append(text)
+
+    def entity(self, name: str, *_rest: object) -> None:
+        message = "declares an entity, which robot files have no use for; write its text where it is used"
+        raise RobotFileError(message, path=self.path, line=self.parser.CurrentLineNumber, value=name)

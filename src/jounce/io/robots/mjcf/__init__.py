@@ -1,0 +1,1 @@
+"""MJCF, compiled by MuJoCo: bodies, drives, ties, and what is left out."""

@@ -1,0 +1,122 @@
+"""What MuJoCo's dynamics has and a robot has not: springs, tendons, compensated gravity, a fluid; it warns."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Container, Iterable, Iterator, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from jounce.io.robots.elements.faults import JOINT_SPRINGS
+from jounce.io.robots.mjcf.drives import single_spring
+from jounce.io.robots.mjcf.files import line_of
+
+COMPENSATION = "gravity compensation of bodies"
+FLUID = "forces of the fluid around"
+OF_TENDONS = {
+    "stiffness": "springs of tendons",
+    "damping": "damping of tendons",
+    "frictionloss": "friction of tendons",
+    "armature": "armature of tendons",
+}
+OF_DRIVES = {
+    "damping": "damping of actuators on tendons",
+    "armature": "armature of actuators on tendons",
+}
+FLUID_UNITS = {"density": "kg/m^3", "viscosity": "Pa s"}
+
+
+class LeftOut(NamedTuple):
+    """A part of the file that is not read: what it is of whom, its name and line, the entry and its value."""
+
+    heading: str
+    shown: str
+    line: int | None
+    name: str
+    value: object
+
+
+def left_out_of_spec(spec: Any, mujoco: Any) -> list[LeftOut]:
+    """Return what is left out with tendons and their actuators, before these are taken away."""
+    works = _working(spec.option.disableflags, mujoco)
+    # MuJoCo itself refuses damping and armature of actuators of other kinds
+    drives = [(k, x) for k, x in enumerate(spec.actuators) if x.trntype == mujoco.mjtTrn.mjTRN_TENDON]
+    kinds = ((OF_TENDONS, "tendon", enumerate(spec.tendons)), (OF_DRIVES, "actuator", drives))
+    left = []
+    for headings, kind, parts in kinds:
+        for k, part in parts:
+            name = part.name or f"{kind}_{k}"
+            read = _read_of(part, mujoco) if kind == "tendon" else ()
+            for key, heading in headings.items():
+                value = np.ravel(getattr(part, key))
+                if value.any() and works(key) and (key not in read or value[1:].any()):
+                    left.append(LeftOut(heading, name, line_of(part.info), f"{kind}s.{name}.{key}", _plain(value)))
+    return left
+
+
+def _read_of(tendon: Any, mujoco: Any) -> tuple[str, ...]:
+    """Return the attributes of a tendon that are read, as far as they are one number."""
+    if not len(tendon.path) or any(part.type != mujoco.mjtWrap.mjWRAP_JOINT for part in tendon.path):
+        return ()
+    lengths = np.ravel(tendon.springlength)
+    slack = len(set(lengths.tolist())) > 1 and lengths[0] != -1 and lengths[1] != -1
+    read = ("damping", "frictionloss", "armature")
+    return read if slack else ("stiffness", *read)
+
+
+def left_out_of_model(
+    model: Any, mujoco: Any, bodies: Sequence[str], joints: Sequence[str], fixed: Container[str]
+) -> Iterator[LeftOut]:
+    """Give what is left out of joints, bodies and the whole of a compiled model; lines are those of the elements.
+
+    Parameters
+    ----------
+    model, mujoco
+        The compiled model, and the package.
+    bodies, joints : sequence of str
+        Their names, by number.
+    fixed : container of str
+        Joints that an equality holds where they are, which no force moves.
+    """
+    works = _working(model.opt.disableflags, mujoco)
+    free = [name not in fixed for name in joints]
+    for j, name in enumerate(joints):
+        stiffness = np.array([model.jnt_stiffness[j], *model.jnt_stiffnesspoly[j]])
+        if stiffness.any() and works("stiffness") and free[j] and not single_spring(model, j):
+            yield LeftOut(JOINT_SPRINGS, name, None, f"joints.{name}.stiffness", _plain(stiffness))
+    passive = works("stiffness") or works("damping")  # MuJoCo leaves out all such forces where it leaves out both
+    falls = model.opt.gravity.any() and works("gravity")
+    matters = passive and falls and model.jnt_actgravcomp.any()  # else bodies feel less of gravity
+    for k in np.flatnonzero((model.body_gravcomp != 0) & (model.body_mass > 0)).tolist() if matters else ():
+        if any(free[j] and not model.jnt_actgravcomp[j] for j in _moved_by(model, k)):
+            yield LeftOut(COMPENSATION, bodies[k], None, f"links.{bodies[k]}.gravcomp", float(model.body_gravcomp[k]))
+    fluid = {key: float(getattr(model.opt, key)) for key in FLUID_UNITS if getattr(model.opt, key)}
+    heavy = np.flatnonzero(model.body_mass).tolist()
+    if fluid and passive and any(free[j] for k in heavy for j in _moved_by(model, k)):
+        shown = " and ".join(f"{key} {value:g} {FLUID_UNITS[key]}" for key, value in fluid.items())
+        yield LeftOut(FLUID, shown, None, f"option.{next(iter(fluid))}", next(iter(fluid.values())))
+
+
+def _moved_by(model: Any, body: int) -> Iterable[int]:
+    """Give the joints between a body and the world."""
+    while body > 0:
+        first = int(model.body_jntadr[body])
+        yield from range(first, first + int(model.body_jntnum[body]))
+        body = int(model.body_parentid[body])
+
+
+def _working(flags: int, mujoco: Any) -> Callable[[str], bool]:
+    """Return whether MuJoCo computes what belongs to an attribute, or the file switches it off."""
+    bits = mujoco.mjtDisableBit
+    switches = {
+        "stiffness": bits.mjDSBL_SPRING,
+        "damping": bits.mjDSBL_DAMPER,
+        "frictionloss": bits.mjDSBL_FRICTIONLOSS,
+        "gravity": bits.mjDSBL_GRAVITY,
+    }
+    return lambda key: key not in switches or not flags & int(switches[key])
+
+
+def _plain(values: np.ndarray) -> object:
+    """Return one number where those of higher powers are zero, else all of them."""
+    return values.tolist() if values[1:].any() else float(values[0])

@@ -1,0 +1,375 @@
+"""Robots from MJCF files: compiled by MuJoCo, then read body by body."""
+
+from __future__ import annotations
+
+import dataclasses
+import importlib
+import re
+from collections.abc import Container, Iterable
+from os import PathLike
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float
+
+from jounce.errors import JounceError, RobotError, RobotFileError
+from jounce.io.robots.elements.faults import FIXED_ALREADY, Faults, left_out
+from jounce.io.robots.elements.followers import with_room
+from jounce.io.robots.elements.xml_elements import Element
+from jounce.io.robots.mjcf.drives import Drives
+from jounce.io.robots.mjcf.files import check_assets, check_copies, included, line_of, quiet_mujoco
+from jounce.io.robots.mjcf.left_out import LeftOut, left_out_of_model, left_out_of_spec
+from jounce.io.robots.mjcf.ties import NO_CLOSURE, Ties, linear_tendons, tied_tendons
+from jounce.rigid.inertia import Inertia
+from jounce.robot.model.couplings import Coupling
+from jounce.robot.model.floating_base import floating_joints
+from jounce.robot.model.links_and_joints import Closure, Joint, Limits, Link, Mimic, leaders
+from jounce.robot.model.tree import quaternion_matrix, turn_about
+from jounce.robot.robot import Robot
+
+_Vector = Float[np.ndarray, "3"]
+_Matrix = Float[np.ndarray, "3 3"]
+DEFORMABLE = "has deformable parts (flex), which no rigid body stands for"
+POSE_KEYS = ("pos", "quat", "axisangle", "xyaxes", "zaxis", "euler")
+NUMERIC = {  # attributes whose numbers MuJoCo takes even when they are not finite
+    **dict.fromkeys(("body", "site"), POSE_KEYS),
+    "inertial": (*POSE_KEYS, "mass", "diaginertia", "fullinertia"),
+    "joint": ("pos", "axis", "range", "ref", "armature", "damping", "frictionloss", "polycoef"),
+    "freejoint": ("armature", "damping", "frictionloss"),
+    "option": ("gravity",),
+    **dict.fromkeys(("motor", "position", "velocity", "damper", "general"), ("gear",)),
+}
+
+
+def read_mjcf(root: Element, faults: Faults, allow: Iterable[str | PathLike[str]] = ()) -> Robot:
+    """Return the robot that an MJCF file describes, as MuJoCo compiles it.
+
+    The base is the link ``world``. Hinges and slides are taken with their anchors and reference positions: a coordinate
+    is MuJoCo's ``qpos``. A ball becomes three turns z, y, x about moving axes, zero in the pose of the file; a free
+    joint three slides along the axes of the world, whose coordinates are the position of the body, and three such
+    turns, zero where its axes are those of the world; what drives them acts on the angular velocity (`BallDrive`).
+    Several joints on one body have massless links between them. Bodies and joints without a name are called
+    ``body_1``, ``joint_0`` and so on, by their number in MuJoCo. Armature, damping, friction and linear springs of
+    joints are read, with the armature and damping of actuators on them, tendons along joints (`Tendon`), and the share
+    of gravity that is compensated for bodies; ranges become limits, and symmetric ranges of force limits of effort. A
+    joint tied to another by a linear equality, of joints or of tendons along joints, follows it; active equalities of
+    type connect and weld become closures, named closure_0 and so on where they have no name. Contacts and all else that
+    is no body, joint or actuator of a joint are left out; there is a warning of springs that are not linear, fluids,
+    and what other tendons and the actuators on them add. What a flag switches off is zero.
+
+    Parameters
+    ----------
+    root : Element
+        The element ``<mujoco>``; MuJoCo reads the file again itself.
+    faults : Faults
+        Takes what no real robot has, and what is left out.
+    allow
+        Folders besides that of the file that included files and meshes may be below.
+
+    Raises
+    ------
+    RobotFileError
+        MuJoCo refuses the file, or it holds what a tree of rigid bodies cannot have.
+    """
+    try:
+        mujoco: Any = importlib.import_module("mujoco")
+    except ImportError:
+        message = 'reading MJCF files needs the package mujoco, which is not installed: pip install "jounce[mjcf]"'
+        raise RobotFileError(message, path=root.path) from None
+    parts = [root, *included(root, allow)]
+    for part in parts:
+        _check_numbers(part)
+    check_copies(parts)
+    try:
+        with quiet_mujoco(mujoco):
+            spec = mujoco.MjSpec.from_file(root.path)
+            scaled = spec.compiler.fusestatic and getattr(spec.compiler, "settotalmass", 0.0) > 0  # which is deprecated
+            unread = left_out_of_spec(spec, mujoco)
+            _strip(spec, mujoco, tied_tendons(spec, mujoco, root.path) | linear_tendons(spec, mujoco))
+            check_assets(spec, parts, allow)
+            model = spec.compile()
+    except (ValueError, RuntimeError, OSError) as error:
+        raise _refused(str(error), root) from None
+    if scaled and model.body_mass[model.body_weldid == 0].any():
+        # MuJoCo counts bodies fixed to the world in the total or not, by whether a sensor or the like refers to them
+        message = "settotalmass with fusestatic depends on which bodies fixed to the world are kept"
+        raise root.error(f"{message}; remove fusestatic, or give masses instead", "compiler.settotalmass")
+    reader = _Reader(root, mujoco, spec, model, faults)
+    robot = reader.robot()
+    reader.tell(unread, parts)
+    return robot
+
+
+def _check_numbers(root: Element) -> None:
+    """Refuse numbers that are not finite, some of which MuJoCo takes, and deformable parts, whose files it reads."""
+    names = {element.attributes.get(key) for element in root.walk() for key in ("name", "class")}
+    for element in root.walk():
+        if element.tag in ("flex", "flexcomp"):
+            raise element.error(DEFORMABLE)
+        numeric = NUMERIC.get(element.tag, ())
+        for key, text in element.attributes.items():
+            words = text.split()
+            if key in numeric or (text not in names and any(re.fullmatch(r"[+-]?nan", word, re.I) for word in words)):
+                element.numbers(key, len(words), element.attributes.get("name") or element.tag, key)
+
+
+def _refused(says: str, root: Element) -> RobotFileError:
+    """Return MuJoCo's own message as an error with the place that it names."""
+    name = re.search(r"[Ee]lement (?:name )?'([^']+)'", says)
+    words = re.sub(r"\s*\n?Element (?:name )?'.*", "", says, flags=re.DOTALL)
+    words = ascii(re.sub(r"^(?:XML )?Error: (?:Error: )?", "", words.strip()))[1:-1]
+    message = f"MuJoCo cannot use this: {' '.join(words.replace(chr(92) + 'n', ' ').split())}"
+    if "opening file" in words and (name is None or name[1] != "include"):
+        advice = "meshes are needed only for bodies without an <inertial>: give those bodies one, or put the file where"
+        message += f"; {advice} the model looks for it"
+    elif "mass and inertia of moving bodies" in words:
+        message += "; give the body an <inertial> with a mass and an inertia, or a <geom> with a size"
+    named = None if name is None else ascii(name[1])[1:-1]
+    return RobotFileError(message, path=root.path, line=line_of(says), name=named)
+
+
+def _strip(spec: Any, mujoco: Any, tied: Container[str]) -> None:
+    """Take away what does not bear on the motion of rigid bodies, so that no mesh or texture has to be there.
+
+    A shape stays where it gives a body its mass, a tendon where it is tied.
+    """
+    spec.compiler.fusestatic = False  # or bodies without joints would lose their frames
+    joints = (mujoco.mjtTrn.mjTRN_JOINT, mujoco.mjtTrn.mjTRN_JOINTINPARENT)  # which differ for balls and free joints
+    unused = [actuator for actuator in spec.actuators if actuator.trntype not in joints]
+    unused += list(spec.lights)
+    unused += [tendon for tendon in spec.tendons if tendon.name not in tied]
+    for parts in (spec.sensors, spec.pairs, spec.excludes, spec.keys, spec.tuples, spec.skins):
+        unused += list(parts)
+    unused += [e for e in spec.equalities if e.type == mujoco.mjtEq.mjEQ_TENDON and not e.active]
+    always = spec.compiler.inertiafromgeom == mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_TRUE
+    remaining = []
+    for body in spec.bodies:
+        moves = body.name != "world" and (always or not body.explicitinertial)
+        for shape in body.geoms:
+            (remaining if moves and _weighs(shape, spec.compiler) else unused).append(shape)
+    for shown in (*remaining, *spec.sites):
+        shown.material = ""
+    for material in spec.materials:  # which stay, for tendons keep their names whatever is set here
+        material.textures = [""] * len(material.textures)
+    meshes, fields = ({getattr(shape, name) for shape in remaining} for name in ("meshname", "hfieldname"))
+    unused += [mesh for mesh in spec.meshes if mesh.name not in meshes]
+    unused += [field for field in spec.hfields if field.name not in fields]
+    unused += list(spec.textures)
+    for part in unused:
+        spec.delete(part)
+
+
+def _weighs(shape: Any, compiler: Any) -> bool:
+    """Whether a shape has a part in the mass of its body; its mass is NaN where it follows from the density."""
+    first, last = compiler.inertiagrouprange
+    return bool(first <= shape.group <= last and (shape.density if np.isnan(shape.mass) else shape.mass) > 0)
+
+
+class _Reader:
+    """Turns a compiled model into links and joints."""
+
+    def __init__(self, root: Element, mujoco: Any, spec: Any, model: Any, faults: Faults):
+        self.root, self.mujoco, self.spec, self.model, self.faults = root, mujoco, spec, model, faults
+        kinds = ("free", "ball", "hinge", "slide")
+        self.kind = {name: int(getattr(mujoco.mjtJoint, f"mjJNT_{name.upper()}")) for name in kinds}
+        self.bodies = names_of_bodies(model)
+        self.joint_names = _names([model.joint(k).name for k in range(model.njnt)], "joint")
+        self.lines = {  # a <freejoint> has no line of its own
+            f"joints.{self.joint_names[joint.id]}": line_of(joint.info) or line_of(joint.parent.info)
+            for joint in spec.joints
+        }
+        self.lines |= {f"links.{self.bodies[body.id]}": line_of(body.info) for body in spec.bodies}
+        self.links: list[Link] = []
+        self.joints: list[Joint] = []
+        self.ties = Ties(model, mujoco, self.joint_names)
+        self.mimics: dict[str, Mimic] = {}
+        self.closures: list[Closure] = []
+        self.drives = Drives(model, mujoco, self.joint_names)
+        self.couplings: list[Coupling] = []
+
+    def error(self, message: str, name: str, **value: Any) -> RobotFileError:
+        """Return an error about a joint or link, with its line."""
+        key = name
+        while key and key not in self.lines:
+            key = key.rpartition(".")[0]
+        return RobotFileError(message, path=self.root.path, line=self.lines.get(key), name=ascii(name)[1:-1], **value)
+
+    def robot(self) -> Robot:
+        """Return the robot."""
+        model = self.model
+        if model.nflex:
+            raise RobotFileError(DEFORMABLE, path=self.root.path)
+        self._tie()
+        try:
+            for k in range(model.nbody):
+                self._body(k)
+            gravity = model.opt.gravity if self.drives.works("GRAVITY") else (0.0, 0.0, 0.0)
+            couplings = [*self.couplings, *self.drives.tendons(self.ties.fixed)]
+            name = self.root.attributes.get("model") or "robot"
+            joints = with_room(self.joints, self.faults, self._located, self.ties.fixed)
+            robot = Robot(name, self.links, joints, gravity, self.closures, couplings=couplings)
+            return robot.locked(self.ties.fixed) if self.ties.fixed else robot
+        except RobotFileError:
+            raise
+        except RobotError as error:
+            raise self._located(error) from None
+
+    def _located(self, error: RobotError) -> RobotFileError:
+        return self.error(error.message, error.name or "", value=error.value)
+
+    def tell(self, noted: Iterable[LeftOut], parts: Iterable[Element]) -> None:
+        """Note what is left out, in tendons and actuators as found, and in what is compiled."""
+        options = [element for part in parts for element in part.walk() if element.tag == "option"]
+        self.lines |= {f"option.{key}": element.line for element in options for key in element.attributes}
+        more = left_out_of_model(self.model, self.mujoco, self.bodies, self.joint_names, self.ties.fixed)
+        for heading, shown, line, name, value in (*noted, *more):
+            if line is not None:
+                self.lines[name] = line
+            self.faults.leave_out(heading, shown, self.error(left_out(heading), name, value=value))
+
+    def _tie(self) -> None:
+        """Read what joints have to do with one another, and what closes loops."""
+        model, kinds = self.model, self.mujoco.mjtEq
+        lines = [line_of(equality.info) for equality in self.spec.equalities]
+        names = _names([model.equality(k).name for k in range(model.neq)], "closure")
+        for k in np.flatnonzero(model.eq_active0):
+            kind, name = model.eq_type[k], model.equality(int(k)).name
+            location = {"path": self.root.path, "line": lines[k], "name": f"equality.{name}" if name else "equality"}
+            self.lines[f"closures.{names[k]}"] = lines[k]
+            if kind in (int(kinds.mjEQ_CONNECT), int(kinds.mjEQ_WELD)):
+                closure = self._closure(k, names[k])
+                rigid = [int(model.body_weldid[self.bodies.index(link)]) for link in closure.links]
+                if rigid[0] == rigid[1]:
+                    message = f"{closure.links[0]} and {closure.links[1]} are fixed to one another, and need no closure"
+                    self.faults.leave_out(FIXED_ALREADY, names[k], RobotFileError(message, **location))
+                else:
+                    self.closures.append(closure)
+                continue
+            if kind == int(kinds.mjEQ_JOINT):
+                self.ties.add_joints(k, location)
+            elif kind == int(kinds.mjEQ_TENDON):
+                self.ties.add_tendons(k, location)
+            else:
+                word = kinds(int(kind)).name.removeprefix("mjEQ_").lower()
+                raise RobotFileError(f"an active equality of type {word} {NO_CLOSURE}", **location)
+        self.mimics = leaders(self.ties.mimics)
+
+    def _closure(self, k: Any, name: str) -> Closure:
+        """Return a connect or weld: its anchors and its relative pose as MuJoCo holds them."""
+        model, data = self.model, self.model.eq_data[k]
+        weld = model.eq_type[k] == int(self.mujoco.mjtEq.mjEQ_WELD)
+        numbers = (int(model.eq_obj1id[k]), int(model.eq_obj2id[k]))
+        if model.eq_objtype[k] == int(self.mujoco.mjtObj.mjOBJ_SITE):
+            sites, turns = list(numbers), [quaternion_matrix(model.site_quat[i]) for i in numbers]
+            points, rotation = [model.site_pos[i] for i in sites], turns[0] @ turns[1].T
+            numbers = tuple(int(model.site_bodyid[i]) for i in sites)
+        elif weld:  # the anchor is kept in the frame of the second body, and where it has to be in that of the first
+            points, rotation = [data[3:6], data[0:3]], quaternion_matrix(data[6:10])
+        else:
+            points, rotation = [data[0:3], data[3:6]], None
+        turning = weld and data[10] != 0  # a weld without torque holds a point only
+        links = (self.bodies[numbers[0]], self.bodies[numbers[1]])
+        return Closure(name, links, "weld" if turning else "connect", points, rotation=rotation if turning else None)
+
+    def _body(self, k: int) -> None:
+        """Add the link of a body, the joints that move it, and the massless links between these."""
+        model, name = self.model, self.bodies[k]
+        inertia = None
+        if model.body_mass[k] > 0 or model.body_inertia[k].any():
+            try:
+                principal = Inertia(model.body_mass[k], tensor=model.body_inertia[k], strict=False)
+                inertia = principal.moved(model.body_ipos[k], quaternion_matrix(model.body_iquat[k]))
+            except JounceError as error:
+                raise self.error(error.message, f"links.{name}.{error.name}", value=error.value) from None
+            self.faults.check(principal, name, self.lines.get(f"links.{name}"))
+        self.links.append(Link(name, inertia, 1.0 - self.drives.compensated(k)))
+        if k == 0:
+            return
+        parent = self.bodies[model.body_parentid[k]]
+        position, rotation = np.array(model.body_pos[k]), quaternion_matrix(model.body_quat[k])
+        numbers = range(model.body_jntadr[k], model.body_jntadr[k] + model.body_jntnum[k])
+        for j in numbers:
+            anchor, last = np.array(model.jnt_pos[j]), j == numbers[-1]
+            here = name if last and not anchor.any() else self._unused(f"{name}_{self.joint_names[j]}")
+            if model.jnt_type[j] == self.kind["free"]:
+                self._expand(j, parent, name, np.zeros(3), np.eye(3))
+                return
+            if here != name:
+                self.links.append(Link(here))
+            if model.jnt_type[j] == self.kind["ball"]:
+                self._expand(j, parent, here, position + rotation @ anchor, rotation)
+            else:
+                self._single(j, parent, here, position + rotation @ anchor, rotation)
+            parent, position, rotation = here, -anchor, np.eye(3)
+        if parent != name:
+            self.joints.append(Joint(self._unused(f"{name}_fixed"), parent, name, "fixed", position, rotation))
+
+    def _unused(self, name: str) -> str:
+        """Return a name that no body, joint or link has."""
+        taken = {*self.bodies, *self.joint_names, *(link.name for link in self.links), *(j.name for j in self.joints)}
+        while name in taken:
+            name += "_"
+        return name
+
+    def _single(self, j: int, parent: str, child: str, position: _Vector, rotation: _Matrix) -> None:
+        """Add a hinge or a slide; the pose in the file is that at its reference coordinate."""
+        model, name = self.model, self.joint_names[j]
+        turning, axis, reference = model.jnt_type[j] == self.kind["hinge"], model.jnt_axis[j], self.ties.reference(j)
+        if turning and reference:
+            rotation = rotation @ turn_about(axis, -reference)
+        elif reference:
+            position = position - rotation @ axis * reference
+        drives, several = self.drives.of_joint(j)
+        if several:
+            raise self.error(f"{several} must be one number, proportional to the velocity", f"joints.{name}.damping")
+        limited = bool(model.jnt_limited[j])
+        lower, upper = (float(value) for value in model.jnt_range[j]) if limited else (None, None)
+        kind = "prismatic" if not turning else "revolute" if limited else "continuous"
+        limits = Limits(lower=lower, upper=upper, effort=self.drives.efforts.get(j))
+        self.joints.append(
+            Joint(name, parent, child, kind, position, rotation, axis, limits, self.mimics.get(name), **drives)
+        )
+
+    def _expand(self, j: int, parent: str, child: str, position: _Vector, rotation: _Matrix) -> None:
+        """Add the slides and turns that a free joint or a ball stands for."""
+        model, name = self.model, self.joint_names[j]
+        _, joints = floating_joints(child, prefix=name)
+        if model.jnt_type[j] == self.kind["ball"]:
+            joints = joints[3:]
+        drives = self.drives.of_several(j)
+        if model.dof_dampingpoly[model.jnt_dofadr[j]].any():
+            raise self.error("damping must be one number, proportional to the velocity", f"joints.{name}.damping")
+        for k in np.flatnonzero(model.actuator_trnid[:, 0] == j):
+            for field in ("armature", "damping", "dampingpoly"):
+                values = getattr(model, f"actuator_{field}")[k]
+                if np.any(values):
+                    message = f"{field} of an actuator of a ball or free joint has no counterpart in slides and turns"
+                    value = np.ravel(values).tolist()
+                    raise self.error(f"{message}; set it to zero", f"joints.{name}.{field}", value=value)
+        pose = {"position": position, "rotation": rotation}
+        for made in joints:  # each with a name of its own: base_x may be that of another joint in the file
+            end = child if made is joints[-1] else self._unused(made.child)
+            if end != child:
+                self.links.append(Link(end))
+            own = {"name": self._unused(made.name), "parent": parent, "child": end}
+            along = {} if made.turning else drives
+            self.joints.append(dataclasses.replace(made, **own, **pose, **along))
+            parent, pose = end, {}
+        self.couplings += self.drives.ball(name, [joint.name for joint in self.joints[-3:]], drives)
+
+
+def names_of_bodies(model: Any) -> list[str]:
+    """Return the names of the links that the bodies of a compiled model become, by number."""
+    return _names([model.body(k).name for k in range(model.nbody)], "body")
+
+
+def _names(given: list[str], kind: str) -> list[str]:
+    """Return the names, with others for those that are empty."""
+    names = list(given)
+    for k, name in enumerate(names):
+        if not name:
+            name = f"{kind}_{k}"
+            while name in names:
+                name += "_"
+            names[k] = name
+    return names

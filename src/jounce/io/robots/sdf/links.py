@@ -1,0 +1,91 @@
+"""Links of SDF files: their inertias, and the gravity that they feel."""
+
+from __future__ import annotations
+
+import numpy as np
+from jaxtyping import Float
+
+from jounce.io.robots.elements.faults import FLUID_MASS, PARTLY_INERTIAL, WITHOUT_INERTIAL, Faults, left_out
+from jounce.io.robots.elements.xml_elements import Element
+from jounce.io.robots.sdf.poses import Frames, check_known, number_of, only, pose_of
+from jounce.io.robots.sdf.shapes import inertia_of_shapes
+from jounce.rigid.inertia import Inertia
+
+GRAVITY = (0.0, 0.0, -9.81)
+TENSOR = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
+SHOWN = ("visual", "collision", "sensor", "light", "audio_sink", "audio_source", "projector", "particle_emitter")
+LINK = ("pose", "inertial", "gravity", "enable_wind", "self_collide", "kinematic", "must_be_base_link", "battery")
+LINK += ("velocity_decay", "material", "plugin", "frame", *SHOWN)
+INERTIAL = ("pose", "mass", "inertia", "density", "auto_inertia_params", "fluid_added_mass", "frame")
+
+
+def read_inertia(name: str, element: Element, frames: Frames, faults: Faults) -> Inertia | None:
+    """Return the inertia of a link in its frame, None where all of it is zero."""
+    where = ("links", name)
+    check_known(element, LINK, *where)
+    inertial = only(element, "inertial", *where)
+    if inertial is None:
+        message = "<inertial> is missing: SDF takes the link for 1 kg with moments of 1 kg m^2; give it its own"
+        faults.add(WITHOUT_INERTIAL, name, element.error(message, *where))
+        return Inertia(1.0, tensor=np.eye(3))
+    where = (*where, "inertial")
+    check_known(inertial, INERTIAL, *where)
+    _check_readable(name, inertial, faults, *where)
+    if inertial.attributes.get("auto", "false").strip() in ("true", "1"):
+        inertia = inertia_of_shapes(name, element, inertial, frames, faults)
+        faults.check(inertia, name, inertial.line)
+        return inertia
+    moments = only(inertial, "inertia", *where)
+    if moments is not None:
+        check_known(moments, TENSOR, *where, "inertia")
+    _check_whole(name, inertial, moments, faults)
+    mass = number_of(inertial, "mass", *where, default=1.0)
+    xx, xy, xz, yy, yz, zz = (
+        number_of(moments, key, *where, "inertia", default=float(key[1] == key[2])) for key in TENSOR
+    )
+    if mass < 0:
+        raise inertial.error("must be greater than zero", *where, "mass", value=mass)
+    tensor = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+    if mass == 0 and not tensor.any():
+        return None
+    inertia = Inertia(mass, tensor=tensor, strict=False)
+    faults.check(inertia, name, (moments or inertial).line)
+    return inertia.moved(*pose_of(inertial, *where))
+
+
+def _check_readable(name: str, inertial: Element, faults: Faults, *where: str) -> None:
+    """Refuse an inertia that is placed elsewhere, and note the mass of a fluid, which is left out."""
+    pose, added = only(inertial, "pose", *where), only(inertial, "fluid_added_mass", *where)
+    given = {} if pose is None else pose.attributes
+    frame = given.get("relative_to") or given.get("frame") or name
+    if pose is not None and frame != name:
+        message = "an inertia is placed in the frame of its link, relative to nothing else"
+        raise pose.error(message, *where, "pose", value=frame)
+    for entry in [] if added is None else added.children:
+        if value := entry.content_numbers(1, *where, added.tag if added else "", entry.tag)[0]:
+            error = entry.error(left_out(FLUID_MASS), *where, "fluid_added_mass", value=value)
+            faults.leave_out(FLUID_MASS, name, error)
+
+
+def _check_whole(name: str, inertial: Element, moments: Element | None, faults: Faults) -> None:
+    """Note a mass or moments that are not given, which SDF takes for 1."""
+    missing = [] if inertial.first("mass") is not None else ["mass"]
+    missing += [key for key in ("ixx", "iyy", "izz") if moments is None or moments.first(key) is None]
+    if missing:
+        message = f"<inertial> does not give {', '.join(missing)}, which SDF takes for 1; give all of it"
+        faults.add(PARTLY_INERTIAL, name, inertial.error(message, "links", name, "inertial"))
+
+
+def gravity_of(world: Element | None) -> Float[np.ndarray, "3"]:
+    """Return the gravity in the axes of the world.
+
+    Parameters
+    ----------
+    world : Element or None
+        The element ``<world>`` that holds the model.
+    """
+    holders = [] if world is None else [world, *world.every("physics")]  # up to SDF 1.5 it was a matter of the physics
+    for holder in holders:
+        if (element := only(holder, "gravity", "world")) is not None:
+            return np.array(element.content_numbers(3, "world", "gravity"))
+    return np.array(GRAVITY)

@@ -1,0 +1,322 @@
+"""Models of SDF files: the one that is asked for, with what it includes and nests as links and joints of its own.
+
+A nested model becomes links, joints and frames whose names begin with its own and ``::``, as SDF itself names them, and
+a frame for the model, which the poses within it are relative to.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import os
+import re
+from collections.abc import Iterable, Iterator
+from os import PathLike
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from jounce.errors import RobotFileError, no_such
+from jounce.io.files.reading import named_file
+from jounce.io.robots.elements.faults import RENAMED, Faults
+from jounce.io.robots.elements.xml_elements import Element, read_markup
+from jounce.io.robots.sdf.joints import with_named_axes
+from jounce.io.robots.sdf.poses import MODEL, WORLD, FramePose, Frames, check_known, flag_of, only
+from jounce.io.robots.sdf.scopes import made, named, placed, reference_pose, scope, scoped
+
+MODEL_PARTS = ("static", "self_collide", "allow_auto_disable", "enable_wind", "pose", "link", "joint", "frame")
+MODEL_PARTS += ("plugin", "gripper", "include", "model")
+INCLUDE_PARTS = ("uri", "name", "pose", "placement_frame", "static", "plugin", "merge")
+ROOT = ("model", "world")
+NOT_THERE = "models that the world includes and that are not there"
+NEWEST = (1, 7)  # version of what is made here: axes name their frames
+MOST_NESTED = 50
+MOST_LINKS = 20_000
+
+
+@dataclasses.dataclass(frozen=True)
+class ChosenModel:
+    """A model of a file, all that it nests among its own links and joints.
+
+    Attributes
+    ----------
+    model : Element
+        Without nested models.
+    pose : FramePose
+        In the world.
+    world : Element or None
+        The element ``<world>`` that holds it.
+    version : tuple of int
+        Of SDF, which its joints are written in.
+    """
+
+    model: Element
+    pose: FramePose
+    world: Element | None
+    version: tuple[int, ...]
+
+
+def chosen_model(
+    root: Element, faults: Faults, name: str | None = None, allow: Iterable[str | PathLike[str]] = ()
+) -> ChosenModel:
+    """Return the model of a file that is asked for, or the only one that moves.
+
+    Parameters
+    ----------
+    root : Element
+        The element ``<sdf>``.
+    faults : Faults
+        Takes models that are included and not there.
+    name : str, optional
+        Of the model.
+    allow
+        Folders besides that of the file that included models may be below.
+
+    Raises
+    ------
+    RobotFileError
+        There is no such model, several move, or one cannot be read.
+    """
+    check_known(root, (*ROOT, "actor", "light", "include"))
+    reader = _Models(faults, tuple(allow))
+    version = version_of(root)
+    holders = [(root, None), *((world, world) for world in root.every("world"))]
+    given: dict[str, _Given] = {}
+    for holder, world in holders:
+        for model, its_version in reader.models(holder, version):
+            label = model.attributes.get("name", "") if len(given) else model.attributes.get("name", "robot")
+            if label in given:
+                message = f"two models of one world have this name, the first in line {given[label].model.line}"
+                raise model.error(message, "models", value=label)
+            given[label] = _Given(model, its_version, world)
+    if not given:
+        raise root.error("must hold one <model>, it holds 0", value=[])
+    if name is not None and name not in given:
+        raise RobotFileError(no_such("model", name, given), path=root.path, name="model", value=name)
+    label = _only_one(given, reader) if name is None else name
+    model, its_version, world = given[label]
+    joints = [] if world is None else world.every("joint")
+    if any(label in _models_of(joint) for joint in joints):
+        return ChosenModel(_joined(label, given, joints, reader), FramePose(np.zeros(3), np.eye(3)), world, NEWEST)
+    whole = reader.flattened(model, its_version, top=True)
+    if reference_pose(whole)[1]:  # relative to another model, or to a frame of the world
+        frames = [] if world is None else world.every("frame")
+        everything = dataclasses.replace(model, attributes={"name": WORLD}, children=[*frames])
+        for other, one in given.items():
+            if one.world is world:
+                everything.children += scope(other, reader.flattened(one.model, one.version, top=True))
+        pose = Frames(everything, named(everything)).of(f"{label}::{MODEL}", model, "pose")
+        return ChosenModel(whole, pose, world, NEWEST)
+    return ChosenModel(whole, placed(whole), world, NEWEST)
+
+
+def version_of(root: Element) -> tuple[int, ...]:
+    """Return the version of SDF that a file is written in."""
+    text = root.text("version", "version")
+    try:
+        return tuple(int(part) for part in text.split("."))
+    except ValueError:
+        raise root.error(
+            "the version must be numbers with points between, such as 1.7", "version", value=text
+        ) from None
+
+
+class _Given(NamedTuple):
+    """A model as its file has it, the version of that, and the world that holds it."""
+
+    model: Element
+    version: tuple[int, ...]
+    world: Element | None
+
+
+def _only_one(given: dict[str, _Given], reader: _Models) -> str:
+    """Return the name of the only model, or of the only one that moves, or is not static."""
+    loose = [name for name, one in given.items() if not _static(one.model)]
+    moving = [name for name in loose if _moves(given[name], reader)] if len(given) > 1 else []
+    for names in (list(given), moving, loose if not moving else []):
+        if len(names) == 1:
+            return names[0]
+    several = moving or loose or list(given)
+    words = "that move" if moving else "and none that moves"
+    message = (
+        f"holds {len(several) if moving else len(given)} models {words}; choose one with model=NAME (--model NAME)"
+    )
+    raise given[several[1]].model.error(message, "models", value=several)
+
+
+def _static(model: Element) -> bool:
+    return flag_of(model, "static", "static")
+
+
+def _moves(given: _Given, reader: _Models) -> bool:
+    """Whether a model has joints that move, of its own or of those that it nests."""
+    if any(part.tag == "joint" and part.attributes.get("type") not in ("fixed", None) for part in given.model.walk()):
+        return True
+    if not any(part.tag == "include" for part in given.model.walk()):
+        return False
+    whole = reader.flattened(given.model, given.version, top=True)
+    return any(joint.attributes.get("type") != "fixed" for joint in whole.every("joint"))
+
+
+def _models_of(joint: Element) -> set[str]:
+    """Return the names of the models whose frames a joint of the world joins."""
+    return {part.content.strip().partition("::")[0] for tag in ("parent", "child") for part in joint.every(tag)}
+
+
+def _joined(label: str, given: dict[str, _Given], joints: list[Element], reader: _Models) -> Element:
+    """Return models that joints of the world join as one, those that are static fixed to the world."""
+    members, before = {label}, 0
+    while len(members) != before:
+        before = len(members)
+        for joint in joints:
+            if (ends := _models_of(joint) - {WORLD}) & members:
+                for end in ends - given.keys():
+                    raise joint.error(no_such("model of this world", end, given), "joints", value=end)
+                members |= ends
+    whole = dataclasses.replace(given[label].model, attributes={"name": label}, children=[])
+    for name in (name for name in given if name in members):
+        model = reader.flattened(given[name].model, given[name].version, top=True)
+        whole.children += scope(name, model)
+        if _static(model):
+            ends = {"parent": WORLD, "child": f"{name}::{Frames(model, named(model)).canonical_link()}"}
+            fixed = [made(model, tag, text) for tag, text in ends.items()]
+            attributes = {"name": f"{name}::{WORLD}_fixed", "type": "fixed"}
+            whole.children.append(dataclasses.replace(model, tag="joint", attributes=attributes, children=fixed))
+    whole.children += [joint for joint in joints if _models_of(joint) & members]
+    return whole
+
+
+class _Models:
+    """Reads models, with those that they include, each file once."""
+
+    def __init__(self, faults: Faults, allow: tuple[str | PathLike[str], ...]):
+        self.faults, self.allow = faults, allow
+        self.files: dict[str, tuple[Element, tuple[int, ...]]] = {}
+        self.open: list[str] = []
+        self.links = 0
+
+    def models(self, holder: Element, version: tuple[int, ...]) -> Iterator[tuple[Element, tuple[int, ...]]]:
+        """Give the models of a file or a world, those that it includes too; what is not there is noted."""
+        for child in holder.children:
+            if child.tag == "model":
+                yield child, version
+            elif child.tag == "include":
+                path = self._path(child)
+                if path is None:
+                    uri = self._uri(child)
+                    error = child.error(
+                        "there is no such model; allow the folder that holds it with --allow", value=uri
+                    )
+                    self.faults.leave_out(NOT_THERE, uri, error)
+                    continue
+                yield self._included(child, path)
+
+    def flattened(self, model: Element, version: tuple[int, ...], *, top: bool = False) -> Element:
+        """Return a model whose nested ones are among its own links, joints and frames, in the newest version."""
+        check_known(model, MODEL_PARTS)
+        children: list[Element] = []
+        for child in model.children:
+            if child.tag in ("model", "include"):
+                children += self._nested(child, version)
+                continue
+            if child.tag == "link":
+                self.links += 1
+                if self.links > MOST_LINKS:
+                    raise child.error(f"more than {MOST_LINKS} links with all that is included", "links")
+            children.append(self._newest(child, model, version) if child.tag == "joint" else child)
+        whole = dataclasses.replace(model, children=children)
+        if not top:
+            named(whole)
+        return whole
+
+    def _newest(self, joint: Element, model: Element, version: tuple[int, ...]) -> Element:
+        """Return a joint as the newest version has it: axes name their frames, no link has its name."""
+        name = joint.attributes.get("name", "")
+        if version < (1, 7) and any(link.attributes.get("name") == name for link in model.every("link")):
+            taken = {part.attributes.get("name") for part in model.children}
+            new = f"{name}_joint"
+            while new in taken:
+                new += "_"
+            message = f"a link has the name of this joint, which is called {new}; give it another"
+            self.faults.add(RENAMED, name, joint.error(message, "joints", name))
+            joint = dataclasses.replace(joint, attributes={**joint.attributes, "name": new})
+        return with_named_axes(joint, version)
+
+    def _nested(self, child: Element, version: tuple[int, ...]) -> list[Element]:
+        """Return the parts of a nested or included model, by their names in the one that holds it."""
+        model, merged = child, False
+        if child.tag == "include":
+            path = self._path(child)
+            if path is None:
+                advice = "put it beside the file, or allow the folder that holds it with --allow DIR (allow=[DIR])"
+                raise child.error(f"there is no such model; {advice}", "include", value=self._uri(child))
+            merged = child.attributes.get("merge", "false").strip() in ("true", "1")
+            if path in self.open or len(self.open) > MOST_NESTED:
+                raise child.error("models include one another without end", "include", value=self._uri(child))
+            self.open.append(path)
+            model, version = self._included(child, path)
+        whole = self.flattened(model, version)
+        if child.tag == "include":
+            self.open.pop()
+        name = model.text("name", "models")
+        return scoped(whole, name, reference_pose(whole), only(whole, "pose") or child, merged=merged)
+
+    def _included(self, include: Element, path: str) -> tuple[Element, tuple[int, ...]]:
+        """Return an included model, with the name, the pose and the flag that the element gives it."""
+        check_known(include, INCLUDE_PARTS, "include")
+        if path not in self.files:
+            root = read_markup(path, self.faults)
+            if root.tag != "sdf":
+                raise include.error("included models must be of SDF", "include", value=f"<{root.tag}>")
+            models = root.every("model")
+            if len(models) != 1:
+                raise include.error(f"the file must hold one <model>, it holds {len(models)}", "include", value=path)
+            self.files[path] = models[0], version_of(root)
+        model, version = self.files[path]
+        attributes = dict(model.attributes)
+        if (given := only(include, "name", "include")) is not None:
+            attributes["name"] = given.content.strip()
+        replaced = {tag: part for tag in ("pose", "static") if (part := only(include, tag, "include")) is not None}
+        if (frame := only(include, "placement_frame", "include")) is not None:
+            attributes["placement_frame"] = frame.content.strip()
+        children = [*replaced.values(), *(x for x in model.children if x.tag not in replaced)]
+        return dataclasses.replace(model, attributes=attributes, children=children), version
+
+    def _uri(self, include: Element) -> str:
+        uri = only(include, "uri", "include")
+        if uri is None or not uri.content.strip():
+            raise include.error("<include> has no <uri>", "include")
+        return uri.content.strip()
+
+    def _path(self, include: Element) -> str | None:
+        """Return the file of an included model, None if it is not there."""
+        uri = self._uri(include)
+        match = re.fullmatch(r"(?:(model|package|file)://)?(.*)", uri)
+        assert match is not None  # it matches anything
+        kind, name = match.groups()
+        if "://" in name or not name.strip("/"):
+            return None
+        folder = Path(include.path).parent
+        folders = [folder, *(folder.parents if kind in ("model", "package") else ()), *map(Path, self.allow)]
+        for directory in folders:
+            target = directory / name
+            if not os.path.lexists(target):
+                continue
+            file = _manifest(target) if target.is_dir() else str(target)
+            try:
+                path = named_file(file, include.path, self.allow, folder=directory, error=RobotFileError)
+            except RobotFileError as error:
+                raise include.error(error.message, "include", value=uri) from None
+            return path if os.path.lexists(path) else None
+        return None
+
+
+def _manifest(folder: Path) -> str:
+    """Return the file of a model's folder: the newest of its manifest, else the usual one."""
+    config = folder / "model.config"
+    if os.path.lexists(config):
+        files = [x for x in read_markup(str(config)).every("sdf") if x.content.strip()]
+        versions = [tuple(int(n) for n in re.findall(r"\d+", x.attributes.get("version", "0"))) for x in files]
+        if files:
+            return str(folder / files[versions.index(max(versions))].content.strip())
+    return str(folder / "model.sdf")

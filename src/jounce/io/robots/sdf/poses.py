@@ -1,0 +1,198 @@
+"""Poses in SDF files: each relative to a frame that has a name, and so resolved from one frame to the next."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from typing import NamedTuple
+
+import numpy as np
+from jaxtyping import Float
+
+from jounce.errors import no_such
+from jounce.io.robots.elements.faults import TWICE
+from jounce.io.robots.elements.xml_elements import Element
+
+MODEL = "__model__"
+WORLD = "world"
+MAX_CHAIN = 1000  # frames, each attached to the next
+
+
+class FramePose(NamedTuple):
+    """Where a frame is in another one: its origin, and its axes as columns."""
+
+    position: Float[np.ndarray, "3"]
+    rotation: Float[np.ndarray, "3 3"]
+
+    def then(self, inner: FramePose) -> FramePose:
+        """Return where a frame is that this one holds at a place."""
+        return FramePose(self.position + self.rotation @ inner.position, self.rotation @ inner.rotation)
+
+    def seen_from(self, outer: FramePose) -> FramePose:
+        """Return where the frame is in another one; both places are in one frame."""
+        return FramePose(outer.rotation.T @ (self.position - outer.position), outer.rotation.T @ self.rotation)
+
+
+HERE = FramePose(np.zeros(3), np.eye(3))
+
+
+class Frames:
+    """The frames of a model: its links, joints and further frames by name, and where they are in the model.
+
+    Parameters
+    ----------
+    model : Element
+        The element ``<model>``.
+    elements : dict of str to Element
+        Links, joints and frames by name.
+    """
+
+    def __init__(self, model: Element, elements: dict[str, Element]):
+        self.model, self.elements = model, elements
+        self._resolved: dict[str, FramePose] = {MODEL: HERE}
+
+    def pose(self, name: str) -> FramePose:
+        """Return where a frame is in the model."""
+        chain = [name]
+        while chain[-1] not in self._resolved:
+            element = self.elements[chain[-1]]
+            self._extend(chain, self._reference(element), element)
+        for name in reversed(chain[:-1]):
+            element = self.elements[name]
+            self._resolved[name] = self._resolved[self._reference(element)].then(pose_of(element, name))
+        return self._resolved[name]
+
+    def of(self, name: str, element: Element, *where: str) -> FramePose:
+        """Return where a frame is in the model; `element` names the frame, which must be there."""
+        return self.pose(self._known(name, element, *where))
+
+    def link(self, name: str, element: Element, *where: str) -> str:
+        """Return the link that a frame is fixed to, or ``world``; `element` names the frame."""
+        chain = [name]
+        while True:
+            name = chain[-1]
+            if name == WORLD:
+                return name
+            known = self._known(name, element, *where)
+            if known == MODEL:
+                return self.canonical_link()
+            target = self.elements[known]
+            if target.tag == "link":
+                return known
+            following = text_of(target, "child", "joints", name) if target.tag == "joint" else _attachment(target)
+            self._extend(chain, following, target)
+
+    def canonical_link(self) -> str:
+        """Return the link that stands for the model: the first one, unless it names another."""
+        links = [name for name, element in self.elements.items() if element.tag == "link"]
+        chosen = self.model.attributes.get("canonical_link") or links[0]
+        if chosen not in links:
+            raise self.model.error(no_such("link", chosen, links), "canonical_link", value=chosen)
+        return chosen
+
+    def _extend(self, chain: list[str], name: str, element: Element) -> None:
+        if name in chain or len(chain) > MAX_CHAIN:
+            circle = " -> ".join([*chain[-5:], name])
+            raise element.error("is placed relative to itself", f"{element.tag}s", chain[-1], value=circle)
+        chain.append(name)
+
+    def _reference(self, element: Element) -> str:
+        """Return the frame that the pose of an element is relative to."""
+        pose = element.first("pose")
+        given = "" if pose is None else pose.attributes.get("relative_to") or pose.attributes.get("frame") or ""
+        if not given:
+            if element.tag == "link":
+                return MODEL
+            given = _attachment(element) if element.tag == "frame" else text_of(element, "child")
+        return self._known(given, pose or element)
+
+    def _known(self, name: str, element: Element, *where: str) -> str:
+        """Return the name of a frame that must be there; that of a nested model stands for its own frame."""
+        if name == MODEL or name in self.elements:
+            return name
+        if (own := f"{name}::{MODEL}") in self.elements:
+            return own
+        raise element.error(no_such("link, joint or frame", name, self.elements), *where, value=name)
+
+
+def _attachment(frame: Element) -> str:
+    return frame.attributes.get("attached_to") or MODEL
+
+
+def pose_of(element: Element, *name: str) -> FramePose:
+    """Return the pose of an element in the frame that it is relative to: turns about fixed axes, or a quaternion."""
+    from scipy.spatial.transform import Rotation
+
+    pose = element.first("pose")
+    if pose is None or not pose.content.strip():
+        return HERE
+    form = pose.attributes.get("rotation_format", "euler_rpy")
+    if form == "quat_xyzw":
+        *position, x, y, z, w = pose.content_numbers(7, *name, "pose")
+        if math.hypot(x, y, z, w) < 1e-9:
+            raise pose.error("the quaternion must not be zero", *name, "pose", value=[x, y, z, w])
+        return FramePose(np.array(position), Rotation.from_quat([x, y, z, w]).as_matrix())
+    if form != "euler_rpy":
+        raise pose.error("rotation_format must be euler_rpy or quat_xyzw", *name, "pose", value=form)
+    *position, roll, pitch, yaw = pose.content_numbers(6, *name, "pose")
+    degrees = pose.attributes.get("degrees", "false").strip() in ("true", "1")
+    return FramePose(np.array(position), Rotation.from_euler("xyz", [roll, pitch, yaw], degrees=degrees).as_matrix())
+
+
+def only(element: Element, tag: str, *name: str) -> Element | None:
+    """Return the first child of a tag, None if there is none; others are noted."""
+    elements = element.every(tag)
+    if len(elements) > 1:
+        shown = ".".join(name) or f"<{element.tag}>"
+        elements[1].leave_out(TWICE, shown, f"<{tag}> is given twice, first in line {elements[0].line}", *name)
+    return elements[0] if elements else None
+
+
+def needed(element: Element, tag: str, *name: str) -> Element:
+    """Return the one child of a tag, which must be there."""
+    single = only(element, tag, *name)
+    if single is None:
+        raise element.error(f"<{element.tag}> has no <{tag}>", *name)
+    return single
+
+
+def text_of(element: Element, tag: str, *name: str) -> str:
+    """Return the text of a child that must be there and not be blank."""
+    child = needed(element, tag, *name)
+    text = child.content.strip()
+    if not text:
+        raise child.error(f"<{tag}> is empty", *name, tag)
+    return text
+
+
+def number_of(element: Element | None, tag: str, *name: str, default: float, infinite: bool = False) -> float:
+    """Return the number in a child, or the default where there is none."""
+    child = None if element is None else only(element, tag, *name)
+    return default if child is None else child.content_numbers(1, *name, tag, infinite=infinite)[0]
+
+
+def flag_of(element: Element | None, tag: str, *name: str, default: bool = False) -> bool:
+    """Return the truth value in a child, or the default where there is none."""
+    child = None if element is None else only(element, tag, *name)
+    if child is None:
+        return default
+    word = child.content.strip().lower()
+    if word not in ("true", "1", "false", "0"):
+        raise child.error(f"<{tag}> must be true or false", *name, value=word)
+    return word in ("true", "1")
+
+
+def check_known(element: Element, known: Iterable[str], *name: str) -> None:
+    """Note an element that SDF does not have; those of other programs have a prefix, such as ``gz:``."""
+    for child in element.children:
+        if child.tag not in known and ":" not in child.tag:
+            child.leave_out_unknown(no_such("element of SDF here", child.tag, known), *name)
+
+
+def vector_of(element: Element, *name: str) -> Float[np.ndarray, "3"]:
+    """Return the direction in an element, of length one."""
+    values = np.array(element.content_numbers(3, *name))
+    length = float(np.linalg.norm(values))
+    if length < 1e-9:
+        raise element.error("must have a direction", *name, value=values.tolist())
+    return values / length

@@ -1,0 +1,122 @@
+"""Parts of nested models of SDF under the names that they have in the model or the world that holds them."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import Any
+
+import numpy as np
+
+from jounce.errors import no_such
+from jounce.io.robots.elements.xml_elements import Element
+from jounce.io.robots.sdf.poses import MODEL, WORLD, FramePose, Frames, only, pose_of
+
+NAMED = ("link", "joint", "frame")
+REFERENCES = ("relative_to", "expressed_in", "attached_to")  # attributes that name a frame
+TEXTS = ("parent", "child", "gearbox_reference_body", "mimicJoint", "joint")
+TEXTS += ("drake:ball_constraint_body_A", "drake:ball_constraint_body_B")
+
+
+def named(model: Element) -> dict[str, Element]:
+    """Return links, joints and frames of a model by name."""
+    elements: dict[str, Element] = {}
+    for tag in NAMED:
+        for element in model.every(tag):
+            name = element.text("name", f"{tag}s")
+            if name in elements:
+                message = f"this name is given twice, first in line {elements[name].line}"
+                raise element.error(message, f"{tag}s", value=name)
+            if name == WORLD or (name.startswith("__") and name.endswith("__")):
+                if name == WORLD and tag == "link" and element.first("inertial") is None:
+                    element.leave_out_unknown("SDF keeps this name for itself: leave the link out", "links", name)
+                    continue
+                raise element.error("SDF keeps this name for itself", f"{tag}s", value=name)
+            elements[name] = element
+    if not any(element.tag == "link" for element in elements.values()):
+        raise model.error("a robot needs at least one <link>")
+    return elements
+
+
+def scope(name: str, model: Element) -> list[Element]:
+    """Return the parts of a model by the names that they have in the world."""
+    return scoped(model, name, reference_pose(model), only(model, "pose") or model)
+
+
+def placed(model: Element) -> FramePose:
+    """Return the pose of a model, from that of the frame which it is placed by."""
+    frame, pose = model.attributes.get("placement_frame", "").strip(), pose_of(model)
+    if not frame:
+        return pose
+    elements = named(model)
+    if frame != MODEL and frame not in elements:
+        raise model.error(no_such("link, joint or frame", frame, elements), "placement_frame", value=frame)
+    here = Frames(model, elements).pose(frame)
+    return pose.then(FramePose(np.zeros(3), np.eye(3)).seen_from(here))
+
+
+def reference_pose(model: Element) -> tuple[FramePose, str]:
+    """Return the pose of a model and the frame that it is relative to, empty for the model that holds it."""
+    pose = only(model, "pose")
+    given = "" if pose is None else pose.attributes.get("relative_to") or pose.attributes.get("frame") or ""
+    return placed(model), "" if given == WORLD else given
+
+
+def made(like: Element, tag: str, text: str = "", **attributes: str) -> Element:
+    """Return an element of the file and line of another one."""
+    return Element(tag, attributes, like.path, like.line, pieces=[text], faults=like.faults)
+
+
+def scoped(
+    model: Element, scope: str, placed: tuple[FramePose, str], at: Element, *, merged: bool = False
+) -> list[Element]:
+    """Return the parts of a model with the names that they have in the one that holds it, and its frame."""
+    from scipy.spatial.transform import Rotation
+
+    frame = f"_merged__{scope}__model__" if merged else f"{scope}::{MODEL}"
+
+    def rename(name: str) -> str:
+        if name in ("", WORLD):
+            return name
+        return frame if name == MODEL else name if merged else f"{scope}::{name}"
+
+    pose, relative = placed
+    canonical = Frames(model, named(model)).canonical_link()
+    numbers = [*pose.position, *Rotation.from_matrix(pose.rotation).as_quat()]
+    where = made(at, "pose", " ".join(map(repr, map(float, numbers))), relative_to=relative or MODEL)
+    where.attributes["rotation_format"] = "quat_xyzw"
+    own = made(at, "frame", name=frame, attached_to=rename(canonical))
+    own.children.append(where)
+    parts = [own]
+    for child in model.children:
+        if child.tag in ("pose", "static", "self_collide", "allow_auto_disable", "enable_wind"):
+            continue
+        part = _renamed(child, rename)
+        if child.tag in NAMED:
+            part.attributes["name"] = rename(child.attributes.get("name", ""))
+        if child.tag == "link":
+            _relative(part, frame)
+        elif child.tag == "frame":
+            part.attributes["attached_to"] = part.attributes.get("attached_to") or frame
+        parts.append(part)
+    return parts
+
+
+def _renamed(element: Element, rename: Any) -> Element:
+    """Return an element in which all that names a link, a joint or a frame names it anew."""
+    attributes = {key: rename(x) if key in REFERENCES else x for key, x in element.attributes.items()}
+    if element.tag == "pose" and "frame" in attributes:
+        attributes["frame"] = rename(attributes["frame"])
+    if element.tag in ("mimic", "drake:mimic") and "joint" in attributes:
+        attributes["joint"] = rename(attributes["joint"])
+    pieces = [rename(element.content.strip())] if element.tag in TEXTS and not element.children else element.pieces
+    children = [_renamed(child, rename) for child in element.children]
+    return dataclasses.replace(element, attributes=attributes, pieces=pieces, children=children)
+
+
+def _relative(link: Element, frame: str) -> None:
+    """Place a link relative to a frame unless it names one."""
+    pose = link.first("pose")
+    if pose is None:
+        link.children.append(made(link, "pose", relative_to=frame))
+    elif not (pose.attributes.get("relative_to") or pose.attributes.get("frame")):
+        pose.attributes["relative_to"] = frame

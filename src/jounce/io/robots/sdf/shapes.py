@@ -1,0 +1,95 @@
+"""Inertias of SDF links that follow from their collision shapes: ``<inertial auto="true">``."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from jounce.errors import RobotError
+from jounce.io.robots.elements.faults import DEFAULT_DENSITY, OVERWRITTEN, Faults
+from jounce.io.robots.elements.xml_elements import Element
+from jounce.io.robots.sdf.poses import HERE, Frames, needed, number_of, only, pose_of
+from jounce.rigid.inertia import Inertia
+
+DENSITY = 1000.0  # of water, kg/m^3
+SIZES = {
+    "box": {"size": ("size", 1.0)},
+    "capsule": {"radius": ("radius", 1.0), "length": ("length", 1.0)},
+    "cone": {"radius": ("radius", 1.0), "length": ("length", 1.0)},
+    "cylinder": {"radius": ("radius", 1.0), "length": ("length", 1.0)},
+    "ellipsoid": {"size": ("radii", 2.0)},
+    "sphere": {"radius": ("radius", 1.0)},
+}
+"""Of each shape the sizes of the solid: the element that holds each, and by what it is to be multiplied."""
+
+
+def inertia_of_shapes(name: str, link: Element, inertial: Element, frames: Frames, faults: Faults) -> Inertia:
+    """Return the inertia of a link in its frame, from its collision shapes, as the reference library of SDF adds them.
+
+    The density is that of the collision, else that of ``<inertial>``, else 1000 kg/m^3. A ``<mass>`` scales the whole
+    to that mass. A cone stands along z, its middle at the pose of the collision.
+
+    Parameters
+    ----------
+    name : str
+        Of the link.
+    link, inertial : Element
+        The elements ``<link>`` and ``<inertial>``.
+    frames : Frames
+        Of the model, which collisions may be placed relative to.
+    faults : Faults
+        Takes a density that is not given, and moments that are not used.
+
+    Raises
+    ------
+    RobotFileError
+        There is no collision, one has a shape whose inertia is not computed, or a size is missing or impossible.
+    """
+    where = ("links", name, "inertial")
+    collisions = link.every("collision")
+    if not collisions:
+        message = 'auto="true" takes the inertia from <collision> shapes, and the link has none; write mass and inertia'
+        raise inertial.error(message, *where)
+    for part in (part for tag in ("pose", "inertia") for part in inertial.every(tag)):
+        message = 'auto="true" computes the inertia from shapes, and takes this for nothing; leave one of them out'
+        faults.add(OVERWRITTEN, name, part.error(message, *where, part.tag))
+    total = Inertia.total([_of_collision(name, x, inertial, frames, faults) for x in collisions])
+    if only(inertial, "mass", *where) is None:
+        return total
+    mass = number_of(inertial, "mass", *where, default=1.0)
+    if mass <= 0:
+        message = 'must be greater than zero, for auto="true" scales the inertia of the shapes to it'
+        raise needed(inertial, "mass").error(message, *where, "mass", value=mass)
+    return Inertia(mass, total.center_of_mass, total.tensor * (mass / total.mass), strict=False)
+
+
+def _of_collision(name: str, collision: Element, inertial: Element, frames: Frames, faults: Faults) -> Inertia:
+    where = ("links", name, "collision", collision.attributes.get("name", ""))
+    shapes = needed(collision, "geometry", *where).children
+    if len(shapes) != 1 or shapes[0].tag not in SIZES:
+        tag = shapes[0].tag if shapes else ""
+        message = f"the inertia of this shape is not computed (of {', '.join(SIZES)} it is); write mass and inertia"
+        raise (shapes[0] if shapes else collision).error(message, *where, value=f"<{tag}>" if tag else None)
+    shape = shapes[0]
+    sizes: dict[str, Any] = {}
+    for key, (tag, factor) in SIZES[shape.tag].items():
+        part = needed(shape, tag, *where)
+        values = np.array(part.content_numbers(3 if key == "size" else 1, *where, tag)) * factor
+        sizes[key] = values if key == "size" else float(values[0])
+    given = next((x for x in (only(collision, "density", *where), only(inertial, "density", *where)) if x), None)
+    if given is None and inertial.first("mass") is None:
+        message = f"no density is given, and SDF takes {DENSITY:g} kg/m^3; give <density>"
+        faults.add(DEFAULT_DENSITY, name, collision.error(message, *where))
+    density = DENSITY if given is None else given.content_numbers(1, *where, "density")[0]
+    try:
+        own = Inertia.solid(shape.tag, density=density, **sizes)
+    except RobotError as error:
+        raise shape.error(error.message, *where, error.name or "", value=error.value) from None
+    middle = np.array([0.0, 0.0, -sizes["length"] / 4]) if shape.tag == "cone" else np.zeros(3)
+    pose = only(collision, "pose", *where)
+    relative = "" if pose is None else pose.attributes.get("relative_to") or pose.attributes.get("frame") or ""
+    at = pose_of(collision, *where)
+    if relative not in ("", name):
+        at = frames.of(relative, pose or collision).seen_from(frames.pose(name)).then(at)
+    return own.moved(middle, HERE.rotation).moved(*at)

@@ -1,0 +1,1 @@
+"""URDF: links and joints, extensions of simulators, and what is left out."""

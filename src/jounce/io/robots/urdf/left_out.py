@@ -1,0 +1,216 @@
+"""What URDF files hold beside links and joints that bears on motions or forces: rotors are read, the rest warned of.
+
+Drake, Gazebo, Isaac Sim and MuJoCo each add elements of their own, of which a reader of links and joints sees nothing.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable, Iterator, Mapping
+
+from jounce.errors import no_such
+from jounce.io.robots.elements.faults import (
+    BUSHINGS,
+    JOINT_SPRINGS,
+    LEAVE,
+    MASS_OF_SHAPES,
+    PLUGINS,
+    ROTORS,
+    Faults,
+    left_out,
+)
+from jounce.io.robots.elements.xml_elements import Element
+from jounce.io.robots.sdf.joints import RATIO, ROTOR
+from jounce.io.robots.sdf.left_out import DECAY, KINEMATIC, STATIC, follower
+from jounce.robot.model.links_and_joints import Joint
+from jounce.robot.robot import Robot
+
+IN_GAZEBO = "links and joints that <gazebo> adds"
+WEIGHT = "the weight of links that <gazebo> takes out of gravity, which other readers of URDF count"
+FORCE_ELEMENTS = "<force_element>, which is a force"
+QUATERNIONS = "quat_xyzw, of which the version of this file knows nothing"
+OF_MUJOCO = "what <mujoco> says of gravity and fluids"
+OF_FILE = {
+    "force_element": FORCE_ELEMENTS,
+    "drake:linear_bushing_rpy": BUSHINGS,
+}
+OF_DYNAMICS = dict.fromkeys(("stiffness", "spring_k"), JOINT_SPRINGS) | dict.fromkeys(
+    ("armature", "rotor_inertia"), ROTORS
+)
+SPRINGS = ("springStiffness", "spring_stiffness")
+OTHER_ROTORS = ("rotorInertia", "rotor_inertia", "motorInertia", "motor_inertia")  # of actuators, by nobody's rule
+VERSIONS = ((1, 0), (1, 1), (1, 2))
+YES, NO = ("true", "1"), ("false", "0")
+
+
+def check_version(root: Element, faults: Faults) -> None:
+    """Take ``quat_xyzw`` out of a file whose version does not have it, with a note: it turns nothing there.
+
+    The reference parser, urdfdom, reads it from version 1.1 on; below, and where no version is given, which is 1.0, it
+    takes the identity, or ``rpy``. Versions that it does not know are refused, as there.
+
+    Raises
+    ------
+    RobotFileError
+        The version is none of those that there are, or something is left out and that is an error.
+    """
+    text = root.attributes.get("version", "1.0")
+    match = re.fullmatch(r"(\d+)\.(\d+)", text.strip(), re.ASCII)
+    if match is None or tuple(map(int, match.groups())) not in VERSIONS:
+        valid = ", ".join(f"{major}.{minor}" for major, minor in VERSIONS)
+        raise root.error(f"there is no such version of URDF; valid: {valid}", "version", value=text)
+    if tuple(map(int, match.groups())) > (1, 0):
+        return
+    for element in root.children:
+        holders = [element] if element.tag == "joint" else element.every("inertial") if element.tag == "link" else []
+        for origin in (origin for holder in holders for origin in holder.every("origin")):
+            if (value := origin.attributes.pop("quat_xyzw", None)) is not None:
+                name = element.attributes.get("name", "")
+                message = (
+                    "quat_xyzw turns nothing below version 1.1 of URDF, and no version means 1.0: give rpy, or write "
+                    '<robot version="1.1">'
+                )
+                faults.leave_out(
+                    QUATERNIONS, name, origin.error(message, f"{element.tag}s", name, "origin", value=value)
+                )
+
+
+def rotors(root: Element, faults: Faults) -> dict[str, float]:
+    """Return the inertia of rotors seen at the joints, by name: ``rotor_inertia * gear_ratio^2`` of transmissions.
+
+    As Drake reads them: the ratio is 1 unless given, and ``mechanicalReduction`` has no part in it. A transmission of
+    several joints or actuators is left out.
+    """
+    inertias: dict[str, float] = {}
+    known = dict.fromkeys(element.attributes.get("name", "") for element in root.every("joint"))
+    for transmission in root.every("transmission"):
+        actuators, joints = transmission.every("actuator"), transmission.every("joint")
+        for actuator in actuators:
+            rotor, gear = actuator.first(ROTOR), actuator.first(RATIO)
+            if rotor is None:
+                continue
+            name = transmission.attributes.get("name") or actuator.attributes.get("name") or "transmission"
+            where = ("transmissions", name)
+            inertia = rotor.number("value", *where, ROTOR)
+            ratio = 1.0 if gear is None else gear.number("value", *where, RATIO)
+            if inertia < 0:
+                raise rotor.error("must be zero or greater", *where, ROTOR, value=inertia)
+            if inertia == 0:
+                continue
+            if len(actuators) != 1 or len(joints) != 1:
+                faults.leave_out(ROTORS, name, rotor.error(left_out(ROTORS), *where, ROTOR, value=inertia))
+                continue
+            joint = joints[0].text("name", *where, "joint")
+            if joint not in known:
+                raise joints[0].error(no_such("joint", joint, known), *where, "joint", value=joint)
+            inertias[joint] = inertias.get(joint, 0.0) + inertia * ratio**2
+    return inertias
+
+
+def note_left_out(root: Element, robot: Robot, names: Mapping[str, list[Joint]], faults: Faults) -> None:
+    """Note what else a file holds that changes motions or forces, once the robot is made.
+
+    Parameters
+    ----------
+    root : Element
+        The element ``<robot>``.
+    robot : Robot
+        What was made of it.
+    names : dict of str to list of Joint
+        What each joint of the file became.
+    faults : Faults
+        Takes what is left out.
+
+    Raises
+    ------
+    RobotFileError
+        Something is left out and that is an error.
+    """
+    elements = {element.attributes.get("name", ""): element for element in root.every("joint")}
+    moving = bool(robot.moving_joints)
+    for element in root.children:
+        if element.tag in OF_FILE:
+            heading = OF_FILE[element.tag]
+            _leave(faults, heading, element.attributes.get("name") or f"<{element.tag}>", element, LEAVE)
+        elif element.tag == "joint":
+            _note_dynamics(element, faults)
+        elif element.tag == "gazebo":
+            for heading, shown, part in _of_gazebo(element, elements, robot, names, moving=moving):
+                _leave(faults, heading, shown, part, LEAVE)
+        elif element.tag == "transmission":
+            for part in (part for actuator in element.every("actuator") for part in actuator.children):
+                if part.tag in OTHER_ROTORS:
+                    _leave(faults, ROTORS, element.attributes.get("name") or part.tag, part, LEAVE)
+        elif element.tag == "mujoco":
+            for part in element.children:
+                _note_mujoco(part, faults)
+
+
+def _leave(faults: Faults, heading: str, shown: str, element: Element, message: str) -> None:
+    error = element.error(message.format(heading), shown, value=element.content.strip() or f"<{element.tag}>")
+    faults.leave_out(heading, shown, error)
+
+
+def _note_dynamics(joint: Element, faults: Faults) -> None:
+    """Note what simulators add to the dynamics of a joint."""
+    dynamics, name = joint.first("dynamics"), joint.attributes["name"]
+    for key, heading in OF_DYNAMICS.items() if dynamics is not None and joint.attributes["type"] != "fixed" else ():
+        where = ("joints", name, "dynamics", key)
+        if dynamics is not None and (value := dynamics.numbers(key, 1, *where, infinite=True)) not in (None, [0.0]):
+            faults.leave_out(heading, name, dynamics.error(left_out(heading), *where, value=value))
+
+
+def _note_mujoco(part: Element, faults: Faults) -> None:
+    given = [key for key in ("gravity", "density", "viscosity") if part.tag == "option" and key in part.attributes]
+    for key in given:
+        _leave(faults, OF_MUJOCO, f"{key} {part.attributes[key]}", part, LEAVE)
+    shapes = part.attributes.get("inertiafromgeom") == "true" or "settotalmass" in part.attributes
+    if part.tag == "compiler" and shapes:
+        _leave(faults, MASS_OF_SHAPES, "<mujoco>", part, LEAVE)
+
+
+def _of_gazebo(
+    gazebo: Element,
+    joints: Mapping[str, Element],
+    robot: Robot,
+    names: Mapping[str, list[Joint]],
+    *,
+    moving: bool,
+) -> Iterator[tuple[str, str, Element]]:
+    """Give what an element for Gazebo changes: the heading, of which link or joint, and where it stands."""
+    about = gazebo.attributes.get("reference", "").strip()
+    moves = any(joint.moving for joint in names.get(about, ()))
+    frame = robot.frames.get(about)
+    on_moving = frame is not None and frame.body >= 0
+    table: dict[str, tuple[str, bool, Callable[[Element], bool]]] = {
+        **dict.fromkeys(SPRINGS, (JOINT_SPRINGS, moves and len(names.get(about, ())) > 1, _counts)),
+        "gravity": (WEIGHT, on_moving, lambda x: x.content.strip() in NO),
+        "turnGravityOff": (WEIGHT, on_moving, lambda x: x.content.strip() in YES),
+        "kinematic": (KINEMATIC, on_moving, lambda x: x.content.strip() in YES),
+        "static": (STATIC, moving and not about, lambda x: x.content.strip() in YES),
+        "dampingFactor": (DECAY, on_moving, _counts),
+        "velocity_decay": (DECAY, on_moving, lambda x: any(map(_counts, x.children))),
+        "joint": (IN_GAZEBO, not about, lambda x: x.attributes.get("name") not in robot.closures),
+        "link": (IN_GAZEBO, not about, lambda _: True),
+        "plugin": (PLUGINS, True, lambda x: _followed(x, joints)),
+    }
+    for part in gazebo.children:
+        heading, bears, counts = table.get(part.tag, ("", False, _counts))
+        if bears and counts(part):
+            shown = about or part.attributes.get("name") or robot.name
+            yield heading, follower(part) if part.tag == "plugin" else shown, part
+
+
+def _counts(element: Element) -> bool:
+    """Whether an element holds anything but the number zero; so is what is no number."""
+    try:
+        return float(element.content) != 0 and not math.isnan(float(element.content))
+    except ValueError:
+        return True
+
+
+def _followed(plugin: Element, joints: Mapping[str, Element]) -> bool:
+    """Whether a plugin makes a joint follow another that does not do so by itself."""
+    joint = joints.get(follower(plugin))
+    return joint is not None and joint.first("mimic") is None

@@ -1,0 +1,1 @@
+"""Trajectories as ROS writes them: messages, recorded joint states, bags."""

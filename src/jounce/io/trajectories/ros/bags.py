@@ -1,0 +1,148 @@
+"""Bags of ROS and ROS 2: joint states and trajectories of a topic, read by the package rosbags."""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Sequence
+from decimal import Decimal
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from jounce.errors import TrajectoryError
+from jounce.io.trajectories.recordings import LEVELS, Recording
+from jounce.io.trajectories.ros.joint_states import State, recorded_states
+from jounce.io.trajectories.ros.messages import MEASURED
+from jounce.io.trajectories.stamps import in_sequence
+
+SUFFIXES = (".bag", ".db3", ".mcap")
+METADATA = "metadata.yaml"
+NANO = 1_000_000_000
+STATE, TRAJECTORY = "sensor_msgs/msg/JointState", "trajectory_msgs/msg/JointTrajectory"
+CONTROLLER = "control_msgs/msg/JointTrajectoryControllerState"
+STATES = (STATE, CONTROLLER)
+MOST = 20_000_000
+"""Messages."""
+
+
+def is_bag(path: str) -> bool:
+    """Tell whether a path is that of a bag: its file, or the folder of one of ROS 2."""
+    place = Path(path)
+    try:
+        return place.suffix.lower() in SUFFIXES or (place.is_dir() and (place / METADATA).is_file())
+    except (OSError, ValueError):
+        return False
+
+
+def read_bag(path: str, joints: Sequence[str] | None = None, topic: str | None = None) -> Recording:
+    """Read the recording of a topic of a bag: JointState, JointTrajectoryControllerState, or one JointTrajectory.
+
+    Raises
+    ------
+    TrajectoryError
+        If rosbags is not installed, the bag cannot be read, or has no such topic, or several.
+    """
+    try:
+        highlevel: Any = importlib.import_module("rosbags.highlevel")
+        stores: Any = importlib.import_module("rosbags.typesys")
+    except ImportError:
+        message = "bags need the package rosbags: pip install 'jounce[bags]'"
+        raise TrajectoryError(message, path=path) from None
+    place = Path(path)
+    if not place.exists():
+        raise TrajectoryError("file not found", path=path)
+    if place.suffix.lower() in SUFFIXES[1:] and (place.parent / METADATA).is_file():
+        place = place.parent
+    try:
+        with highlevel.AnyReader([place], default_typestore=stores.get_typestore(stores.Stores.LATEST)) as reader:
+            connections = _chosen(reader, topic, path)
+            if connections[0].msgtype in STATES:
+                recording = _states(reader, connections, path)
+            else:
+                recording = _trajectory(reader, connections, path)
+    except TrajectoryError:
+        raise
+    except Exception as reason:  # noqa: BLE001 - whatever a damaged bag makes of its reader
+        words = " ".join(str(reason).split()).encode("ascii", "backslashreplace").decode("ascii")
+        raise TrajectoryError(f"the bag cannot be read: {words or type(reason).__name__}", path=path) from None
+    recording = in_sequence(recording)
+    return recording if joints is None else recording.renamed(tuple(joints))
+
+
+def _chosen(reader: Any, topic: str | None, path: str) -> list[Any]:
+    """Return the connections of one topic of a type that is read."""
+    fit = [x for x in reader.connections if x.msgtype in (*STATES, TRAJECTORY)]
+    topics = list(dict.fromkeys(x.topic for x in fit))
+    if topic is not None:
+        if topic not in topics:
+            valid = ", ".join(topics) or "none"
+            message = f"no topic of joint states or trajectories has this name; valid: {valid}"
+            raise TrajectoryError(message, path=path, name="topic", value=topic)
+        topics = [topic]
+    if not topics:
+        types = ", ".join(sorted({str(x.msgtype) for x in reader.connections})) or "nothing"
+        message = f"the bag has no topic of {', '.join(STATES)} or {TRAJECTORY}"
+        raise TrajectoryError(message, path=path, value=types)
+    states = [x for x in topics if any(c.topic == x and c.msgtype in STATES for c in fit)]
+    topics = topics if len(topics) == 1 or len(states) != 1 else states
+    if len(topics) > 1:
+        message = "the bag has several topics of joint states or trajectories; choose one: " + ", ".join(topics)
+        raise TrajectoryError(message, path=path, name="topic")
+    return [x for x in fit if x.topic == topics[0]]
+
+
+def _states(reader: Any, connections: list[Any], path: str) -> Recording:
+    states, received = [], []
+    for connection, stamp, raw in reader.messages(connections=connections):
+        message = reader.deserialize(raw, connection.msgtype)
+        if len(states) >= MOST:
+            raise TrajectoryError(f"has more than {MOST} messages; cut the bag", path=path)
+        own, (names, *levels) = message.header.stamp, _measured(message)
+        number = len(states) + 1
+        if not names or len(levels[0]) != len(names) or not np.isfinite(levels[0]).all():
+            fault = f"message {number} of {connection.topic} must have one finite position for each joint"
+            raise TrajectoryError(fault, path=path, name="position", value=levels[0].tolist()[:10])
+        known = len(levels[1]) == len(names) and bool(np.isfinite(levels[1]).all())
+        states.append(State(Decimal(own.sec) + Decimal(int(own.nanosec)) / NANO, names, levels[: 1 + known], 0))
+        received.append(Decimal(stamp) / NANO)
+    if len(states) < 2:
+        raise TrajectoryError("at least two samples are needed", path=path, value=len(states))
+    if not any(state.stamp for state in states):  # no stamps of their own: when they were received
+        states = [State(stamp, x.names, x.levels) for stamp, x in zip(received, states, strict=True)]
+    return recorded_states(path, states)
+
+
+def _measured(message: Any) -> tuple[list[str], np.ndarray, np.ndarray]:
+    """Return names, positions and velocities of a joint state, or of what a controller's state says was measured."""
+    if hasattr(message, "joint_names"):
+        part = next(getattr(message, key) for key in MEASURED if hasattr(message, key))
+        return list(message.joint_names), np.asarray(part.positions, float), np.asarray(part.velocities, float)
+    return list(message.name), np.asarray(message.position, float), np.asarray(message.velocity, float)
+
+
+def _trajectory(reader: Any, connections: list[Any], path: str) -> Recording:
+    messages = [
+        reader.deserialize(raw, connection.msgtype) for connection, _, raw in reader.messages(connections=connections)
+    ]
+    if len(messages) != 1:
+        message = f"the topic has {len(messages)} trajectories, and one is read; cut the bag to one of them"
+        raise TrajectoryError(message, path=path, name="topic", value=connections[0].topic)
+    names, points = tuple(messages[0].joint_names), messages[0].points
+    if len(points) < 2:
+        raise TrajectoryError("must have two points at least", path=path, name="points", value=len(points))
+    values = np.full((len(points), len(LEVELS), len(names)), np.nan)
+    times = np.empty(len(points))
+    for k, point in enumerate(points):
+        times[k] = point.time_from_start.sec + point.time_from_start.nanosec / NANO
+        for level, key in enumerate(LEVELS):
+            row = np.asarray(getattr(point, key), float)
+            if len(row) not in ((len(names),) if level == 0 else (0, len(names))) or not np.isfinite(row).all():
+                fault = f"must be {len(names)} finite numbers, one for each joint"
+                raise TrajectoryError(fault, path=path, name=f"points[{k}].{key}", value=row.tolist()[:10])
+            if len(row):
+                values[k, level] = row
+        if k and times[k] < times[k - 1]:
+            fault = "must come after that of the point before"
+            raise TrajectoryError(fault, path=path, name=f"points[{k}].time_from_start", value=float(times[k]))
+    return Recording(path, names, times, values, points=True)

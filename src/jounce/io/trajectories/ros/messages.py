@@ -1,0 +1,254 @@
+"""Messages of ROS as files: trajectories, goals of controllers, and joint states, as tools print and save them."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping, Sequence
+from decimal import Decimal
+from typing import Any
+
+import numpy as np
+
+from jounce.io.files.located_data import Location, Source
+from jounce.io.trajectories.recordings import LEVELS, Recording
+from jounce.io.trajectories.ros.joint_states import State, recorded_states
+from jounce.io.trajectories.stamps import in_sequence
+
+NANO = 1_000_000_000
+STATES = ("position", "velocity")
+MEASURED = ("feedback", "actual")
+"""What a controller's state has of what was measured, in ROS 2 and before."""
+CUT = "..."
+"""What ``ros2 topic echo`` prints in the place of what it leaves out."""
+START = 1e-6  # rad or m: so far may the robot be from where a trajectory starts
+_POINT = {*LEVELS, "effort", "time_from_start"}
+_INSIDE: tuple[tuple[str, ...], ...] = ((), ("trajectory",), ("joint_trajectory",), ("goal", "trajectory"))
+"""Where messages hold a JointTrajectory: itself, FollowJointTrajectory goals, RobotTrajectory, action goals."""
+
+
+def is_message(data: Any) -> bool:
+    """Tell whether the data of a file are those of a message of ROS, or of several."""
+    first = data[0] if isinstance(data, list) and data else data
+    if not isinstance(first, dict):
+        return False
+    displayed = isinstance(first.get("trajectory"), list) and "model_id" in first
+    return (
+        displayed
+        or _is_state(first)
+        or measured_part(first) is not None
+        or any(_is_trajectory(_inside(first, keys)) for keys in _INSIDE)
+    )
+
+
+def _inside(data: Any, keys: Sequence[str]) -> Any:
+    for key in keys:
+        data = data.get(key) if isinstance(data, dict) else None
+    return data
+
+
+def _is_trajectory(data: Any) -> bool:
+    return isinstance(data, dict) and "joint_names" in data and "points" in data
+
+
+def _is_state(data: Any) -> bool:
+    return isinstance(data, dict) and "name" in data and "position" in data
+
+
+def measured_part(data: Any) -> str | None:
+    """Return under which key the state of a controller holds what was measured; None of anything else."""
+    if not isinstance(data, dict) or "joint_names" not in data or "points" in data:
+        return None
+    return next((key for key in MEASURED if isinstance(data.get(key), dict)), None)
+
+
+def read_messages(source: Source, joints: Sequence[str] | None = None) -> Recording:
+    """Return the recording of a message of ROS, or of a list of joint states; names given take the place of its own.
+
+    JointTrajectory, FollowJointTrajectory goals, RobotTrajectory and DisplayTrajectory of MoveIt, JointState, and
+    JointTrajectoryControllerState, of which what was measured is read.
+
+    Raises
+    ------
+    TrajectoryError
+        If something in it is missing, or is none of the numbers it should be: the message names the line.
+    """
+    data = source.data
+    if isinstance(data, list) and all(map(_is_state, data)):
+        recording = _states(source)
+    elif isinstance(data, list) and all(measured_part(x) is not None for x in data):
+        recording = _controller_states(source)
+    elif isinstance(data, list):
+        message = f"the file has {len(data)} messages, each a trajectory of its own; keep one"
+        raise source.error(message, (1,))
+    elif _is_state(data) or measured_part(data) is not None:
+        raise source.error("a single state is no trajectory; echo more than one")
+    else:
+        recording = _trajectories(source)
+    recording = in_sequence(recording)
+    return recording if joints is None else recording.renamed(tuple(joints))
+
+
+def _trajectories(source: Source) -> Recording:
+    """Return the points of a trajectory, or of several that follow one another."""
+    displayed = source.data.get("trajectory")
+    if not isinstance(displayed, list):
+        keys = next(keys for keys in _INSIDE if _is_trajectory(_inside(source.data, keys)))
+        return _points(source, keys)
+    if not displayed:
+        raise source.error("holds no trajectory", ("trajectory",))
+    places: list[Location] = [("trajectory", k, "joint_trajectory") for k in range(len(displayed))]
+    for place in places:
+        if not _is_trajectory(_at(source, place)):
+            raise source.error("must hold joint_names and points", place[:2])
+    parts = [_points(source, place) for place in places]
+    whole = parts[0]
+    for place, part in zip(places[1:], parts[1:], strict=True):
+        whole = _joined(source, place, whole, part)
+    return _started(source, whole)
+
+
+def _joined(source: Source, place: Location, first: Recording, then: Recording) -> Recording:
+    same = first.names == then.names and first.values.shape[1] == then.values.shape[1]
+    if not same or np.nanmax(np.abs(first.values[-1, 0] - then.values[0, 0])) > START:
+        message = "does not start where the trajectory before it ends, with the same joints; keep one of them"
+        raise source.error(message, place)
+    if not np.array_equal(first.values[-1], then.values[0], equal_nan=True):
+        message = "does not go on with the velocities and accelerations of the trajectory before it; keep one of them"
+        raise source.error(message, place)
+    times = np.append(first.times, first.times[-1] + then.times[1:] - then.times[0])
+    lines = [*first.lines, *then.lines[1:]]
+    values = np.concatenate([first.values, then.values[1:]])
+    return Recording(first.path, first.names, times, values, lines, points=True)
+
+
+def _started(source: Source, recording: Recording) -> Recording:
+    """Check that a robot starts where its trajectory does, where a message tells both."""
+    at: Location = ("trajectory_start", "joint_state")
+    state = _at(source, at)
+    if not _is_state(state) or len(state["name"]) != len(state["position"]):
+        return recording
+    where = dict(zip(state["name"], state["position"], strict=True))
+    for k, name in enumerate(recording.names):
+        if isinstance(where.get(name), int | float) and abs(where[name] - recording.values[0, 0, k]) > START:
+            message = (
+                f"the robot starts at {where[name]:.9g}, and the trajectory of {name} at "
+                f"{recording.values[0, 0, k]:.9g}: it would jump"
+            )
+            raise source.error(message, (*at, "position"))
+    return recording
+
+
+def _at(source: Source, location: Location) -> Any:
+    """Return what stands at a location, also within lists; None where nothing does."""
+    entry = source.data
+    for step in location:
+        if isinstance(step, int):
+            entry = entry[step] if isinstance(entry, list) and step < len(entry) else None
+        else:
+            entry = entry.get(step) if isinstance(entry, dict) else None
+    return entry
+
+
+def _points(source: Source, at: Location) -> Recording:
+    """Return the points of the JointTrajectory at a location."""
+    data = _at(source, at)
+    for key in data:
+        if key not in ("header", "joint_names", "points"):
+            raise source.error("unknown key of a trajectory; valid: header, joint_names, points", (*at, key))
+    names = _names(source, (*at, "joint_names"), data["joint_names"])
+    points = data["points"]
+    _check_whole(source, (*at, "points"), points)
+    if not isinstance(points, list) or len(points) < 2:
+        raise source.error("must be a list of two points at least", (*at, "points"))
+    values = np.full((len(points), len(LEVELS), len(names)), np.nan)
+    times, lines = [], []
+    for k, point in enumerate(points):
+        place: Location = (*at, "points", k)
+        if not isinstance(point, dict) or set(point) - _POINT:
+            raise source.error("must be a point of a trajectory, with positions", place, value=point)
+        if not point.get("positions"):
+            raise source.error("positions are missing", place)
+        for level, key in enumerate(LEVELS):
+            if point.get(key):
+                values[k, level] = _row(source, (*place, key), point[key], len(names))
+        times.append(_seconds(source, (*place, "time_from_start"), point.get("time_from_start")))
+        lines.append(source.line(place) or 0)
+        if k and times[k] < times[k - 1]:
+            message = "must come after that of the point before"
+            raise source.error(message, (*place, "time_from_start"), value=times[k])
+    given = len(LEVELS) - int(np.argmax(np.append(~np.isnan(values).all(axis=(0, 2)), True)[::-1][1:]))
+    return Recording(source.path, names, np.array(times), values[:, :given], lines, points=True)
+
+
+def _states(source: Source) -> Recording:
+    """Return the recording of joint states, one after another."""
+    states = []
+    for k, state in enumerate(source.data):
+        names = _names(source, (k, "name"), state["name"])
+        levels = [_row(source, (k, key), state[key], len(names)) for key in STATES if state.get(key)]
+        if not state["position"]:
+            raise source.error("positions are missing", (k, "position"))
+        header = state.get("header")
+        stamp = _stamp(source, (k, "header", "stamp"), header.get("stamp") if isinstance(header, dict) else None)
+        states.append(State(stamp, names, levels, source.line((k,)) or 0))
+    return recorded_states(source.path, states)
+
+
+def _controller_states(source: Source) -> Recording:
+    """Return the recording of what the states of a controller say was measured."""
+    states, keys = [], set()
+    for k, state in enumerate(source.data):
+        key = str(measured_part(state))
+        names, part = _names(source, (k, "joint_names"), state["joint_names"]), state[key]
+        if not part.get("positions"):
+            raise source.error("positions are missing", (k, key))
+        levels = [_row(source, (k, key, x), part[x], len(names)) for x in LEVELS[:2] if part.get(x)]
+        header = state.get("header")
+        stamp = _stamp(source, (k, "header", "stamp"), header.get("stamp") if isinstance(header, dict) else None)
+        states.append(State(stamp, names, levels, source.line((k,)) or 0))
+        keys.add(key)
+    recording = recorded_states(source.path, states)
+    note = f"of the states of a controller what was measured is read ({', '.join(sorted(keys))})"
+    return dataclasses.replace(recording, notes=(*recording.notes, note))
+
+
+def _names(source: Source, at: Location, own: Any) -> tuple[str, ...]:
+    _check_whole(source, at, own)
+    if not isinstance(own, list) or not own or not all(isinstance(name, str) for name in own):
+        raise source.error("must be a list of names", at, value=own)
+    if len(set(own)) < len(own):
+        raise source.error("a joint is named twice", at, value=own)
+    return tuple(own)
+
+
+def _check_whole(source: Source, at: Location, given: Any) -> None:
+    if isinstance(given, list) and CUT in given:
+        message = "was cut where it was printed; echo it with --full-length"
+        raise source.error(message, at)
+
+
+def _row(source: Source, at: Location, given: Any, count: int) -> list[float]:
+    _check_whole(source, at, given)
+    numbers = isinstance(given, list) and all(isinstance(x, int | float) and not isinstance(x, bool) for x in given)
+    if not numbers or len(given) != count or not np.isfinite(given).all():
+        raise source.error(f"must be {count} finite numbers, one for each joint: {at[-1]}", at, value=given)
+    return [float(x) for x in given]
+
+
+def _seconds(source: Source, at: Location, given: Any) -> float:
+    if not isinstance(given, dict):
+        location = at if given is not None else at[:-1]
+        raise source.error("must hold sec and nanosec: time_from_start", location, value=given)
+    return float(_stamp(source, at, given))
+
+
+def _stamp(source: Source, at: Location, given: Any) -> Decimal:
+    """Return a time of ROS 2 or ROS, s, exactly."""
+    parts = ("sec", "nanosec") if isinstance(given, Mapping) and "sec" in given else ("secs", "nsecs")
+    if not isinstance(given, Mapping) or set(given) - set(parts):
+        raise source.error(f"must hold sec and nanosec: {at[-1]}", at, value=given)
+    values = [given.get(part, 0) for part in parts]
+    for part, value in zip(parts, values, strict=True):
+        if isinstance(value, bool) or not isinstance(value, int) or value < 0:
+            raise source.error("must be a whole number, 0 or greater", (*at, part), value=value)
+    return Decimal(values[0]) + Decimal(values[1]) / NANO

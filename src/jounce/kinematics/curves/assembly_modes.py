@@ -1,0 +1,359 @@
+"""All assemblies of a mechanism at one instant: from many starts, and along the curves through those found."""
+
+import dataclasses
+from collections.abc import Iterator, Sequence
+from typing import Any, overload
+
+import numpy as np
+
+from jounce.base.display import Displayed
+from jounce.base.modules import with_fields
+from jounce.base.shapes import Real
+from jounce.errors import AssemblyError, MobilityError
+from jounce.execution.device import resident
+from jounce.kinematics.assembly.assemble import (
+    check_assembled,
+    check_mobility,
+    find_assembly,
+    nearest_to_guess,
+    redundancy_of,
+)
+from jounce.kinematics.assembly.axis_directions import axis_signs, drawn_axis_signs
+from jounce.kinematics.assembly.gauss_newton import assemble_from_guess
+from jounce.kinematics.curves.curve import Curve
+from jounce.kinematics.curves.path_tracker import PathTracker
+from jounce.kinematics.curves.start import first_instant, posed
+from jounce.kinematics.curves.starts import assemble_side_by_side
+from jounce.kinematics.curves.tracing import check_number, traced
+from jounce.mechanism import Mechanism, build, check_mechanism
+from jounce.mechanism.building.preconditions import check_holonomic, concrete
+from jounce.mechanism.carriages import check_without_ends
+
+BATCH = 256  # starts side by side
+OFTEN = 3  # times that each assembly is to be found before it is believed that none is left
+MOST_ROUNDS = 8  # times as many starts as asked for, if some were found less often
+CLOSED = 1e-9  # of the residual of a start that led to an assembly
+SAME, SAME_IF_SINGULAR = 1e-6, 1e-3  # rad or sizes of the mechanism
+NEARLY_SINGULAR = 1e-5  # smallest singular value of the Jacobian
+MOST_SINGULAR = 8
+TOLERANCE = 1e-12
+
+
+@dataclasses.dataclass(frozen=True)
+class Assembly:
+    """One of the ways in which a mechanism can be put together.
+
+    Attributes
+    ----------
+    number : int
+        From 1, in the order of how far it is from the starting guess.
+    mechanism : Mechanism
+        With this configuration as its starting guess.
+    circuit : int or None
+        Which of the circuits it is on, from 1: two assemblies on one circuit can move into each other without being
+        taken apart. None where circuits were not asked for.
+    branch : int or None
+        Which of the branches of the circuit, from 1: two on one branch can be driven into each other.
+    hits : int
+        How many starts led to it; 0 if it was found along a circuit.
+    distance : float
+        From the starting guess, rad or sizes of the mechanism.
+    smallest_singular_value : float
+        Of the scaled Jacobian; near zero at a dead point.
+    """
+
+    number: int
+    mechanism: Mechanism
+    circuit: int | None
+    branch: int | None
+    hits: int
+    distance: float
+    smallest_singular_value: float
+
+
+class Assemblies(Displayed, Sequence[Assembly]):
+    """All assemblies that were found, in the order of how far they are from the starting guess.
+
+    Attributes
+    ----------
+    starts : int
+        How many were made.
+    since_last_new : int
+        How many of them came after that which found the last new one: the larger, the less may be missing.
+    circuits : tuple of Curve
+        One curve of each circuit.
+    movable : int
+        How many starts led to configurations in which the mechanism can move although its drivers are held. There is
+        no end of them, so that they are not among the assemblies.
+    """
+
+    def __init__(
+        self,
+        members: Sequence[Assembly],
+        starts: int,
+        since_last_new: int,
+        circuits: tuple[Curve, ...] = (),
+        movable: int = 0,
+    ):
+        self._found, self.circuits, self.movable = tuple(members), circuits, movable
+        self.starts, self.since_last_new = starts, since_last_new
+
+    def __repr__(self) -> str:
+        parts = [f"{len(self)} assemblies" if len(self) != 1 else "1 assembly"]
+        if self.circuits:
+            parts.append(f"{len(self.circuits)} circuit{'s' * (len(self.circuits) != 1)}")
+        parts += [f"{self.starts} starts", f"{self.since_last_new} since the last new one"]
+        if self.movable:
+            parts.append(f"{self.movable} to configurations that move with the drivers held")
+        return f"<Assemblies {', '.join(parts)}>"
+
+    def __len__(self) -> int:
+        return len(self._found)
+
+    @overload
+    def __getitem__(self, index: int) -> Assembly: ...
+    @overload
+    def __getitem__(self, index: slice) -> tuple[Assembly, ...]: ...
+    def __getitem__(self, index: Any) -> Any:
+        return self._found[index]
+
+    def __iter__(self) -> Iterator[Assembly]:
+        return iter(self._found)
+
+    def number(self, number: int) -> Assembly:
+        """Return the assembly of a number, from 1.
+
+        Raises
+        ------
+        AssemblyError
+            If there is none of this number.
+        """
+        if not isinstance(number, int) or isinstance(number, bool) or not 1 <= number <= len(self):
+            message = f"there is no assembly of this number: {len(self)} were found from {self.starts} starts"
+            raise AssemblyError(message, name="assembly", value=number)
+        return self._found[number - 1]
+
+
+@concrete
+def assemblies(
+    mechanism: Mechanism,
+    time: Real | None = None,
+    *,
+    count: int = 1024,
+    seed: int = 0,
+    circuits: bool = True,
+    driver: str | None = None,
+) -> Assemblies:
+    """Return all assemblies of a driven mechanism at one instant that many random starts lead to.
+
+    Starts are random poses of all bodies; as many as asked for are made, and more, up to eight times as many, while
+    some assembly was found less than three times. The circuits through those found are then traced, which finds what
+    else lies on them.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+        Drivers and joints must leave no degree of freedom.
+    time : float, optional
+        Instant, s; the first of the mechanism's own unless given.
+    count : int, default 1024
+        Number of starts.
+    seed : int, default 0
+        Of the random numbers: the same one gives the same starts.
+    circuits : bool, default True
+        Whether to tell the circuit and the branch of each, for which curves are traced; with several drivers only if
+        one is named.
+    driver : str, optional
+        Whose value is free on the circuits, where there are several drivers; see `jounce.trace`.
+
+    Returns
+    -------
+    Assemblies
+        A sequence, with how many starts were made, and how many since the last new assembly was found.
+
+    Raises
+    ------
+    MechanismError
+        If the mechanism or an option is not valid.
+    AssemblyError
+        If no start leads to an assembly: a loop cannot close.
+    MobilityError
+        If degrees of freedom are left: then there are infinitely many.
+
+    Examples
+    --------
+    >>> import jounce as jn
+    >>> found = jn.assemblies(jn.load("examples/four_bar.yaml"))
+    >>> [(assembly.circuit, assembly.branch) for assembly in found]
+    [(1, 1), (2, 1)]
+    """
+    check_mechanism(mechanism)
+    check_without_ends(mechanism, "a search for assemblies")
+    check_holonomic(mechanism, "an assembly")
+    check_number("count", count, 1, 10**7, whole=True)
+    check_number("seed", seed, 0, 2**63 - 1, whole=True)
+    if time is not None:
+        check_number("time", time, -np.inf, np.inf)
+    instant = first_instant(mechanism) if time is None else float(time)
+    search = _Search(mechanism, instant)
+    search.from_starts(count, np.random.default_rng(seed))
+    curves: tuple[Curve, ...] = ()
+    if circuits and (driver is not None or len(mechanism.drivers) == 1):
+        curves = search.along_circuits(driver)
+    return search.result(curves)
+
+
+@dataclasses.dataclass
+class _Configuration:
+    coordinates: dict[str, np.ndarray]
+    smallest: float
+    hits: int
+    circuit: int | None = None
+    branch: int | None = None
+
+
+class _Search:
+    """What is known of the assemblies at an instant."""
+
+    def __init__(self, mechanism: Mechanism, instant: float):
+        self.mechanism, self.instant = dataclasses.replace(mechanism, assembly=None), instant
+        model = build(mechanism)
+        if model.system.shape[0] < model.system.shape[1]:
+            message = "joints and drivers leave degrees of freedom, so that there are infinitely many assemblies"
+            raise MobilityError(f"{message}: add drivers")
+        self.first, trial = find_assembly(model, instant, TOLERANCE)
+        self.trial = trial
+        system = with_fields(self.first.system, row_scale=trial.scale[:, None])
+        self.system = resident(with_fields(system, outputs=(), forces=(), fronts=None))
+        self.model = dataclasses.replace(self.first, system=system)
+        self.tracker = PathTracker(self.model, driven=False)
+        self.configurations: list[_Configuration] = []
+        self.axis_signs = axis_signs(self.system, trial.coordinates) if trial.closed else drawn_axis_signs(model)
+        self.starts = self.since_last_new = self.movable = 0
+        if trial.closed:
+            check_mobility(self.model, redundancy_of(self.first, trial, instant)[1])
+            self.add({name: x[..., 0] for name, x in trial.coordinates.items()}, hits=0)
+
+    def from_starts(self, count: int, random: np.random.Generator) -> None:
+        """Look from random starts, until each assembly was found often enough."""
+        most = MOST_ROUNDS * count
+        while self.starts < count or (self.starts < most and any(x.hits < OFTEN for x in self.configurations)):
+            self._round(min(BATCH, most - self.starts), random)
+        if not self.configurations and not self.movable:
+            check_assembled(self.first, self.trial, self.instant)
+            raise AssemblyError(f"no assembly was found from {self.starts} starts at t = {self.instant:g} s")
+        if not self.configurations:
+            message = (
+                f"at t = {self.instant:g} s the mechanism can move with its drivers held: infinitely many assemblies"
+            )
+            raise MobilityError(message)
+
+    def _round(self, count: int, random: np.random.Generator) -> None:
+        starts = self._random_poses(random)
+        instant, kind = np.float64(self.instant), self.model.pose_type
+        assembled, gaps = assemble_side_by_side(self.system, starts, instant, pose_type=kind)
+        coordinates, gaps = {name: np.asarray(x) for name, x in assembled.items()}, np.asarray(gaps)
+        for lane in range(count):
+            self.starts += 1
+            self.since_last_new += 1
+            new = gaps[lane] <= CLOSED and self.add({name: x[..., lane] for name, x in coordinates.items()})
+            if new and not self._set_movable_apart():
+                self.since_last_new = 0
+
+    def _set_movable_apart(self) -> bool:
+        """Take singular ones for parts of a curve or a surface once they are many, dead points being few; tell it."""
+        singular = [x for x in self.configurations if x.smallest < NEARLY_SINGULAR]
+        if len(singular) <= (0 if self.movable else MOST_SINGULAR):
+            return False
+        self.movable += sum(x.hits for x in singular)
+        self.configurations = [x for x in self.configurations if x.smallest >= NEARLY_SINGULAR]
+        return True
+
+    def _random_poses(self, random: np.random.Generator) -> dict[str, np.ndarray]:
+        """Return random poses of all bodies, the ground where it is."""
+        guess = self.model.guess
+        position = np.repeat(np.asarray(guess["position"], float), BATCH, axis=-1)
+        position[:, 1:] += self.model.length * random.uniform(-1.0, 1.0, size=position[:, 1:].shape)
+        if "angle" in guess:
+            angle = np.repeat(np.asarray(guess["angle"], float), BATCH, axis=-1)
+            angle[1:] += random.uniform(-np.pi, np.pi, size=angle[1:].shape)
+            return {"position": position, "angle": angle}
+        quaternion = np.repeat(np.asarray(guess["quaternion"], float), BATCH, axis=-1)
+        turned = random.normal(size=quaternion[:, 1:].shape)
+        quaternion[:, 1:] = turned / np.linalg.norm(turned, axis=0)
+        return {"position": position, "quaternion": quaternion}
+
+    def add(self, coordinates: dict[str, np.ndarray], hits: int = 1) -> bool:
+        """Add an assembly, and tell whether it is new; one with a part turned over in its joint is none."""
+        there = {name: x[..., None] for name, x in coordinates.items()}
+        if not np.array_equal(axis_signs(self.system, there), self.axis_signs):
+            return False
+        for known in self.configurations:
+            same = SAME if known.smallest > NEARLY_SINGULAR else SAME_IF_SINGULAR
+            if np.max(np.abs(self.tracker.difference(coordinates, known.coordinates))) < same:
+                known.hits += hits
+                return False
+        coordinates = self._polished(coordinates)
+        point = self.tracker.point_without_series({name: x[..., None] for name, x in coordinates.items()}, self.instant)
+        sizes = np.linalg.svd(point.jacobian, compute_uv=False)
+        self.configurations.append(_Configuration(coordinates, float(sizes[: self.tracker.columns][-1]), hits))
+        return True
+
+    def _polished(self, coordinates: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+        """Return an assembly to rounding, its planar angles with the whole turns that are nearest to the guess."""
+        begun = {name: x[..., None] for name, x in coordinates.items()}
+        trial = assemble_from_guess(self.first, self.instant, TOLERANCE, begun)
+        if not trial.closed:
+            return coordinates  # next to a singular position, as good as it gets
+        trial = nearest_to_guess(self.first, trial, self.instant) if "angle" in coordinates else trial
+        return {name: x[..., 0] for name, x in trial.coordinates.items()}
+
+    def along_circuits(self, driver: str | None) -> tuple[Curve, ...]:
+        """Trace the circuits of all assemblies, and add what else is on them."""
+        circuits: list[Curve] = []
+        number = 0
+        while number < len(self.configurations):
+            if self.configurations[number].circuit is None:
+                begun = posed(self.mechanism, self.configurations[number].coordinates)
+                curves = traced(begun, self.instant, driver).connected()
+                circuits.append(curves[0])
+                self.configurations[number].circuit, self.configurations[number].branch = len(circuits), 1
+                before = 0  # branches of the curves through the same change points
+                for curve in curves:
+                    self._assign(curve, len(circuits), before)
+                    before += len(curve.branches)
+            number += 1
+        return tuple(circuits)
+
+    def _assign(self, curve: Curve, circuit: int, before: int) -> None:
+        """Tell the circuit and the branch of all assemblies on a curve, whose branches come after so many others."""
+        for arc_length in curve.where(curve.first_value):
+            coordinates = curve.coordinates_at(arc_length)
+            self.add(coordinates, hits=0)
+            known = self._nearest(coordinates)
+            if known.circuit is None:
+                known.circuit, known.branch = circuit, before + curve.branch_at(arc_length)
+
+    def _nearest(self, coordinates: dict[str, np.ndarray]) -> _Configuration:
+        away = [np.max(np.abs(self.tracker.difference(coordinates, x.coordinates))) for x in self.configurations]
+        return self.configurations[int(np.argmin(away))]
+
+    def result(self, circuits: tuple[Curve, ...]) -> Assemblies:
+        """Return the assemblies in the order of how far they are from the starting guess."""
+        guess = {name: np.asarray(x)[..., 0] for name, x in self.model.guess.items()}
+        away = [float(np.linalg.norm(self.tracker.difference(x.coordinates, guess))) for x in self.configurations]
+        order = np.argsort(away, kind="stable")
+        renumbered: dict[int, int] = {}
+        for k in order:
+            circuit = self.configurations[k].circuit
+            if circuit is not None:
+                renumbered.setdefault(circuit, len(renumbered) + 1)
+        members = []
+        for number, k in enumerate(order, start=1):
+            x = self.configurations[k]
+            circuit = None if x.circuit is None else renumbered[x.circuit]
+            mechanism = posed(self.mechanism, x.coordinates)
+            members.append(Assembly(number, mechanism, circuit, x.branch, x.hits, away[k], x.smallest))
+        ranked = sorted(renumbered, key=lambda circuit: renumbered[circuit])
+        ranked_circuits = tuple(circuits[k - 1] for k in ranked)
+        return Assemblies(members, self.starts, self.since_last_new, ranked_circuits, self.movable)

@@ -1,0 +1,1 @@
+"""Building a mechanism, and one whose parameters are traced."""

@@ -1,0 +1,120 @@
+"""Courses of belts: strands, wraps and length, from the centers of their pulleys."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from jaxtyping import Float
+
+from jounce.constraints.planar import Belt
+from jounce.errors import MechanismError
+from jounce.mechanism.building.builder import group_rows
+
+Points = Float[np.ndarray, "2 *batch"]
+
+
+class BeltCourse(NamedTuple):
+    """Where a belt runs; angles in rad, lengths in m, NaN where the pulleys overlap.
+
+    Attributes
+    ----------
+    line : array of shape (...)
+        Angle of the line of centers, from the first to the second.
+    leaving : array of shape (...)
+        Angle from there to where the strand on its left leaves the first pulley; that on its right, as much below.
+    strand : array of shape (...)
+        Length of each strand.
+    wraps : tuple of array of shape (...)
+        Angles over which the belt lies on each pulley.
+    length : array of shape (...)
+        Of the whole belt.
+    """
+
+    line: Any
+    leaving: Any
+    strand: Any
+    wraps: tuple[Any, Any]
+    length: Any
+
+
+def belt_course(first: Points, second: Points, radii: Sequence[float], crossed: bool) -> BeltCourse:
+    """Return where a belt runs around two pulleys.
+
+    Parameters
+    ----------
+    first, second : array of shape (2, ...)
+        Their centers, m.
+    radii : sequence of float
+        m.
+    crossed : bool
+        Whether its strands cross.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> course = belt_course(np.zeros(2), np.array([0.5, 0.0]), (0.1, 0.1), False)
+    >>> round(float(course.length - 2 * 0.5 - 2 * np.pi * 0.1), 12)  # two strands and a whole turn
+    0.0
+    """
+    x, y = second - first
+    distance, (one, two) = np.hypot(x, y), radii
+    radial = one + two if crossed else one - two
+    with np.errstate(invalid="ignore", divide="ignore"):
+        strand = np.sqrt(np.where(distance > one + two, distance**2 - radial**2, np.nan))
+        leaving = np.arccos(radial / distance)
+    on_first = 2 * (np.pi - leaving)
+    on_second = on_first if crossed else 2 * leaving
+    return BeltCourse(
+        np.arctan2(y, x), leaving, strand, (on_first, on_second), 2 * strand + one * on_first + two * on_second
+    )
+
+
+def belt_outline(course: BeltCourse, centers: Sequence[Points], radii: Sequence[float], crossed: bool) -> Any:
+    """Return points around a belt, (..., points, 2), m: of the strand on the left, around the second pulley, and back.
+
+    The first half of the points is on the second pulley, the other half on the first.
+    """
+    share = np.linspace(-1.0, 1.0, 33)
+    side = -1.0 if crossed else 1.0  # of the second pulley on which the strand on the left arrives
+    line, leaving = course.line[..., None], course.leaving[..., None]
+    around_second = line - side * (np.pi - leaving if crossed else leaving) * share
+    around_first = line + np.pi - (np.pi - leaving) * share
+    parts = [
+        center[:, ..., None] + radius * np.stack([np.cos(angle), np.sin(angle)])
+        for center, radius, angle in zip(centers[::-1], radii[::-1], (around_second, around_first), strict=True)
+    ]
+    return np.moveaxis(np.concatenate(parts, axis=-1), 0, -1)
+
+
+def check_room(motion: Any) -> None:
+    """Raise MechanismError where pulleys that no body carries at one distance overlap in a motion, with the instant."""
+    model = motion.model
+    for group, rows in zip(model.system.groups, group_rows(model), strict=True):
+        if isinstance(group.element, Belt) and group.element.arm is None:
+            _check_belts(group, model.rows[rows], motion.poses[1], motion.time)
+
+
+def _check_belts(group: Any, names: Sequence[str], coordinates: Mapping[str, Any], time: np.ndarray) -> None:
+    belt = group.element
+    centers = [
+        centers_of(coordinates, slot, point)
+        for slot, point in zip(group.bodies, (belt.point_i, belt.point_j), strict=False)
+    ]
+    distance = np.hypot(*(centers[1] - centers[0]))
+    bad = np.argwhere((distance <= np.asarray(belt.radius_i + belt.radius_j)).T)
+    if len(bad):
+        lane, instance = bad[0]
+        least = float(np.asarray(belt.radius_i + belt.radius_j)[instance, 0])
+        message = (
+            f"at t = {time[lane]:g} s the centers are {distance[instance, lane]:.6g} m apart, and the pulleys overlap "
+            f"below {least:.6g} m, the sum of the radii"
+        )
+        raise MechanismError(message, name=f"{names[instance]}.radii")
+
+
+def centers_of(coordinates: Mapping[str, Any], bodies: Sequence[int], point: Any) -> Float[np.ndarray, "2 body time"]:
+    """Return where points of planar bodies are, m."""
+    position = np.asarray(coordinates["position"])[0][:, list(bodies)]
+    angle = np.asarray(coordinates["angle"])[0][list(bodies)]
+    x, y = np.asarray(point)
+    return position + np.stack([np.cos(angle) * x - np.sin(angle) * y, np.sin(angle) * x + np.cos(angle) * y])

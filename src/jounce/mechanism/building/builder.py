@@ -1,0 +1,366 @@
+"""From names to indices, once: the numeric model of a mechanism and where each of its rows comes from."""
+
+import dataclasses
+from functools import lru_cache, partial
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax.core import Tracer
+from jaxtyping import Float
+
+from jounce.base.modules import unchecked, with_fields
+from jounce.base.shapes import Numbers
+from jounce.constraints.facts import facts_of, field_kinds, value_fields
+from jounce.jet import Jet
+from jounce.linear_algebra.fronts import Fronts, elimination
+from jounce.linear_algebra.pattern import Pattern
+from jounce.mechanism.building.starting_guess import pose_at, starting_guess
+from jounce.mechanism.carriages import ENDING
+from jounce.mechanism.mechanism import Mechanism
+from jounce.mechanism.outputs.base import AbstractMotionOutput
+from jounce.mechanism.system import POSITION_COMPONENTS, Group, System, holding, law_left_out
+from jounce.mechanism.transmissions.axis_angles import (
+    AttitudeHistory,
+    PrescribedAngle,
+    departure,
+    measures_angle,
+    prescribed_angles,
+    with_angles,
+    with_datum_of,
+    with_datums,
+)
+from jounce.mechanism.transmissions.gear_frames import Grouped, grouped_with_frames
+from jounce.rigid import PlanarPose, SpatialPose
+from jounce.rigid.pose import Pose
+from jounce.trajectory import AbstractMotion
+from jounce.trajectory.curves import CurveLaw
+
+
+@dataclasses.dataclass(frozen=True)
+class Model:
+    """The numeric model of a mechanism.
+
+    Parameters
+    ----------
+    system : System
+        Residual, Jacobian and outputs as functions of the pose of all bodies.
+    pose_type : type
+        PlanarPose or SpatialPose.
+    guess : dict of str to array
+        Coordinates of the starting guess of all bodies, the ground first, shape (..., bodies, 1).
+    rows : tuple of str
+        Name of the joint or driver of each row of the residual.
+    drivers : tuple of str
+        Names of the drivers, in the order of `System.admissible`.
+    forces : tuple of tuple of str
+        Names of the applied forces in each group of the system, in the order of `System.finite_forces`.
+    bodies : tuple of str
+        Names of the moving bodies, in the order of the pose.
+    outputs : tuple of tuple of str
+        Names of the outputs in each group of the system.
+    length : float
+        Size of the mechanism, by which positions are scaled, m.
+    reference : dict of str to array
+        Coordinates from which angles about axes are counted: those of the starting guess, until put together.
+    prescribed : tuple of PrescribedAngle
+        Angles that drivers prescribe there, with their whole turns.
+    history : AttitudeHistory, optional
+        In space, from the starting guess to where the drivers fulfill their laws, where that is more than half a turn.
+    """
+
+    system: System
+    pose_type: type[Pose]
+    guess: dict[str, Any]
+    rows: tuple[str, ...]
+    drivers: tuple[str, ...]
+    forces: tuple[tuple[str, ...], ...]
+    bodies: tuple[str, ...]
+    outputs: tuple[tuple[str, ...], ...]
+    length: float
+    reference: dict[str, Any]
+    prescribed: tuple[PrescribedAngle, ...] = ()
+    history: AttitudeHistory | None = None
+
+
+def group_rows(model: Model) -> list[slice]:
+    """Return where the rows of each group stand: those of all its instances in turn, once for each row of the joint."""
+    slices, first = [], 0
+    for group in model.system.groups:
+        names, last = model.rows[first : first + group.instances], first
+        while model.rows[last : last + group.instances] == names:
+            last += group.instances
+        slices.append(slice(first, last))
+        first = last
+    return slices
+
+
+def build(mechanism: Mechanism, like: Model | None = None, *, initial: bool = False) -> Model:
+    """Return the numeric model of a mechanism.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+        To be solved.
+    like : Model, optional
+        Of the same mechanism with other values of its parameters, which may be traced by JAX here: its starting guess,
+        its size, and the offsets that follow from them, are taken over.
+    initial : bool, default False
+        Whether its initial conditions hold, beside the drivers.
+
+    Raises
+    ------
+    MechanismError
+        If a value does not fit: a vector of wrong length, a zero axis, a negative length, a number not finite.
+    ExpressionError
+        If an expression uses a name that is not a parameter.
+    """
+    parameters, components = mechanism.parameter_values, POSITION_COMPONENTS[mechanism.space]
+    (groups, names), (forces, force_names), (outputs, output_names) = grouped_elements(mechanism, initial=initial)
+    if like is not None:
+        parts = {"groups": groups, "forces": forces, "outputs": outputs}
+        known = {name: tuple(map(_with_derived_of, part, getattr(like.system, name))) for name, part in parts.items()}
+        return dataclasses.replace(like, system=with_fields(like.system, **known))
+
+    pose_type = PlanarPose if components == 2 else SpatialPose
+    guess = starting_guess(mechanism, parameters, components)
+    groups = tuple(with_sense(with_offsets(group, pose_type, guess), pose_type, guess) for group in groups)
+    groups, forces, outputs = (with_datums(part, guess) for part in (groups, forces, outputs))
+    length = _size(groups, guess["position"][:, : 1 + len(mechanism.rigid_bodies)])
+    history = AttitudeHistory(guess["quaternion"], np.zeros(1)) if components == 3 else None
+    parts = ((groups, names), (forces, force_names), (outputs, output_names))
+    return model_of(tuple(mechanism.bodies), parts, guess, length, history)
+
+
+def released(model: Model) -> Model:
+    """Return the model without the initial conditions with which it was built."""
+    system, groups, names = model.system, [], []
+    for group, rows in zip(model.system.groups, group_rows(model), strict=True):
+        its = model.rows[rows][: group.instances]
+        stay = [k for k, name in enumerate(its) if not name.startswith("initial.")]
+        if len(stay) < len(its):  # drivers of the same kind may be among them
+            element = jax.tree.map(lambda values, stay=stay: values[..., stay, :], group.element)
+            group = with_fields(group, element=element, bodies=tuple(tuple(s[k] for k in stay) for s in group.bodies))
+        if stay:
+            groups.append(group)
+            names.append(tuple(its[k] for k in stay))
+    parts = ((tuple(groups), tuple(names)), ((), ()), ((), ()))
+    own = sum(not name.endswith(ENDING) for name in model.bodies) + 1  # carriages follow the bodies
+    length = _size(tuple(groups), model.guess["position"][:, :own])
+    bare = model_of(model.bodies, parts, model.guess, length, model.history)
+    system = with_fields(bare.system, forces=system.forces, outputs=system.outputs)
+    return dataclasses.replace(bare, system=system, forces=model.forces, outputs=model.outputs)
+
+
+def model_of(
+    bodies: tuple[str, ...],
+    parts: tuple[Grouped, Grouped, Grouped],
+    guess: dict[str, Any],
+    length: Any,
+    history: AttitudeHistory | None,
+) -> Model:
+    """Return the model of groups that are whole: joints and drivers, forces, outputs, with their names."""
+    (groups, names), (forces, force_names), (outputs, output_names) = parts
+    pose_type = PlanarPose if "angle" in guess else SpatialPose
+    row_counts = [_row_count(group, pose_type, guess) for group in groups]
+    rows = [n for members, count in zip(names, row_counts, strict=True) for _ in range(count) for n in members]
+    drivers = tuple(n for group, members in zip(groups, names, strict=True) if group.is_driver for n in members)
+    joined = tuple(group.bodies for group in groups)
+    pattern, fronts = _layout(joined, tuple(row_counts), pose_type.shifts + pose_type.turns, len(bodies))
+    system = {
+        "groups": groups,
+        "outputs": outputs,
+        "pattern": pattern,
+        "row_scale": np.ones((len(rows), 1)),
+        "column_scale": np.array([length] * pose_type.shifts + [1.0] * pose_type.turns),
+        "body_count": len(bodies),
+        "forces": forces,
+        "fronts": fronts,
+        "rank": None,
+    }
+    return Model(
+        unchecked(System, system),
+        pose_type,
+        guess,
+        tuple(rows),
+        drivers,
+        _plain(force_names),
+        bodies,
+        _plain(output_names),
+        length,
+        reference=guess,
+        history=history,
+    )
+
+
+def grouped_elements(mechanism: Mechanism, *, initial: bool = False) -> tuple[Grouped, Grouped, Grouped]:
+    """Return the groups of joints and drivers, of forces and of outputs; values may be traced by JAX.
+
+    Initial conditions are among the drivers, where they are asked for.
+    """
+
+    def grouped(*kinds: str) -> Grouped:
+        elements = {f"{kind}.{k}": v for kind in kinds for k, v in mechanism.elements[kind].items()}
+        return grouped_with_frames(
+            mechanism, {name: v for name, v in elements.items() if not isinstance(v, AbstractMotionOutput)}
+        )
+
+    held = grouped("joints", "drivers", "initial") if initial else grouped("joints", "drivers")
+    return held, grouped("forces"), grouped("outputs")
+
+
+def with_reference(
+    model: Model,
+    coordinates: dict[str, Any],
+    instant: float,
+    prescribed: tuple[PrescribedAngle, ...] = (),
+    *,
+    keep: bool = False,
+) -> tuple[Model, float]:
+    """Return the model with angles about axes counted from a position, and how far off those of drivers were, rad.
+
+    Parameters
+    ----------
+    model : Model
+        Of a mechanism.
+    coordinates : dict of str to array
+        Of all bodies, the ground first, put together.
+    instant : float
+        At which they are there, s.
+    prescribed : tuple of PrescribedAngle
+        Angles that are prescribed there by others than the drivers, such as initial conditions.
+    keep : bool, default False
+        Whether angles go on from those counted so far, instead of those that the frames of the bodies have.
+    """
+    system = model.system
+    if not any(map(measures_angle, (*system.groups, *system.forces, *system.outputs))):
+        return dataclasses.replace(model, reference=coordinates, prescribed=prescribed), 0.0
+    groups = with_datums(system.groups, coordinates, keep=keep)
+    prescribed = (*prescribed_by_drivers(groups, coordinates, instant), *prescribed)
+    forces, outputs = (with_datums(part, coordinates, prescribed) for part in (system.forces, system.outputs))
+    system = with_fields(system, groups=groups, forces=forces, outputs=outputs)
+    away = departure(model.system.groups, groups)
+    return dataclasses.replace(model, system=system, reference=coordinates, prescribed=prescribed), away
+
+
+def counted_as_in(groups: tuple[Group, ...], model: Model) -> tuple[Group, ...]:
+    """Return groups with angles about axes counted as if they had been in the model when it was put together."""
+    if model.history is None or not any(map(measures_angle, groups)):
+        return groups
+    first, last = ({"quaternion": model.history.quaternion[..., instant]} for instant in (slice(1), slice(-1, None)))
+    groups = with_datums(groups, first)
+    groups = with_angles(with_datums(groups, last), model.history.last_angles(groups))
+    return with_datums(groups, model.reference, model.prescribed)
+
+
+def prescribed_by_drivers(
+    groups: tuple[Group, ...], coordinates: dict[str, Any], instant: float
+) -> list[PrescribedAngle]:
+    """Return the angles about axes that drivers prescribe at an instant, with their whole turns."""
+    motions = [group.element.motion for group in groups if measures_angle(group)]
+    if not motions:
+        return []
+    values = [np.asarray(value) for value in _law_values(motions, np.full((1, 1), instant))]
+    return prescribed_angles(groups, coordinates, values)
+
+
+@jax.jit
+def _law_values(motions: list[AbstractMotion], instant: Float[Numbers, "1 1"]) -> list[Numbers]:
+    return [motion(Jet([instant])).coefficients[0] for motion in motions]
+
+
+def _plain(names: tuple[tuple[str, ...], ...]) -> tuple[tuple[str, ...], ...]:
+    """Return names in groups without the kind before them."""
+    return tuple(tuple(name.partition(".")[2] for name in members) for members in names)
+
+
+@lru_cache(maxsize=32)
+def _layout(
+    bodies: tuple[tuple[tuple[int, ...], ...], ...], row_counts: tuple[int, ...], width: int, body_count: int
+) -> tuple[Pattern, Fronts | None]:
+    """Return where the entries of the Jacobian stand, and how it is eliminated: the same for all values, so is kept."""
+    pattern = Pattern.of([Group(None, its) for its in bodies], row_counts, width, body_count)
+    fronts = elimination(pattern)
+    for array in jax.tree.leaves((pattern, fronts)):
+        array.setflags(write=False)  # many models share it
+    return pattern, fronts
+
+
+def _row_count(group: Group, pose_type: type[Pose], guess: dict[str, Any]) -> int:
+    leaves, structure = jax.tree.flatten((law_left_out(group), guess))
+    return _row_count_of(structure, tuple(map(np.shape, leaves)), pose_type)
+
+
+@lru_cache(maxsize=1000)
+def _row_count_of(structure: Any, shapes: tuple[tuple[int, ...], ...], pose_type: type[Pose]) -> int:
+    """Read the number of rows off the shape of the residual; it depends on the structure only, so is kept."""
+
+    def residual(leaves: tuple[Any, ...], time: Any) -> Any:
+        group, guess = jax.tree.unflatten(structure, leaves)
+        return group.residual(pose_at(guess, pose_type), Jet([time])).coefficients[0]
+
+    leaves = tuple(jax.ShapeDtypeStruct(shape, np.float64) for shape in shapes)
+    return jax.eval_shape(residual, leaves, np.zeros((1, 1))).shape[0]
+
+
+def with_offsets(group: Group, pose_type: type[Pose], guess: dict[str, Any]) -> Group:
+    """Fill in the offsets that were not given: those with which the starting guess fulfills the joint."""
+    fields = value_fields(type(group.element))
+    if "offset" not in fields or group.element.offset is not None:
+        return group
+    offset = _fulfilling_offset(group, guess, pose_type)
+    return holding(group, "offset", offset if isinstance(offset, Tracer) else np.asarray(offset))
+
+
+@partial(jax.jit, static_argnames="pose_type")
+def _fulfilling_offset(group: Group, guess: dict[str, Any], pose_type: type[Pose]) -> Float[Numbers, "instance 1"]:
+    def residual(offset: Any) -> Any:
+        trial = holding(group, "offset", offset)
+        return trial.residual(pose_at(guess, pose_type), Jet([jnp.zeros((1, 1))])).coefficients[0]
+
+    zero = jnp.zeros((group.instances, 1))
+    value, slope = jax.jvp(residual, (zero,), (jnp.ones_like(zero),))
+    return -jnp.sum(value * slope, axis=0)  # the slope is -1 in the row that holds the offset, else 0
+
+
+def with_sense(group: Group, pose_type: type[Pose], guess: dict[str, Any]) -> Group:
+    """Fill in with which sign of the Euler parameters an attitude is compared: that of the starting guess."""
+    if not hasattr(group.element, "sense"):
+        return group
+    pose = pose_at(guess, pose_type)
+    sense = group.element.sense_at(*(pose.take(indices) for indices in group.bodies))
+    return holding(group, "sense", sense if sense is None or isinstance(sense, Tracer) else np.asarray(sense))
+
+
+def _with_derived_of(group: Group, known: Group) -> Group:
+    """Return a group with offsets and signs that another one has derived from a position."""
+    if measures_angle(group):
+        return with_datum_of(group, known)
+    if hasattr(group.element, "sense"):
+        return holding(group, "sense", known.element.sense)
+    if "offset" not in value_fields(type(group.element)) or group.element.offset is not None:
+        return group
+    return holding(group, "offset", known.element.offset)
+
+
+def _size(groups: tuple[Group, ...], positions: Float[Numbers, "component body 1"]) -> float:
+    """Return the largest distance among the points of the joints and the bodies of the guess, 1 if there is none."""
+    points, sizes = [positions[..., 0]], []
+    for group in groups:
+        facts = facts_of(type(group.element))
+        for name, kind in field_kinds(type(group.element)).items():
+            value: Any = getattr(group.element, name)
+            if isinstance(value, CurveLaw):
+                sizes += [] if isinstance(value.unit, Tracer) else [np.max(value.unit)]
+                continue
+            if value is None or facts.dimensions[name] != "length" or isinstance(value, Tracer):
+                continue
+            if kind == "vector" and name.startswith("point"):
+                points.append(value[..., 0])
+            elif kind == "points":
+                points += list(value[..., 0])
+            elif kind == "scalar" and facts.signs[name] == "positive":
+                sizes.append(np.max(value))
+    farthest = np.linalg.norm(np.concatenate(points, axis=1), axis=0).max()
+    return float(max([farthest, *sizes])) or 1.0

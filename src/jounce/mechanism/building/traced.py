@@ -1,0 +1,230 @@
+"""Mechanisms of which JAX traces some values: the values out and in again, and the model that depends on them.
+
+What a solution decides by values, it decides outside of what is traced: whole turns, signs, the size of the mechanism.
+The rest of a model is a function of the traced values, and is put together here as one: also the offsets that follow
+from the starting guess, and the position in which angles about axes are counted from.
+"""
+
+import dataclasses
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, NamedTuple
+
+import jax.numpy as jnp
+import numpy as np
+from jax.core import Tracer
+
+from jounce.base.modules import with_fields
+from jounce.constraints.angles import Datum, angle_of
+from jounce.constraints.base import value_fields
+from jounce.constraints.planar import length_of
+from jounce.errors import UnsupportedError
+from jounce.jet.turns import brought_near
+from jounce.mechanism.building.builder import Model, grouped_elements, model_of, with_offsets, with_sense
+from jounce.mechanism.building.preconditions import PLAIN
+from jounce.mechanism.building.starting_guess import pose_at, starting_guess
+from jounce.mechanism.mechanism import Mechanism
+from jounce.mechanism.resolve import resolve
+from jounce.mechanism.system import Group, holding
+from jounce.mechanism.transmissions.axis_angles import measures_angle
+from jounce.mechanism.transmissions.gear_checks import check_ratios
+from jounce.rigid import PlanarPose, SpatialPose
+from jounce.trajectory import Expression
+
+Part = tuple[Any, ...]
+"""One array for each group of joints and drivers, of forces or of outputs that measures an angle about an axis."""
+
+
+class Angles(NamedTuple):
+    """Angles about axes as a solution counted them, for each group that measures some, rad; see `Datum`.
+
+    Attributes
+    ----------
+    angle : tuple of tuple of array of shape (instances, 1)
+        Of joints and drivers, of forces and of outputs, where the mechanism is put together.
+    near : tuple of tuple of array of shape (instances, time)
+        Of forces and of outputs at all instants.
+    """
+
+    angle: tuple[Part, Part, Part]
+    near: tuple[Part, Part]
+
+
+def traced_values(tree: Any) -> list[Any]:
+    """Return the values that JAX traces in a mechanism, or in any nesting of dataclasses, mappings and sequences."""
+    values: list[Any] = []
+
+    def seen(value: Any) -> Any:
+        values.append(value)
+        return value
+
+    _mapped(tree, seen)
+    return values
+
+
+def with_values(tree: Any, values: Sequence[Any]) -> Any:
+    """Return a mechanism with other values in the places of those that JAX traces, in the order of `traced_values`."""
+    left = iter(values)
+    return _mapped(tree, lambda _: next(left))
+
+
+def template(tree: Any) -> Callable[[Sequence[Any]], Any]:
+    """Return what makes a mechanism again from values in the places of those that JAX traces, and holds none of them.
+
+    Numbers become plain ones on the way, as a mechanism is checked for.
+    """
+    holder = _mapped(tree, lambda _: _PLACEHOLDER)
+
+    def made(values: Sequence[Any]) -> Any:
+        left = iter(values)
+        return _mapped(holder, lambda _: next(left))
+
+    return made
+
+
+class _Placeholder:
+    """Stands where a traced value stood."""
+
+
+_PLACEHOLDER = _Placeholder()
+
+
+def _mapped(value: Any, function: Callable[[Any], Any]) -> Any:
+    """Return a nesting with what a function makes of each traced value; what holds none stays the same object."""
+    if isinstance(value, Tracer | _Placeholder):
+        return function(value)
+    if type(value) in PLAIN or isinstance(value, type):
+        return value
+    if isinstance(value, Mapping):
+        entries = {key: _mapped(entry, function) for key, entry in value.items()}
+        return value if _same(entries.values(), value.values()) else entries
+    if isinstance(value, list | tuple):
+        parts = [_mapped(entry, function) for entry in value]
+        if _same(parts, value):
+            return value
+        return type(value)(*parts) if hasattr(value, "_fields") else type(value)(parts)
+    if not dataclasses.is_dataclass(value):
+        return value
+    names = [field.name for field in dataclasses.fields(value) if hasattr(value, field.name)]
+    fields = {name: _mapped(getattr(value, name), function) for name in names}
+    if _same(fields.values(), (getattr(value, name) for name in names)):
+        return value
+    copy = object.__new__(type(value))  # its values were checked before JAX traced them, or are when it is solved
+    for name, field in fields.items():
+        object.__setattr__(copy, name, field)
+    return copy
+
+
+def _same(new: Any, old: Any) -> bool:
+    return all(a is b for a, b in zip(new, old, strict=True))
+
+
+def traced_model(
+    mechanism: Mechanism, length: Any, angles: Angles | None = None, first: Mapping[str, Any] | None = None
+) -> Model:
+    """Return the numeric model of a mechanism as a function of the values that JAX traces in it.
+
+    Rows are not scaled, and there is no history of turns.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+        Some of its values may be traced.
+    length : float
+        Its size, m.
+    angles : Angles, optional
+        As a solution counted them. Without, angles about axes are those of the attitude matrices: they tell the same
+        at the position in which the mechanism is put together, and need to know of none.
+    first : dict of str to array, optional
+        Coordinates of all bodies in that position, the ground first, (..., bodies, 1).
+
+    Raises
+    ------
+    UnsupportedError
+        If an offset would follow from an orientation that is traced.
+    """
+    posed = _with_plain_orientations(mechanism)
+    planar = mechanism.space == "planar"
+    components, pose_type = (2, PlanarPose) if planar else (3, SpatialPose)
+    guess = starting_guess(posed, mechanism.parameter_values, components)
+    (groups, names), *others = grouped_elements(mechanism)
+    check_ratios(groups, names)
+    groups = tuple(with_sense(with_offsets(group, pose_type, guess), pose_type, guess) for group in groups)
+    parts = [groups, *(part for part, _ in others)]
+    if angles is not None and any(measures_angle(group) for part in parts for group in part):
+        assert first is not None
+        near = (angles.angle[0], *angles.near)
+        parts = [_counted(*each, pose_at(first, pose_type)) for each in zip(parts, angles.angle, near, strict=True)]
+    named = zip(parts, (names, *(label for _, label in others)), strict=True)
+    whole: Any = tuple(named)
+    model = model_of(tuple(mechanism.bodies), whole, guess, 1.0, None)
+    scale = jnp.concatenate([jnp.full(components, length), jnp.ones(pose_type.turns)])
+    return dataclasses.replace(model, system=with_fields(model.system, column_scale=scale))
+
+
+def _with_plain_orientations(mechanism: Mechanism) -> Mechanism:
+    """Return a mechanism whose orientations, where a solution looks for its positions from, are not traced."""
+    values = mechanism.parameter_values
+    traced = [name for name, body in mechanism.bodies.items() if _depends(body.orientation, values)]
+    if not traced:
+        return mechanism
+    for name, joint in mechanism.joints.items():
+        missing = "offset" in value_fields(type(joint)) and getattr(joint, "offset", 0.0) is None
+        if missing or hasattr(joint, "sense"):
+            raise UnsupportedError(
+                f"the offset of the joint {name} follows from the starting guess, and is not differentiated by an "
+                "orientation there; give the offset",
+                name=f"bodies.{traced[0]}.orientation",
+            )
+    plain = {name: dataclasses.replace(mechanism.bodies[name], orientation=None) for name in traced}
+    return dataclasses.replace(mechanism, bodies={**mechanism.bodies, **plain})
+
+
+def _depends(orientation: Any, values: Mapping[str, Any]) -> bool:
+    """Tell whether an orientation holds values that JAX traces, or expressions of them."""
+    if isinstance(orientation, Mapping):
+        return any(_depends(entry, values) for key, entry in orientation.items() if key != "euler")
+    if isinstance(orientation, list | tuple):
+        return any(_depends(entry, values) for entry in orientation)
+    return isinstance(orientation, Tracer) or (
+        isinstance(orientation, str | Expression) and isinstance(resolve(orientation, values), Tracer)
+    )
+
+
+def _counted(groups: tuple[Group, ...], angles: Part, near: Part, pose: Any) -> tuple[Group, ...]:
+    """Return groups whose angles about axes are counted from a pose, with the turns that are known."""
+    known = zip(angles, near, strict=True)
+    return tuple(_with_datum(group, pose, *next(known)) if measures_angle(group) else group for group in groups)
+
+
+def _with_datum(group: Group, pose: SpatialPose, known: Any, near: Any) -> Group:
+    element, (body_i, body_j) = group.element, (pose.take(indices) for indices in group.bodies)
+    e0, e = (jet.coefficients[0] for jet in body_i.relative_quaternion(body_j.quaternion))
+    attitude = jnp.concatenate([e0[None], e])
+    axis = jnp.asarray(element.axis if hasattr(element, "axis") else element.axis_i)
+    axis = axis / length_of(axis)[None]
+    if element.vector_i is None:
+        angle, is_defined = angle_of(attitude, axis)
+        return holding(group, "datum", Datum(attitude, jnp.where(is_defined, brought_near(angle, known), known), near))
+    across = None
+    if hasattr(element, "role"):  # a driver or a force acts about the axis, see `axis_angles`
+        second = jnp.asarray(element.vector_j)
+        along = body_j.to_body(body_i.direction(axis)).coefficients[0]
+        across = second - (second * along).sum(axis=0, keepdims=True) * along
+    return holding(group, "datum", Datum(attitude, known, near, across))
+
+
+def angles_of(model: Model, counted: tuple[tuple[Group, ...], tuple[Group, ...]]) -> Angles:
+    """Return the angles about axes of a solution.
+
+    Parameters
+    ----------
+    model : Model
+        That was solved.
+    counted : tuple of tuple of Group
+        Its forces and its outputs, with the turns of all instants.
+    """
+    system = model.system
+    data = [[g.element.datum for g in part if measures_angle(g)] for part in (system.groups, *counted)]
+    angle: Any = tuple(tuple(np.asarray(datum.angle) for datum in part) for part in data)
+    near: Any = tuple(tuple(np.asarray(datum.near) for datum in part) for part in data[1:])
+    return Angles(angle, near)

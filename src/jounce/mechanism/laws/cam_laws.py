@@ -1,0 +1,83 @@
+"""The laws of cams as laws of time, where what leads a cam has a law of time itself."""
+
+from collections.abc import Iterator
+from typing import Any
+
+from jounce.constraints.base import value_fields
+from jounce.constraints.cams import Cam, coordinate_of_element
+from jounce.errors import JounceError
+from jounce.mechanism.laws.output_drivers import driver_of_output
+from jounce.mechanism.mechanism import Mechanism
+from jounce.mechanism.resolve import resolve_motion
+from jounce.trajectory import FollowingMotion, OutputMotion
+
+
+def same_coordinate(element: Any, other: Any) -> bool:
+    """Tell whether two drivers have the same coordinate, whatever their laws.
+
+    Examples
+    --------
+    >>> from jounce import drivers
+    >>> one, two = (drivers.CoordinateDriver(("ground", "shaft"), "angle", law) for law in ("t", "2*t"))
+    >>> same_coordinate(one, two)
+    True
+    """
+    if type(element) is not type(other) or element.bodies != other.bodies:
+        return False
+    return all(_plain(element, name) == _plain(other, name) for name in value_fields(type(element)) if name != "motion")
+
+
+def _plain(element: Any, name: str) -> str:
+    value = getattr(element, name)
+    value = value.tolist() if hasattr(value, "tolist") else list(value) if isinstance(value, tuple) else value
+    if name == "ratio" and (value is None or element.bodies[0] == "ground"):
+        value = 1.0
+    if isinstance(value, list):
+        return repr([float(x) if isinstance(x, int | float) else str(x) for x in value])
+    return repr(float(value)) if isinstance(value, int | float) else str(value)
+
+
+def driver_of_leader(mechanism: Mechanism, cam: Cam) -> str | None:
+    """Return the name of the driver that moves the leader of a cam by a law of time, None if none does."""
+    for name, driver in mechanism.drivers.items():
+        try:
+            if same_coordinate(coordinate_of_element(driver), cam.leader):
+                return name
+        except JounceError:  # a driver that leads no cam
+            continue
+    return None
+
+
+def leader_name(mechanism: Mechanism, cam: Cam) -> str | None:
+    """Return the name of a driver, joint, initial condition or output that has the coordinate that leads a cam."""
+    kinds = (mechanism.drivers, mechanism.joints, mechanism.initial)
+    names = [cam.of] if cam.of else []
+    for name in [*names, *(x for kind in kinds for x in kind), *mechanism.outputs]:
+        element = next((kind[name] for kind in kinds if name in kind), None)
+        try:
+            if element is None:
+                element = driver_of_output(mechanism, OutputMotion(name, "0"), "of")
+            if element is not cam and same_coordinate(coordinate_of_element(element), cam.leader):
+                return name
+        except JounceError:
+            continue
+    return None
+
+
+def cams_in_time(mechanism: Mechanism) -> Iterator[tuple[str, FollowingMotion]]:
+    """Yield the laws of cams whose leaders are driven, as laws of time, by the names of the cams.
+
+    Invalid laws are left out: their use refuses them.
+    """
+    values = mechanism.parameter_values
+    for name, cam in mechanism.joints.items():
+        if not isinstance(cam, Cam) or (leader := driver_of_leader(mechanism, cam)) is None:
+            continue
+        motion: Any = getattr(mechanism.drivers[leader], "motion", None)
+        if motion is None or isinstance(motion, OutputMotion):
+            continue
+        try:
+            law, led = (resolve_motion(x, values) for x in (cam.motion, motion))
+        except JounceError:
+            continue
+        yield name, FollowingMotion(law, led)

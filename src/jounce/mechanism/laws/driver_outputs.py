@@ -1,0 +1,51 @@
+"""The coordinates of drivers as outputs: what their laws prescribe, read off the bodies."""
+
+from typing import Any
+
+import equinox as eqx
+
+from jounce.constraints.facts import dimension_of_field, stem_of, value_fields
+from jounce.errors import MechanismError, check_name
+from jounce.mechanism.outputs.base import AbstractMotionOutput
+
+
+def is_turning(driver: Any) -> bool:
+    """Tell whether the law of a driver is an angle, so that what it exerts is a torque.
+
+    A class that does not state its dimension drives an angle where it has no points.
+    """
+    stated = dimension_of_field(driver, "motion")
+    if stated != "any":
+        return stated == "angle"
+    return not any(stem_of(field) == "point" for field in value_fields(type(driver)))
+
+
+class _DriverCoordinateOutput(AbstractMotionOutput):
+    driver: str = eqx.field(static=True)
+
+    source = "driver"
+
+    def check(self, mechanism: Any) -> None:
+        """Raise MechanismError unless the driver exists, its class defines its coordinate, and the unit fits."""
+        check_name("driver", self.driver, mechanism.drivers, MechanismError, name="driver")
+        driver = mechanism.drivers[self.driver]
+        if not hasattr(driver, "evaluate"):
+            message = "the class of this driver does not define its coordinate; give it a method evaluate"
+            raise MechanismError(message, name="driver", value=self.driver)
+        if is_turning(driver) != (self.unit == "rad"):
+            word = "an angle" if is_turning(driver) else "a displacement"
+            raise MechanismError(f"the coordinate of this driver is {word}", name="quantity")
+
+    def coefficients(self, motion: Any) -> Any:
+        """Return the Taylor coefficients of the coordinate, (order + 1, 1, time)."""
+        return motion.driver_coefficients(self.driver)
+
+
+class DriverAngleOutput(_DriverCoordinateOutput):
+    """Angle of a driver, rad, as its law has it: that of the bodies, also where the law follows from an output."""
+
+    unit = "rad"
+
+
+class DriverDisplacementOutput(_DriverCoordinateOutput):
+    """Displacement of a driver, m, as its law has it: that of the bodies, also where the law follows from an output."""

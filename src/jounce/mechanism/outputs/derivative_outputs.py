@@ -1,0 +1,298 @@
+"""Derivatives of outputs with respect to other outputs: bump steer, motion ratios, mechanical advantages, rates.
+
+Along a motion ``dy/dx = y' / x'``, and the next derivative with respect to x is that of this one: quotients of series.
+"""
+
+from collections import Counter
+from collections.abc import Mapping
+from typing import Any, ClassVar, NamedTuple
+
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Float
+
+from jounce.base.modules import is_ours, unchecked, with_fields
+from jounce.base.shapes import Numbers
+from jounce.constraints.base import Nested, Whole
+from jounce.errors import MechanismError, no_such, whole_number
+from jounce.jet import Jet
+from jounce.jet.algebra import stacked
+from jounce.jet.rounding import nan_where_rounding, rates_of
+from jounce.mechanism.outputs.base import AbstractMotionOutput, AbstractOutput, AbstractQuantity
+
+HIGHEST = 10  # derivative with respect to an output
+OFF_ZERO = 1e-3  # sizes of what moves: the least size of a quantity that is zero where it stands still
+MOST_NAMED = 4  # instants
+RATES = ("derivative", "rate", "second rate", "third rate", "fourth rate")
+
+
+class Operand(NamedTuple):
+    """An output, or one of its components."""
+
+    output: Any
+    component: int
+
+
+class DerivativeOutput(AbstractMotionOutput):
+    """Derivative of an output with respect to another along the motion, ``d^n of / d by^n``.
+
+    Bump steer is that of a toe angle with respect to the height of the wheel, a motion ratio that of the length of a
+    spring, a wheel rate that of a force. Where `by` stands still there is none.
+
+    Parameters
+    ----------
+    of, by : str
+        Names of outputs of the mechanism, or of components of them, such as ``C_y``.
+    order : int, default 1
+        n, up to 10.
+    """
+
+    of: str = eqx.field(static=True)
+    by: str = eqx.field(static=True)
+    order: Whole = eqx.field(static=True, default=1)
+    bound_operands: Any = eqx.field(default=None, init=False)  # the operands, once it is an output of a mechanism
+
+    source: ClassVar[str] = "of"
+    rate_names = RATES
+
+    def __check_init__(self):
+        whole_number("order", self.order, 1, HIGHEST, error=MechanismError)
+
+    @property
+    def operands(self) -> tuple[Operand, Operand]:
+        """The outputs that it is of, in a mechanism."""
+        if self.bound_operands is None:
+            message = "its outputs are found when it is an output of a mechanism, and `evaluate` is given one"
+            raise MechanismError(message, name="of", value=self.of)
+        return self.bound_operands
+
+    @property
+    def unit(self) -> str:  # type: ignore[override] - of an instance, as it depends on the outputs
+        """Unit in SI."""
+        return _unit(self.operands, int(self.order))
+
+    @property
+    def lost_orders(self) -> int:  # type: ignore[override] - of an instance, as it depends on the order
+        """Derivatives by which it is shorter than the motion."""
+        return int(self.order) + max(operand.output.lost_orders for operand in self.operands)
+
+    @property
+    def of_forces(self) -> bool:  # type: ignore[override] - of an instance
+        """Whether applied forces bear on it."""
+        return any(operand.output.of_forces for operand in self.operands)
+
+    def coefficients(self, motion: Any) -> Numbers:
+        """Return the Taylor coefficients of the derivative, (levels, 1, time)."""
+        y, x = (_series(motion, operand) for operand in self.operands)
+        scale = _scale(x, self.operands[1].output.unit, motion.model.length)
+        return stacked(derivative_by(y, x, int(self.order), scale))[:, None]
+
+    def remark(self, motion: Any, values: Float[np.ndarray, "time derivative"]) -> str:
+        """Return why values are NaN at instants that were solved, and at which."""
+        missing = ~np.isfinite(values).all(axis=1) & (np.asarray(motion.status) == 0)
+        if not missing.any():
+            return ""
+        where = ", ".join(f"{t:.6g} s" for t in motion.time[missing][:MOST_NAMED])
+        more = ", ..." if missing.sum() > MOST_NAMED else ""
+        return f"undefined at t = {where}{more}, where '{self.by}' stands still or '{self.of}' is undefined"
+
+
+class PosedDerivativeOutput(AbstractOutput):
+    """A `DerivativeOutput` whose outputs are functions of poses, as a mechanism has it."""
+
+    of: str = eqx.field(static=True)
+    by: str = eqx.field(static=True)
+    order: Whole = eqx.field(static=True)
+    first: Nested
+    second: Nested
+    components: tuple[int, int] = eqx.field(static=True)
+    count: int = eqx.field(static=True)  # bodies of the first
+
+    form: ClassVar[type] = DerivativeOutput
+    rate_names = RATES
+
+    @property
+    def operands(self) -> tuple[Operand, Operand]:
+        """The outputs that it is of."""
+        return Operand(self.first, self.components[0]), Operand(self.second, self.components[1])
+
+    @property
+    def unit(self) -> str:  # type: ignore[override] - of an instance, as it depends on the outputs
+        """Unit in SI."""
+        return _unit(self.operands, int(self.order))
+
+    @property
+    def lost_orders(self) -> int:  # type: ignore[override] - of an instance, as it depends on the order
+        """Derivatives by which it is shorter than the motion."""
+        return int(self.order) + max(operand.output.lost_orders for operand in self.operands)
+
+    def evaluate(self, *bodies: Any) -> Jet:
+        y = _component(self.first.evaluate(*bodies[: self.count]), self.components[0])
+        x = _component(self.second.evaluate(*bodies[self.count :]), self.components[1])
+        reach = [jnp.sqrt(jnp.sum(body.position.coefficients[0] ** 2, axis=0)) for body in bodies]
+        return derivative_by(y, x, int(self.order), _scale(x, self.second.unit, jnp.max(jnp.stack(reach), axis=0)))
+
+
+def _unit(operands: tuple[Operand, Operand], order: int) -> str:
+    of, by = operands
+    return quotient_unit(of.output.unit, by.output.unit, order)
+
+
+def derivative_by(y: Jet, x: Jet, order: int, scale: Any) -> Jet:
+    """Return the derivative of one series with respect to another, NaN where rounding decides it.
+
+    Parameters
+    ----------
+    y, x : Jet
+        Of shape (...).
+    order : int
+        Of the derivative.
+    scale : array of shape (...)
+        The size of x.
+    """
+    speed = x.differentiate()
+    nearness, rate = rates_of(speed, scale, jnp.ndim(scale))
+    for _ in range(order):
+        y = y.differentiate() / speed
+    return nan_where_rounding(y, nearness, rate, lost=order - 1)
+
+
+def _scale(x: Jet, unit: str, reach: Any) -> Any:
+    """Return the size of a quantity: an angle has 1 rad, a length is not smaller than a part of what moves."""
+    size = jnp.abs(x.coefficients[0])
+    return jnp.ones_like(size) if unit == "rad" else size + (OFF_ZERO * reach if unit == "m" else 0.0)
+
+
+def _component(jet: Jet, component: int) -> Jet:
+    return jet if component < 0 else jet[component]
+
+
+def _series(motion: Any, operand: Operand) -> Jet:
+    """Return the series of an output of a motion, or of a component, of shape (time,)."""
+    series = motion.series(operand.output)
+    return Jet(tuple(series[:, max(operand.component, 0)]))
+
+
+def bound(outputs: Mapping[str, AbstractQuantity], mechanism: Any) -> Mapping[str, AbstractQuantity]:
+    """Return outputs of a mechanism, derivatives among them with the outputs that they name.
+
+    Those that name none that is left keep what they have: some of the outputs of a mechanism may be asked for alone.
+
+    Raises
+    ------
+    MechanismError
+        If a derivative names no output, none that is one number, or itself.
+    """
+    if not any(form_of(output) is DerivativeOutput for output in outputs.values()):
+        return outputs
+    bound_outputs: dict[str, AbstractQuantity] = {}
+    for name in outputs:
+        _bind(name, outputs, mechanism, bound_outputs, ())
+    return {name: bound_outputs[name] for name in outputs}
+
+
+def bound_alone(output: AbstractQuantity, mechanism: Any) -> AbstractQuantity:
+    """Return an output that is none of the mechanism, a derivative with the outputs of the mechanism that it names."""
+    return _with_operands(output, mechanism.outputs, mechanism) if form_of(output) is DerivativeOutput else output
+
+
+def form_of(output: AbstractQuantity) -> type[Any]:
+    """Return the class by which an output was given, and is named in files."""
+    return getattr(type(output), "form", type(output))
+
+
+def _bind(
+    name: str,
+    outputs: Mapping[str, AbstractQuantity],
+    mechanism: Any,
+    bound_outputs: dict[str, AbstractQuantity],
+    waiting: tuple[str, ...],
+) -> AbstractQuantity:
+    """Return an output with those that it names, which are put among those found before it."""
+    output: Any = outputs[name]
+    if name in bound_outputs or form_of(output) is not DerivativeOutput:
+        return bound_outputs.setdefault(name, output)
+    if name in waiting:
+        raise MechanismError("this derivative is one of itself", name=f"outputs.{name}.of", value=output.of)
+    stems = [_stem(given, outputs, mechanism) for given in (output.of, output.by)]
+    if all(stems) or getattr(output, "bound_operands", output) is None:
+        own = {stem: _bind(stem, outputs, mechanism, bound_outputs, (*waiting, name)) for stem in stems if stem}
+        try:
+            output = _with_operands(output, {**outputs, **own}, mechanism)
+        except MechanismError as error:
+            error.name = f"outputs.{name}.{error.name}"
+            raise
+    return bound_outputs.setdefault(name, output)
+
+
+def _stem(name: str, outputs: Mapping[str, AbstractQuantity], mechanism: Any) -> str:
+    """Return the output that a name is of; empty where there is none."""
+    if name in outputs:
+        return name
+    stem, _, label = name.rpartition("_")
+    return stem if stem in outputs and label in outputs[stem].component_labels(mechanism) else ""
+
+
+def _with_operands(output: Any, outputs: Mapping[str, AbstractQuantity], mechanism: Any) -> AbstractQuantity:
+    """Return a derivative with the outputs that it names."""
+    of, by = (_operand(key, getattr(output, key), outputs, mechanism) for key in ("of", "by"))
+    words = {"of": output.of, "by": output.by, "order": output.order}
+    if not (_posed(of.output) and _posed(by.output)):
+        return with_fields(DerivativeOutput(**words), bound_operands=(of, by))
+    values = {
+        "bodies": (*of.output.bodies, *by.output.bodies),
+        "first": of.output,
+        "second": by.output,
+        "components": (of.component, by.component),
+        "count": len(of.output.bodies),
+    }
+    return unchecked(PosedDerivativeOutput, words | values)
+
+
+def _operand(key: str, name: str, outputs: Mapping[str, AbstractQuantity], mechanism: Any) -> Operand:
+    """Return the output, or the component of one, that has a name."""
+    stem = _stem(name, outputs, mechanism)
+    if not stem:
+        labels = {other: output.component_labels(mechanism) for other, output in outputs.items()}
+        known = [each for other, its in labels.items() for each in ([f"{other}_{x}" for x in its] or [other])]
+        raise MechanismError(no_such("output", name, known), name=key, value=name)
+    labels = outputs[stem].component_labels(mechanism)
+    if labels and stem == name:
+        raise MechanismError(f"this output has components; name one, such as {name}_{labels[0]}", name=key, value=name)
+    return Operand(outputs[stem], labels.index(name.rpartition("_")[2]) if labels else -1)
+
+
+def _posed(output: Any) -> bool:
+    """Tell whether an output is a function of poses alone, without a reference position."""
+    if not isinstance(output, AbstractOutput) or not is_ours(type(output)):
+        return False
+    return not hasattr(output, "datum") or output.vector_i is not None
+
+
+def quotient_unit(of: str, by: str, order: int) -> str:
+    """Return the unit of a derivative with respect to a quantity, time last.
+
+    Examples
+    --------
+    >>> quotient_unit("rad", "m", 2), quotient_unit("m", "m", 1), quotient_unit("m", "m", 2)
+    ('rad/m^2', '1', '1/m')
+    >>> quotient_unit("N*m", "rad", 1), quotient_unit("rad/s", "m", 1), quotient_unit("1", "rad/s", 2)
+    ('N*m/rad', 'rad/m/s', 's^2/rad^2')
+    """
+    powers: Counter[str] = Counter()
+    for unit, power in ((of, 1), (by, -order)):
+        first, *below = unit.split("/")
+        powers[first] += power
+        for part in below:
+            base, _, exponent = part.partition("^")
+            powers[base] -= power * int(exponent or 1)
+    del powers["1"]
+
+    def written(base: str, power: int) -> str:
+        return base if power == 1 else f"({base})^{power}" if "*" in base else f"{base}^{power}"
+
+    above = "*".join(written(base, power) for base, power in powers.items() if power > 0)
+    below = [(part, -power) for base, power in powers.items() if power < 0 for part in base.split("*")]
+    below.sort(key=lambda pair: pair[0] == "s")
+    return (above or "1") + "".join(f"/{written(*pair)}" for pair in below)

@@ -1,0 +1,1 @@
+"""Gears, belts and ropes: turns counted about axes, frames and lengths."""

@@ -1,0 +1,368 @@
+"""Where angles about axes are counted from: the position in which a mechanism was put together, and its turns."""
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from jounce.base.modules import unchecked, with_fields
+from jounce.base.shapes import Numbers
+from jounce.constraints.angles import Datum, angle_of
+from jounce.jet.turns import counted_on, principal, whole_periods
+from jounce.mechanism.system import Group, holding
+from jounce.mechanism.time import nearest_instants
+from jounce.mechanism.transmissions.turn_counting import refined_samples
+
+Coordinates = Mapping[str, Any]  # of all bodies, the ground first, by name: (..., bodies, batch)
+Quaternions = Float[np.ndarray, "4 *#rest"]
+Vectors = Float[np.ndarray, "3 *#rest"]
+Angles = Float[np.ndarray, "instance batch"]
+PARALLEL = 1e-9  # largest sine between axes that are one
+
+
+class PrescribedAngle(NamedTuple):
+    """An angle that a driver prescribes.
+
+    Attributes
+    ----------
+    bodies : tuple of int
+        Indices of the bodies i and j.
+    axis : array of shape (3,)
+        Unit axis in the global frame.
+    angle : float
+        As the law says it, with its whole turns, rad.
+    """
+
+    bodies: tuple[int, int]
+    axis: Float[np.ndarray, " 3"]
+    angle: float
+
+
+class AttitudeHistory(NamedTuple):
+    """Attitudes that all bodies went through, so close to each other that no body makes half a turn in between.
+
+    Attributes
+    ----------
+    quaternion : array of shape (4, bodies, samples)
+        The ground first.
+    time : array of shape (samples,)
+        When, s; zeros where it was no motion.
+    period, repeated : int
+        The last samples make a turn, of which so many more follow.
+    between : callable, optional
+        Returns the attitudes at any instants, (4, bodies, instants).
+    """
+
+    quaternion: Float[np.ndarray, "4 bodies sample"]
+    time: Float[np.ndarray, " sample"]
+    period: int = 1
+    repeated: int = 0
+    between: Callable[[Float[np.ndarray, " time"]], Float[np.ndarray, "4 bodies time"]] | None = None
+
+    def sampled(
+        self, measure: Callable[[Float[np.ndarray, "4 bodies sample"]], Float[np.ndarray, "angle sample"]]
+    ) -> tuple[Float[np.ndarray, " sample"], Float[np.ndarray, "angle sample"]]:
+        """Return instants, and angles there that are known up to whole turns, so close that none is lost in between.
+
+        Parameters
+        ----------
+        measure : callable
+            Returns the angles, rad, of attitudes of all bodies, (4, bodies, samples).
+        """
+        between, known = self.between, measure(self.quaternion)
+        if between is None:
+            return self.time, known
+        whole = np.zeros(len(self.time), int)  # one path, along which instants are measured
+        samples = refined_samples(lambda _, instants: measure(between(instants)), whole, self.time, known)
+        return samples.share, samples.angle
+
+    def angles(self, group: Group) -> tuple[Float[np.ndarray, " sample"], Float[np.ndarray, "instance sample"]]:
+        """Return instants, and the angles about axes that a group measures there, counted on from its datum."""
+        time, raw = self.sampled(lambda quaternion: raw_angles([group], {"quaternion": quaternion})[0])
+        begun = np.asarray(group.element.datum.near)[..., 0]
+        return time, counted_on(np.column_stack([begun, raw]))[:, 1:]
+
+    def last_angles(self, groups: Sequence[Group]) -> list[np.ndarray]:
+        """Return the angles at the end, (instances, 1) each, with the turns that are repeated."""
+        angles = [self.angles(group)[1] for group in groups if measures_angle(group)]
+        if not self.repeated:
+            return [angle[:, -1:] for angle in angles]
+        ends = [(angle[:, -1:], angle[:, -1 - self.period, None]) for angle in angles]
+        return [last + self.repeated * whole_periods(last - before) for last, before in ends]
+
+    def counting(self, groups: Sequence[Group], instants: Float[np.ndarray, " time"]) -> tuple[Group, ...]:
+        """Return groups that have the turns of each instant, from the sample nearest to it in time."""
+        counted = []
+        for time, angles in (self.angles(group) for group in groups if measures_angle(group)):
+            backward = time[-1] < time[0]
+            known, angles = (time[::-1], angles[:, ::-1]) if backward else (time, angles)
+            counted.append(angles[:, nearest_instants(known, instants)])
+        return with_turns(groups, counted)
+
+
+def measures_angle(group: Group) -> bool:
+    """Tell whether the elements of a group measure an angle about an axis."""
+    return hasattr(group.element, "datum")
+
+
+def with_datums(
+    groups: Sequence[Group],
+    coordinates: Coordinates,
+    prescribed: Sequence[PrescribedAngle] = (),
+    *,
+    keep: bool = False,
+) -> tuple[Group, ...]:
+    """Return groups with the angles about axes counted from a position.
+
+    Parameters
+    ----------
+    groups : sequence of Group
+        Those that measure no such angle stay as they are.
+    coordinates : dict of str to array
+        Of all bodies, the ground first, shape (..., bodies, 1).
+    prescribed : sequence of PrescribedAngle, optional
+        Angles known with their turns: one about the same axis between the same bodies has as many.
+    keep : bool, default False
+        Whether angles go on from the datum of now, instead of those that the frames of the bodies have.
+    """
+    return tuple(
+        _with_datum(group, coordinates, prescribed, keep=keep) if measures_angle(group) else group for group in groups
+    )
+
+
+def raw_angles(groups: Sequence[Group], coordinates: Coordinates) -> list[np.ndarray]:
+    """Return the angles about axes that groups measure, up to whole turns, (instances, batch) each.
+
+    Parameters
+    ----------
+    groups : sequence of Group
+        Those that measure no such angle have no entry.
+    coordinates : dict of str to array
+        Of all bodies, the ground first, shape (..., bodies, batch).
+    """
+    return [_raw_angle(group, relative_attitude(group, coordinates)) for group in filter(measures_angle, groups)]
+
+
+def _raw_angle(group: Group, attitude: Quaternions) -> Angles:
+    """Return the angles that a group measures at attitudes of its second bodies relative to the first."""
+    element, axis = group.element, axis_of(group)
+    if element.vector_i is None:
+        return since(element.datum, attitude, axis)
+    second = element.vector_j if element.datum.across is None else element.datum.across
+    return _between(attitude, axis, np.asarray(element.vector_i), np.asarray(second))
+
+
+def with_angles(groups: Sequence[Group], angles: Sequence[np.ndarray]) -> tuple[Group, ...]:
+    """Return groups of which the data hold other angles, for those that measure one about an axis."""
+    return _with_data(groups, angles, lambda datum, angle: with_fields(datum, angle=angle, near=angle))
+
+
+def with_turns(groups: Sequence[Group], near: Sequence[Any]) -> tuple[Group, ...]:
+    """Return groups that measure angles about axes with the turns of these, (instances, batch) each; may be traced."""
+    return _with_data(groups, near, lambda datum, turns: with_fields(datum, near=turns))
+
+
+def _with_data(groups: Sequence[Group], values: Sequence[Any], put: Callable[[Datum, Any], Datum]) -> tuple[Group, ...]:
+    """Return groups with other data, one value for each that measures an angle about an axis."""
+    remaining = iter(values)
+    return tuple(holding(g, "datum", put(g.element.datum, next(remaining))) if measures_angle(g) else g for g in groups)
+
+
+def at_lanes(groups: Sequence[Group], lanes: Int[np.ndarray, " lane"]) -> tuple[Group, ...]:
+    """Return groups whose angles about axes have the turns of a whole batch, for some of its lanes."""
+    return with_turns(groups, [g.element.datum.near[..., lanes] for g in groups if measures_angle(g)])
+
+
+def _with_datum(group: Group, coordinates: Coordinates, prescribed: Sequence[PrescribedAngle], *, keep: bool) -> Group:
+    element, attitude = group.element, relative_attitude(group, coordinates)
+    axis, known = axis_of(group), element.datum
+    before = np.zeros(attitude.shape[1:]) if known is None else since(known, attitude, axis)
+    if element.vector_i is not None:
+        angle = _between(attitude, axis, np.asarray(element.vector_i), np.asarray(element.vector_j))
+    elif keep:
+        angle = before
+    else:
+        angle, is_defined = angle_of(attitude, axis)
+        angle = np.where(is_defined, angle, before)
+    angle = before + principal(angle - before) if known is not None else principal(angle)
+    for k, bodies in enumerate(zip(*group.bodies, strict=True)):
+        for given in prescribed:
+            sign = _relative_sign(bodies, turned(coordinates["quaternion"][:, bodies[0], 0], axis[:, k, 0]), given)
+            if sign:
+                expected = sign * given.angle
+                angle[k] = expected + principal(angle[k] - expected)
+    # a driver or a force acts about the axis, wherever its vector on body j points beside it
+    acts = element.vector_i is not None and hasattr(element, "role")
+    across = _across(np.asarray(element.vector_j), attitude, axis) if acts else None
+    values = {"attitude": attitude, "angle": angle, "near": angle, "across": across}
+    return holding(group, "datum", unchecked(Datum, values))
+
+
+def with_datum_of(group: Group, known: Group) -> Group:
+    """Return a group with its angles counted from where those of another are; its own vectors may be traced by JAX."""
+    datum = known.element.datum
+    if datum.across is not None:
+        across = _across(group.element.vector_j, np.asarray(datum.attitude), axis_of(known))
+        datum = with_fields(datum, across=across)
+    return holding(group, "datum", datum)
+
+
+def departure(before: Sequence[Group], after: Sequence[Group]) -> float:
+    """Return by how much the angles of drivers, and the directions of their axes, differ between two data, rad."""
+    largest = 0.0
+    for old, new in zip(before, after, strict=True):
+        if measures_angle(new):
+            axis, attitude = axis_of(new), new.element.datum.attitude
+            angle = principal(_raw_angle(old, attitude) - new.element.datum.angle)
+            turn = _product(attitude, _inverse(old.element.datum.attitude))[1:]
+            tilt = turn - (turn * axis).sum(axis=0) * axis
+            largest = max(largest, np.max(np.abs(angle)), np.max(np.abs(tilt)))
+    return float(largest)
+
+
+def prescribed_angles(
+    groups: Sequence[Group], coordinates: Coordinates, laws: Sequence[np.ndarray]
+) -> list[PrescribedAngle]:
+    """Return the angles that drivers prescribe at a position, in space; `laws` holds the values for each such group."""
+    prescribed = []
+    for group, values in zip((g for g in groups if measures_angle(g)), laws, strict=True):
+        for k, bodies in enumerate(zip(*group.bodies, strict=True)):
+            axis = turned(coordinates["quaternion"][:, bodies[0], 0], axis_of(group)[:, k, 0])
+            prescribed.append(PrescribedAngle(bodies, axis, float(np.broadcast_to(values, (group.instances, 1))[k, 0])))
+    return [given for given in prescribed if np.isfinite(given.angle)]
+
+
+def lost_count(groups: Sequence[Group], history: AttitudeHistory) -> tuple[int, int, float] | None:
+    """Return where shafts of a ratio have lost count of their turns: group, instance, and instant, s; None if nowhere.
+
+    Their residual knows angles up to whole turns. Along attitudes that are close to each other turns are counted.
+    """
+    for index, group in enumerate(groups):
+        whole = getattr(group.element, "whole", None)
+        if whole is None:
+            continue
+        time, raw = history.sampled(lambda quaternion, g=group: _shaft_angles(g, quaternion))
+        first, second = np.split(counted_on(raw), 2)
+        excess = second - np.asarray(group.element.ratio) * first
+        lost = np.abs(excess - excess[:, :1]) > np.pi / 2 / np.asarray(whole)
+        if lost.any():
+            instance = int(np.argmax(lost.any(axis=1)))
+            return index, instance, float(time[np.argmax(lost[instance])])
+    return None
+
+
+def _shaft_angles(group: Group, quaternion: Float[np.ndarray, "4 bodies sample"]) -> Float[np.ndarray, "angle sample"]:
+    """Return how far shafts of a group are turned in their frames, up to whole turns: the first, then the second."""
+    element, frame, angles = group.element, quaternion[:, list(group.bodies[2])], []
+    for bodies, axis, held in zip(
+        group.bodies[:2], (element.axis_i, element.axis_j), (element.held_i, element.held_j), strict=True
+    ):
+        axis = np.asarray(axis) / np.linalg.norm(axis, axis=0)
+        angles.append(-since(held, _product(_inverse(quaternion[:, list(bodies)]), frame), axis))
+    return np.concatenate(angles)
+
+
+def axis_of(group: Group) -> Float[np.ndarray, "3 instance 1"]:
+    """Return the unit axes on body i of the elements of a group, (3, instances, 1)."""
+    element = group.element
+    axis = np.asarray(element.axis if hasattr(element, "axis") else element.axis_i)
+    return axis / np.linalg.norm(axis, axis=0)
+
+
+def relative_attitude(group: Group, coordinates: Coordinates) -> Quaternions:
+    """Return the Euler parameters of the second bodies of a group relative to the first, (4, instances, 1)."""
+    first, second = (np.asarray(coordinates["quaternion"])[:, list(bodies)] for bodies in group.bodies)
+    return _product(_inverse(first), second)
+
+
+def attitudes_of(
+    bodies: Sequence[int], quaternion: Float[np.ndarray, "4 bodies sample"]
+) -> Float[np.ndarray, "4 sample"]:
+    """Return the Euler parameters, (4, samples), of a body, or of the second body relative to the first.
+
+    Parameters
+    ----------
+    bodies : sequence of int
+        One or two indices of bodies.
+    quaternion : array of shape (4, bodies, samples)
+        Of all bodies, the ground first.
+    """
+    *base, body = (quaternion[:, k] for k in bodies)
+    return _product(_inverse(base[0]), body) if base else body
+
+
+def since(datum: Datum, attitude: Quaternions, axis: Vectors) -> Angles:
+    """Return the angle of an attitude, within half a turn of that of a datum."""
+    return np.asarray(datum.angle) + angle_of(_product(attitude, _inverse(np.asarray(datum.attitude))), axis)[0]
+
+
+def _between(attitude: Quaternions, axis: Vectors, first: Vectors, second: Vectors) -> Angles:
+    """Return the signed angle about an axis from a vector of body i to one of body j."""
+    b = turned(attitude, second)
+    across = b - (b * axis).sum(axis=0) * axis
+    return np.arctan2((_cross(axis, first) * across).sum(axis=0), (first * across).sum(axis=0))
+
+
+def _across(second: Numbers, attitude: Quaternions, axis: Vectors) -> Numbers:
+    """Return the part of vectors of bodies j across axes of bodies i."""
+    along = turned(_inverse(attitude), axis)
+    return second - (second * along).sum(axis=0) * along
+
+
+def _relative_sign(bodies: tuple[int, ...], axis: Float[np.ndarray, " 3"], given: PrescribedAngle) -> int:
+    """Return 1 where an angle follows that of a driver, -1 where it runs against it, else 0."""
+    if sorted(bodies) != sorted(given.bodies) or np.linalg.norm(_cross(axis, given.axis)) > PARALLEL:
+        return 0
+    return int(np.sign(axis @ given.axis)) * (1 if bodies == given.bodies else -1)
+
+
+def _inverse(p: Quaternions) -> Quaternions:
+    return np.concatenate([p[:1], -p[1:]])
+
+
+def _product(p: Quaternions, q: Quaternions) -> Quaternions:
+    return _bilinear(_HAMILTON, p, q)
+
+
+def turned(p: Quaternions, vector: Vectors) -> Vectors:
+    """Return vectors given in the axes of bodies, by Euler parameters of these, in global ones."""
+    twice = 2 * _cross(p[1:], vector)
+    return vector + p[:1] * twice + _cross(p[1:], twice)
+
+
+def _cross(a: Vectors, b: Vectors) -> Any:
+    """Return the cross products along the first axis."""
+    return _bilinear(_LEVI_CIVITA, a, b)
+
+
+def _bilinear(signs: np.ndarray, a: Numbers, b: Numbers) -> Any:
+    """Return sums of products of components along the first axis: five calls of NumPy, where each takes a microsecond.
+
+    Parameters
+    ----------
+    signs : array of shape (components, components squared)
+        Of the product of component i of one and j of the other, in column i times components plus j.
+    """
+    products = np.asarray(a)[:, None] * np.asarray(b)[None]
+    return (signs @ products.reshape(signs.shape[1], -1)).reshape(len(signs), *products.shape[2:])
+
+
+def _levi_civita() -> np.ndarray:
+    signs = np.zeros((3, 3, 3))
+    for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
+        signs[i, j, k], signs[i, k, j] = 1.0, -1.0
+    return signs
+
+
+def _hamilton() -> np.ndarray:
+    """Return the signs of the products of quaternions (e0, e): ``p0 q0 - p.q`` and ``p0 q + q0 p + p x q``."""
+    signs = np.zeros((4, 4, 4))
+    signs[0, 0, 0] = 1.0
+    for k in (1, 2, 3):
+        signs[0, k, k], signs[k, 0, k], signs[k, k, 0] = -1.0, 1.0, 1.0
+    signs[1:, 1:, 1:] = _levi_civita()
+    return signs
+
+
+_LEVI_CIVITA, _HAMILTON = _levi_civita().reshape(3, 9), _hamilton().reshape(4, 16)

@@ -1,0 +1,149 @@
+"""Whether gears, belts, cams and wheels have what they need: what carries and turns them, ratios and laws, a side."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import jax
+import numpy as np
+from jax.core import Tracer
+
+from jounce.constraints import planar, spatial
+from jounce.constraints.cams import Cam, turns_in_space
+from jounce.errors import MechanismError, UnsupportedError
+from jounce.jet import Jet
+from jounce.jet.turns import WHOLE_TURN
+from jounce.mechanism.system import Group
+from jounce.mechanism.transmissions.axis_angles import turned
+from jounce.mechanism.transmissions.gear_frames import LARGEST_WHOLE, WHOLE, is_toothed
+from jounce.mechanism.transmissions.rope_lengths import check_ropes
+
+LEAST_DIFFERENCE = 0.05  # of the radii of a belt's pulleys where no body carries both: less is a tiny part of a turn
+FLAT = 1e-6  # sine of the angle between the axis of a wheel and the normal of its plane: less, and it lies on it
+TURN = np.linspace(-np.pi, np.pi, 128, endpoint=False)[None] + 0.0123  # rad, where laws of angles are looked at
+
+
+def check_gears(groups: Sequence[Group], names: Sequence[Sequence[str]]) -> None:
+    """Raise MechanismError unless what carries gears and turns cams was found, and ropes are as long as can be.
+
+    Parameters
+    ----------
+    groups : sequence of Group
+        Of joints and drivers.
+    names : sequence of sequence of str
+        Of the elements of each, with their kinds before them.
+    """
+    check_ropes(groups, names)
+    for group, members in zip(groups, names, strict=True):
+        if isinstance(group.element, Cam):
+            _check_cams(group.element, members)
+        if is_toothed(group.element) and group.element.arm is None:
+            message = (
+                "no body carries both gears: pin each gear at its center, by a revolute joint with the same point, to "
+                "one body, such as a carrier or the ground, so that the centers keep their distance"
+            )
+            raise MechanismError(message, name=f"{members[0]}.points")
+        if isinstance(group.element, planar.Belt) and group.element.arm is None:
+            _check_belts(group.element, members)
+        if isinstance(group.element, spatial.Gear) and None in (group.element.held_i, group.element.held_j):
+            slot = 0 if group.element.held_i is None else 1
+            message = (
+                f"the {('first', 'second')[slot]} gear does not turn about this axis in the frame, the third body: "
+                "hinge it there, or to a body that turns about the same axis, by joints that have the axis"
+            )
+            raise MechanismError(message, name=f"{members[0]}.axes")
+        if isinstance(group.element, spatial.Gear) and not isinstance(group.element.whole, Tracer):
+            odd = np.flatnonzero(np.isnan(group.element.whole))
+            if odd.size:
+                message = (
+                    f"must be one of whole numbers up to {LARGEST_WHOLE}, such as teeth, as attitudes tell angles up "
+                    "to whole turns only: write it as 22/37"
+                )
+                value = float(np.asarray(group.element.ratio).ravel()[odd[0]])
+                raise MechanismError(message, name=f"{members[odd[0]]}.ratio", value=value)
+
+
+def _check_belts(belts: planar.Belt, names: Sequence[str]) -> None:
+    """Raise MechanismError where belts cannot count the turns of their lines of centers."""
+    if isinstance(belts.ratio, Tracer):
+        return
+    differences = np.abs(1.0 - np.asarray(belts.ratio)).ravel()
+    odd = np.flatnonzero((differences > 0) & (differences < LEAST_DIFFERENCE))
+    if odd.size:
+        message = (
+            "radii that are nearly the same need one body that carries both pulleys, which counts the turns of the "
+            "line of centers: pin both to it, or make the radii equal"
+        )
+        values = [float(np.asarray(x).ravel()[odd[0]]) for x in (belts.radius_i, belts.radius_j)]
+        raise MechanismError(message, name=f"{names[odd[0]]}.radii", value=values)
+
+
+def _check_cams(cams: Cam, names: Sequence[str]) -> None:
+    """Raise MechanismError where an angle in space is that of no hinge, or a law of one depends on its whole turns."""
+    for field, part in (("bodies", cams.follower), ("motion.of", cams.leader)):
+        if turns_in_space(part) and part.datum is None:
+            message = (
+                "the body does not turn about this axis: an angle in space leads or follows a cam where both bodies "
+                "are hinged about the axis, by joints that have it"
+            )
+            raise MechanismError(message, name=f"{names[0]}.{field}")
+    if not turns_in_space(cams.leader) or any(isinstance(x, Tracer) for x in jax.tree.leaves(cams.motion)):
+        return
+    once, again = (np.asarray(cams.motion(Jet([TURN + k * WHOLE_TURN])).coefficients[0]) for k in (0, 1))
+    rise = np.broadcast_to(again - once, (len(names), TURN.shape[-1]))
+    if turns_in_space(cams.follower):
+        rise = rise - WHOLE_TURN * np.round(rise / WHOLE_TURN)
+    size = np.abs(np.broadcast_to(once, rise.shape)).max(axis=-1) + 1e-300
+    odd = np.flatnonzero(~(np.abs(rise).max(axis=-1) <= WHOLE * size))
+    if odd.size:
+        message = (
+            "must come back after a whole turn of its leader, as beyond: repeat does, since attitudes tell angles in "
+            "space up to whole turns only"
+        )
+        if turns_in_space(cams.follower):
+            message += "; an angle that follows may have gone whole turns"
+        raise MechanismError(message, name=f"{names[int(odd[0])]}.motion")
+
+
+def check_wheels(groups: Sequence[Group], names: Sequence[Sequence[str]], guess: Mapping[str, Any]) -> None:
+    """Raise MechanismError where a wheel lies flat on its plane, or behind one of the ground, at the guess.
+
+    Parameters
+    ----------
+    groups : sequence of Group
+        Of joints and drivers.
+    names : sequence of sequence of str
+        Of the elements of each, with their kinds before them.
+    guess : dict of str to array
+        Coordinates of all bodies, the ground first, (..., bodies, 1).
+    """
+    for group, members in zip(groups, names, strict=True):
+        wheel = group.element
+        if not isinstance(wheel, spatial.Wheel):
+            continue
+        plane, own = (guess["quaternion"][:, list(bodies)] for bodies in group.bodies)
+        on_plane, center = (
+            guess["position"][:, list(bodies)] + turned(attitude, np.asarray(point))
+            for bodies, attitude, point in zip(group.bodies, (plane, own), (wheel.point_i, wheel.point_j), strict=True)
+        )
+        normal, axis = turned(plane, np.asarray(wheel.normal_i)), turned(own, np.asarray(wheel.axis_j))
+        sizes = np.linalg.norm(normal, axis=0) * np.linalg.norm(axis, axis=0)
+        flat = np.linalg.norm(np.cross(normal, axis, axis=0), axis=0) <= FLAT * sizes
+        height = ((center - on_plane) * normal).sum(axis=0) / np.linalg.norm(normal, axis=0)
+        for k, name in enumerate(members[: group.instances]):  # others name further rows of the same
+            if flat[k, 0]:
+                message = "the wheel lies flat on its plane, where no point of its rim touches alone: tilt the body"
+                raise MechanismError(message, name=f"{name}.axis")
+            if height[k, 0] < 0 and not group.bodies[0][k]:  # on the ground, which stands where it is
+                message = (
+                    f"the center of the wheel is {-height[k, 0]:.4g} m behind its plane at the starting guess, and "
+                    "the normal leads from the plane to the wheel: reverse it, or guess the body on its side"
+                )
+                raise MechanismError(message, name=f"{name}.plane.normal")
+
+
+def check_ratios(groups: Sequence[Group], names: Sequence[Sequence[str]]) -> None:
+    """Raise UnsupportedError if JAX differentiates by a ratio of turns in space: whole turns are not known to it."""
+    for group, members in zip(groups, names, strict=True):
+        if isinstance(group.element, spatial.Gear) and isinstance(group.element.ratio, Tracer):
+            message = "a ratio of turns in space is not differentiated, as whole turns go with it; vary it instead"
+            raise UnsupportedError(message, name=f"{members[0]}.ratio")

@@ -1,0 +1,354 @@
+"""What carries gears: the body that both centers are pinned to, the axes of shafts in the frame that they turn in.
+
+Centers of toothed gears, and of the pulleys of most belts, keep their distance where one body has both. It is found by
+the pins: a center stands on every body that is pinned there. So is the axis of a shaft in the frame m, by the joints
+that hold directions parallel. Where JAX traces values, points and directions are the same that are given by the same
+numbers or expressions.
+"""
+
+import dataclasses
+import math
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, NamedTuple
+
+import jax.numpy as jnp
+import numpy as np
+from jax.core import Tracer
+
+from jounce.base.modules import with_fields
+from jounce.constraints import planar, spatial
+from jounce.constraints.angles import Datum, coaxial
+from jounce.constraints.cams import Cam, turns_in_space
+from jounce.constraints.facts import PAIRS, facts_of
+from jounce.constraints.ropes import Rope, distinct, shares_points
+from jounce.errors import JounceError, MechanismError
+from jounce.mechanism.mechanism import GROUND, Mechanism
+from jounce.mechanism.resolve import along_instances, resolve
+from jounce.mechanism.system import POSITION_COMPONENTS, Group, group_elements, holding
+from jounce.mechanism.transmissions.rope_lengths import check_ropes
+
+LARGEST_GAP = 1e-6  # of the distance of centers, as written numbers are rounded
+SAME_DIRECTION = 1e-9  # largest sine
+LARGEST_WHOLE = 1000  # of the whole numbers in a ratio of turns in space
+WHOLE = 1e-9  # how near to a whole number a multiple of a ratio is
+
+
+class BodyVector(NamedTuple):
+    """A point or a direction of a body: its components, and as they were given."""
+
+    body: str
+    value: tuple[Any, ...]
+    given: tuple[Any, ...]
+
+
+Grouped = tuple[tuple[Group, ...], tuple[tuple[str, ...], ...]]
+"""Groups, and the names of the elements of each, with their kinds before them."""
+Joined = Sequence[tuple[BodyVector, BodyVector]]
+"""Pairs of places that a joint holds together."""
+
+
+class Arm(NamedTuple):
+    """The body that has the centers of two gears, and the angle of the line between them in its frame, rad."""
+
+    body: str
+    angle: Any
+
+
+def is_toothed(element: Any) -> bool:
+    """Tell whether an element is a pair of planar gears with teeth."""
+    return isinstance(element, planar.Gear) and element.ratio is None
+
+
+def on_line(element: Any) -> bool:
+    """Tell whether an element turns planar bodies relative to the line of their centers: teeth, or a belt."""
+    return is_toothed(element) or isinstance(element, planar.Belt)
+
+
+def grouped_with_frames(mechanism: Mechanism, elements: Mapping[str, Any]) -> Grouped:
+    """Return the groups of some elements of a mechanism, by name with their kinds; gears with what carries them."""
+    index = {name: k for k, name in enumerate((GROUND, *mechanism.bodies))}
+    arms = _find_arms(mechanism, elements)
+    given = _with_arms(_with_slots(elements), arms)
+    groups, names = group_elements(given, mechanism.parameter_values, index, POSITION_COMPONENTS[mechanism.space])
+    named_groups = zip(groups, names, strict=True)
+    return tuple(_with_carriers(group, members, arms, mechanism, elements) for group, members in named_groups), names
+
+
+def check_distances(mechanism: Mechanism) -> None:
+    """Raise MechanismError where centers of gears are not as far apart as their radii say, or those of pulleys are
+    nearer, and where a rope is longer or shorter than it can be.
+    """
+    joints = {f"joints.{name}": joint for name, joint in mechanism.joints.items()}
+    if any(isinstance(joint, Rope) for joint in joints.values()):
+        check_ropes(*grouped_with_frames(mechanism, joints))
+    _find_arms(mechanism, joints)
+
+
+def carriers(mechanism: Mechanism) -> set[str]:
+    """Return the bodies that carry gears with teeth, or both pulleys of a belt; the ground may be among them."""
+    return {arm.body for arm in _find_arms(mechanism, mechanism.joints).values()}
+
+
+def _find_arms(mechanism: Mechanism, elements: Mapping[str, Any]) -> dict[str, Arm]:
+    """Return what carries the toothed gears and the belts among some elements, by their names; none that is not found.
+
+    Raises
+    ------
+    MechanismError
+        If the centers are not as far apart as the pitch radii say, or those of pulleys nearer.
+    """
+    toothed = {name: element for name, element in elements.items() if on_line(element)}
+    if not toothed:
+        return {}
+    pins = _joined_vectors(mechanism, _pinned)
+    arms = {name: _find_arm(name, element, mechanism.parameter_values, pins) for name, element in toothed.items()}
+    return {name: arm for name, arm in arms.items() if arm is not None}
+
+
+def _find_arm(name: str, gear: planar.Gear | planar.Belt, parameters: Mapping[str, Any], pins: Joined) -> Arm | None:
+    try:
+        radii = [resolve(radius, parameters) for radius in (gear.radius_i, gear.radius_j)]
+        points = [
+            _body_vector(body, p, parameters) for body, p in zip(gear.bodies, (gear.point_i, gear.point_j), strict=True)
+        ]
+    except JounceError:
+        return None  # which is told where all values of the gear are
+    plain = not any(isinstance(radius, Tracer) for radius in radii)
+    if plain and not all(math.isfinite(radius) and radius for radius in radii):
+        return None
+    size = sum(abs(radius) for radius in radii) if plain else 1.0
+
+    def same(a: Any, b: Any) -> bool:
+        return abs(a - b) <= LARGEST_GAP * size
+
+    def coincide(a: BodyVector, b: BodyVector) -> bool:
+        pairs = zip(a.value, b.value, a.given, b.given, strict=True)
+        return all(_same(x, y, of_x, of_y, same) for x, y, of_x, of_y in pairs)
+
+    first, second = (_on_joined_bodies(point, pins, coincide) for point in points)
+    shared = [body for body in first if body in second and body not in gear.bodies]
+    if not shared:
+        return None
+    body = GROUND if GROUND in shared else shared[0]
+    line = [b - a for a, b in zip(first[body].value, second[body].value, strict=True)]
+    if plain and not any(isinstance(x, Tracer) for x in line):
+        check = _check_gap if is_toothed(gear) else _check_overlap
+        check(name, body, math.hypot(*line), [float(radius) for radius in radii])
+        return Arm(body, math.atan2(line[1], line[0]))
+    center_distance = jnp.abs(
+        radii[0] + radii[1]
+    )  # of a design that JAX traces: it fails where there is a gap, or an overlap
+    gap = jnp.hypot(*line) - center_distance
+    meshes = jnp.abs(gap) <= LARGEST_GAP * center_distance if is_toothed(gear) else gap > 0
+    return Arm(body, jnp.where(meshes, jnp.arctan2(line[1], line[0]), jnp.nan))
+
+
+def _check_gap(name: str, body: str, distance: float, radii: Sequence[float]) -> None:
+    """Raise MechanismError unless centers are as far apart on a body as pitch radii say."""
+    center_distance = abs(sum(radii))
+    if radii[0] < 0 and radii[1] < 0:
+        raise MechanismError("one gear at most is a ring, of a radius below zero", name=f"{name}.radii", value=radii)
+    if center_distance <= LARGEST_GAP * max(map(abs, radii)) or min(radii) < 0 < sum(radii):
+        message = "a ring is larger than the gear in it, or they do not turn against each other"
+        raise MechanismError(message, name=f"{name}.radii", value=radii)
+    if not abs(distance - center_distance) <= LARGEST_GAP * center_distance:
+        kind = "of a ring less that of the gear in it" if min(radii) < 0 else "together"
+        message = (
+            f"the centers are {distance:.9g} m apart on '{body}', and the pitch radii {kind} are "
+            f"{center_distance:.9g} m, a gap of {distance - center_distance:.3g} m: move a center, or change a radius "
+            "(a ring has one below zero)"
+        )
+        raise MechanismError(message, name=f"{name}.radii", value=radii)
+
+
+def _check_overlap(name: str, body: str, distance: float, radii: Sequence[float]) -> None:
+    """Raise MechanismError unless pulleys on a body have room for each other."""
+    if not distance > sum(radii):
+        message = (
+            f"the centers are {distance:.9g} m apart on '{body}', and the pulleys overlap below {sum(radii):.9g} m, "
+            "the sum of the radii: move a center, or change a radius"
+        )
+        raise MechanismError(message, name=f"{name}.radii", value=radii)
+
+
+def _with_slots(elements: Mapping[str, Any]) -> dict[str, Any]:
+    """Return elements of which ropes with several points on a body have it once."""
+    changed = dict(elements)
+    for name, element in elements.items():
+        if shares_points(element):
+            bodies, slots = distinct(element.bodies)
+            changed[name] = unchecked_copy(element, bodies=bodies, slots=slots)
+    return changed
+
+
+def _with_arms(elements: Mapping[str, Any], arms: Mapping[str, Arm]) -> dict[str, Any]:
+    """Return elements of which gears with teeth and belts have a third body, that carries them."""
+    changed = dict(elements)
+    for name, arm in arms.items():
+        changed[name] = unchecked_copy(changed[name], bodies=(*changed[name].bodies, arm.body))
+    return changed
+
+
+def unchecked_copy(element: Any, **changed: Any) -> Any:
+    """Return an element with other values in some fields, which are not checked."""
+    copy = object.__new__(type(element))
+    for field in dataclasses.fields(element):
+        object.__setattr__(copy, field.name, changed.get(field.name, getattr(element, field.name)))
+    return copy
+
+
+def _with_carriers(
+    group: Group, members: Sequence[str], arms: Mapping[str, Arm], mechanism: Mechanism, elements: Mapping[str, Any]
+) -> Group:
+    """Return a group of gears with what is found of what carries them; others as they are."""
+    if on_line(group.element) and all(name in arms for name in members):
+        return holding(group, "arm", along_instances(*(_number(arms[name].angle) for name in members)))
+    if shares_points(elements[members[0]]):
+        return holding(group, "slots", distinct(elements[members[0]].bodies)[1])
+    if isinstance(group.element, spatial.Gear):
+        return _on_frames(group, [elements[name] for name in members], mechanism)
+    if isinstance(group.element, Cam):
+        return _on_hinges(group, [elements[name] for name in members], mechanism)
+    return group
+
+
+def _number(value: Any) -> Any:
+    return value if isinstance(value, Tracer) else np.float64(value)
+
+
+def _on_frames(group: Group, gears: Sequence[spatial.Gear], mechanism: Mechanism) -> Group:
+    """Return shafts with the axes that they turn about in their frames, where these are found, and whole turns."""
+    hinges, parameters = _joined_vectors(mechanism, _held_parallel), mechanism.parameter_values
+    for slot, field in enumerate(("held_i", "held_j")):
+        data = []
+        for gear in gears:
+            axis = _body_vector(gear.bodies[slot], (gear.axis_i, gear.axis_j)[slot], parameters)
+            there = _on_joined_bodies(axis, hinges, _parallel).get(gear.bodies[2])
+            if there is None:
+                break
+            data.append((_vector(axis.value), _vector(there.value)))
+        if len(data) == len(gears):
+            axis, there = (along_instances(*vectors) for vectors in zip(*data, strict=True))
+            group = holding(group, field, _coaxial(axis, there))
+    return holding(group, "whole", _whole_multiples(group.element.ratio))
+
+
+def _on_hinges(group: Group, cams: Sequence[Cam], mechanism: Mechanism) -> Group:
+    """Return cams of which the parts that are angles in space know the axis on both bodies, where it is found."""
+    hinges = None
+    for field in ("follower", "leader"):
+        if not turns_in_space(getattr(group.element, field)):
+            continue
+        hinges = _joined_vectors(mechanism, _held_parallel) if hinges is None else hinges
+        parts = [getattr(cam, field) for cam in cams]
+        axes = [_body_vector(part.bodies[0], part.axis_i, mechanism.parameter_values) for part in parts]
+        found = [
+            _on_joined_bodies(axis, hinges, _parallel).get(part.bodies[1])
+            for axis, part in zip(axes, parts, strict=True)
+        ]
+        if any(there is None for there in found):
+            continue
+        first, second = (along_instances(*(_vector(x.value) for x in its if x)) for its in (axes, found))
+        part, datum = getattr(group.element, field), _coaxial(first, second)
+        if part.vector_j is not None:  # what of it is along the axis turns nothing
+            datum = with_fields(datum, across=_across(part.vector_j, second))
+        group = holding(group, field, with_fields(part, datum=datum))
+    return group
+
+
+def _across(vector: Any, axis: Any) -> Any:
+    unit = axis / ((axis * axis).sum(axis=0) ** 0.5)
+    return vector - (vector * unit).sum(axis=0) * unit
+
+
+def _coaxial(axis: Any, there: Any) -> Datum:
+    datum = coaxial(axis, there)
+    if any(isinstance(x, Tracer) for x in (axis, there)):
+        return datum
+    return Datum(*(np.asarray(x) for x in (datum.attitude, datum.angle, datum.near)))
+
+
+def _whole_multiples(ratio: Any) -> Any:
+    """Return the smallest whole numbers, (instances, 1), by which ratios become whole; NaN where there are none."""
+    namespace = jnp if isinstance(ratio, Tracer) else np
+    counts = np.arange(1.0, LARGEST_WHOLE + 1)
+    products = ratio[..., None] * counts
+    fits = namespace.abs(products - namespace.round(products)) <= WHOLE * namespace.maximum(
+        1.0, namespace.abs(products)
+    )
+    return namespace.where(fits.any(axis=-1), 1.0 + namespace.argmax(fits, axis=-1), np.nan)
+
+
+def _joined_vectors(
+    mechanism: Mechanism, pairs_of: Callable[[Any], Sequence[tuple[str, str]]]
+) -> list[tuple[BodyVector, BodyVector]]:
+    """Return the places that joints hold together, by the pairs of fields that say so."""
+    pairs = []
+    for joint in mechanism.joints.values():
+        for names in pairs_of(joint):
+            try:
+                first, second = (
+                    _body_vector(body, getattr(joint, name), mechanism.parameter_values)
+                    for body, name in zip(joint.bodies, names, strict=False)
+                )
+            except JounceError:
+                continue
+            pairs.append((first, second))
+    return pairs
+
+
+def _pinned(joint: Any) -> list[tuple[str, str]]:
+    facts = facts_of(type(joint))
+    return [("point_i", "point_j")] if facts.pair == "revolute" and PAIRS["revolute"] else []
+
+
+def _held_parallel(joint: Any) -> Sequence[tuple[str, str]]:
+    return facts_of(type(joint)).held_parallel
+
+
+def _body_vector(body: str, given: Any, parameters: Mapping[str, Any]) -> BodyVector:
+    entries = tuple(given.tolist() if isinstance(given, np.ndarray) else given)
+    return BodyVector(body, tuple(resolve(entry, parameters) for entry in entries), entries)
+
+
+def _same(a: Any, b: Any, given_a: Any, given_b: Any, near: Callable[[Any, Any], bool]) -> bool:
+    """Tell whether components are the same; what JAX traces is compared as it was given."""
+    if isinstance(a, Tracer) or isinstance(b, Tracer):
+        traced = isinstance(given_a, Tracer) or isinstance(given_b, Tracer)
+        return a is b or (not traced and bool(given_a == given_b))
+    return bool(near(a, b))
+
+
+def _parallel(a: BodyVector, b: BodyVector) -> int:
+    """Return 1 for the same direction, -1 for the opposite one, else 0."""
+    if any(isinstance(x, Tracer) for x in (*a.value, *b.value)):
+        pairs = zip(a.value, b.value, a.given, b.given, strict=True)
+        return int(all(_same(x, y, of_x, of_y, lambda p, q: p == q) for x, y, of_x, of_y in pairs))
+    u, v = (np.asarray(x.value, float) / (np.linalg.norm(x.value) or 1.0) for x in (a, b))
+    return int(np.sign(u @ v)) if np.linalg.norm(np.cross(u, v)) <= SAME_DIRECTION else 0
+
+
+def _on_joined_bodies(
+    start: BodyVector, joined: Joined, alike: Callable[[BodyVector, BodyVector], int | bool]
+) -> dict[str, BodyVector]:
+    """Return where a place is on each body that joints hold to it, one after the other."""
+    reached, waiting = {start.body: start}, [start]
+    while waiting:
+        here = waiting.pop(0)
+        for pair in joined:
+            for near, far in (pair, pair[::-1]):
+                if near.body != here.body or far.body in reached:
+                    continue
+                if sign := int(alike(here, near)):
+                    there = far if sign > 0 else BodyVector(far.body, tuple(-x for x in far.value), far.given)
+                    reached[far.body] = there
+                    waiting.append(there)
+    return reached
+
+
+def _vector(value: tuple[Any, ...]) -> Any:
+    return (
+        jnp.stack([jnp.asarray(x, float) for x in value])
+        if any(isinstance(x, Tracer) for x in value)
+        else np.array(value, float)
+    )

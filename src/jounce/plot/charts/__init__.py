@@ -1,0 +1,1 @@
+"""Charts: curves over time, bands, limits, phase portraits, cams."""

@@ -1,0 +1,1 @@
+"""Drawings of machines: bodies, symbols of joints and drivers, gears, curves, names."""

@@ -1,0 +1,229 @@
+"""A drawing of a mechanism: bodies at many instants, seen from one side, as flat shapes that move."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float
+
+from jounce.mechanism.mechanism import GROUND
+from jounce.plot.drawings.frames import Frame, points_at, within
+from jounce.plot.drawings.geometry import Point, Skeleton, Symbol, frame_along
+from jounce.plot.style import BODY_COLORS
+
+__all__ = ["Drawing", "Flat", "Label", "Shape", "View", "screen_of", "tinted"]
+
+Flat = Float[np.ndarray, "time 2"]
+"""A place or a vector in the plane of the drawing, as it moves."""
+Curve = Float[np.ndarray, "time points 2"]
+View = tuple[float, float]
+"""Azimuth and elevation of the viewer of a spatial mechanism, degrees."""
+VIEW: View = (-60.0, 25.0)
+UNIT = 0.021  # half a pin, in diagonals of what is drawn
+INK = "#222222"
+BARS, PLATES, GUIDES, WHEELS, SYMBOLS, MARKS = 4, 3, 2, 1, 6, 7  # layers
+
+
+@dataclass(frozen=True)
+class Shape:
+    """A line, an area or a disc that moves.
+
+    Parameters
+    ----------
+    kind : str
+        ``line``, ``area`` (closed) or ``disc`` (one point and a radius).
+    points : numpy.ndarray of shape (time, points, 2)
+        In the plane of the drawing, m.
+    stroke, fill : str
+        Colors; empty where there is none.
+    width : float
+        Of the line, in points of print.
+    dashes : tuple of float
+        Lengths of strokes and gaps, in widths; a full line when empty.
+    layer : int
+        Higher ones hide lower ones.
+    radius : float
+        Of a disc, m.
+    owner : str
+        The body or element that it shows, with its kind: ``bodies.crank``.
+    """
+
+    kind: str
+    points: Curve
+    stroke: str = INK
+    fill: str = ""
+    width: float = 1.0
+    dashes: tuple[float, ...] = ()
+    layer: int = SYMBOLS
+    radius: float = 0.0
+    owner: str = ""
+
+
+@dataclass(frozen=True)
+class Label:
+    """A name and the place it belongs to, (time, 2) m."""
+
+    text: str
+    anchor: Flat
+    color: str
+    owner: str
+
+
+def screen_of(view: View) -> Float[np.ndarray, "3 3"]:
+    """Return unit vectors to the right, upward and toward a viewer, in rows, from azimuth and elevation in degrees.
+
+    Examples
+    --------
+    >>> screen_of((-90.0, 0.0)).round(12).tolist()  # from the front: x to the right, z upward
+    [[1.0, 0.0, 0.0], [-0.0, 0.0, 1.0], [0.0, -1.0, 0.0]]
+    """
+    azimuth, elevation = np.radians(view)
+    sa, ca, se, ce = np.sin(azimuth), np.cos(azimuth), np.sin(elevation), np.cos(elevation)
+    return np.array([[-sa, ca, 0.0], [-se * ca, -se * sa, ce], [ce * ca, ce * sa, se]])
+
+
+@dataclass
+class Drawing:
+    """Bodies at many instants, seen from one side, and the shapes and names that are drawn of them.
+
+    Parameters
+    ----------
+    skeleton : Skeleton
+        What the mechanism looks like.
+    frames : dict of str to numpy.ndarray
+        Of each body, (time, components, 1 + components).
+    view : tuple of float
+        Azimuth and elevation of the viewer, degrees; of no account in the plane.
+
+    Attributes
+    ----------
+    shapes, labels : list
+        What was drawn.
+    supports : list of numpy.ndarray
+        Where stands are.
+    owner : str
+        What is being drawn, unless a shape tells otherwise.
+    """
+
+    skeleton: Skeleton
+    frames: dict[str, Frame]
+    view: View = VIEW
+    shapes: list[Shape] = field(default_factory=list)
+    labels: list[Label] = field(default_factory=list)
+    supports: list[Flat] = field(default_factory=list)
+    owner: str = ""
+
+    @cached_property
+    def planar(self) -> bool:
+        """Whether the mechanism is planar."""
+        return self.frames[GROUND].shape[1] == 2
+
+    @cached_property
+    def screen(self) -> np.ndarray:
+        """Unit vectors to the right, upward and toward the viewer, in rows."""
+        return screen_of(self.view)
+
+    @cached_property
+    def colors(self) -> dict[str, str]:
+        """Color of each moving body."""
+        moving = [body for body in self.skeleton.links if body != GROUND]
+        return {body: BODY_COLORS[k % len(BODY_COLORS)] for k, body in enumerate(moving)}
+
+    @cached_property
+    def unit(self) -> float:
+        """Half a pin, m: a share of what all links ever cover, but no more than fits the links."""
+        points = [self.flat(self.at(link.body, link.points)).reshape(-1, 2) for link in self.skeleton.links.values()]
+        for wheel in self.skeleton.wheels:
+            center = self.flat(self.at(wheel.body, wheel.center))
+            points += [center - wheel.radius, center + wheel.radius]
+        everywhere = np.concatenate(points)
+        everywhere = everywhere[np.isfinite(everywhere).all(axis=1)]
+        extent = np.linalg.norm(np.ptp(everywhere, axis=0)) if len(everywhere) else 0.0
+        return UNIT * float(extent or self.skeleton.size)
+
+    def at(
+        self, body: str, points: Float[np.ndarray, "*points components"]
+    ) -> Float[np.ndarray, "time *points components"]:
+        """Return points of a body, (..., components), in the global frame."""
+        return points_at(self.frames[body], points)
+
+    def toward(self, body: str, vector: Point) -> Float[np.ndarray, "time components"]:
+        """Return a unit vector along a vector of a body, in the global frame."""
+        turned = self.at(body, vector) - self.frames[body][:, :, 0]
+        return turned / np.linalg.norm(turned, axis=-1, keepdims=True)
+
+    def within(self, body: str, points: Float[np.ndarray, "time components"]) -> Float[np.ndarray, "time components"]:
+        """Return global points in the frame of a body."""
+        return within(self.frames[body], points)
+
+    def flat(self, points: np.ndarray) -> np.ndarray:
+        """Return points or vectors, (..., components), as they are seen, (..., 2)."""
+        return points if self.planar else points @ self.screen[:2].T
+
+    def depth(self, vectors: np.ndarray) -> np.ndarray:
+        """Return how far vectors, (..., 3), point toward the viewer, (...)."""
+        return vectors @ self.screen[2]
+
+    def frame_along(self, body: str, axis: Float[np.ndarray, "3"]) -> Float[np.ndarray, "time 3 3"]:
+        """Return three global unit vectors, in rows, of which the first is along an axis of a body."""
+        return np.stack([self.toward(body, unit) for unit in frame_along(axis)], axis=1)
+
+    def global_point(self, symbol: Symbol, slot: int | None = None) -> Float[np.ndarray, "time components"]:
+        """Return the point of a symbol on one of its bodies, a moving one by default, in the global frame."""
+        slot = symbol.moving_slot if slot is None else slot
+        return self.at(symbol.bodies[slot], symbol.points[slot])
+
+    def point(self, symbol: Symbol, slot: int | None = None) -> Flat:
+        """Return the point of a symbol on one of its bodies as it is seen."""
+        return self.flat(self.global_point(symbol, slot))
+
+    def ends(self, symbol: Symbol) -> tuple[Flat, Flat]:
+        """Return the points of a symbol on its first two bodies as they are seen."""
+        return self.point(symbol, 0), self.point(symbol, 1)
+
+    def line(self, *points: np.ndarray, **look: Any) -> None:
+        """Draw a line through points, each (time, 2) or constant, (2,)."""
+        self._add("line", self._joined(points), look)
+
+    def area(self, *points: np.ndarray, **look: Any) -> None:
+        """Draw a closed outline."""
+        self._add("area", self._joined(points), look)
+
+    def curve(self, points: Curve, *, closed: bool = False, **look: Any) -> None:
+        """Draw a line through points."""
+        self._add("area" if closed else "line", points, look)
+
+    def disc(self, center: Flat, radius: float, **look: Any) -> None:
+        """Draw a disc around a place."""
+        self._add("disc", center[:, None], {"radius": float(radius), **look})
+
+    def name(self, text: str, anchor: Flat, color: str) -> None:
+        """Write a name near a place."""
+        self.labels.append(Label(text, anchor, color, self.owner))
+
+    def move_name(self, owner: str, anchor: Flat) -> None:
+        """Write a name near another place."""
+        self.labels = [replace(label, anchor=anchor) if label.owner == owner else label for label in self.labels]
+
+    def _joined(self, points: Sequence[np.ndarray]) -> Curve:
+        count = len(self.frames[GROUND])
+        return np.stack([np.broadcast_to(point, (count, 2)) for point in points], axis=1)
+
+    def _add(self, kind: str, points: Curve, look: dict[str, Any]) -> None:
+        self.shapes.append(Shape(kind, points, **{"owner": self.owner, **look}))
+
+
+def tinted(color: str, share: float = 0.2) -> str:
+    """Return a color mixed with white.
+
+    Examples
+    --------
+    >>> tinted("#0072B2"), tinted("#000000", 0.5)
+    ('#cce3f0', '#808080')
+    """
+    parts = [int(color[k : k + 2], 16) for k in (1, 3, 5)]
+    return "#" + "".join(f"{round(255 - share * (255 - part)):02x}" for part in parts)

@@ -1,0 +1,89 @@
+"""Symbols of drivers and forces: arrows, cylinders, springs."""
+
+from __future__ import annotations
+
+import numpy as np
+from jaxtyping import Float
+
+from jounce.mechanism.mechanism import GROUND
+from jounce.plot.drawings.drawing import INK, MARKS, SYMBOLS, Drawing, Flat
+from jounce.plot.drawings.geometry import Symbol
+from jounce.plot.drawings.symbol_parts import PAPER, actuator, ball, normal_of, pin, spring, stand, turn, unit_vector
+
+__all__ = ["DRIVERS_AND_FORCES"]
+
+HINGES = ("revolute", "cylindrical", "universal", "screw", "spherical", "slot", "prismatic")  # that have one place
+
+
+def _spring(drawing: Drawing, symbol: Symbol) -> None:
+    stand(drawing, symbol)
+    ends = drawing.ends(symbol)
+    spring(drawing, *ends)
+    for end in ends:
+        drawing.disc(end, 0.4 * drawing.unit, fill=PAPER, width=1.0, layer=SYMBOLS)
+
+
+def _cylinder_and_rod(drawing: Drawing, symbol: Symbol) -> None:
+    stand(drawing, symbol)
+    ends = drawing.ends(symbol)
+    actuator(drawing, *ends)
+    for end in ends:
+        (pin if drawing.planar else ball)(drawing, end)
+
+
+def _sliding(drawing: Drawing, symbol: Symbol) -> None:
+    """Draw a double arrow along the direction in which a point is driven, beside it."""
+    if symbol.kind == "coordinate" and symbol.axes[0] is None:
+        _turning(drawing, symbol)
+        return
+    body = GROUND if symbol.kind == "coordinate" else symbol.bodies[0]
+    along = drawing.flat(drawing.toward(body, symbol.axis_on(0)))
+    u, side = drawing.unit, normal_of(unit_vector(along))
+    point = drawing.point(symbol, 1) + 2.0 * u * side
+    drawing.line(point - 2.4 * u * along, point + 2.4 * u * along, width=1.3, layer=MARKS)
+    for sign in (-1.0, 1.0):
+        tip = point + sign * 3.4 * u * along
+        back = point + sign * 2.2 * u * along
+        drawing.area(tip, back + 0.55 * u * side, back - 0.55 * u * side, fill=INK, width=0.4, layer=MARKS)
+
+
+def _turning(drawing: Drawing, symbol: Symbol) -> None:
+    """Draw an arrow, or a spring, about the axis of a turn, at the joint of its bodies where they have one."""
+    turn(drawing, *_pivot(drawing, symbol), spiral=symbol.kind == "spiral")
+
+
+def _pivot(drawing: Drawing, symbol: Symbol) -> tuple[Flat, Float[np.ndarray, "time 2 2"]]:
+    """Return the place about which two bodies turn, and two flat vectors across the axis there."""
+    hinges = [s for s in drawing.skeleton.symbols if s.kind in HINGES]
+    between = set(symbol.bodies)
+    shared = [s for s in hinges if between - {GROUND} <= set(s.bodies) and between <= {*s.bodies[:2], GROUND}]
+    shared = shared or [s for s in hinges if symbol.bodies[-1] in s.bodies]
+    body = next(body for body in reversed(symbol.bodies) if body != GROUND)
+    if shared:
+        center = drawing.point(shared[0], shared[0].bodies.index(body) if body in shared[0].bodies else None)
+    else:
+        center = drawing.flat(drawing.at(body, drawing.skeleton.links[body].points[0]))
+    if drawing.planar:
+        return center, np.broadcast_to(np.eye(2), (len(center), 2, 2))
+    axis = symbol.axes[0] if symbol.axes[0] is not None else np.array([0.0, 0.0, 1.0])
+    return center, drawing.flat(drawing.frame_along(symbol.bodies[0], axis)[:, 1:])
+
+
+def _point_force(drawing: Drawing, symbol: Symbol) -> None:
+    """Draw a mark where a force acts: its direction changes with time."""
+    point, u = drawing.point(symbol, 0), drawing.unit
+    corners = [point + u * np.array(corner) for corner in ((0.0, 0.9), (0.9, 0.0), (0.0, -0.9), (-0.9, 0.0))]
+    drawing.area(*corners, fill=INK, width=0.6, layer=MARKS)
+
+
+DRIVERS_AND_FORCES = {
+    "coordinate": _sliding,
+    "slide": _sliding,
+    "distance": _cylinder_and_rod,
+    "rotation": _turning,
+    "spring": _spring,
+    "slide spring": _spring,
+    "spiral": _turning,
+    "point force": _point_force,
+    "none": lambda *_: None,
+}

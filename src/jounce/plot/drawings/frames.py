@@ -1,0 +1,108 @@
+"""Where bodies and their points are: in a motion, put together at the start, at the starting guess.
+
+A frame holds the origin of a body, m, and its axes, in columns, at some instants: (time, components, 1 + components).
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping
+from typing import Any
+
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Float
+
+from jounce.execution.compilation import compiled
+from jounce.jet import Jet
+from jounce.jet.algebra import stacked
+from jounce.kinematics import Motion
+from jounce.kinematics.assembly.assemble import assemble
+from jounce.kinematics.curves.choice import chosen
+from jounce.mechanism import Mechanism, build, time_grid, with_output_drivers
+from jounce.mechanism.building.starting_guess import starting_guess
+from jounce.mechanism.mechanism import GROUND
+from jounce.mechanism.system import POSITION_COMPONENTS
+from jounce.rigid import PlanarPose, SpatialPose
+
+__all__ = ["Frame", "assembled", "frames", "guessed", "points_at", "within"]
+
+ASSEMBLY_TOLERANCE = 1e-10  # rad, or sizes of the mechanism
+
+Frame = Float[np.ndarray, "time components columns"]
+"""Origin and axes of a body."""
+
+
+def assembled(mechanism: Mechanism) -> dict[str, Frame]:
+    """Return the frames of all bodies, the ground first, put together near the starting guess at the first instant.
+
+    Degrees of freedom may be left; initial conditions count as drivers.
+
+    Raises
+    ------
+    AssemblyError
+        The bodies cannot be put together.
+
+    Examples
+    --------
+    >>> import jounce as jn
+    >>> from jounce.plot.drawings.frames import assembled
+    >>> assembled(jn.load("examples/four_bar.yaml"))["crank"][0, :, 1].round(6).tolist()  # x axis
+    [0.866025, 0.5]
+    """
+    fixed = with_output_drivers(mechanism)
+    started = dataclasses.replace(fixed, drivers={**fixed.drivers, **fixed.initial}, initial={})
+    first = 0.0
+    if mechanism.time is not None:
+        first = float(time_grid(mechanism.time, mechanism.parameter_values)[0])
+    model, coordinates = assemble(build(chosen(started, first)), first, ASSEMBLY_TOLERANCE, free=True)
+    return _by_body(mechanism, _frames(model.pose_type, coordinates))
+
+
+def guessed(mechanism: Mechanism) -> dict[str, Frame]:
+    """Return the frames of all bodies, the ground first, at the starting guess.
+
+    Examples
+    --------
+    >>> import jounce as jn
+    >>> from jounce.plot.drawings.frames import guessed
+    >>> guessed(jn.load("examples/four_bar.yaml"))["rocker"][0, :, 0].round(6).tolist()  # origin
+    [0.1321, 0.0]
+    """
+    guess = starting_guess(mechanism, mechanism.parameter_values, POSITION_COMPONENTS[mechanism.space])
+    return _by_body(mechanism, _frames(PlanarPose if mechanism.space == "planar" else SpatialPose, guess))
+
+
+def frames(motion: Motion) -> dict[str, Frame]:
+    """Return the frames of all bodies of a motion, the ground first; NaN at instants that were not solved."""
+    if "frames" not in motion.derived:
+        pose_type, coordinates = motion.poses
+        whole = _frames(pose_type, {name: derivatives[0] for name, derivatives in coordinates.items()})
+        motion.derived["frames"] = np.where(np.asarray(motion.status) == 0, whole, np.nan)
+    return _by_body(motion.mechanism, motion.derived["frames"])
+
+
+def _by_body(mechanism: Mechanism, whole: Any) -> dict[str, Frame]:
+    by_time, names = np.moveaxis(np.asarray(whole), -1, 0), (GROUND, *mechanism.rigid_bodies)
+    return {body: by_time[..., k] for k, body in enumerate(names)}
+
+
+@compiled("pose_type")
+def _frames(pose_type: Any, coordinates: Mapping[str, Any]) -> Any:
+    """Return origin and axes of all bodies, shape (components, 1 + components, bodies, time)."""
+    pose = pose_type.from_coordinates({name: Jet((value,)) for name, value in coordinates.items()})
+    columns = [pose.position, *(pose.direction(unit) for unit in np.eye(pose_type.shifts))]
+    return jnp.stack([stacked(column)[0] for column in columns], axis=1)
+
+
+def points_at(
+    frame: Frame, points: Float[np.ndarray, "*points components"]
+) -> Float[np.ndarray, "time *points components"]:
+    """Return points of a body in the global frame."""
+    turned = np.einsum("tck,...k->t...c", frame[:, :, 1:], points)
+    return turned + frame[:, :, 0].reshape(len(frame), *[1] * (points.ndim - 1), -1)
+
+
+def within(frame: Frame, points: Float[np.ndarray, "time components"]) -> Float[np.ndarray, "time components"]:
+    """Return global points in the frame of a body."""
+    return np.einsum("tkc,tk->tc", frame[:, :, 1:], points - frame[:, :, 0])

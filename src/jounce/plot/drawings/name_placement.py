@@ -1,0 +1,188 @@
+"""Names put near what they belong to, where they cover neither each other nor, as far as can be, the drawing."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Sequence
+from itertools import pairwise
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from jounce.plot.drawings.drawing import SYMBOLS, WHEELS, Label
+from jounce.plot.drawings.scene import Scene, outline
+
+__all__ = ["NamePlace", "place_names"]
+
+DIRECTIONS = 16
+DISTANCES = (1.7, 2.6, 3.8, 5.5, 8.0)  # of the nearest edge of a name, in units of the drawing
+LEADER = 3.0  # units, from which on a thin line leads from a name to its place
+SPACING = 4.0  # pixels between the places along a line that a name should not cover
+MOST_INSTANTS = 9  # at which the names of what moves are tried
+COST_OF_DISTANCE, COST_OF_BAR, COST_OF_SYMBOL = 3.0, 1.5, 4.0  # by unit, by place covered on a bar, on a pin or arrow
+COST_OF_OVERLAP, COST_OF_EDGE, COST_OF_STRANGER = 4.0, 5.0, 30.0  # by pixel of area, by pixel outside, if ambiguous
+
+Pixels = Float[np.ndarray, "2"]
+Points = Float[np.ndarray, "points 2"]
+Boxes = Float[np.ndarray, "boxes 4"]
+
+
+@dataclasses.dataclass(frozen=True)
+class NamePlace:
+    """Where a name is, seen from what it belongs to.
+
+    Parameters
+    ----------
+    direction : tuple of float
+        Unit vector from the anchor to the center of the name, upward positive.
+    distance : float
+        From the anchor to the edge of the name, in units of the drawing.
+    led : bool
+        Whether a thin line leads to it: where it is far, or nearer to the anchor of another name at some instant.
+    """
+
+    direction: tuple[float, float]
+    distance: float
+    led: bool
+
+    def offset(self, half: Pixels, unit: float) -> Pixels:
+        """Return the vector from the anchor to the center of the name, pixels, by half its size and the unit."""
+        return _offsets(np.array([self.direction]), np.array([self.distance]), half, unit)[0]
+
+
+def place_names(
+    labels: Sequence[Label],
+    halves: Sequence[Pixels],
+    scene: Scene,
+    to_pixels: Callable[[np.ndarray], np.ndarray],
+    frame: Float[np.ndarray, "4"],
+    taken: Boxes,
+) -> list[NamePlace | None]:
+    """Choose the place of each name, which holds for all instants of a scene.
+
+    Names are placed one after the other, each where the sum of its costs at some instants is least: the distance, the
+    parts of the drawing and the other names that it covers, and anchors of other names that are nearer than its own.
+
+    Parameters
+    ----------
+    labels : sequence of Label
+        What is written.
+    halves : sequence of numpy.ndarray of shape (2,)
+        Half the width and half the height of each name, pixels.
+    scene : Scene
+        What is drawn.
+    to_pixels : callable
+        From places of the scene, (..., 2) m, to pixels, upward positive.
+    frame : numpy.ndarray of shape (4,)
+        Left, lower, right and upper end of the drawing, pixels.
+    taken : numpy.ndarray of shape (boxes, 4)
+        Where other texts are.
+
+    Returns
+    -------
+    list of NamePlace
+        None for a name whose anchor is not known at any instant.
+    """
+    unit = float(np.diff(to_pixels(np.array([[0.0, 0.0], [scene.unit, 0.0]])), axis=0)[0, 0])
+    instants = _spread(max((len(label.anchor) for label in labels), default=1))
+    drawn = [_drawn(scene, instant, to_pixels) for instant in instants.tolist()]
+    anchors = np.array([to_pixels(_at(label.anchor, instants)) for label in labels]).reshape(-1, len(instants), 2)
+    boxes = [taken for _ in instants]
+    places: list[NamePlace | None] = []
+    angle = 2 * np.pi * np.arange(1, DIRECTIONS + 1) / DIRECTIONS
+    directions = np.tile(np.stack([np.cos(angle), np.sin(angle)], axis=1), (len(DISTANCES), 1))
+    distances = np.repeat(DISTANCES, DIRECTIONS)
+    for number, half in enumerate(halves):
+        offsets = _offsets(directions, distances, half, unit)
+        known = [k for k in range(len(instants)) if np.isfinite(anchors[number, k]).all()]
+        if not known:
+            places.append(None)
+            continue
+        cost = COST_OF_DISTANCE * distances
+        for k in known:
+            own, others = anchors[number, k], np.delete(anchors[:, k], number, axis=0)
+            cost = cost + _costs(own, offsets, half, *drawn[k], boxes[k], others, frame) / len(known)
+        best = int(np.argmin(cost))
+        strange = False
+        for k in known:
+            own, center = anchors[number, k], anchors[number, k] + offsets[best]
+            box = np.concatenate([center - half, center + half])
+            boxes[k] = np.vstack([boxes[k], box])
+            strange = strange or bool(_strange(box[None, :2], box[None, 2:], own, anchors[:, k])[0])
+        direction, distance = (float(directions[best, 0]), float(directions[best, 1])), float(distances[best])
+        places.append(NamePlace(direction, distance, distance > LEADER or strange))
+    return places
+
+
+def _spread(count: int) -> Int[np.ndarray, " instants"]:
+    return np.unique(np.linspace(0, count - 1, min(count, MOST_INSTANTS)).round().astype(int))
+
+
+def _at(points: np.ndarray, instants: Int[np.ndarray, " instants"]) -> np.ndarray:
+    return points[np.minimum(instants, len(points) - 1)]
+
+
+def _offsets(
+    directions: Float[np.ndarray, "places 2"], distances: Float[np.ndarray, " places"], half: Pixels, unit: float
+) -> Float[np.ndarray, "places 2"]:
+    """Return vectors from an anchor to centers of a name, so that its edge has a distance from the anchor."""
+    reach = np.minimum((half / np.maximum(np.abs(directions), 1e-9)).min(axis=1), half.max())
+    return directions * (distances * unit + reach)[:, None]
+
+
+def _drawn(
+    scene: Scene, instant: int, to_pixels: Callable[[np.ndarray], np.ndarray]
+) -> tuple[Points, Float[np.ndarray, " points"]]:
+    """Return covered along all lines that are drawn, pixels, and what covering each one costs."""
+    points, costs = [np.zeros((0, 2))], [np.zeros(0)]
+    for shape in scene.shapes:
+        corners = outline(shape, instant)
+        if shape.layer > WHEELS and len(corners) and np.isfinite(corners).all():
+            covered = _along(to_pixels(corners))
+            points.append(covered)
+            costs.append(np.full(len(covered), COST_OF_SYMBOL if shape.layer >= SYMBOLS else COST_OF_BAR))
+    return np.concatenate(points), np.concatenate(costs)
+
+
+def _costs(
+    own: Pixels,
+    offsets: Float[np.ndarray, "places 2"],
+    half: Pixels,
+    drawn: Points,
+    weights: Float[np.ndarray, " points"],
+    boxes: Boxes,
+    others: Points,
+    frame: Float[np.ndarray, "4"],
+) -> Float[np.ndarray, " places"]:
+    """Return what the places of a name cost at one instant, without their distance."""
+    reach = np.abs(offsets).max(axis=0) + half + 2.0
+    near = (np.abs(drawn - own) < reach).all(axis=1)
+    low, high = own + offsets - half, own + offsets + half
+    taken = drawn[near]
+    inside = ((taken > low[:, None] - 1.5) & (taken < high[:, None] + 1.5)).all(axis=2)
+    overlap = np.minimum(high[:, None], boxes[:, 2:]) - np.maximum(low[:, None], boxes[:, :2])
+    clash = np.maximum(0.0, overlap).prod(axis=2).sum(axis=1)
+    outside = (np.maximum(0.0, frame[:2] - low) + np.maximum(0.0, high - frame[2:])).sum(axis=1)
+    covered = inside @ weights[near]
+    strange = COST_OF_STRANGER * _strange(low, high, own, others)
+    return covered + COST_OF_OVERLAP * clash + COST_OF_EDGE * outside + strange
+
+
+def _strange(low: np.ndarray, high: np.ndarray, own: Pixels, anchors: Points) -> Bool[np.ndarray, " places"]:
+    """Tell which boxes are nearer to another anchor than to their own, so that a name could be read as another's."""
+    strangers = anchors[np.linalg.norm(anchors - own, axis=1) > 2.0]  # a joint and its body may have one anchor
+    return np.any(_gap(low, high, strangers) <= _gap(low, high, own[None]) + 1.0, axis=1)
+
+
+def _gap(low: np.ndarray, high: np.ndarray, points: Points) -> Float[np.ndarray, "places points"]:
+    """Return how far points are from boxes, pixels."""
+    return np.linalg.norm(np.maximum(0.0, np.maximum(low[:, None] - points, points - high[:, None])), axis=2)
+
+
+def _along(corners: Points) -> Points:
+    """Return places along a line of corners, no farther apart than some pixels."""
+    parts = [corners[:1]]
+    for first, second in pairwise(corners):
+        count = min(500, 1 + int(np.linalg.norm(second - first) / SPACING))
+        parts.append(first + (second - first) * (np.arange(1, count + 1) / count)[:, None])
+    return np.concatenate(parts)

@@ -1,0 +1,1 @@
+"""Facts about a mechanism: freedom, gears, ropes and belts, ranges."""

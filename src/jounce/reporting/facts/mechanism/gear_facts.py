@@ -1,0 +1,120 @@
+"""How fast the gears of a mechanism turn for a turn of each driver: ratios of trains, from the Jacobian."""
+
+from collections.abc import Sequence
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+from typing_extensions import TypedDict
+
+from jounce.constraints import spatial
+from jounce.constraints.facts import facts_of
+from jounce.mechanism.laws.driver_outputs import is_turning
+from jounce.mechanism.resolve import resolve
+from jounce.mechanism.transmissions.axis_angles import turned
+from jounce.mechanism.transmissions.gear_frames import carriers
+from jounce.reporting.facts.mechanism.freedom_facts import StartingState
+
+LARGEST_TEETH = 1000  # of ratios that are told as fractions
+WHOLE = 1e-9
+STILL = 1e-12
+
+
+class TrainFacts(TypedDict):
+    """Speed of a gear over that of a driver, the other drivers held, and as a fraction where it is one."""
+
+    body: str
+    driver: str
+    ratio: float
+    fraction: str | None
+
+
+def train_facts(state: StartingState) -> list[dict[str, Any]]:
+    """Return the speed ratios of all bodies that mesh, have a belt or carry gears, where put together: TrainFacts.
+
+    In space a speed is the angular velocity along the axis of a gear, or along that of a gear that the body carries.
+
+    Parameters
+    ----------
+    state : StartingState
+        Of a mechanism whose drivers determine it; else nothing is told.
+
+    Examples
+    --------
+    >>> import jounce as jn
+    >>> from jounce.mechanism import build
+    >>> train = jn.load("examples/epicyclic.yaml")
+    >>> facts = train_facts(StartingState(train, build(train), 0.0))
+    >>> [(x["body"], x["driver"], x["fraction"]) for x in facts if x["body"] == "ring"]
+    [('ring', 'sun_drive', '-2/5'), ('ring', 'carrier_drive', '7/5')]
+    """
+    mechanism, model, here = state.mechanism, state.model, state.here
+    meshing = _meshing(state)
+    if not meshing or here is None or not state.ok or state.freedom["left"]:
+        return []
+    turning = {name: driver for name, driver in mechanism.drivers.items() if is_turning(driver)}
+    facts = []
+    scale = np.asarray(model.system.column_scale)
+    for body, axes in meshing.items():
+        for name in turning:
+            right = np.zeros(len(model.rows))
+            right[model.rows.index(f"drivers.{name}")] = -1.0
+            step = here.step(right)
+            if step is None:
+                continue
+            turns = (step.reshape(-1, len(scale)) * scale)[:, model.pose_type.shifts :]
+            speeds = [float(turns[list(mechanism.bodies).index(body)] @ axis) / _unit(state, name) for axis in axes]
+            ratio = max(speeds, key=abs)
+            if abs(ratio) > STILL:
+                facts.append({"body": body, "driver": name, "ratio": ratio, "fraction": _fraction(ratio)})
+    return facts
+
+
+def _meshing(state: StartingState) -> dict[str, list[Any]]:
+    """Return the moving bodies that gears and belts turn, and that carry them, with axes of their own about which."""
+    mechanism = state.mechanism
+    meshing: dict[str, list[Any]] = {}
+    for joint in mechanism.joints.values():
+        if isinstance(joint, spatial.Gear):
+            shafts = [
+                _unit_vector([resolve(entry, mechanism.parameter_values) for entry in np.asarray(axis).tolist()])
+                for axis in (joint.axis_i, joint.axis_j)
+            ]
+            meshing |= {body: [axis] for body, axis in zip(joint.bodies, shafts, strict=False)}
+            meshing.setdefault(joint.bodies[2], [_seen_from(state, joint.bodies, k, x) for k, x in enumerate(shafts)])
+    if mechanism.space == "planar":
+        symbols = {name: facts_of(type(joint)).symbol for name, joint in mechanism.joints.items()}
+        for name, joint in mechanism.joints.items():
+            if symbols[name] in ("gear", "belt") or (symbols[name] == "coordinate" and joint.coordinate == "angle"):
+                meshing |= {body: [np.ones(1)] for body in joint.bodies}
+        meshing |= {body: [np.ones(1)] for body in carriers(mechanism)}
+    return {body: meshing[body] for body in mechanism.bodies if body in meshing}
+
+
+def _seen_from(state: StartingState, bodies: Sequence[str], slot: int, axis: Any) -> Any:
+    """Return an axis of one of the bodies of gears, by its slot, in the frame of the third."""
+    index = ["ground", *state.mechanism.bodies]
+    if state.coordinates is None:
+        return axis
+    shaft, frame = (np.asarray(state.coordinates["quaternion"])[:, [index.index(bodies[k])], 0] for k in (slot, 2))
+    back = frame * np.array([[1.0], [-1.0], [-1.0], [-1.0]])
+    return turned(back, turned(shaft, axis[:, None]))[:, 0]
+
+
+def _unit_vector(given: Any) -> Any:
+    vector = np.array(given, float)
+    return vector / np.linalg.norm(vector)
+
+
+def _unit(state: StartingState, driver: str) -> float:
+    """Return how far a driver goes while its row of the residual changes by one."""
+    return 1.0 / float(np.asarray(state.row_scale)[state.model.rows.index(f"drivers.{driver}"), 0])
+
+
+def _fraction(ratio: float) -> str | None:
+    fraction = Fraction(ratio).limit_denominator(LARGEST_TEETH)
+    return (
+        str(fraction)
+        if abs(float(fraction) - ratio) <= WHOLE * abs(ratio) and abs(fraction.numerator) <= LARGEST_TEETH
+        else None
+    )

@@ -1,0 +1,142 @@
+"""How far a driver can go from where a mechanism starts, and how well it transmits motion there, as plain data."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from typing_extensions import TypedDict
+
+from jounce.kinematics import Curve, trace
+from jounce.kinematics.transmission import extremes, recognized
+from jounce.mechanism import Mechanism
+from jounce.reporting.facts.curve_facts import value_words
+from jounce.reporting.text.summaries import Facts
+
+POOR_ANGLE = math.radians(40.0)  # of transmission, below which forces and play grow (VDI 2123)
+POOR_SHARE = 0.05  # smallest singular value, of its median on the branch
+
+
+class TransmissionFacts(TypedDict):
+    """Extremes of the transmission angle, rad, with the driver's values there."""
+
+    smallest: float
+    smallest_at: float
+    largest: float
+    largest_at: float
+
+
+class RangeFacts(TypedDict):
+    """The branch that a mechanism starts on: null bounds are those of a driver that makes whole turns."""
+
+    driver: str
+    unit: str
+    low: float | None
+    high: float | None
+    low_is_dead_point: bool
+    high_is_dead_point: bool
+    circuit_closed: bool
+    type: str | None
+    transmission: TransmissionFacts | None
+    smallest_singular_value: float
+    smallest_singular_value_at: float
+    change_points: list[float]
+    warnings: list[str]
+
+
+def range_facts(mechanism: Mechanism, driver: str | None = None) -> dict[str, Any] | None:
+    """Return how far the driver can go on the branch of the start: RangeFacts; None where nothing is driven.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+        Driven.
+    driver : str, optional
+        Whose value is free, where there are several.
+    """
+    curve = trace(mechanism, driver=driver, order=0)
+    if curve.driver is None:
+        return None
+    low, high = curve.range
+    whole = not math.isfinite(low)
+    linkage = recognized(mechanism, curve.driver)
+    transmission = None
+    if linkage is not None:
+        (least, least_at), (most, most_at) = extremes(linkage, low, high)
+        transmission = {"smallest": least, "smallest_at": least_at, "largest": most, "largest_at": most_at}
+    sizes, values = _on_branch(curve)
+    worst = int(np.argmin(sizes))
+    facts = {
+        "driver": curve.driver,
+        "unit": curve.unit,
+        "low": None if whole else low,
+        "high": None if whole else high,
+        "low_is_dead_point": _is_limit(curve, low),
+        "high_is_dead_point": _is_limit(curve, high),
+        "circuit_closed": curve.closed,
+        "type": None if linkage is None else linkage.type,
+        "transmission": transmission,
+        "smallest_singular_value": float(sizes[worst]),
+        "smallest_singular_value_at": float(values[worst]),
+        "change_points": [curve.value(point.arc_length) for point in curve.change_points],
+    }
+    return facts | {"warnings": _warnings(facts, whole, float(np.median(sizes)))}
+
+
+def _is_limit(curve: Curve, value: float) -> bool:
+    """Tell whether the driver turns back at a value: an open curve may end elsewhere."""
+    return any(abs(x.value - value) <= 1e-9 * max(abs(value), 1e-300) for x in curve.turning_points)
+
+
+def _on_branch(curve: Curve) -> tuple[np.ndarray, np.ndarray]:
+    """Return the smallest singular values on the branch of the start, and the driver's values there."""
+    points, branch = curve.arc_lengths, curve.branches[0]
+    inside = (points >= branch.start) & (points <= branch.stop)
+    if curve.closed:
+        inside |= points - curve.length >= branch.start
+    return curve.smallest_singular_values[inside], curve.values[inside, 0]
+
+
+def _warnings(facts: Facts, whole: bool, median: float) -> list[str]:
+    messages = []
+    unit = facts["unit"]
+    if (transmission := facts["transmission"]) is not None and transmission["smallest"] < POOR_ANGLE:
+        where = value_words(transmission["smallest_at"], unit)
+        angle = f"{math.degrees(transmission['smallest']):.3g} deg"
+        messages.append(
+            f"poor transmission: the transmission angle goes down to {angle}, at {facts['driver']} = {where}"
+        )
+    elif facts["transmission"] is None and whole and facts["smallest_singular_value"] < POOR_SHARE * median:
+        where = value_words(facts["smallest_singular_value_at"], unit)
+        messages.append(f"poor transmission: close to a singular position at {facts['driver']} = {where}")
+    ends = " and ".join(value_words(facts[end], unit) for end in ("low", "high") if facts[f"{end}_is_dead_point"])
+    if ends:
+        messages.append(f"{facts['driver']} turns back at dead points: {ends}; keep its law well inside")
+    if facts["change_points"]:
+        where = ", ".join(value_words(value, unit) for value in facts["change_points"])
+        messages.append(f"branches cross at change points: {facts['driver']} = {where}")
+    return messages
+
+
+def range_words(facts: Facts) -> str:
+    """Word the range of a driver and how well it transmits."""
+    unit, driver = facts["unit"], facts["driver"]
+    lines = ["Range"]
+    if facts["low"] is None:
+        lines.append(f"  {driver} makes whole turns on this circuit")
+    else:
+        lines.append(f"  {driver} from {value_words(facts['low'], unit)} to {value_words(facts['high'], unit)}")
+        lines += [
+            f"  (its {end} value is as far as the curve was followed)"
+            for end, key in (("least", "low"), ("largest", "high"))
+            if not facts[f"{key}_is_dead_point"]
+        ]
+    if facts["type"]:
+        lines.append(f"  {facts['type']}")
+    if (transmission := facts["transmission"]) is not None:
+        least, most = (math.degrees(transmission[end]) for end in ("smallest", "largest"))
+        lines.append(f"  transmission angle from {least:.6g} deg to {most:.6g} deg")
+    smallest = value_words(facts["smallest_singular_value_at"], unit)
+    lines.append(f"  smallest singular value {facts['smallest_singular_value']:.3g}, at {driver} = {smallest}")
+    return "\n".join([*lines, *(f"  warning: {warning}" for warning in facts["warnings"])])

@@ -1,0 +1,154 @@
+"""Where derivatives of laws jump or bend, and the instants beside: a largest value may be a one-sided limit there."""
+
+from collections.abc import Iterable, Iterator
+from typing import Any
+
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Float, Int
+
+from jounce.settings import under_own_settings
+from jounce.trajectory.law_checks.seen_jumps import seen_jumps
+from jounce.trajectory.law_checks.smoothness import HIGHEST, SeenLeaders, known_jumps
+from jounce.trajectory.laws.composed import FollowingMotion
+from jounce.trajectory.laws.profiles import AbstractProfile
+from jounce.trajectory.laws.stacking import law_derivatives
+from jounce.trajectory.motion import AbstractMotion, ExpressionMotion, SplineMotion
+
+BENDING = frozenset({"abs", "sign", "sqrt", "asin", "acos", "atan2"})  # functions that may have kinks or jumps
+LOOKS = 2001  # at a law that may bend anywhere
+SIDE_OFFSET = 2e-11  # of a span of time: how far beside a break its sides are; kinks are found to half of that
+MOST = 1000  # breaks of the derivative above those asked for; of more, as of a spline through samples, none is used
+
+Times = Float[np.ndarray, " time"]
+Breaks = Float[np.ndarray, " break"]
+
+
+@under_own_settings
+def law_breaks(laws: Iterable[AbstractMotion], first: float, last: float, order: int) -> Breaks:
+    """Return the instants at which a derivative up to an order jumps or bends, in the sequence of time, s.
+
+    Where pieces of a law meet is known, also where they are passed by what leads the law. Kinks of expressions with
+    ``abs`` and the like, and of Python functions, are looked for.
+
+    Parameters
+    ----------
+    laws : iterable of AbstractMotion
+        With numbers in the place of parameters.
+    first, last : float
+        s.
+    order : int
+        Of the highest derivative that matters.
+
+    Examples
+    --------
+    >>> import jounce as jn
+    >>> segments = [jn.laws.Segment("dwell", 0.25), jn.laws.Segment("cycloidal", 0.5, by=0.1)]
+    >>> ramp = jn.laws.SegmentedMotion(segments, beyond="hold")
+    >>> bent = jn.laws.ExpressionMotion(jn.laws.Expression("abs(t - 0.1)"), {})
+    >>> law_breaks([ramp, bent], 0.0, 1.0, 4).round(9).tolist()
+    [0.1, 0.25, 0.75]
+    """
+    breaks, seen = [np.zeros(0)], SeenLeaders()
+    every = {id(law): law for law in _with_leaders(laws)}.values()  # several laws may have one leader
+    for law in every if last > first else ():
+        level = min(order + 1, HIGHEST)
+        instants, jumps, _ = known_jumps(law, first, last, level, seen)
+        jump, bend = np.any(jumps[:-1] != 0, axis=0), jumps[-1] != 0
+        breaks.append(instants[jump | bend if np.sum(jump | bend) <= MOST else jump])
+        if _may_bend(law):
+            breaks.append(_seen(law, first, last, order))
+    return distinct_instants(np.concatenate(breaks), first, last)
+
+
+def both_sides(
+    breaks: Breaks, first: float, last: float
+) -> tuple[Float[np.ndarray, " side"], Int[np.ndarray, " side"]]:
+    """Return the instants just before and just after breaks, within a first and a last instant, and of which they are.
+
+    Examples
+    --------
+    >>> instants, which = both_sides(np.array([0.5, 1.0]), 0.0, 1.0)
+    >>> instants.round(9).tolist(), which.tolist()
+    ([0.5, 0.5, 1.0], [0, 0, 1])
+    """
+    away = _side_offset(first, last)
+    instants = (breaks[:, None] + away * np.array([-1.0, 1.0])).ravel()
+    which = np.repeat(np.arange(len(breaks)), 2)
+    inside = (instants > first) & (instants < last)
+    return instants[inside], which[inside]
+
+
+def with_sides(instants: Times, breaks: Breaks) -> Float[np.ndarray, " all"]:
+    """Return a grid with the instants just before and just after breaks."""
+    return np.union1d(instants, both_sides(breaks, float(instants[0]), float(instants[-1]))[0])
+
+
+def at_breaks(instants: Times, breaks: Breaks, first: float, last: float) -> Times:
+    """Return instants, a break in the place of each that is just beside it.
+
+    Examples
+    --------
+    >>> at_breaks(np.array([0.3, 0.5 - 2e-11]), np.array([0.5]), 0.0, 1.0).tolist()
+    [0.3, 0.5]
+    """
+    if not len(breaks):
+        return instants
+    after = np.clip(np.searchsorted(breaks, instants), 1, max(len(breaks) - 1, 1))
+    pair = breaks[np.stack([after - 1, np.minimum(after, len(breaks) - 1)])]
+    nearest = np.where(np.abs(pair[0] - instants) <= np.abs(pair[1] - instants), pair[0], pair[1])
+    return np.where(np.abs(nearest - instants) <= 1.5 * _side_offset(first, last), nearest, instants)
+
+
+def _side_offset(first: float, last: float) -> float:
+    return max(SIDE_OFFSET * (last - first), 8 * float(np.spacing(max(abs(first), abs(last)))))
+
+
+def distinct_instants(instants: Float[np.ndarray, " instant"], first: float, last: float) -> Times:
+    """Return instants in their sequence without those that are others but for rounding."""
+    instants = np.unique(instants)
+    return instants[np.diff(instants, prepend=-np.inf) > 2 * _side_offset(first, last)]
+
+
+def _with_leaders(laws: Iterable[AbstractMotion]) -> Iterator[AbstractMotion]:
+    """Yield laws, and those that lead them or parts of them."""
+    for law in laws:
+        yield law
+        if isinstance(law, FollowingMotion):
+            yield from _with_leaders(law.parts[1:])
+        elif parts := getattr(law, "parts", ()):
+            yield from (x for part in parts for x in _with_leaders([part]) if x is not part)
+
+
+def may_break(law: AbstractMotion) -> bool:
+    """Tell whether a law may jump or bend somewhere: all but expressions of smooth functions."""
+    return not isinstance(law, ExpressionMotion) or _may_bend(law)
+
+
+def _may_bend(law: Any) -> bool:
+    """Tell whether a law may have a kink that is not known: one that is no spline, profile or smooth expression.
+
+    Kinks of its leader are looked for there.
+    """
+    if parts := getattr(law, "parts", ()):
+        return any(map(_may_bend, parts[:1] if isinstance(law, FollowingMotion) else parts))
+    if isinstance(law, ExpressionMotion):
+        used: set[str] = set()
+        law.expression.folded(lambda _: None, lambda _: None, lambda word, _: used.add(word))
+        return bool(used & BENDING)
+    return not isinstance(law, SplineMotion | AbstractProfile)
+
+
+def _seen(law: AbstractMotion, first: float, last: float, order: int) -> Times:
+    """Return where derivatives of a law are seen to jump."""
+    level = min(order + 2, HIGHEST + 1)
+
+    def evaluate(times: Times) -> Any:
+        filled = np.full(max(16, 1 << (len(times) - 1).bit_length()), last)  # few shapes, so that few are compiled
+        filled[: len(times)] = times
+        derivatives = np.asarray(law_derivatives([law], jnp.asarray(filled), level))[..., : len(times)]
+        return np.nan_to_num(np.moveaxis(derivatives, -1, 0))
+
+    looks = np.linspace(first, last, LOOKS)
+    with np.errstate(over="ignore", invalid="ignore"):  # next to what grows without bound
+        return seen_jumps(evaluate, looks, evaluate(looks))[0]

@@ -1,0 +1,357 @@
+"""To which derivative motion laws are continuous, and by how much the others jump: what is heard as a ping."""
+
+import dataclasses
+import math
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from jounce.jet import Jet
+from jounce.jet.programs.composition import Composed
+from jounce.trajectory.checks import whole_number
+from jounce.trajectory.knots import SMOOTH, Jumps, derivative_sizes, knot_jumps
+from jounce.trajectory.laws.composed import FollowingMotion, OutputMotion
+from jounce.trajectory.laws.integrated import IntegratedMotion
+from jounce.trajectory.laws.piecewise import PiecewiseMotion
+from jounce.trajectory.laws.profiles import AbstractProfile
+from jounce.trajectory.laws.user_laws import ReadMotion
+from jounce.trajectory.motion import AbstractMotion, ExpressionMotion, FunctionMotion, SplineMotion
+
+HIGHEST = 10  # derivative that is looked at
+MOST_CROSSINGS = 10_000
+INTERVALS = 4000  # at a leader, for where it passes a knot of the law that follows it
+STEPS = 44  # of bisection between two of these: to rounding
+SLACK = 1e-6  # of the time between two looks, by which a crossing at an end may be beyond it
+BROKEN = {"abs": "kinks", "sign": "jumps"}  # what functions of expressions have where their argument is zero
+ROUNDING = 1e-9  # of the way of a profile by its duration to the power of the order: a smaller jump is none
+
+
+@dataclasses.dataclass(frozen=True)
+class DerivativeJumps:
+    """The jumps of one derivative of a law.
+
+    Attributes
+    ----------
+    order : int
+        Of the derivative.
+    count : int
+        How many there are in the time looked at.
+    size, instant : float
+        The largest one, m or rad by s to the power of the order, and where it is, s; NaN where there is none.
+    """
+
+    order: int
+    count: int
+    size: float
+    instant: float
+
+
+@dataclasses.dataclass(frozen=True)
+class Continuity:
+    """To which derivative a law is continuous.
+
+    Attributes
+    ----------
+    derivatives : tuple of DerivativeJumps
+        From the law itself up to jounce, or to the first derivative that jumps if that is higher.
+    unknown : str
+        Why that may not be all; empty where it is.
+    """
+
+    derivatives: tuple[DerivativeJumps, ...]
+    unknown: str = ""
+
+    @property
+    def smoothness(self) -> int | None:
+        """The highest derivative that is continuous, -1 if the law itself jumps; None if none of those known jumps."""
+        broken = [x.order for x in self.derivatives if x.count]
+        return min(broken) - 1 if broken else None
+
+
+def continuity(law: AbstractMotion, first: float, last: float, order: int = 4, *, periodic: bool = False) -> Continuity:
+    """Return to which derivative a law is continuous from a first to a last instant.
+
+    Parameters
+    ----------
+    law : AbstractMotion
+        With numbers in the place of parameters.
+    first, last : float
+        s.
+    order : int, default 4
+        Up to which all derivatives are examined.
+    periodic : bool, default False
+        Whether the law begins again after the last instant, as that of a cam does after a turn.
+
+    Returns
+    -------
+    Continuity
+        Of what a law through samples is between them, its smoothness is taken as that of its degree.
+
+    Raises
+    ------
+    TrajectoryError
+        If the order is no whole number from 0 to 10, or the law waits for parameters.
+
+    Examples
+    --------
+    >>> import jounce as jn
+    >>> segments = [jn.laws.Segment("cycloidal", 0.5, by=0.1), jn.laws.Segment("dwell", 0.5)]
+    >>> law = jn.laws.SegmentedMotion(segments, beyond="advance")
+    >>> found = jn.laws.continuity(law, 0.0, 2.0)
+    >>> found.smoothness, [(x.order, x.count, x.instant) for x in found.derivatives if x.count]
+    (2, [(3, 5, 0.0)])
+    """
+    whole_number("order", order, 0, HIGHEST)
+    instants, jumps, unknown = _jumps(law, first, last)
+    repeats = getattr(law, "beyond", "") in ("repeat", "advance")
+    if periodic:  # its end is its beginning, and counts once; whatever else a law is there, it begins again
+        near = SLACK * (last - first)
+        inside = (instants < last - near) & ((instants > first + near) | repeats)
+        instants, jumps = instants[inside], jumps[:, inside]
+    if periodic and not repeats:
+        ends = [np.asarray(law(Jet.variable(np.asarray(at, float), HIGHEST)).derivatives()) for at in (last, first)]
+        rounding = SMOOTH * derivative_sizes(law, first, last, HIGHEST)
+        closing = np.where(np.abs(ends[1] - ends[0]) <= rounding, 0.0, ends[1] - ends[0])
+        instants, jumps = np.append(instants, first), np.column_stack([jumps, closing])
+    broken = np.flatnonzero(np.any(jumps != 0, axis=1))
+    highest_order = max(order, int(broken[0])) if len(broken) else order
+    summaries = []
+    for level in range(highest_order + 1):
+        sizes = np.abs(jumps[level])
+        where = int(np.argmax(sizes >= 0.999999 * sizes.max())) if sizes.any() else -1
+        at = (float(jumps[level, where]), float(instants[where])) if where >= 0 else (np.nan, np.nan)
+        summaries.append(DerivativeJumps(level, int(np.count_nonzero(sizes)), *at))
+    return Continuity(tuple(summaries), unknown)
+
+
+def knots(law: AbstractMotion, first: float, last: float) -> Float[np.ndarray, " knots"]:
+    """Return the instants from a first to a last one at which a derivative up to the tenth is known to jump.
+
+    Parameters
+    ----------
+    law : AbstractMotion
+        With numbers in the place of parameters.
+    first, last : float
+        s.
+
+    Examples
+    --------
+    >>> import jounce as jn
+    >>> law = jn.laws.SegmentedMotion([jn.laws.Segment("dwell", 0.5), jn.laws.Segment("cycloidal", 0.5, by=0.1)])
+    >>> knots(law, 0.0, 2.0).tolist()
+    [0.5, 1.0]
+    """
+    instants, jumps, _ = _jumps(law, first, last)
+    return np.unique(instants[np.any(jumps != 0, axis=0)])
+
+
+class SeenLeaders:
+    """Values of leaders that several laws follow, so that each is evaluated but once: while one thing is found."""
+
+    def __init__(self) -> None:
+        self._values: dict[tuple[int, int, bytes], tuple[AbstractMotion, list[np.ndarray]]] = {}
+
+    def coefficients(self, leader: AbstractMotion, instants: np.ndarray, order: int = 0) -> list[np.ndarray]:
+        """Return the Taylor coefficients of a leader at instants."""
+        key = id(leader), order, instants.tobytes()
+        if key not in self._values:
+            jet = leader(Jet.variable(instants, order) if order else Jet([instants])).dense()
+            self._values[key] = leader, [np.asarray(c) for c in jet.coefficients]
+        return self._values[key][1]
+
+
+def known_jumps(
+    law: AbstractMotion, first: float, last: float, order: int, seen: SeenLeaders | None = None
+) -> tuple[Float[np.ndarray, " knots"], Float[np.ndarray, "levels knots"], bool]:
+    """Return the instants at which derivatives up to an order are known to jump, by how much, and if these are all.
+
+    Parameters
+    ----------
+    law : AbstractMotion
+        With numbers in the place of parameters.
+    first, last : float
+        s.
+    order : int
+        Highest derivative.
+    seen : SeenLeaders, optional
+        What is known of leaders, where several laws are asked about.
+
+    Examples
+    --------
+    >>> import jounce as jn
+    >>> instants, sizes, all_of_them = known_jumps(jn.laws.PiecewiseMotion(["t", "2*t - 1"], until=[1.0]), 0.0, 2.0, 2)
+    >>> instants.tolist(), sizes[:, 0].tolist(), all_of_them  # expressions may have kinks of their own
+    ([1.0], [0.0, 1.0, 0.0], False)
+    """
+    instants, sizes, _ = _jumps(law, first, last, order, seen)
+    return instants, sizes, _is_of_polynomials(law)
+
+
+def _is_of_polynomials(law: AbstractMotion) -> bool:
+    """Tell whether a law is made of smooth pieces whose ends are known."""
+    if isinstance(law, PiecewiseMotion | IntegratedMotion):
+        return all(map(_is_of_polynomials, law.parts))
+    return isinstance(law, SplineMotion | AbstractProfile)
+
+
+def _jumps(
+    law: AbstractMotion, first: float, last: float, order: int = HIGHEST, seen: SeenLeaders | None = None
+) -> tuple[np.ndarray, Float[np.ndarray, "levels knots"], str]:
+    """Return the instants in a time at which derivatives jump, by how much, and what is not known."""
+    none, seen = (np.zeros(0), np.zeros((order + 1, 0))), seen or SeenLeaders()
+    match law:
+        case OutputMotion() if law.parts:
+            return _jumps(law.parts[0], first, last, order, seen)
+        case FollowingMotion() if law.parts:
+            following, leader = law.parts
+            return _followed(following, leader, first, last, order, seen)
+        case IntegratedMotion() if law.parts:
+            instants, sizes, unknown = _jumps(law.parts[0], first, last, max(order - 1, 0), seen)
+            return instants, np.concatenate([np.zeros((1, len(instants))), sizes])[: order + 1], unknown
+        case PiecewiseMotion() if law.parts:
+            return _of_pieces(law, first, last, order)
+        case SplineMotion():
+            start = float(np.asarray(law.breakpoints)[0])
+            repeats = law.beyond == "repeat"
+            return *_repeated(knot_jumps(law, order), start, float(law.stop), first, last, repeats=repeats), ""
+        case AbstractProfile():
+            return *_within(*_profile_jumps(law, order), first, last), ""
+        case ExpressionMotion():
+            words = str(law.expression.folded(lambda _: "", lambda _: "", lambda word, parts: f"{word} {parts}"))
+            kinks = [f"{kind} where {word} is of zero" for word, kind in BROKEN.items() if word in words]
+            return *none, f"it may have {' and '.join(kinks)}" if kinks else ""
+        case FunctionMotion() | ReadMotion(computes=Composed()):
+            return *none, "it is a Python function"
+        case ReadMotion():
+            return *none, f"nothing is known of a {type(law.computes.source.value).__name__}"
+    return *none, f"nothing is known of a {type(law).__name__}"
+
+
+def _repeated(
+    jumps: Jumps, start: float, stop: float, first: float, last: float, *, repeats: bool
+) -> tuple[Float[np.ndarray, " all"], Float[np.ndarray, "levels all"]]:
+    """Return the jumps within a time, those of all periods where the law repeats."""
+    instants, sizes = jumps
+    if repeats and len(instants):
+        period = stop - start
+        since = np.arange(np.floor((first - start) / period), np.floor((last - start) / period) + 1)
+        since = since[: max(MOST_CROSSINGS // len(instants), 1)]
+        instants = (instants + period * since[:, None]).ravel()
+        sizes = np.tile(sizes, (1, len(since)))
+    return _within(instants, sizes, first, last)
+
+
+def _within(instants: np.ndarray, sizes: np.ndarray, first: float, last: float) -> tuple[np.ndarray, np.ndarray]:
+    slack = 1e-12 * max(abs(first), abs(last))
+    inside = (instants >= first - slack) & (instants <= last + slack)
+    return instants[inside], sizes[:, inside]
+
+
+def _profile_jumps(law: AbstractProfile, order: int) -> Jumps:
+    """Return the jumps at the beginning and at the end of a profile, which is the same backward but for the sign."""
+    begin = np.asarray(law(Jet.variable(np.asarray(law.start_time, float), order)).dense().derivatives(), float)
+    least = ROUNDING * abs(law.end - law.start) / law.duration ** np.arange(order + 1)
+    begin = np.where(np.abs(begin) <= least, 0.0, begin)
+    begin[0] = 0.0
+    ends = np.array([law.start_time, law.stop_time], float)
+    return ends, np.stack([begin, begin * (-1.0) ** np.arange(order + 1)], axis=1)
+
+
+def _of_pieces(law: PiecewiseMotion, first: float, last: float, order: int) -> tuple[np.ndarray, np.ndarray, str]:
+    """Return the jumps between pieces, and those that pieces have themselves."""
+    law_jumps = [(*law.jumps(order), "")]
+    bounded = law.beyond != "continue"
+    whole = (float(law.start), float(law.until[-1])) if bounded else (first, last)
+    inner = law.until[: len(law.parts) - 1]
+    begins, ends = (whole[0] if bounded else -np.inf, *inner), (*inner, whole[1] if bounded else np.inf)
+    for part, begin, end in zip(law.parts, begins, ends, strict=True):
+        if whole[0] < end and whole[1] > begin:
+            own, jumps, unknown = _jumps(part, max(whole[0], begin), min(whole[1], end), order)
+            within = (own > begin) & (own < end)
+            law_jumps.append((own[within], jumps[:, within], unknown))
+    parts = list(zip(*law_jumps, strict=True))
+    jumps = np.concatenate(parts[0]), np.concatenate(parts[1], axis=1)
+    repeats = law.beyond in ("repeat", "advance")
+    within = _repeated(jumps, *whole, first, last, repeats=repeats)
+    return *within, "; ".join(dict.fromkeys(filter(None, parts[2])))
+
+
+def _followed(
+    law: AbstractMotion, leader: AbstractMotion, first: float, last: float, order: int, seen: SeenLeaders
+) -> tuple[np.ndarray, np.ndarray, str]:
+    """Return the jumps of a law of what a leader prescribes, where the leader passes its knots.
+
+    The jump is a polynomial of how far the leader is from the knot, so that its derivatives by time follow from the jet
+    of the leader there.
+    """
+    none = np.zeros(0), np.zeros((order + 1, 0))
+    own, _, unknown = _jumps(leader, first, last, order, seen)
+    if len(own):
+        unknown = "its leader has jumps of its own"
+    if isinstance(law, SplineMotion) and not knot_jumps(law, order)[1].any():
+        return *none, unknown
+    looks = np.linspace(first, last, INTERVALS + 1)
+    values = seen.coefficients(leader, looks)[0]
+    knots, jumps, less = _jumps(law, float(values.min()), float(values.max()), order, seen)
+    if not jumps.any():
+        return *none, unknown or less
+    peaks = [np.abs(c).max(where=np.isfinite(c), initial=0.0) for c in seen.coefficients(leader, looks, order)]
+    step = (last - first) / INTERVALS
+    # a knot at which the leader begins or ends is passed on the way there, or from there
+    looks = np.concatenate([[first - step], looks, [last + step]])
+    values = seen.coefficients(leader, looks)[0]
+    jumping = jumps.any(axis=0)
+    knots, jumps = knots[jumping], jumps[:, jumping]
+    which, crossing = _passed(values, knots)
+    if not len(which):
+        return *none, unknown or less
+    times = _crossings(leader, knots[which], looks[crossing], looks[crossing + 1], seen)
+    inside = (times > first - SLACK * step) & (times < last + SLACK * step)
+    sequence = np.flatnonzero(inside)[np.argsort(times[inside])]
+    which, crossing, times = which[sequence], crossing[sequence], np.clip(times[sequence], first, last)
+    passing = seen.coefficients(leader, times, order)
+    change = _composed(jumps[:, which], np.stack([0 * times, *passing[1:]]))  # at the knot, not near it
+    bound = _composed(np.abs(jumps), np.stack([0.0, *peaks[1:]])[:, None])[:, which]
+    forward = np.where(values[crossing] < knots[which], 1.0, -1.0)
+    return times, np.where(np.abs(change) <= 1e-9 * bound, 0.0, forward * change), unknown or less
+
+
+def _passed(
+    values: Float[np.ndarray, " look"], knots: Float[np.ndarray, " knot"]
+) -> tuple[Int[np.ndarray, " crossing"], Int[np.ndarray, " crossing"]]:
+    """Return which knots lie between two values in sequence, and after which value; what is not finite passes none."""
+    sequence = np.argsort(knots)
+    low, high = np.minimum(values[:-1], values[1:]), np.maximum(values[:-1], values[1:])
+    first, beyond = (np.searchsorted(knots[sequence], x, side="right") for x in (low, high))
+    count = np.where(np.isfinite(low) & np.isfinite(high), beyond - first, 0)
+    crossing = np.repeat(np.arange(len(count)), count)
+    offset = np.arange(len(crossing)) - np.repeat(np.cumsum(count) - count, count)
+    return sequence[first[crossing] + offset], crossing
+
+
+def _composed(
+    jump: Float[np.ndarray, "levels crossing"], away: Float[np.ndarray, "levels #crossing"]
+) -> Float[np.ndarray, "levels crossing"]:
+    """Return the derivatives by time of polynomials, given by their derivatives at zero, of how far a leader is."""
+    levels = len(jump)
+    change = np.zeros(jump.shape)
+    for level in range(levels - 1, -1, -1):
+        change = np.stack([sum(away[k - j] * change[j] for j in range(k + 1)) for k in range(levels)])
+        change[0] += jump[level] / math.factorial(level)
+    return change * np.array([math.factorial(k) for k in range(levels)], float)[:, None]
+
+
+def _crossings(
+    leader: AbstractMotion, knots: np.ndarray, low: np.ndarray, high: np.ndarray, seen: SeenLeaders
+) -> np.ndarray:
+    """Return when a leader passes values, each between an instant before and one after, by bisection."""
+
+    def away(instants: np.ndarray) -> np.ndarray:
+        return seen.coefficients(leader, instants)[0] - knots
+
+    below = away(low) < 0
+    for _ in range(STEPS):
+        middle = (low + high) / 2
+        before = (away(middle) < 0) == below
+        low, high = np.where(before, middle, low), np.where(before, high, middle)
+    return high

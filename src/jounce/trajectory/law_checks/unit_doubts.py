@@ -1,0 +1,244 @@
+"""Angles that are likely meant in degrees: recognized by the values that a law takes over a run, whatever its form.
+
+No rule can know what was meant. Doubtful are values of many turns, or of more than one turn to a whole or half number,
+that go back and forth, or from rest to rest, as positions in degrees do; a shaft that goes on turning may take any
+value, and so may angles that are round in degrees once they are in rad: they had their unit.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any, TypeGuard
+
+import numpy as np
+from jaxtyping import Float
+
+from jounce.errors import JounceError
+from jounce.jet import Jet
+from jounce.trajectory.laws.composed import FollowingMotion
+from jounce.trajectory.laws.piecewise import PiecewiseMotion
+from jounce.trajectory.laws.profiles import AbstractProfile
+from jounce.trajectory.laws.segments import SegmentedMotion
+from jounce.trajectory.motion import AbstractMotion, ExpressionMotion, FunctionMotion, SplineMotion
+
+INSTANTS = 201
+TURN = 2 * math.pi
+MANY_TURNS = 2 * TURN  # to which a value without a unit is rarely meant in rad
+AT_REST = 0.05  # of the fastest step, the first or the last one
+DWELL = 0.03  # of the run, for which a law stands still at what it was to reach
+ROUND = 1e-7  # of a value
+ENDLESS = 1e300  # beyond it nothing is an angle, and sums overflow
+NEAR = 1e-3  # of a half degree, to which the largest value of a law is known
+OUTSIDE = 2.0  # times the limits of a joint
+SLACK = 0.05  # of a range of degrees, by which limits may be broken
+
+Values = Float[np.ndarray, " instants"]
+_OPERATIONS: dict[str, Any] = {
+    "+": np.add,
+    "-": np.subtract,
+    "*": np.multiply,
+    "/": np.divide,
+    "**": np.power,
+    "neg": np.negative,
+    "pos": np.positive,
+    "asin": np.arcsin,
+    "acos": np.arccos,
+    "atan": np.arctan,
+    "atan2": np.arctan2,
+}
+
+
+def looks_like_degrees(value: float) -> bool:
+    """Tell whether a number of rad is likely one of degrees: many turns, or a round number of more than one.
+
+    Examples
+    --------
+    >>> [looks_like_degrees(x) for x in (6.0, 10.0, 12.0, 90.0, math.radians(1080))]
+    [False, True, False, True, False]
+    """
+    turns = math.degrees(value / 5)
+    if math.isfinite(turns) and abs(turns - round(turns)) <= ROUND * abs(turns):
+        return False  # it had its unit, or is a multiple of pi
+    return abs(value) > MANY_TURNS or (abs(value) > TURN and value % 5 == 0)
+
+
+def values_of(law: AbstractMotion, first: float, last: float) -> Values | None:
+    """Return values that a law takes from a first to a last instant, None if it has none there."""
+    grid = np.linspace(first, last, INSTANTS)
+    try:
+        values = _values(law, grid)
+    except (JounceError, TypeError, ValueError, ArithmeticError):  # the use of the law raises it
+        return None
+    return values if values.shape == grid.shape and np.abs(values).max() < ENDLESS else None
+
+
+def _values(law: AbstractMotion, grid: Values) -> Values:
+    """Return values of a law, by NumPy alone where it is a formula or made of polynomials: nothing is compiled.
+
+    A Python function is called once, with all instants where it takes them.
+
+    A profile from rest to rest has those of a cubic with the same ends.
+    """
+    if isinstance(law, ExpressionMotion):
+        known = {name: float(value) for name, value in law.parameters.items()}
+        with np.errstate(all="ignore"):
+            values = law.expression.folded(float, {**known, "t": grid}.__getitem__, _operated)
+        return np.broadcast_to(np.asarray(values, float), grid.shape)
+    if isinstance(law, FollowingMotion) and law.parts:
+        own, leader = law.parts
+        plain = isinstance(leader, ExpressionMotion | FollowingMotion) or _is_polynomial(leader)
+        if not plain and _is_polynomial(own):  # it is followed from its beginning to its end, at some pace
+            return _spline_values(own, np.linspace(float(own.breakpoints[0]), float(own.stop), len(grid)))
+        return _values(own, _values(leader, grid))
+    if isinstance(law, PiecewiseMotion) and law.parts and law.beyond == "continue":
+        piece = np.searchsorted(np.array(law.until, float), grid, side="right")
+        own = [grid[piece == k] for k in range(len(law.parts))]
+        return np.concatenate([_values(part, x) for part, x in zip(law.parts, own, strict=True) if len(x)])
+    if isinstance(law, AbstractProfile):
+        share = np.clip((grid - float(law.start_time)) / float(law.duration), 0.0, 1.0)
+        return float(law.start) + (float(law.end) - float(law.start)) * share**2 * (3 - 2 * share)
+    if _is_polynomial(law):
+        return _spline_values(law, grid)
+    if type(law) is FunctionMotion and (values := _of_all(law.function, grid)) is not None:
+        return values
+    return np.asarray(law(Jet([grid])).coefficients[0], float)
+
+
+def _of_all(function: Callable[[Any], Any], grid: Values) -> Values | None:
+    """Return what a function of one instant is at all of them, None where it does not take them at once."""
+    try:
+        with np.errstate(all="ignore"):
+            values = np.asarray(function(grid), float)
+    except Exception:  # noqa: BLE001 - a user's function, of which nothing is known
+        return None
+    return values if values.shape == grid.shape else None
+
+
+def _operated(word: str, arguments: list[Any]) -> Any:
+    """Apply an operator or a function of expressions to arrays of NumPy."""
+    return _OPERATIONS[word](*arguments) if word in _OPERATIONS else getattr(np, word)(*arguments)
+
+
+def _is_polynomial(law: AbstractMotion) -> TypeGuard[SplineMotion]:
+    if not isinstance(law, SplineMotion) or np.ndim(law.stop):
+        return False
+    known = type(law)._within in (SplineMotion._within, SegmentedMotion._within)
+    return known and type(law)._evaluated is SplineMotion._evaluated
+
+
+def _spline_values(law: SplineMotion, grid: Values) -> Values:
+    begins, stop = np.asarray(law.breakpoints, float), float(law.stop)
+    first, turns = begins[0], np.zeros_like(grid)
+    if law.beyond == "repeat":
+        turns = np.floor((grid - first) / (stop - first))
+    elif law.beyond != "continue":
+        grid = np.clip(grid, first, stop)
+    grid = grid - turns * (stop - first)
+    piece = np.clip(np.searchsorted(begins, grid, side="right") - 1, 0, len(begins) - 1)
+    local, values = grid - begins[piece], np.zeros_like(grid)
+    for power in np.asarray(law.coefficients, float)[::-1]:
+        values = values * local + power[piece]
+    if isinstance(law, SegmentedMotion):
+        amplitude, frequency, phase = np.asarray(law.sines, float)[:, piece]
+        values = values + amplitude * np.sin(local * frequency + phase)
+    return values + turns * float(np.asarray(law.advance))
+
+
+def degrees_meant(values: Values, lower: float | None = None, upper: float | None = None) -> str:
+    """Word why the values of an angle are likely meant in degrees, with what they are; nothing if they are not.
+
+    Parameters
+    ----------
+    values : array of shape (instants,)
+        In their order, rad.
+    lower, upper : float, optional
+        Between which they should be, rad.
+
+    Examples
+    --------
+    >>> t = np.linspace(0.0, 1.0, 201)
+    >>> degrees_meant(30 + 60 * np.sin(2 * np.pi * t))
+    'goes from -30 to 90 rad, 19 turns: degrees?'
+    >>> degrees_meant(2 * np.pi * 100 * t), degrees_meant(0.5 * np.sin(2 * np.pi * t))
+    ('', '')
+    """
+    low, high = float(values.min()), float(values.max())
+    largest = max(abs(low), abs(high))
+    limit = max((abs(x) for x in (lower, upper) if x is not None), default=0.0)
+    if limit and largest <= max(OUTSIDE * limit, TURN):
+        return ""
+    if lower is not None and upper is not None:
+        slack = math.degrees(SLACK * (upper - lower))
+        within = math.degrees(lower) - slack <= low and high <= math.degrees(upper) + slack
+    else:
+        within = False
+    if not within and not (
+        (looks_like_degrees(low if -low > high else high) or _is_round(values)) and _is_position(values)
+    ):
+        return ""
+    turns = max(high - low, largest) / TURN
+    phrase = f"goes from {_round(low)} to {_round(high)} rad" if high > low else f"is {_round(low)} rad"
+    return f"{phrase}, {turns:.2g} turns: degrees?"
+
+
+def _round(value: float) -> str:
+    return f"{value + 0.0:.4g}"
+
+
+def _is_round(values: Values) -> bool:
+    """Tell whether values go to a whole or half number of more than one turn, at most two; their vertex counts."""
+    sizes = np.abs(values)
+    top = int(np.argmax(sizes))
+    left, largest, right = sizes[max(top - 1, 0)], sizes[top], sizes[min(top + 1, len(sizes) - 1)]
+    if 0 < top < len(sizes) - 1 and (bend := 2 * largest - left - right) > 0:
+        largest += (right - left) ** 2 / (8 * bend)
+    return bool(TURN < largest <= MANY_TURNS and abs(2 * largest - round(2 * largest)) <= NEAR)
+
+
+def _is_position(values: Values) -> bool:
+    """Tell whether values are those of something that is positioned: back and forth, or from rest to rest.
+
+    Where the largest and the least stand side by side, on both sides of zero, they are those beside a pole.
+    """
+    if (
+        abs(int(np.argmax(values)) - int(np.argmin(values))) == 1
+        and values.max() > 0 > values.min()
+        and len(values) > 2
+    ):
+        return False
+    fallen = float((np.maximum.accumulate(values) - values).max())
+    risen = float((values - np.minimum.accumulate(values)).max())
+    if min(fallen, risen) > TURN:
+        return True
+    steps = np.abs(np.diff(values))
+    fastest = float(steps.max())
+    if not fastest or max(fallen, risen) <= TURN:
+        return False
+    ends = bool(steps[0] <= AT_REST * fastest), bool(steps[-1] <= AT_REST * fastest)
+    still = steps <= ROUND * fastest
+    return all(ends) or float(still.mean()) >= DWELL
+
+
+def trajectory_doubt(laws: dict[str, Any], first: float, last: float, limits: dict[str, Any]) -> str:
+    """Word which joints of a trajectory are likely given in degrees, nothing if none is.
+
+    Parameters
+    ----------
+    laws : dict of str to AbstractMotion
+        Of joints that turn.
+    first, last : float
+        s.
+    limits : dict of str to Limits
+        Of these joints.
+    """
+    doubts = {}
+    for name, law in laws.items():
+        values = values_of(law, first, last)
+        if values is not None and (why := degrees_meant(values, limits[name].lower, limits[name].upper)):
+            doubts[name] = why
+    if not doubts:
+        return ""
+    name, why = next(iter(doubts.items()))
+    others = f" (and {count - 1} joint{'s' if count > 2 else ''} like it)" if (count := len(doubts)) > 1 else ""
+    return f"{name} {why}{others} A number without a unit is in SI; give the unit, or convert to rad"

@@ -1,0 +1,1 @@
+"""Laws of motion: expressions, profiles, pieces, and laws composed of others."""

@@ -1,0 +1,254 @@
+"""Motion laws of which a derivative is given by a formula, such as the speed of a motor that runs up."""
+
+import functools
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from numpy.polynomial import chebyshev
+
+from jounce.base.shapes import Numbers
+from jounce.errors import TrajectoryError
+from jounce.jet import Jet
+from jounce.jet.pieces import last_begun
+from jounce.trajectory.beyond import SLACK
+from jounce.trajectory.checks import whole_number
+from jounce.trajectory.laws.composed import Law, MadeOfOthers, with_values
+from jounce.trajectory.laws.piecewise import PiecewiseMotion
+from jounce.trajectory.laws.segment_pieces import Value, number_of_value, parsed_value
+from jounce.trajectory.laws.user_laws import read_laws
+from jounce.trajectory.motion import AbstractMotion, SplineMotion
+from jounce.units.expression import Expression
+
+HIGHEST = 4  # derivative that may be given: jounce
+PANELS = 1200  # on either side of the start, each a polynomial
+DEGREE = 15  # of the polynomial through the derivative on a panel
+RESOLVED = 2e-14  # of the largest value so far: by how much the polynomial may miss the derivative
+FIRST, WIDENED = 1e-3, 0.1  # s, the first panel, and by how much of the way so far a panel may be longer
+NARROWED = tuple(2.0**-k for k in range(16))  # lengths that are tried for the next panel
+ROUNDING = 1e-9  # of the largest value: what may be rounding where no shorter panel is better
+STEEPER = 10.0  # times larger is a jump at most on the shortest panel than on the longest; a pole is more
+SHORTEST = 1e-13  # of the way so far: a panel that is taken as it is
+
+_NODES = np.cos(np.pi * (np.arange(DEGREE + 1) + 0.5) / (DEGREE + 1))
+_BETWEEN = np.cos(np.pi * np.arange(1, DEGREE + 1) / (DEGREE + 1))
+_ABSCISSAS = np.concatenate([_NODES, _BETWEEN])[None]
+_FITTED = np.linalg.inv(chebyshev.chebvander(_NODES, DEGREE))  # from values at the nodes to Chebyshev coefficients
+_SEEN = chebyshev.chebvander(_BETWEEN, DEGREE)
+_RAISED = np.stack([chebyshev.chebint(row, lbnd=-1) for row in np.eye(DEGREE + 1)], axis=1)
+
+
+class IntegratedMotion(MadeOfOthers):
+    """A motion law one of whose derivatives is another law: of a speed that is known, for example.
+
+    Its derivatives from that one on are those of the law, exactly. What is below follows by integration over panels so
+    short that a polynomial of degree 15 is the law to rounding.
+
+    Parameters
+    ----------
+    law : AbstractMotion, Expression or str
+        Of the derivative, m or rad by s to the power of `derivative`; an expression of ``t`` and of parameters.
+    derivative : int, default 1
+        Which derivative it is: 1 velocity, 2 acceleration, 3 jerk, 4 jounce.
+    initial : sequence of float, str or Expression, optional
+        The law and its derivatives below `derivative` at the start, lowest first; zero where not given.
+    start : float, str or Expression, default 0
+        The instant at which they are known, s.
+
+    Raises
+    ------
+    TrajectoryError
+        If something is no law or no number, or there are too many initial values.
+
+    Examples
+    --------
+    >>> import jounce as jn
+    >>> run_up = jn.laws.IntegratedMotion("100*(1 - exp(-t/0.2))")  # rad/s
+    >>> [round(float(x), 4) for x in run_up(jn.Jet.variable(0.5, order=2)).derivatives()]
+    [31.6417, 91.7915, 41.0425]
+    """
+
+    initial: Any
+    start: Any
+    breakpoints: Any
+    halves: Any
+    coefficients: Any
+    derivative: int = eqx.field(static=True)
+
+    def __init__(self, law: Law, derivative: int = 1, initial: Sequence[Value] = (), start: Value = 0.0):
+        order = self.derivative = whole_number("derivative", derivative, 1, HIGHEST)
+        if isinstance(initial, str) or not isinstance(initial, Sequence) or len(initial) > order:
+            message = f"must be a list of at most {order} values: the law and its derivatives below that one"
+            raise TrajectoryError(message, name="initial", value=initial)
+        values = [*initial, *(0.0,) * (order - len(initial))]
+        given = [_known(f"initial[{k}]", x) for k, x in enumerate(values)]
+        begin = _known("start", start)
+        inner = law if order == 1 else IntegratedMotion(law, order - 1, given[1:], begin)
+        self._take([inner], law, tuple(given), begin)
+        waiting = any(isinstance(x, Expression) for x in (*given, begin)) or not self.parts
+        self.initial, self.start = (None, None) if waiting else (given[0], begin)
+        self.breakpoints = self.halves = self.coefficients = None
+        if waiting:
+            self.parts = ()
+            return
+        begin = jnp.asarray(begin, float)
+        table = _panels(read_laws(self.parts[0]), jax.lax.stop_gradient(begin))
+        self.breakpoints, self.halves, self.coefficients = table
+        self.initial = given[0] - _at(*table, begin)  # nothing, but for its slope by the start
+
+    @property
+    def is_open(self) -> bool:
+        """Whether the start or a value there is an expression of parameters, which have no values yet."""
+        return self.initial is None
+
+    def resolved(self, parameters: Mapping[str, Any]) -> "IntegratedMotion":
+        """Return the law with numbers in the place of parameters."""
+        if not self.is_open:
+            return self
+        _, law, given, start = self.recipe.value
+        numbers = [x.evaluate(parameters) if isinstance(x, Expression) else x for x in (*given, start)]
+        if isinstance(law, str | Expression):
+            law = with_values(parsed_value(law), parameters)
+        else:
+            law = law.resolved(parameters)
+        return IntegratedMotion(law, self.derivative, numbers[:-1], numbers[-1])
+
+    def check_instants(self, first: float, last: float) -> None:
+        """Raise MechanismError if the derivative says nothing of instants between the start and those asked for."""
+        if self.is_open:
+            return
+        start = float(self.start)
+        self.parts[0].check_instants(min(first, start), max(last, start))
+        ends = float(self.breakpoints[0]), float(self.breakpoints[-1] + 2 * self.halves[-1])
+        slack = SLACK * (last - first)
+        for instant, least, most in ((first, ends[0] - slack, np.inf), (last, -np.inf, ends[1] + slack)):
+            if not least <= instant <= most:
+                message = (
+                    f"the law with this derivative is integrated from {ends[0]:.6g} to {ends[1]:.6g} s only, "
+                    "as it varies so finely or has no value beyond; choose another start"
+                )
+                raise TrajectoryError(message, value=instant)
+
+    def __call__(self, time: Jet) -> Jet:
+        """Return the jet of the law at the instants of the time jet; parameters need their values, see `resolved`."""
+        (law,) = self._known_parts()
+        value = self._integral(time.coefficients[0]) + self.initial
+        if time.order == 0:
+            return Jet([value])
+        rate = law(time.truncate(time.order - 1)) * time.differentiate()
+        return rate.integrate(value)
+
+    def _integral(self, instants: Any) -> Any:
+        """Return the integral from the start to some instants; NaN beyond the panels."""
+        begins, halves, table = self.breakpoints, self.halves, self.coefficients
+        if np.ndim(begins) > 1:  # several laws of one kind, stacked along an axis before the batch
+            rows = jnp.broadcast_to(instants, (begins.shape[1], jnp.shape(instants)[-1]))
+            return jax.vmap(_at, in_axes=(1, 1, 2, 0))(begins[..., 0], halves[..., 0], table[..., 0], rows)
+        return _at(begins, halves, table, instants)
+
+
+def _at(begins: Any, halves: Any, table: Any, instants: Any) -> Any:
+    piece = last_begun(begins, instants)
+    begin, half, powers = (x.at[..., piece].get(mode="promise_in_bounds") for x in (begins, halves, table))
+    u = (instants - begin) / half - 1.0
+    ahead = behind = jnp.zeros_like(u)  # the recurrence of Clenshaw
+    for c in powers[:0:-1]:
+        ahead, behind = c + 2.0 * u * ahead - behind, ahead
+    inside = jnp.abs(u) <= 1.0 + 1e-6
+    return jnp.where(inside, powers[0] + u * ahead - behind, jnp.nan)
+
+
+def _known(name: str, value: Value) -> Any:
+    value = parsed_value(value)
+    return value if isinstance(value, Expression) and value.names else number_of_value(name, value)
+
+
+@eqx.filter_jit
+def _panels(law: AbstractMotion, start: Any) -> tuple[Numbers, Numbers, Numbers]:
+    """Return panels to both sides of a start, and the integral of a law from there on each of them.
+
+    Returns
+    -------
+    begins : array of shape (panels,)
+        s, not decreasing.
+    halves : array of shape (panels,)
+        Half of their lengths, s.
+    coefficients : array of shape (degree + 2, panels)
+        Of Chebyshev polynomials over the panel.
+    """
+    lengths, fixed = jnp.asarray(NARROWED), jax.tree.map(jax.lax.stop_gradient, law)
+
+    def values(law: AbstractMotion, instants: Any) -> Any:
+        flat = law(Jet([instants.reshape(-1)])).dense().coefficients[0]
+        return jnp.broadcast_to(flat, instants.size).reshape(instants.shape)
+
+    def panel(sign: Any, state: Any, _: Any) -> tuple[Any, Any]:
+        at, length, largest, total = state
+        distance = jnp.abs(at - start)
+        shortest = SHORTEST * jnp.maximum(jnp.abs(at), distance) + 1e-300
+        to_border = sign * (_next_border(fixed, at, sign, shortest) - at)
+        tried = jnp.minimum(jnp.minimum(2.0 * length, FIRST + WIDENED * distance) * lengths, to_border)
+        tried = jax.lax.stop_gradient(jnp.maximum(tried, shortest))
+        half = tried / 2.0
+        middle = at + sign * half
+        nodes = middle[:, None] + half[:, None] * _ABSCISSAS
+        samples = values(fixed, nodes)
+        fitted = samples[:, : DEGREE + 1] @ _FITTED.T
+        sizes = jnp.maximum(largest, jnp.max(jnp.abs(samples), axis=1))
+        off = jnp.max(jnp.abs(samples[:, DEGREE + 1 :] - fitted @ _SEEN.T), axis=1)
+        known = jnp.isfinite(off)
+        noise = 4.0 * jnp.min(jnp.where(known, off, jnp.inf))  # what shorter panels do not resolve, either
+        fine = off <= jnp.maximum(RESOLVED * sizes, jnp.minimum(noise, ROUNDING * sizes))
+        own = jnp.max(jnp.abs(samples), axis=1)
+        jumps = (tried <= shortest) & known & (own <= STEEPER * jnp.maximum(own[0], largest))  # and no pole
+        fine = known & (fine | jumps)
+        any_fine = jnp.any(fine)
+        pick = jnp.where(any_fine, jnp.argmax(fine), len(NARROWED) - 1)
+        # the panel that is taken alone has slopes by parameters: others may have values without bounds
+        chosen = values(law, jnp.where(any_fine, nodes[pick, : DEGREE + 1], start))
+        raised = (_FITTED @ chosen) @ _RAISED.T * half[pick]
+        gain = jnp.sum(raised)  # at its right end, every polynomial being one there
+        begin = jnp.where(sign > 0, at, at - tried[pick])
+        before = jnp.where(sign > 0, total, total - gain)
+        end = jnp.where(any_fine, at + sign * tried[pick], at)
+        after = jnp.where(any_fine, total + sign * gain, total)
+        accepted = jnp.where(any_fine, raised.at[0].add(before), 0.0), jnp.where(any_fine, half[pick], 0.0)
+        size = jnp.where(any_fine, sizes[pick], largest)
+        return (end, tried[pick], size, after), (jnp.where(any_fine, begin, at), *accepted)
+
+    state = start, jnp.asarray(FIRST), jnp.zeros(()), jnp.zeros(())
+
+    def side(sign: Any) -> Any:
+        return jax.lax.scan(functools.partial(panel, sign), state, None, length=PANELS)[1]
+
+    sides = jax.vmap(side)(jnp.array([-1.0, 1.0]))
+    begins, powers, halves = (jnp.concatenate([x[0, ::-1], x[1]]) for x in sides)
+    return jax.lax.stop_gradient(begins), jax.lax.stop_gradient(halves), powers.T
+
+
+def _next_border(law: AbstractMotion, at: Any, sign: Any, least: Any) -> Any:
+    """Return the next instant at which pieces of a law meet, infinite where nothing is known of any."""
+    if isinstance(law, IntegratedMotion):
+        return _next_border(law.parts[0], at, sign, least)
+    if isinstance(law, PiecewiseMotion):
+        ends = [*([] if law.start is None else [law.start]), *law.until]
+        borders, repeats = jnp.stack([jnp.asarray(x, float) for x in ends]) if ends else None, law.beyond
+        inner = [_next_border(part, at, sign, least) for part in law.parts if law.beyond == "continue"]
+    elif isinstance(law, SplineMotion):
+        borders = jnp.append(jnp.asarray(law.breakpoints, float), jnp.asarray(law.stop, float))
+        repeats, inner = law.beyond, []
+    else:
+        return sign * jnp.inf
+    inside = [sign * x for x in inner]
+    if borders is not None:
+        shift = 0.0
+        if repeats in ("repeat", "advance"):
+            period = borders[-1] - borders[0]
+            shift = jnp.floor((at + sign * 2 * least - borders[0]) / period) * period
+            borders = jnp.concatenate([borders[:1] - period, borders, borders[-1:] + period])
+        ahead = sign * (borders + shift - at)
+        inside.append(jnp.min(jnp.where(ahead > 2 * least, ahead, jnp.inf)) + sign * at)
+    return sign * functools.reduce(jnp.minimum, inside, jnp.inf)

@@ -1,0 +1,237 @@
+"""Motion laws that are one law after another, once or again and again."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+from jax.core import Tracer
+from jaxtyping import Float
+
+from jounce.base.shapes import is_traced
+from jounce.errors import MechanismError, TrajectoryError, check_choice
+from jounce.jet import Jet
+from jounce.trajectory.beyond import CLOSED, check_within, continued
+from jounce.trajectory.knots import SMOOTH, derivative_sizes
+from jounce.trajectory.laws.composed import Law, MadeOfOthers
+from jounce.trajectory.laws.segment_pieces import Value, number_of_value, parsed_value
+from jounce.units.expression import Expression
+
+BEYOND = ("refuse", "hold", "repeat", "advance")
+
+
+class PiecewiseMotion(MadeOfOthers):
+    """A motion law that is one law until an instant, another until the next, and so on.
+
+    Where two of them meet, derivatives are those from the right; `jumps` tells which are not continuous.
+
+    Parameters
+    ----------
+    laws : sequence of AbstractMotion, Expression or str
+        In their order; expressions are of ``t``, the time since zero, and of the parameters of a mechanism.
+    until : sequence of float, str or Expression
+        Increasing instants at which the laws end, s, which may be expressions of parameters. If the last law has none,
+        it goes on for ever, and so does the first one backward.
+    start : float, str or Expression, optional
+        Where the first law begins, s, if the last one ends; 0 unless given.
+    beyond : {"refuse", "hold", "repeat", "advance"}, default "refuse"
+        What the law is before its beginning and after its end: nothing (an error); the value there, at rest; the laws
+        again, which must end where they began; or the laws again, each time from where they ended.
+
+    Raises
+    ------
+    TrajectoryError
+        If the instants do not increase, are too few or too many, or laws that are to repeat do not close.
+
+    Examples
+    --------
+    >>> import jounce as jn
+    >>> law = jn.laws.PiecewiseMotion(["t**2", "2*t - 1"], until=[1.0])
+    >>> [float(x) for x in law(jn.Jet.variable(3.0, order=2)).derivatives()]
+    [5.0, 2.0, 0.0]
+    >>> instants, jumps = law.jumps(2)
+    >>> instants.tolist(), jumps[:, 0].tolist()  # acceleration goes from 2 to 0 at 1 s
+    ([1.0], [0.0, 0.0, -2.0])
+    >>> table = jn.laws.PiecewiseMotion(["t", "1"], until=[1.0, 3.0], beyond="advance")  # goes on by 1 every 3 s
+    >>> [float(x) for x in table(jn.Jet.variable(6.5, order=1)).derivatives()]
+    [2.5, 1.0]
+    """
+
+    until: Any
+    start: Any
+    advance: Any
+    beyond: str = eqx.field(static=True)
+
+    def __init__(self, laws: Sequence[Law], until: Sequence[Value], start: Value | None = None, beyond: str = "refuse"):
+        check_choice("beyond", beyond, BEYOND, TrajectoryError)
+        if isinstance(laws, str) or not isinstance(laws, Sequence) or not laws:
+            raise TrajectoryError("must be a list of laws", name="laws", value=laws)
+        ends = [_instant(f"until[{k}]", x) for k, x in enumerate(until)]
+        if len(ends) not in (len(laws) - 1, len(laws)):
+            message = f"{len(laws)} laws need {len(laws) - 1} instants, at which all but the last end, or one more"
+            raise TrajectoryError(message, name="until", value=len(ends))
+        bounded = len(ends) == len(laws)
+        if not bounded and (start is not None or beyond != BEYOND[0]):
+            name, value = ("beyond", beyond) if beyond != BEYOND[0] else ("start", start)
+            raise TrajectoryError("the last law has no end; say until when it goes", name=name, value=value)
+        begin = _instant("start", 0.0 if start is None else start) if bounded else None
+        borders = [begin, *ends] if bounded else ends
+        self.beyond = beyond if bounded else "continue"
+        self._take(laws, tuple(ends), start, beyond)
+        if any(isinstance(x, Expression) for x in borders):
+            self.parts, self.until, self.start, self.advance = (), (), None, None
+            return
+        if not any(isinstance(x, Tracer) for x in borders) and (np.diff(borders) <= 0).any():
+            if bounded and ends[0] <= begin and (np.diff(ends) > 0).all():
+                message = "the first law must end after it begins; give start, which is 0 unless given"
+                raise TrajectoryError(message, name="until[0]", value=ends[0])
+            raise TrajectoryError("must increase", name="until", value=ends)
+        self.until, self.start = tuple(ends), begin
+        self.advance = self._gain() if bounded and self.parts and beyond in ("repeat", "advance") else None
+
+    def _gain(self) -> Any:
+        """Return by how much the law goes on from one repetition to the next."""
+        first, last = (
+            part(Jet([jnp.asarray(at, float)])).coefficients[0]
+            for part, at in ((self.parts[0], self.start), (self.parts[-1], self.until[-1]))
+        )
+        gain = last - first
+        if self.beyond == "advance" or is_traced(gain):
+            return gain if self.beyond == "advance" else jnp.zeros_like(gain)
+        gain = float(gain)
+        largest = float(np.max([size[0] for size in self._sizes(0)]))
+        if not abs(gain) <= CLOSED * largest:
+            message = f"do not end where they begin, but {gain:.6g} from there; close them, or choose beyond: advance"
+            raise TrajectoryError(message, name="laws", value=float(last))
+        return 0.0
+
+    @property
+    def is_open(self) -> bool:
+        """Whether instants are expressions of parameters, which have no values yet."""
+        return any(isinstance(x, Expression) for x in (*self.recipe.value[1], parsed_value(self.recipe.value[2])))
+
+    def resolved(self, parameters: Mapping[str, Any]) -> "PiecewiseMotion":
+        """Return the law with numbers in the place of parameters."""
+        _, ends, start, beyond = self.recipe.value
+        numbers = [x.evaluate(parameters) if isinstance(x, Expression) else x for x in (*ends, parsed_value(start))]
+        return PiecewiseMotion(self._resolved_parts(parameters), numbers[:-1], numbers[-1], beyond)
+
+    def check_instants(self, first: float, last: float) -> None:
+        """Raise MechanismError if one of the laws says nothing of instants that are its own, or none has them."""
+        if not self.parts:
+            return
+        if self.beyond != "continue":
+            start, stop = float(self.start), float(self.until[-1])
+            if self.beyond == "refuse":
+                check_within(first, last, start, stop, "laws")
+            whole = self.beyond == "repeat" or self.beyond == "advance"
+            first, last = (start, stop) if whole else np.clip((first, last), start, stop).tolist()
+        begins, ends = self._borders()
+        for part, begin, end in zip(self.parts, begins, ends, strict=True):
+            if first < end and last >= begin:
+                part.check_instants(max(first, begin), min(last, end))
+
+    def _borders(self) -> tuple[tuple[Any, ...], tuple[Any, ...]]:
+        """Return where each law begins and ends; the first and the last go on as far as they are asked for."""
+        inner = self.until[: len(self.parts) - 1]
+        return (-np.inf, *inner), (*inner, np.inf)
+
+    def __call__(self, time: Jet) -> Jet:
+        """Return the jet of the law at the instants of the time jet; parameters need their values, see `resolved`."""
+        self._known_parts()
+        where = self.until, self.start, time.coefficients[0]
+        if self.beyond == "refuse" and np.ndim(self.start) == 0 and not is_traced(where) and np.size(where[2]):
+            self.check_instants(float(np.min(where[2])), float(np.max(where[2])))
+        mode = "repeat" if self.beyond == "advance" else self.beyond
+        stop = self.until[-1] if self.beyond != "continue" else None
+        return continued(self._within, time, self.start, stop, mode, 0.0 if self.advance is None else self.advance)
+
+    def _within(self, time: Jet) -> Jet:
+        instants = time.coefficients[0]
+        begins, ends = self._borders()
+        value: tuple[Any, ...] = ()
+        for part, begin, end in zip(self.parts, begins, ends, strict=True):
+            own = (instants >= begin) & (instants < end)
+            # elsewhere a law may have no value: it is asked for an instant of its own
+            some = jnp.clip(instants, begin, jnp.where(jnp.isinf(begin), end, begin))
+            coefficients = part(Jet((jnp.where(own, instants, some), *time.coefficients[1:]))).dense().coefficients
+            value = tuple(jnp.where(own, f, v) for f, v in zip(coefficients, value or coefficients, strict=True))
+        return Jet(value)
+
+    def jumps(self, order: int = 4) -> tuple[Float[np.ndarray, " knots"], Float[np.ndarray, "{order}+1 knots"]]:
+        """Return where laws meet, and the ends where there are some, and by how much derivatives jump there.
+
+        Parameters
+        ----------
+        order : int, default 4
+            The highest derivative that is looked at.
+
+        Returns
+        -------
+        instants : ndarray of shape (knots,)
+            s; of laws that repeat their beginning stands for their end, too.
+        jumps : ndarray of shape (order + 1, knots)
+            The value from the right less that from the left, m or rad by s to the power of the order; rounding is zero.
+
+        Examples
+        --------
+        >>> import jounce as jn
+        >>> jn.laws.PiecewiseMotion(["t**3", "0"], until=[0.0]).jumps(3)[1][:, 0].tolist()
+        [0.0, 0.0, 0.0, -6.0]
+        """
+        parts = self._known_parts()
+        pairs = list(zip(self.until, parts, parts[1:], strict=False))
+        sizes = self._sizes(order) if self.until else []
+        rest = np.zeros(order + 1)
+        instants = [at for at, *_ in pairs]
+        jumps = [
+            _jump(_derivatives(left, at, order), _derivatives(right, at, order), np.maximum(*sizes[k : k + 2]))
+            for k, (at, left, right) in enumerate(pairs)
+        ]
+        if self.beyond in ("hold", "repeat", "advance"):
+            begin, end = _derivatives(parts[0], self.start, order), _derivatives(parts[-1], self.until[-1], order)
+            own = rest.copy()
+            own[0] = begin[0]
+            if self.beyond == "hold":
+                stop = rest.copy()
+                stop[0] = end[0]
+                instants = [self.start, *instants, self.until[-1]]
+                jumps = [_jump(own, begin, sizes[0]), *jumps, _jump(end, stop, sizes[-1])]
+            else:
+                end[0] -= float(self.advance)
+                instants, jumps = [self.start, *instants], [_jump(end, begin, np.maximum(sizes[0], sizes[-1])), *jumps]
+        return np.array(instants, float), np.stack(jumps, axis=-1) if jumps else np.zeros((order + 1, 0))
+
+    def _sizes(self, order: int) -> list[Float[np.ndarray, " levels"]]:
+        """Return how large the derivatives of each law are; the first and the last go as far as their neighbors."""
+        known = [float(x) for x in self.until]
+        if self.beyond != "continue":
+            borders = [float(self.start), *known]
+        else:
+            lengths = np.diff(known) if len(known) > 1 else [abs(known[0]) or 1.0]
+            borders = [known[0] - lengths[0], *known, known[-1] + lengths[-1]]
+        sizes = []
+        for part, begin, end in zip(self._known_parts(), borders, borders[1:], strict=False):
+            try:
+                sizes.append(derivative_sizes(part, begin, end, order))
+            except MechanismError:  # samples that end before: what they are where laws meet is known
+                instant = begin if begin == known[-1] else end
+                sizes.append(derivative_sizes(part, instant, instant, order))
+        return sizes
+
+
+def _instant(name: str, value: Value) -> Any:
+    """Return a checked instant; an expression of parameters, and what JAX traces, is taken as it is."""
+    value = parsed_value(value)
+    return value if isinstance(value, Expression) and value.names else number_of_value(name, value)
+
+
+def _derivatives(law: Any, instant: Any, order: int) -> Float[np.ndarray, " levels"]:
+    return np.array(law(Jet.variable(np.asarray(instant, float), order)).dense().derivatives(), float)
+
+
+def _jump(left: np.ndarray, right: np.ndarray, sizes: np.ndarray) -> Float[np.ndarray, " levels"]:
+    """Return right less left; what is rounding beside the sizes of the derivatives is zero."""
+    change = right - left
+    return np.where(np.abs(change) <= SMOOTH * sizes, 0.0, change)

@@ -1,0 +1,366 @@
+"""Polynomial motion functions of any degree: splines through knots that carry positions, accelerations or others."""
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float
+
+from jounce.base.shapes import ArrayLike
+from jounce.errors import TrajectoryError, check_choice
+from jounce.trajectory.checks import check_samples, whole_number
+from jounce.trajectory.motion import SplineMotion
+from jounce.trajectory.splines import integrated, local_powers
+
+MAX_CONTINUITY = 10
+ENDS = ("not-a-knot", "natural", "clamped")
+BEYOND = ("refuse", "hold", "continue")
+LARGEST_GROWTH = 1e3  # of what is interpolated, between the knots: by an ill-conditioned system, not by a law
+AT_KNOTS = 1e-6  # of the largest value, by which a law may miss its own knots
+SAMPLES = 4  # in each segment at which the growth is looked at
+
+_Conditions = Mapping[int, float]
+
+
+class PolynomialMotion(SplineMotion):
+    """A motion law of polynomials of degree ``m + 1`` on the segments between knots, continuous to order m.
+
+    The knots carry values of the law or of one of its derivatives: positions, measured accelerations, or values of the
+    m-th derivative, which is linear on each segment. Solved for by SciPy's B-splines in a scaled time.
+
+    A law of s segments has ``s + 1 + m`` free numbers, and the knots fix ``s + 1`` of them. The other m are fixed by
+    conditions at the first and the last knot. Those on derivatives lower than what the knots carry are the constants
+    of its integration; as many are needed as integrations. Those on higher derivatives are either named by `ends`, or
+    given: as many as are left, shared between start and end evenly, or but for one where their number is odd. With more
+    at one end, an error there, of rounding as well, grows by a factor at every knot; such shares are refused unless
+    there is only one segment. With an odd number it does not fade along the knots; prefer `derivative` and m both even
+    or both odd.
+
+    Parameters
+    ----------
+    times : array_like of shape (knots,)
+        Strictly increasing instants, s.
+    values : array_like of shape (knots,)
+        What the knots carry: m or rad, per s to the power of `derivative`.
+    continuity : int, default 4
+        Order m of the highest continuous derivative, from 1 to 10; 2 is the cubic spline.
+    derivative : int, default 0
+        Order of the derivative that the knots carry, from 0 (positions) to m.
+    start, end : dict of int to float, optional
+        Conditions at the first and the last knot: the value of the derivative of each order named, 0 for the position.
+        Without any on the derivatives below `derivative`, these are zero at the start.
+    ends : {"not-a-knot", "natural", "clamped"}, default "not-a-knot"
+        Conditions on the derivatives above `derivative`, when `start` and `end` give none. With c of them needed, the
+        start takes ``ceil(c / 2)`` and the end ``floor(c / 2)``: not-a-knot has the polynomials next to the ends go on
+        over as many knots, natural has the highest of the continuous derivatives vanish, and clamped the lowest (rest).
+    beyond : {"refuse", "hold", "continue"}, default "refuse"
+        What the law is outside of the knots: nothing (an error), the value of the nearest knot, at rest, or what the
+        polynomials of the end segments make of it.
+
+    Raises
+    ------
+    TrajectoryError
+        If the knots are too few, not finite or do not increase, the conditions do not close the system or are shared
+        unevenly between start and end, or what they determine does not stay near what is given.
+
+    Notes
+    -----
+    The formulas are Negrean 2025, equations 61-64. Equation 64 names all derivatives at the first knot and two at the
+    last, one more condition than there are unknowns, and its spline would grow by a factor at every knot.
+
+    Examples
+    --------
+    >>> import jounce as jn
+    >>> law = jn.laws.PolynomialMotion([0.0, 1.0, 2.0], [0.0, 1.0, 0.0], continuity=2, ends="natural")
+    >>> [float(x) for x in law(jn.Jet.variable(1.0, order=2)).derivatives()]
+    [1.0, 0.0, -3.0]
+
+    From rest, with both ends at rest to the second derivative:
+
+    >>> rest = {1: 0.0, 2: 0.0}
+    >>> law = jn.laws.PolynomialMotion([0.0, 1.0], [0.0, 1.0], continuity=4, start=rest, end=rest)
+    >>> round(float(law(jn.Jet.variable(0.5, order=1)).coefficients[1]), 12)
+    1.875
+    """
+
+    def __init__(
+        self,
+        times: ArrayLike,
+        values: ArrayLike,
+        continuity: int = 4,
+        derivative: int = 0,
+        start: _Conditions | None = None,
+        end: _Conditions | None = None,
+        ends: str = "not-a-knot",
+        beyond: str = "refuse",
+    ):
+        times, values = check_samples(times, values)
+        continuity = whole_number("continuity", continuity, 1, MAX_CONTINUITY)
+        derivative = whole_number("derivative", derivative, 0, continuity)
+        check_choice("beyond", beyond, BEYOND, TrajectoryError)
+        check_choice("ends", ends, ENDS, TrajectoryError)
+        conditions = _checked(start, continuity, "start"), _checked(end, continuity, "end")
+        constants = _constants(conditions, derivative)
+        step = (times[-1] - times[0]) / (len(times) - 1)
+        knots = (times - times[0]) / step
+        pieces = _spline(knots, values, continuity + 1 - derivative, _above(conditions, derivative, step), ends)
+        pieces = pieces * step**derivative
+        for _ in range(derivative):
+            pieces = integrated(pieces, np.diff(knots))
+        if derivative:
+            pieces = pieces + _closing(pieces, knots, constants, times[-1] - times[0])
+        with np.errstate(over="ignore", invalid="ignore"):
+            pieces = pieces / step ** np.arange(continuity + 2)[:, None]
+        if not np.isfinite(pieces).all():
+            message = "are too large, or too close in time, for their derivatives to be numbers"
+            raise TrajectoryError(message, name="values", value=float(np.max(np.abs(values))))
+        self._set(times[:-1], pieces, times[-1], beyond)
+
+    @classmethod
+    def from_accelerations(
+        cls,
+        times: ArrayLike,
+        accelerations: ArrayLike,
+        continuity: int = 4,
+        start: _Conditions | None = None,
+        end: _Conditions | None = None,
+        ends: str = "not-a-knot",
+        beyond: str = "refuse",
+    ) -> "PolynomialMotion":
+        """Return the law whose acceleration goes through samples, integrated twice (Negrean 2025, section 4).
+
+        Parameters
+        ----------
+        times : array_like of shape (knots,)
+            Strictly increasing instants, s.
+        accelerations : array_like of shape (knots,)
+            Samples of the acceleration, m/s^2 or rad/s^2.
+        continuity : int, default 4
+            Order m of the highest continuous derivative of the position, at least 2; 4 gives quintic segments.
+        start, end : dict of int to float, optional
+            Two conditions on the position (0) and the velocity (1), one at least on the position: by default
+            ``start={0: 0.0, 1: 0.0}``. And either none or ``m - 2`` on the derivatives from the third on.
+        ends : {"not-a-knot", "natural", "clamped"}, default "not-a-knot"
+            Conditions on the derivatives from the third on, when none are given.
+        beyond : {"refuse", "hold", "continue"}, default "refuse"
+            What the law is outside of the knots.
+
+        Returns
+        -------
+        PolynomialMotion
+            The law of the position.
+
+        Raises
+        ------
+        TrajectoryError
+            As for the class.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> import jounce as jn
+        >>> t = np.linspace(0.0, 1.0, 11)
+        >>> law = jn.laws.PolynomialMotion.from_accelerations(t, 6 * t, start={0: 2.0}, end={0: 3.0})
+        >>> [round(float(x), 9) for x in law(jn.Jet.variable(0.5, order=3)).derivatives()]
+        [2.125, 0.75, 3.0, 6.0]
+        """
+        if continuity < 2:
+            message = "accelerations at the knots are continuous; the order of continuity is at least 2"
+            raise TrajectoryError(message, name="continuity", value=continuity)
+        return cls(times, accelerations, continuity, 2, start, end, ends, beyond)
+
+    @property
+    def continuity(self) -> int:
+        """Order m of the highest continuous derivative."""
+        return self.degree - 1
+
+    @property
+    def knots(self) -> Float[np.ndarray, " knots"]:
+        """Instants of the knots, shape (knots,), s."""
+        return np.append(self.breakpoints, self.stop)
+
+    @property
+    def knot_values(self) -> Float[np.ndarray, " knots"]:
+        """Values of the m-th derivative at the knots, shape (knots,): ``q^(m)_i`` of Negrean 2025, equation 61."""
+        m = self.continuity
+        first, slope = math.factorial(m) * self.coefficients[m], math.factorial(m + 1) * self.coefficients[m + 1]
+        last = first[-1] + slope[-1] * (self.stop - self.breakpoints[-1])
+        return np.append(first, last)
+
+    def integration_constants(self, origin: float = 0.0) -> Float[np.ndarray, "continuity segments"]:
+        """Return the integration constants ``a_k`` of the segments (Negrean 2025, equations 61-63).
+
+        On segment i of length ``T_i``, with ``tau`` the time since `origin`, the derivative of order ``m - p`` is
+        ``(-1)^p (tau_i - tau)^(p+1) / (T_i (p+1)!) q^(m)_{i-1} + (tau - tau_{i-1})^(p+1) / (T_i (p+1)!) q^(m)_i
+        + sum_{k=1}^p a_k tau^(p-k) / (p-k)!``.
+
+        Parameters
+        ----------
+        origin : float, default 0
+            The instant from which ``tau`` counts, s. Far from the segments the terms cancel, and digits are lost.
+
+        Returns
+        -------
+        ndarray of shape (m, segments)
+            ``a_1, ..., a_m``, m or rad per s to the power of ``m - k``.
+
+        Examples
+        --------
+        >>> import jounce as jn
+        >>> law = jn.laws.PolynomialMotion([0.0, 1.0], [2.0, 2.0], continuity=2, derivative=2, start={0: 5.0, 1: 0.0})
+        >>> law.integration_constants().round(12).tolist()  # q = (1 - t)^3 / 3 + t^3 / 3 + a_1 t + a_2
+        [[1.0], [4.666666666667]]
+        """
+        m, knots, highest = self.continuity, self.knots, self.knot_values
+        length, beginning = np.diff(knots), knots[:-1] - origin
+        rest = []
+        for k in range(m):  # what the term of the left knot value does not hold of each power of the local time
+            known = (-1) ** (m + k) * math.comb(m + 1, k) / math.factorial(m + 1) * length ** (m - k) * highest[:-1]
+            rest.append(self.coefficients[k] - known)
+        constants = []
+        for power in range(m - 1, -1, -1):  # the local time is tau - beginning: the powers of tau by the binomial sum
+            shifted = [rest[k] * math.comb(k, power) * (-beginning) ** (k - power) for k in range(power, m)]
+            constants.append(math.factorial(power) * sum(shifted[1:], shifted[0]))
+        return np.stack(constants)
+
+
+def _checked(conditions: Any, continuity: int, name: str) -> dict[int, float]:
+    """Return the conditions at one end, refusing orders that are not continuous and values that are no numbers."""
+    if conditions is None:
+        return {}
+    if not isinstance(conditions, Mapping):
+        raise TrajectoryError("must map orders of derivatives to values, as {1: 0.0}", name=name, value=conditions)
+    for order, value in conditions.items():
+        whole_number(name, order, 0, continuity)
+        if not np.isscalar(value) or isinstance(value, str | bytes) or not np.isfinite(value):
+            raise TrajectoryError(
+                "the value of a condition must be a finite number", name=f"{name}[{order}]", value=value
+            )
+    return {int(order): float(value) for order, value in conditions.items()}
+
+
+_Ends = tuple[dict[int, float], dict[int, float]]
+_Pieces = Float[np.ndarray, "powers segments"]
+
+
+def _constants(conditions: _Ends, derivative: int) -> _Ends:
+    """Return the conditions on the derivatives below that of the knots; by default all zero at the start."""
+    for name, end in zip(("start", "end"), conditions, strict=True):
+        if derivative in end:
+            message = f"the knots carry the derivative of order {derivative}, it takes no condition"
+            raise TrajectoryError(message, name=name, value=end)
+    first, last = ({k: v for k, v in end.items() if k < derivative} for end in conditions)
+    count = len(first) + len(last)
+    if count == 0:
+        return dict.fromkeys(range(derivative), 0.0), {}
+    if count != derivative:
+        message = f"{derivative} conditions on the derivatives below order {derivative} close the system"
+        raise TrajectoryError(f"{message}; give as many in start and end together", value=count)
+    return first, last
+
+
+def _above(conditions: _Ends, derivative: int, step: float) -> _Ends:
+    """Return the conditions on the derivatives above that of the knots, by order above it and in scaled time."""
+    first, last = (
+        {k - derivative: v * step ** (k - derivative) for k, v in end.items() if k > derivative} for end in conditions
+    )
+    return first, last
+
+
+def _spline(
+    knots: Float[np.ndarray, " knots"], values: Float[np.ndarray, " knots"], degree: int, conditions: _Ends, ends: str
+) -> _Pieces:
+    """Return the local Taylor coefficients, shape (degree + 1, segments), of a spline through values at knots."""
+    from scipy.interpolate import make_interp_spline  # here, since importing SciPy takes half a second
+
+    needed, given = degree - 1, len(conditions[0]) + len(conditions[1])
+    if given not in (0, needed):
+        message = f"{needed} conditions on the derivatives above that of the knots close the system, or none"
+        raise TrajectoryError(f"{message}; give as many in start and end together", value=given)
+    first, last = (needed + 1) // 2, needed // 2
+    _check_shares(conditions, len(knots) - 1, (first, last))
+    if not given and ends == "not-a-knot":
+        if len(knots) <= degree:
+            message = f"not-a-knot ends of a law of this degree need at least {degree + 1} knots"
+            raise TrajectoryError(f"{message}; give more, or conditions at the start and the end", value=len(knots))
+        inside = knots[1 + first : len(knots) - 1 - last]
+        bounds = [np.full(degree + 1, knot) for knot in (knots[0], knots[-1])]
+        try:
+            spline = make_interp_spline(knots, values, k=degree, t=np.concatenate([bounds[0], inside, bounds[1]]))
+        except (np.linalg.LinAlgError, ValueError):
+            message = "no spline goes through the samples: their spacing is too uneven; sample evenly"
+            raise TrajectoryError(message, value=float(np.diff(knots).min())) from None
+    else:
+        if not given:
+            top = degree if ends == "natural" else 0
+            start, end = (dict.fromkeys((abs(top - k) for k in range(1, n + 1)), 0.0) for n in (first, last))
+            conditions = start, end
+        both = [sorted(end.items()) or None for end in conditions] if needed else [None, None]
+        try:
+            spline = make_interp_spline(knots, values, k=degree, bc_type=tuple(both))
+        except (np.linalg.LinAlgError, ValueError):
+            orders = [sorted(end) for end in conditions]
+            message = "the conditions at the start and the end do not determine the law; choose others"
+            raise TrajectoryError(message, value=orders) from None
+    pieces = local_powers(spline, knots[:-1], degree)
+    _check_growth(pieces, knots, values, conditions)
+    return pieces
+
+
+def _check_shares(conditions: _Ends, segments: int, shares: tuple[int, int]) -> None:
+    """Raise an error where one end has more conditions than the other, by more than one."""
+    start, end = (len(given) for given in conditions)
+    if segments == 1 or abs(start - end) <= 1:
+        return
+    more, fewer = shares
+    some = f"{more} at each end" if more == fewer else f"{more} at one end and {fewer} at the other"
+    message = (
+        f"of the conditions on the derivatives above that of the knots, {start} are at the start and {end} at the end: "
+        "an error at one end, of rounding as well, then grows by a factor at every knot, and the law with it"
+    )
+    raise TrajectoryError(f"{message}; give {some}, or none", name="start" if start > end else "end")
+
+
+def _check_growth(
+    pieces: _Pieces, knots: Float[np.ndarray, " knots"], values: Float[np.ndarray, " knots"], conditions: _Ends
+) -> None:
+    """Raise an error unless a spline goes through its own knots and stays near them, as far as rounding tells."""
+    given = [abs(value) for end in conditions for value in end.values()]
+    size = max(float(np.max(np.abs(values))), *given, 0.0)
+    local = np.diff(knots) * (np.arange(1, SAMPLES + 1) / SAMPLES)[:, None]
+    along = sum(c * local**k for k, c in enumerate(pieces))
+    missed = float(np.max(np.abs(np.asarray(along)[-1] - values[1:])))
+    if not missed <= AT_KNOTS * size:
+        message = f"the law misses the values at its own knots, by {missed:.3g}: errors grow from knot to knot"
+    elif not np.max(np.abs(along)) <= LARGEST_GROWTH * size:
+        message = f"the law grows to {np.max(np.abs(along)):.3g} between its knots, of which the largest is {size:.3g}"
+    else:
+        return
+    smallest = float(np.min(np.diff(knots)) * (len(knots) - 1) / (knots[-1] - knots[0]))
+    advice = "sample evenly, lower the order of continuity, or choose an even number of conditions, half at each end"
+    raise TrajectoryError(f"{message} (the shortest segment is {smallest:.2g} of the mean one); {advice}")
+
+
+def _closing(pieces: _Pieces, knots: Float[np.ndarray, " knots"], constants: _Ends, duration: float) -> _Pieces:
+    """Return the polynomial of the integration constants, as local Taylor coefficients of the shape of the pieces."""
+    count, length, last = len(constants[0]) + len(constants[1]), knots[-1], knots[-1] - knots[-2]
+    rows, values = [], []
+    for index, conditions in enumerate(constants):
+        for order, value in conditions.items():
+            reached = pieces[order, 0] * math.factorial(order)
+            if index:
+                reached = sum(
+                    c * math.perm(k, order) * last ** (k - order) for k, c in enumerate(pieces[:, -1]) if k >= order
+                )
+            rows.append([float(math.perm(j, order) * (index or j == order)) for j in range(count)])
+            values.append(value * duration**order - reached * length**order)
+    if np.linalg.matrix_rank(np.array(rows)) < count:
+        message = "these conditions do not fix the constants of integration; one at least must be on the position"
+        raise TrajectoryError(message, value=[sorted(end) for end in constants])
+    powers = np.linalg.solve(np.array(rows), np.array(values))
+    at = knots[:-1] / length
+    closing = np.zeros_like(pieces)
+    for k in range(count):
+        closing[k] = sum(powers[j] * math.comb(j, k) * at ** (j - k) for j in range(k, count)) / length**k
+    return closing

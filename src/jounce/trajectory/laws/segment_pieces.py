@@ -1,0 +1,223 @@
+"""Segments of motion laws, and the polynomials and sines that they are made of: the profiles of cam design.
+
+The shapes of harmonic, cycloidal, modified trapezoidal and modified sine laws are given by accelerations, parts of
+sines and constants, which are integrated exactly.
+"""
+
+import dataclasses
+import math
+from collections.abc import Callable, Sequence
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from jax.core import Tracer
+
+from jounce.errors import TrajectoryError
+from jounce.trajectory.checks import finite, positive
+from jounce.trajectory.laws.profiles import RESTS, rest_to_rest_powers
+from jounce.trajectory.laws.trapezoid import LIMITS, TrapezoidalMotion
+from jounce.units.expression import Expression
+
+Value = Any
+"""A number, an expression of parameters, or what JAX traces."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Segment:
+    """A part of a `SegmentedMotion`: how the law goes on, and for how long.
+
+    Parameters
+    ----------
+    profile : str
+        ``dwell``, ``constant_velocity``, ``harmonic``, ``cycloidal``, ``polynomial_3_4_5`` (or ``minimum_jerk``),
+        ``polynomial_4_5_6_7`` (or ``minimum_snap``), ``modified_trapezoid``, ``modified_sine``, ``trapezoidal`` (seven
+        phases of limited jerk), or ``polynomial``, which meets given derivatives at its ends.
+    duration : number or expression, optional
+        s, or rad or m where the law is one of another coordinate. Only a trapezoidal segment with limits needs none.
+    to, by : number or expression, optional
+        The value at the end of the segment, or how far that is from the value at its beginning, m or rad. One of them,
+        or none in a dwell.
+    begin, end : sequence of number or expression, optional
+        Of a polynomial: its derivatives at the beginning and at the end, the velocity first. Unless given, it begins
+        with the velocity and the acceleration with which the segment before ends, and ends at rest.
+    limits : sequence of 3 numbers or expressions, optional
+        Of a trapezoidal segment: largest velocity, acceleration and jerk.
+
+    Examples
+    --------
+    >>> import jounce as jn
+    >>> jn.laws.Segment("cycloidal", duration=0.5, by=0.02).profile
+    'cycloidal'
+    """
+
+    profile: str
+    duration: Value = None
+    to: Value = None
+    by: Value = None
+    begin: Sequence[Value] | None = None
+    end: Sequence[Value] | None = None
+    limits: Sequence[Value] | None = None
+
+
+@dataclasses.dataclass(frozen=True)
+class Piece:
+    """A polynomial and a sine of the time since the beginning of a piece."""
+
+    powers: list[Value]
+    sine: tuple[Value, Value, Value] = (0.0, 0.0, 0.0)  # amplitude, frequency, phase
+    length: Value = 0.0
+
+    def stretched(self, rise: Value, duration: Value) -> "Piece":
+        """Return the piece over a way and a duration other than one."""
+        amplitude, frequency, phase = self.sine
+        powers = [c * rise / duration**k for k, c in enumerate(self.powers)]
+        return Piece(powers, (amplitude * rise, frequency / duration, phase), self.length * duration)
+
+    def lifted(self, value: Value) -> "Piece":
+        """Return the piece with a value added."""
+        return Piece([self.powers[0] + value, *self.powers[1:]], self.sine, self.length)
+
+
+def joined_pieces(segments: Sequence[Segment], value: Value) -> tuple[list[Piece], list[Value], list[Value]]:
+    """Return the pieces of all segments, where each begins and the last one ends, and the values between segments."""
+    pieces: list[Piece] = []
+    values = [value]
+    ends: list[Value] = [0.0]
+    derivatives: list[Value] = [0.0, 0.0]
+    for k, segment in enumerate(segments):
+        new, target, derivatives = _of_segment(segment, f"segments[{k}]", values[-1], derivatives)
+        pieces += new
+        values.append(target)
+        for piece in new:
+            ends.append(ends[-1] + piece.length)
+    return pieces, ends, values
+
+
+def _of_segment(
+    segment: Segment, name: str, value: Value, derivatives: list[Value]
+) -> tuple[list[Piece], Value, list[Value]]:
+    """Return the pieces of a segment, the value at its end, and the derivatives there, the velocity first."""
+    rest: list[Value] = [0.0, 0.0]
+    if segment.to is not None:
+        target = number_of_value(f"{name}.to", segment.to)
+    else:
+        target = value if segment.by is None else value + number_of_value(f"{name}.by", segment.by)
+    rise = target - value
+    if segment.limits is not None:
+        return _within_limits(segment, name, value, target), target, rest
+    duration = number_of_value(f"{name}.duration", segment.duration, positive)
+    if segment.profile == "dwell":
+        return [Piece([value], length=duration)], target, rest
+    if segment.profile == "constant_velocity":
+        return [Piece([value, rise / duration], length=duration)], target, [rise / duration, 0.0]
+    if segment.profile == "polynomial":
+        given = [
+            default if x is None else [number_of_value(f"{name}.{key}", entry) for entry in x]
+            for key, x, default in (("begin", segment.begin, derivatives), ("end", segment.end, rest))
+        ]
+        powers = _meeting([value, *given[0]], [target, *given[1]], duration)
+        # what is not given at the end is what the polynomial makes of it, and the next one begins with that
+        free = [_derivative(powers, order, duration) for order in range(len(given[1]) + 1, len(rest) + 1)]
+        return [Piece(powers, length=duration)], target, [*given[1], *free][: len(rest)]
+    pieces = [piece.stretched(rise, duration).lifted(value) for piece in _shape(segment.profile)]
+    last = [0.0, -(math.pi**2) / 2 * rise / duration**2] if segment.profile == "harmonic" else rest
+    return pieces, target, last
+
+
+def _within_limits(segment: Segment, name: str, value: Value, target: Value) -> list[Piece]:
+    """Return the seven phases of a trapezoidal segment within limits."""
+    numbers = (value, target, *(segment.limits or ()), *([] if segment.duration is None else [segment.duration]))
+    if any(isinstance(x, Tracer) for x in numbers):
+        message = "phases within limits are found case by case, which JAX cannot trace; give a duration, and no limits"
+        raise TrajectoryError(message, name=f"{name}.limits")
+    bounds = [number_of_value(f"{name}.limits", x, positive) for x in segment.limits or ()]
+    given = (
+        {}
+        if segment.duration is None
+        else {"duration": number_of_value(f"{name}.duration", segment.duration, positive)}
+    )
+    if value == target and not given:
+        raise TrajectoryError("goes nowhere, so that its limits give it no duration; give one", name=f"{name}.duration")
+    try:
+        law = TrapezoidalMotion(value, target, **dict(zip(LIMITS, bounds, strict=True)), **given)
+    except TrajectoryError as error:
+        raise error.located(name=f"{name}.{error.name}" if error.name else name) from None
+    lengths = np.diff(law.switches).tolist()
+    return [Piece(c, length=t) for c, t in zip(law.coefficients[:, 1:-1].T.tolist(), lengths, strict=True)]
+
+
+def _meeting(begin: list[Value], end: list[Value], duration: Value) -> list[Value]:
+    """Return the powers of the polynomial of least degree that has values and derivatives at both ends."""
+    lower, count = len(begin), len(begin) + len(end)
+    first = [x * duration**k / math.factorial(k) for k, x in enumerate(begin)]  # in units of the duration
+    matrix = np.array([[math.perm(k, j) for k in range(lower, count)] for j in range(len(end))], float)
+    rest = [
+        x * duration**j - sum(c * math.perm(k, j) for k, c in enumerate(first) if k >= j) for j, x in enumerate(end)
+    ]
+    inverse = np.linalg.inv(matrix)
+    upper = [sum(float(a) * x for a, x in zip(row, rest, strict=True)) for row in inverse]
+    return [c / duration**k for k, c in enumerate([*first, *upper])]
+
+
+def _derivative(powers: list[Value], order: int, at: Value) -> Value:
+    """Return a derivative of a polynomial."""
+    return sum(c * math.perm(k, order) * at ** (k - order) for k, c in enumerate(powers) if k >= order)
+
+
+# accelerations by parts: share of the duration, constant, and amplitude, frequency and phase of a sine
+QUARTER, UP, DOWN = 4 * math.pi, math.pi / 2, 3 * math.pi / 2
+ACCELERATIONS = {
+    "harmonic": ((1.0, 0.0, 1.0, math.pi, UP),),
+    "cycloidal": ((1.0, 0.0, 1.0, 2 * math.pi, 0.0),),
+    "modified_sine": (
+        (0.125, 0.0, 1.0, QUARTER, 0.0), (0.75, 0.0, 1.0, QUARTER / 3, UP), (0.125, 0.0, 1.0, QUARTER, DOWN),
+    ),
+    "modified_trapezoid": (
+        (0.125, 0.0, 1.0, QUARTER, 0.0), (0.25, 1.0, 0.0, 1.0, 0.0), (0.25, 0.0, 1.0, QUARTER, UP),
+        (0.25, -1.0, 0.0, 1.0, 0.0), (0.125, 0.0, 1.0, QUARTER, DOWN),
+    ),
+}  # fmt: skip
+SEGMENT_PROFILES = ("dwell", "constant_velocity", *ACCELERATIONS, *RESTS, "trapezoidal", "polynomial")
+
+
+@lru_cache
+def _shape(profile: str) -> tuple[Piece, ...]:
+    """Return the pieces of a profile over a way and a duration of one."""
+    if profile in RESTS:
+        return (Piece(rest_to_rest_powers(RESTS[profile]), length=1.0),)
+    if profile == "trapezoidal":
+        law = TrapezoidalMotion(0.0, 1.0, duration=1.0)
+        lengths = np.diff(law.switches).tolist()
+        return tuple(Piece(c, length=t) for c, t in zip(law.coefficients[:, 1:-1].T.tolist(), lengths, strict=True))
+    position = velocity = 0.0
+    pieces = []
+    for length, constant, amplitude, frequency, phase in ACCELERATIONS[profile]:
+        reach = amplitude / frequency
+        powers = [
+            position + reach / frequency * math.sin(phase),
+            velocity + reach * math.cos(phase),
+            constant / 2,
+        ]
+        pieces.append(Piece(powers, (-reach / frequency, frequency, phase), length))
+        turned = frequency * length + phase
+        position = sum(c * length**k for k, c in enumerate(powers)) - reach / frequency * math.sin(turned)
+        velocity = powers[1] + constant * length - reach * math.cos(turned)
+    return tuple(_whole(piece, position) for piece in pieces)
+
+
+def _whole(piece: Piece, rise: float) -> Piece:
+    amplitude, frequency, phase = piece.sine
+    return Piece([c / rise for c in piece.powers], (amplitude / rise, frequency, phase), piece.length)
+
+
+def parsed_value(value: Value) -> Value:
+    """Return a value with a text read as an expression."""
+    return Expression(value) if isinstance(value, str) else value
+
+
+def number_of_value(name: str, value: Value, check: Callable[[str, Any], float] = finite) -> Value:
+    """Return a checked number; what JAX traces, and an expression without names, is taken as it is."""
+    value = parsed_value(value)
+    value = value.evaluate() if isinstance(value, Expression) else value
+    return value if isinstance(value, Tracer) else check(name, value)

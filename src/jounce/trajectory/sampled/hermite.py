@@ -1,0 +1,115 @@
+"""Motion laws through instants at which derivatives are known, too."""
+
+import math
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+from jounce.base.shapes import ArrayLike, seconds
+from jounce.errors import TrajectoryError, check_choice
+from jounce.trajectory.checks import finite_numbers, finite_row
+from jounce.trajectory.knots import Jumps, knot_jumps
+from jounce.trajectory.motion import SplineMotion
+
+BEYOND = ("refuse", "hold", "continue")
+MET = 6  # values and derivatives that a piece meets at its end, at most: more lose digits
+
+
+class HermiteMotion(SplineMotion):
+    """A motion law through instants with the value and the derivatives at each.
+
+    At an instant it has the derivatives given there. In between it is a polynomial, which begins with all
+    derivatives of the instant before and meets the first five of the instant after it. An instant that is given twice
+    has the derivatives of the first row from the left and those of the second from the right, which `jumps` tells.
+
+    Parameters
+    ----------
+    times : array_like of shape (instants,)
+        Increasing, s; an instant within may be given twice.
+    derivatives : array_like of shape (instants, order + 1)
+        The law and its time derivatives, lowest first: m or rad by s to the power of the order.
+    beyond : {"refuse", "hold", "continue"}, default "refuse"
+        What the law is before the first and after the last instant, as for `SplineMotion`.
+    incomplete : bool, default False
+        Whether a derivative may be NaN where it is not known, and then those above it, too. Each piece takes what both
+        of its ends know, as joint_trajectory_controller of ros2_control does: it is linear between positions alone, a
+        cubic where velocities are known, and a quintic where accelerations are.
+
+    Raises
+    ------
+    TrajectoryError
+        If the numbers are not finite, the instants do not increase, or their number is not that of the rows.
+
+    Examples
+    --------
+    >>> import jounce as jn
+    >>> law = jn.laws.HermiteMotion([0.0, 1.0], [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]])  # rest to rest: 3-4-5
+    >>> [round(float(x), 12) for x in law(jn.Jet.variable(0.5, order=2)).derivatives()]
+    [0.5, 1.875, -0.0]
+    """
+
+    def __init__(self, times: ArrayLike, derivatives: ArrayLike, beyond: str = "refuse", *, incomplete: bool = False):
+        check_choice("beyond", beyond, BEYOND, TrajectoryError)
+        instants = finite_row("times", times, seconds)
+        shape = np.shape(derivatives)
+        columns = shape[1] if len(shape) == 2 and shape[1] else 1
+        given = np.array(derivatives, float) if incomplete else np.zeros(shape)
+        known = ~np.isnan(given)
+        if known.ndim == 2 and ((known[:, 1:] & ~known[:, :-1]).any() or not known[:, :1].all()):
+            message = "a derivative is known only where those below it are"
+            raise TrajectoryError(message, name="derivatives", value=given[~known.all(axis=1)][0].tolist())
+        filled = np.where(known, given, 0.0) if incomplete else derivatives
+        table = finite_numbers("derivatives", filled, (len(instants), columns))
+        steps = np.diff(instants)
+        twice = steps == 0
+        if (steps < 0).any() or (twice[1:] & twice[:-1]).any() or twice[:1].any() or twice[-1:].any():
+            raise TrajectoryError("must increase", name="times", value=instants.tolist()[:5])
+        begins = np.append(~twice, True)  # of an instant that is given twice the second row begins a piece
+        pieces = hermite_pieces(instants, table) if known.all() else _mixed_pieces(instants, table, known)
+        self._set(instants[begins], pieces[:, begins], instants[-1], beyond)
+
+    def jumps(self, order: int = 4) -> Jumps:
+        """Return the instants, and by how much derivatives to an order jump there, as for `SegmentedMotion`."""
+        return knot_jumps(self, order)
+
+
+def hermite_pieces(
+    times: Float[np.ndarray, " instants"], derivatives: Float[np.ndarray, "instants levels"]
+) -> Float[np.ndarray, "powers instants"]:
+    """Return the powers of the piece that begins at each instant; the last one is its Taylor polynomial."""
+    levels, met = derivatives.shape[1], min(derivatives.shape[1], MET)
+    factorials = np.array([math.factorial(k) for k in range(levels)], float)
+    taylor = (derivatives / factorials).T
+    steps = np.diff(times)
+    steps = np.where(steps > 0, steps, 1.0)
+    scaled = taylor[:, :-1] * steps ** np.arange(levels)[:, None]  # in units of the step
+    ends = taylor[:met, 1:] * steps ** np.arange(met)[:, None]
+    missing = ends - _binomials(met, np.arange(levels)) @ scaled
+    upper = np.linalg.solve(_binomials(met, levels + np.arange(met)), missing)
+    powers = np.concatenate([scaled, upper]) / steps ** np.arange(levels + met)[:, None]
+    powers[:levels] = taylor[:, :-1]
+    return np.column_stack([powers, np.concatenate([taylor[:, -1], np.zeros(met)])])
+
+
+def _mixed_pieces(
+    times: Float[np.ndarray, " instants"],
+    derivatives: Float[np.ndarray, "instants levels"],
+    known: Bool[np.ndarray, "instants levels"],
+) -> Float[np.ndarray, "powers instants"]:
+    """Return the powers of pieces between instants of which some have fewer derivatives than others."""
+    levels = np.minimum(known[:-1].sum(axis=1), known[1:].sum(axis=1))
+    top = int(levels.max())
+    result = np.zeros((top + min(top, MET), len(times)))
+    for count in np.unique(levels).tolist():
+        (first,) = np.nonzero(levels == count)
+        pairs = np.stack([first, first + 1], axis=1).reshape(-1)
+        powers = hermite_pieces(times[pairs], derivatives[pairs, :count])[:, ::2]
+        result[: len(powers), first] = powers
+    last = derivatives[-1, : known[-1].sum()][:top]
+    result[: len(last), -1] = last / np.array([math.factorial(k) for k in range(len(last))], float)
+    return result
+
+
+def _binomials(orders: int, powers: np.ndarray) -> Float[np.ndarray, "orders powers"]:
+    """Return the Taylor coefficients at one of the powers of a variable."""
+    return np.array([[math.comb(int(p), j) for p in powers] for j in range(orders)], float)

@@ -1,0 +1,177 @@
+"""Motion laws of which a derivative was measured: splines through its samples, integrated exactly."""
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax.core import Tracer
+from jaxtyping import Float
+
+from jounce.base.shapes import ArrayLike
+from jounce.errors import MechanismError, check_choice
+from jounce.jet import Jet
+from jounce.trajectory.beyond import CLOSED
+from jounce.trajectory.checks import whole_number
+from jounce.trajectory.motion import SplineMotion, Untraced
+from jounce.trajectory.sample_errors import derivative_errors
+from jounce.trajectory.splines import integrated, spline_through
+from jounce.units.expression import Expression
+
+HIGHEST = 4  # derivative that can be measured: jounce
+BEYOND = ("refuse", "hold", "repeat", "advance", "continue")
+
+InitialValue = float | str | Expression | jax.Array
+
+
+class MeasuredMotion(SplineMotion):
+    """A motion law one of whose derivatives goes through samples, such as measured accelerations.
+
+    The spline through the samples is integrated exactly; what the samples do not say is given at the first of them.
+    Negrean 2025, section 4, drives a robot so.
+
+    Parameters
+    ----------
+    times : array_like of shape (samples,)
+        Strictly increasing instants, s.
+    values : array_like of shape (samples,)
+        Samples of the derivative, m or rad by s to the power of `derivative`.
+    derivative : int, default 2
+        Which derivative was measured: 1 velocity, 2 acceleration, 3 jerk, 4 jounce.
+    initial : sequence of float, str or Expression, optional
+        The law and its derivatives below `derivative` at the first sample, lowest first; zero where not given. Those
+        that are expressions of parameters have their values from the mechanism that the law belongs to.
+    degree : int, default 5
+        Of the spline through the samples, from 1 to 11; that of the law is higher by `derivative`.
+    beyond : {"refuse", "hold", "repeat", "advance", "continue"}, default "refuse"
+        What the law is before the first and after the last sample, as for `SplineMotion`. Where it is to repeat or to
+        advance, its derivatives must be at the last sample what they are at the first.
+
+    Raises
+    ------
+    MechanismError
+        If the samples are not valid, as for `SplineMotion`, or there are too many initial values.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import jounce as jn
+    >>> t = np.linspace(0.0, 1.0, 11)
+    >>> law = jn.laws.MeasuredMotion(t, 6 * t, derivative=2, initial=[2.0, 1.0])  # accelerations of t^3
+    >>> [round(float(x), 9) for x in law(jn.Jet.variable(0.5, order=3)).derivatives()]
+    [2.625, 1.75, 3.0, 6.0]
+    """
+
+    derivative: int = eqx.field(static=True)
+    initial: Untraced = eqx.field(static=True)
+    extrapolation: str = eqx.field(static=True)
+
+    def __init__(
+        self,
+        times: ArrayLike,
+        values: ArrayLike,
+        derivative: int = 2,
+        initial: Sequence[InitialValue] = (),
+        degree: int = 5,
+        beyond: str = "refuse",
+    ):
+        check_choice("beyond", beyond, BEYOND, MechanismError)
+        self.derivative = whole_number("derivative", derivative, 1, HIGHEST, error=MechanismError)
+        repeats = beyond in ("repeat", "advance")
+        samples, ends, pieces, open_by = spline_through(times, values, degree, "repeat" if repeats else beyond)
+        if open_by:
+            message = "samples of a derivative that repeat must end at the value they begin with; the last differs by"
+            raise MechanismError(message, name="values", value=open_by)
+        for _ in range(self.derivative):
+            pieces = integrated(pieces, np.diff(ends))
+        self.initial = Untraced(_checked(initial, self.derivative))
+        known = [np.nan if isinstance(x, Expression) else x for x in self.initial.value]
+        if any(isinstance(x, Tracer) for x in known):
+            self.initial = Untraced(())  # a tracer must not outlive its trace
+        whole, advance = _started(pieces, ends, known), 0.0
+        if repeats and not self._open:
+            advance = _advance(whole, ends, self.derivative, beyond)
+        extrapolation = "repeat" if beyond == "advance" else beyond
+        self._set(ends[:-1], whole, ends[-1], extrapolation, advance, samples=samples)
+        self.extrapolation = beyond
+
+    def resolved(self, parameters: Mapping[str, Any]) -> "MeasuredMotion":
+        """Return the law with numbers in the place of its expressions of parameters."""
+        if not self._open:
+            return self
+        known = [x.evaluate(parameters) if isinstance(x, Expression) else x for x in self.initial.value]
+        times, values = self.samples.value
+        degree = self.degree - self.derivative
+        return MeasuredMotion(times, values, self.derivative, known, degree, self.extrapolation)
+
+    @property
+    def _open(self) -> list[str]:
+        """Names of the parameters without which the law is not known."""
+        return sorted({name for x in self.initial.value if isinstance(x, Expression) for name in x.names})
+
+    def __call__(self, time: Jet) -> Jet:
+        """Return the jet of the law at the instants of the time jet; parameters need their values, see `resolved`."""
+        if self._open:
+            message = "depends on parameters, whose values a mechanism knows; give numbers"
+            raise MechanismError(message, name="initial", value=self._open)
+        return super().__call__(time)
+
+    @property
+    def errors(self) -> np.ndarray:
+        """Estimated errors of the derivatives, relative to their peaks, (degree + 1,)."""
+        if self.samples.derived is None:
+            times, values = self.samples.value
+            measured = derivative_errors(times, values, self.degree - self.derivative)
+            self.samples.derived = np.concatenate([np.full(self.derivative, measured[0]), measured])
+        return self.samples.derived
+
+
+def _started(
+    pieces: Float[np.ndarray, "powers pieces"], ends: Float[np.ndarray, " breakpoints"], initial: Sequence[Any]
+) -> Any:
+    """Return pieces to which the polynomial of the values at the beginning was added."""
+    since = ends[:-1] - ends[0]
+    added = [
+        sum(x / math.factorial(n) * math.comb(n, k) * since ** (n - k) for n, x in enumerate(initial) if n >= k)
+        for k in range(len(initial))
+    ]
+    namespace = jnp if any(isinstance(x, Tracer) for x in initial) else np
+    return namespace.concatenate([pieces[: len(added)] + namespace.stack(added), pieces[len(added) :]])
+
+
+def _advance(pieces: Any, ends: Float[np.ndarray, " breakpoints"], derivative: int, beyond: str) -> Any:
+    """Return by how much a law goes on from one period to the next, whose derivatives must begin as they end."""
+    length = ends[-1] - ends[-2]
+    gains = []
+    for level in range(derivative):
+        end = sum(c * math.perm(k, level) * length ** (k - level) for k, c in enumerate(pieces[:, -1]) if k >= level)
+        gains.append(end - math.factorial(level) * pieces[level, 0])
+    if any(isinstance(x, Tracer) for x in gains):
+        return gains[0] if beyond == "advance" else 0.0
+    for level, gain in enumerate(gains):
+        size = math.factorial(level) * float(np.max(np.abs(pieces[level]))) + abs(float(gain))
+        if abs(float(gain)) > CLOSED * size and (level or beyond == "repeat"):
+            what = f"its derivative {level}" if level else "the law"
+            advice = "change the samples or initial" if level else "close it, or choose beyond: advance"
+            message = (
+                f"samples of a derivative that repeat: {what} ends {float(gain):.6g} from where it began; {advice}"
+            )
+            raise MechanismError(message, name="beyond", value=beyond)
+    return float(gains[0]) if beyond == "advance" else 0.0
+
+
+def _checked(initial: Any, derivative: int) -> tuple[Any, ...]:
+    """Return the values at the first sample, zeros added."""
+    try:
+        known = [Expression(x) if isinstance(x, str) else x for x in initial]
+        known = [x.evaluate() if isinstance(x, Expression) and not x.names else x for x in known]
+        known = [x if isinstance(x, Expression | Tracer) else float(x) for x in known]
+    except (TypeError, ValueError):
+        raise MechanismError("must be a list of numbers", name="initial", value=initial) from None
+    if len(known) > derivative or not np.isfinite([x for x in known if isinstance(x, float)]).all():
+        message = f"must be at most {derivative} finite numbers: the law and its derivatives below the measured one"
+        raise MechanismError(message, name="initial", value=known)
+    return (*known, *(0.0,) * (derivative - len(known)))
