@@ -13,8 +13,8 @@ import pytest
 from jounce.base.private_folder import PrivateFolder
 from jounce.cli.compiled_programs import JaxProgramFolder
 from jounce.execution import compilation
+from jounce.execution.store import programs as store
 from jounce.execution.store.folder import ProgramFolder
-from jounce.execution.store.programs import programs as store
 from tests.execution.store.test_folder import DAMAGES, PROGRAM
 
 FOUR_BAR = pathlib.Path(__file__).resolve().parents[2] / "examples" / "four_bar.yaml"

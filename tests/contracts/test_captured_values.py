@@ -23,7 +23,7 @@ from jounce import jet
 from jounce.constraints import MotionLaw
 from jounce.execution import translated
 from jounce.execution.backends import VARIABLE
-from jounce.execution.store.programs import programs
+from jounce.execution.store import programs
 from tests.problems.own_types import taken_back
 
 GROUND = ("ground", "rod")

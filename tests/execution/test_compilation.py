@@ -9,7 +9,7 @@ import pytest
 import jounce as jn
 from jounce.execution import compilation
 from jounce.execution.compilation import Compiled, compiles_anew
-from jounce.execution.store.programs import programs as store_
+from jounce.execution.store import programs as store_
 from tests.programs import forget
 
 

@@ -13,7 +13,7 @@ from jounce.execution import backends, mapped, translated
 from jounce.execution.llvm import self_test
 from jounce.execution.llvm.modules import object_file
 from jounce.execution.mapped import Mapped, OnXla
-from jounce.execution.store.programs import programs as store_
+from jounce.execution.store import programs as store_
 from tests.execution.test_compilation import Shelf
 
 needs_machine_code = pytest.mark.skipif(

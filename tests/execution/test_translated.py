@@ -10,7 +10,7 @@ import jounce as jn
 from jounce.execution import backends, structure, translated
 from jounce.execution.compilation import Compiled, compiled
 from jounce.execution.llvm import self_test
-from jounce.execution.store.programs import programs as store_
+from jounce.execution.store import programs as store_
 from tests.execution.test_compilation import Shelf
 
 pytestmark = pytest.mark.skipif(

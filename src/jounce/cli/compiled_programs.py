@@ -8,8 +8,8 @@ from typing import Any
 from jounce.base.private_folder import PrivateFolder
 from jounce.errors import OutputError
 from jounce.execution.compilation import ask_before_jax, compiles_anew
+from jounce.execution.store import programs as store
 from jounce.execution.store.folder import ProgramFolder, chosen_folder
-from jounce.execution.store.programs import programs as store
 
 
 class JaxProgramFolder(ProgramFolder):

@@ -39,7 +39,7 @@ def _of_mechanisms(name: str) -> ModuleType | None:
         case "load_drive_limits":
             from jounce.io.mechanisms import drive_limits as home
         case "json_schema":
-            from jounce.io.mechanisms.schema.models import json_schema as home
+            from jounce.io.mechanisms.schema import json_schema as home
         case "write_mechanism":
             from jounce.io.mechanisms.writing import writer as home
         case _:

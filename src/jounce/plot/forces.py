@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Float
 
 from jounce.dynamics import kinetic_energy, potential_energy, power_balance, stored_energy
-from jounce.dynamics.inverse.outputs.components import components as loads
+from jounce.dynamics.inverse.outputs import components as loads
 from jounce.dynamics.masses import check_loads
 from jounce.errors import MechanismError, check_name
 from jounce.kinematics import Motion

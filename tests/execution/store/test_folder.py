@@ -14,8 +14,8 @@ import pytest
 import jounce as jn
 from jounce.base import private_folder
 from jounce.base.private_folder import PrivateFolder
+from jounce.execution.store import folder as program_folder, programs as store
 from jounce.execution.store.folder import ProgramFolder
-from jounce.execution.store.programs import folder as program_folder, programs as store
 
 PROGRAM = bytes(range(256)) * 40
 
