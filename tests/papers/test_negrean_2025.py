@@ -119,7 +119,7 @@ def test_the_signs_of_the_printed_segment_are_the_only_ones_that_keep_the_arm_be
 
 @pytest.mark.slow
 def test_reproduction_writes_its_files(histories, tmp_path, monkeypatch):
-    module = sys.modules["jounce.papers.negrean_2025.reproduce"]
+    module = sys.modules["jounce.papers.negrean_2025.reproduction"]
     monkeypatch.setattr(module, "history", lambda motion: histories[motion.name])
     calls = []
     paths = reproduce(tmp_path / "made" / "here", lambda done, total: calls.append((done, total)))
@@ -266,7 +266,7 @@ def test_pictures_say_which_data_are_stand_ins(tmp_path, samples, masses, said, 
 )
 def test_bad_measurements(tmp_path, run, monkeypatch, samples, link, words):
     monkeypatch.setattr(
-        sys.modules["jounce.papers.negrean_2025.reproduce"], "history", lambda *_: pytest.fail("computed")
+        sys.modules["jounce.papers.negrean_2025.reproduction"], "history", lambda *_: pytest.fail("computed")
     )
     given = []
     for option, name, text in (("--samples", "mine.csv", samples), ("--masses", "link.yaml", link)):
@@ -289,7 +289,7 @@ FIGURES = tuple(f"figure_{k:02d}" for k in (4, 5, 7, 8, 9))
 
 
 def test_a_directory_that_cannot_be_made_is_refused_before_any_computing(tmp_path, monkeypatch):
-    module = sys.modules["jounce.papers.negrean_2025.reproduce"]
+    module = sys.modules["jounce.papers.negrean_2025.reproduction"]
     monkeypatch.setattr(module, "history", lambda *_: pytest.fail("computed"))
     (tmp_path / "file").write_text("")
     with pytest.raises(OutputError, match="files cannot be written there"):

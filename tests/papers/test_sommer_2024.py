@@ -2,7 +2,6 @@
 
 import csv
 import dataclasses
-import importlib
 import pathlib
 import subprocess
 import sys
@@ -21,12 +20,12 @@ from jounce.papers.sommer_2024 import (
     central_difference,
     comparison,
     geometry,
+    reproduction,
 )
 from jounce.papers.sommer_2024.cases import STEPS, TOLERANCES, stencil_instants
 from jounce.papers.sommer_2024.phase_lag import STEPS as LAG_STEPS
 from jounce.papers.sommer_2024.residual_stop import ResidualStop
 
-reproduction = importlib.import_module("jounce.papers.sommer_2024.reproduce")
 ROOT = pathlib.Path(__file__).parents[2]
 FLOOR = 1e-14  # normalized RMSE that every quantity of every simulation must reach
 
