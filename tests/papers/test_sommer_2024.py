@@ -19,6 +19,7 @@ from jounce.papers.sommer_2024 import (
     cases,
     central_difference,
     comparison,
+    figures,
     geometry,
     reproduction,
 )
@@ -128,7 +129,6 @@ DRAWN = ("figure_01", "figure_02", "figure_04", "figure_05", "figure_08", "phase
 def small_run(tmp_path_factory):
     """A whole reproduction, of the four-bar alone."""
     directory = tmp_path_factory.mktemp("small") / "made" / "here"
-    figures = importlib.import_module("jounce.papers.sommer_2024.figures")
     calls, kept = [], {}
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(reproduction, "VALIDATION_CASES", {"four_bar": VALIDATION_CASES["four_bar"]})
