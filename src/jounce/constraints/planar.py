@@ -163,8 +163,8 @@ class Fixed(AbstractConstraint, type="fixed", space="planar"):
 class PlanarCurve(AbstractConstraint, type="curve", space="planar"):
     """Point on a curve: a point of body j stays on a curve of body i, as a pin in a track, or a roller in a cam groove.
 
-    The parameter of the curve is a coordinate of its own, that of a carriage without mass beside the bodies; what the
-    curve exerts is along its normal.
+    The parameter of the curve is a coordinate of its own, that of an additional carriage without mass; the force of
+    the curve is along its normal.
     """
 
     curve: Curve  # of s, m, in the frame of body i

@@ -195,8 +195,8 @@ class PlaneOnPlane(AbstractConstraint, type="planar", space="spatial"):
         check_friction(self)
 
     def residual(self, body_i: SpatialPose, body_j: SpatialPose, time: Jet) -> Jet:
-        apart = slide(body_i, body_j, self.point_i, self.point_j, self.axis_i)
-        return rows(apart, *parallel_rows(body_i, body_j, self.axis_i, self.axis_j))
+        distance = slide(body_i, body_j, self.point_i, self.point_j, self.axis_i)
+        return rows(distance, *parallel_rows(body_i, body_j, self.axis_i, self.axis_j))
 
     def slip(self, bodies: tuple[Any, ...], moving: Velocities) -> Jet:
         """Return how the point of body j slides on the plane, m/s, along two directions of it; turns do not count."""
@@ -227,8 +227,8 @@ class Fixed(AbstractConstraint, type="fixed", space="spatial"):
 class SpatialCurve(AbstractConstraint, type="curve", space="spatial"):
     """Point on a curve: a point of body j stays on a curve of body i, as a roller in the groove of a barrel cam.
 
-    The parameter of the curve is a coordinate of its own, that of a carriage without mass beside the bodies; what the
-    curve exerts is across its tangent.
+    The parameter of the curve is a coordinate of its own, that of an additional carriage without mass; the force of
+    the curve is perpendicular to its tangent.
     """
 
     curve: Curve  # of s, m, in the frame of body i
@@ -248,8 +248,8 @@ class SpatialCurve(AbstractConstraint, type="curve", space="spatial"):
 class Surface(AbstractConstraint, type="surface", space="spatial"):
     """Point on a surface: a point of body j stays on a surface of body i.
 
-    The parameters of the surface are coordinates of their own, those of a carriage without mass beside the bodies; what
-    the surface exerts is along its normal.
+    The parameters of the surface are coordinates of their own, those of an additional carriage without mass; the force
+    of the surface is along its normal.
     """
 
     surface: Curve  # of u and v, m, in the frame of body i
@@ -305,7 +305,7 @@ class Screw(AbstractConstraint, type="screw", space="spatial"):
         return rows(around * cosine + _sliding(bodies, moving, self) * sine)
 
     def pressing(self, bodies: tuple[Any, ...], force: Jet) -> Jet:
-        """Return what presses the flanks of the thread, N: across the helix, of which the axis has a part."""
+        """Return the normal force on the flanks of the thread, N, from its component along the axis."""
         along = bodies[0].direction(self.axis_i).dot(force) / length_of(self.axis_i)
         return rows(along / self._helix()[0])
 
@@ -322,8 +322,8 @@ class Gear(AbstractConstraint, type="gear", space="spatial"):
     The axes may lie as they like, crossed as of a worm and its wheel, cut each other as of bevel gears, or be parallel
     as of a belt, and the frame may move. Each is the axis of a joint, which holds its direction in the frame.
 
-    Turns are those that the attitudes tell, and what is left of the ratio after whole turns of both shafts must vanish:
-    a continuous motion never loses count, of a ratio of whole numbers, as all of teeth are.
+    Turns are read from the attitudes, and the remainder of the ratio after whole turns of both shafts must vanish: a
+    continuous motion never loses count if the ratio is one of whole numbers, as those of all teeth are.
     """
 
     axis_i: Vector  # in the frame of each body

@@ -1,4 +1,4 @@
-"""Functions of JAX as machine code: for one instant alone, or for many side by side; made once for each structure.
+"""Functions of JAX as machine code: for a single instant, or for many side by side; made once for each structure.
 
 XLA makes a program of calls, one for each operation on arrays, and each takes longer than the arithmetic on a few
 numbers. Here one sequence of machine code does all of it (see `jounce.execution.llvm`): of one instant, single values
@@ -30,12 +30,12 @@ _thread = threading.local()
 
 
 def shaped(leaf: Any) -> Any:
-    """Return an array of NumPy, or what tells the shape and the type of one as it is."""
+    """Return a leaf as an array of NumPy; a form, which has only shape and type, stays as it is."""
     return leaf if isinstance(leaf, jax.ShapeDtypeStruct) else np.asarray(leaf)
 
 
-def is_traced_alone() -> bool:
-    """Tell whether what this thread traces becomes machine code of one instant, with loops instead of their turns."""
+def traces_one_instant() -> bool:
+    """Return whether this thread traces a program of a single instant, in which loops are not unrolled."""
     return getattr(_thread, "tracing", False)
 
 
@@ -46,7 +46,7 @@ class Translated:
     ----------
     function : callable
         Of two pytrees of arrays, shared by all instants and of the instant, with a last axis of length one, as its
-        results have; and of static arguments. Alone, of the arguments and keywords that are in the first.
+        results have; and of static arguments. With `single`, it takes the arguments and keywords in the first pytree.
     made_of : tuple of callable
         Functions of the package that say what it computes.
     single : bool, default False
@@ -54,9 +54,9 @@ class Translated:
     rows : bool, default False
         Whether arrays of many instants, those given and the results, have the instants along their first axis.
     most_lines : int, optional
-        Of LLVM's text: what is longer takes too long to compile for what it gains.
+        Of LLVM's text: a longer one takes more time to compile than it saves.
     brief : bool, default False
-        Whether it is called so seldom that it is better compiled soon than well, where it is given little.
+        Whether it is called so seldom that, for small arguments, it is compiled with fewer optimizations.
     """
 
     def __init__(
@@ -74,7 +74,7 @@ class Translated:
         self._programs = ByKey()
 
     def __len__(self) -> int:
-        """How many programs were wanted, those that there is no code for included."""
+        """Return the number of programs that were requested, including those without machine code."""
         return len(self._programs)
 
     def program(
@@ -82,33 +82,33 @@ class Translated:
     ) -> Any:
         """Return the machine code, `Single` or `Program`; None where there is none: no compiler, or no code for it.
 
-        Whole numbers among what many instants share, which say what is joined to what, are part of the program.
+        Arrays of whole numbers that all instants share, which are indices, are part of the program.
 
         Parameters
         ----------
         shared, lanes : tuple
-            The leaves of what is given, or their shapes and types, and its structure.
+            The leaves of the arguments, or their shapes and types, and their structure.
         static : mapping
             Further arguments of the function.
         large : int, optional
             Arrays of more numbers are in memory, as `object_file` has it.
         hasty : bool, default False
-            Whether it is to be there soon rather than fast.
+            Whether a short compilation matters more than a fast program.
         """
         if not is_wanted():
             return None
         (arrays, structure), (few, form) = shared, lanes
         kinds = tuple([(x.shape, x.dtype) for x in arrays])
         ones = tuple([(self._one(x.shape), x.dtype) for x in few])
-        places: Any = {} if self._single else {k: x for k, x in enumerate(arrays) if x.dtype.kind in "iu" and x.ndim}
-        known = tuple([x.tobytes() for x in places.values()])
+        indices: Any = {} if self._single else {k: x for k, x in enumerate(arrays) if x.dtype.kind in "iu" and x.ndim}
+        known = tuple([x.tobytes() for x in indices.values()])
         static_key = tuple([(name, type(value), value) for name, value in static.items()])
         key = structure, form, kinds, ones, known, large, hasty, static_key, settings()
 
         def make() -> Any:
             parts = zip((structure, form), (kinds, ones), strict=True)
             given = [jax.tree.unflatten(tree, [jax.ShapeDtypeStruct(*x) for x in its]) for tree, its in parts]
-            return self._made((given[0], given[1]), places, {"large": large, "hasty": hasty}, static)
+            return self._made((given[0], given[1]), indices, {"large": large, "hasty": hasty}, static)
 
         program = self._programs.get(key, make)
         if isinstance(program, str):
@@ -130,7 +130,7 @@ class Translated:
             _thread.tracing = False
 
     def _made(
-        self, given: tuple[Any, Any], places: Mapping[int, np.ndarray], how: dict[str, Any], static: Mapping[str, Any]
+        self, given: tuple[Any, Any], indices: Mapping[int, np.ndarray], how: dict[str, Any], static: Mapping[str, Any]
     ) -> Single | Program | str | None:
         """Return a program from the store of programs, or one that is made; or the operation that has no code."""
         function = partial(self._traced, **static)
@@ -140,14 +140,14 @@ class Translated:
         def make() -> tuple[Any, ...]:
             try:
                 with compiling(self.function):
-                    binary, results = object_file(function, *given, places, **options)
-            except NoRuleError as missing:  # which is kept, too: to find it out takes long
+                    binary, results = object_file(function, *given, indices, **options)
+            except NoRuleError as missing:  # stored, too, as it takes long to find out
                 return b"", str(missing), None
             except UnsupportedOperationError:
                 return b"", None, None
             return binary, tuple(map(jax.tree.leaves, given)), results
 
-        key = self._key(given, places, dict(static) | how) if current_store() is not None else None
+        key = self._key(given, indices, dict(static) | how) if current_store() is not None else None
         return made_or_kept(key, make, self._loaded)
 
     def _loaded(self, binary: bytes, given: Any, results: Any) -> Single | Program | str | None:
@@ -155,10 +155,10 @@ class Translated:
             return given
         return Single(binary, given, results) if self._single else Program(binary, given, results, rows=self._rows)
 
-    def _key(self, given: tuple[Any, Any], places: Mapping[int, np.ndarray], static: dict[str, Any]) -> str | None:
+    def _key(self, given: tuple[Any, Any], indices: Mapping[int, np.ndarray], static: dict[str, Any]) -> str | None:
         """Return the name of a program in other processes, None where it holds something of a user's own."""
         leaves, tree = jax.tree.flatten(given)
-        kinds = [*((leaf.shape, str(leaf.dtype)) for leaf in leaves), *places.values()]
+        kinds = [*((leaf.shape, str(leaf.dtype)) for leaf in leaves), *indices.values()]
         with suppress(UndescribedError):
             return program_key(self.made_of, tree, [*kinds, "single" if self._single else "side by side"], static)
         return None

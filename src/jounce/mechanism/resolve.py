@@ -77,8 +77,8 @@ def resolve_motion(motion: Any, parameters: Mapping[str, Any]) -> AbstractMotion
 
 
 def _check_names(expression: Expression, own: set[str], parameters: Mapping[str, Any]) -> None:
-    """Raise ExpressionError for a name that is neither a parameter, of which there may be thousands, nor its own."""
-    if any(name not in own and name not in parameters for name in expression.names):
+    """Raise ExpressionError for a name that is neither a parameter nor a variable of the expression."""
+    if any(name not in own and name not in parameters for name in expression.names):  # of thousands of parameters
         expression.check({*parameters, *own})
 
 
@@ -117,21 +117,22 @@ def resolve_law(law: Any, force: AbstractForce, parameters: Mapping[str, Any], c
         Size of a vector, None for a scalar.
     """
     if components is None or isinstance(law, AbstractLaw) or (callable(law) and not isinstance(law, AbstractMotion)):
-        found = _scalar_law(law, force, parameters)
+        force_law = _scalar_law(law, force, parameters)
     else:
         entries = law.tolist() if isinstance(law, np.ndarray) else law
         if isinstance(entries, str) or not isinstance(entries, Sequence) or len(entries) != components:
             raise MechanismError(f"must be a list of {components} laws or numbers", value=_plain(law))
-        found = VectorLaw(tuple(_scalar_law(entry, force, parameters) for entry in entries))
+        force_law = VectorLaw(tuple(_scalar_law(entry, force, parameters) for entry in entries))
     shape = (1, 1) if components is None else (components, 1, 1)
     advice = "it must map the jets of displacement, velocity and time to the jet of the force"
-    got = _tried(
-        "law", advice, lambda x, v, t: found(Jet([x, v, v]), Jet([v, v]), Jet.variable(t, 2)), *[np.zeros(shape)] * 2,
-        np.zeros((1, 1)),
-    )  # fmt: skip
-    if got != shape:
-        raise MechanismError(f"the law cannot be used: its value has the shape {got}, not {shape}; {advice}")
-    return read_law(found, shape[:-2])
+
+    def evaluated(x: Any, v: Any, t: Any) -> Jet:
+        return force_law(Jet([x, v, v]), Jet([v, v]), Jet.variable(t, 2))
+
+    force_shape = _tried("law", advice, evaluated, np.zeros(shape), np.zeros(shape), np.zeros((1, 1)))
+    if force_shape != shape:
+        raise MechanismError(f"the law cannot be used: its value has the shape {force_shape}, not {shape}; {advice}")
+    return read_law(force_law, shape[:-2])
 
 
 def _scalar_law(law: Any, force: AbstractForce, parameters: Mapping[str, Any]) -> AbstractLaw:
@@ -175,10 +176,10 @@ def parameter_value(name: str, value: Any) -> Any:
     def error(message: str, **place: Any) -> MechanismError:
         return MechanismError(f"a parameter {message}", **{**place, "value": _plain(value)})
 
-    place, wanted = f"parameters.{name}", "one finite number"
-    number = real_numbers(place, value, error, wanted)
+    place, expected = f"parameters.{name}", "one finite number"
+    number = real_numbers(place, value, error, expected)
     if number.ndim or not np.isfinite(number):
-        raise error(f"must be {wanted}", name=place)
+        raise error(f"must be {expected}", name=place)
     return float(number)
 
 
@@ -190,9 +191,9 @@ def check_value(kind: str, value: Any, components: int, sign: str = "any") -> No
     shapes = {"scalar": ((),), "vector": ((size,),), "tensor": ((size,), (size, size))}[kind]
     array = value if isinstance(value, np.ndarray) and value.dtype.kind == "f" else None
     if (array is None and not isinstance(value, float)) or (() if array is None else array.shape) not in shapes:
-        wanted = "one number" if kind == "scalar" else f"a vector of {size} numbers"
-        raise MechanismError(f"must be {wanted}", value=_plain(value))
-    entries = [value] if array is None else array.ravel().tolist()  # of so few numbers Python tells sooner than NumPy
+        expected = "one number" if kind == "scalar" else f"a vector of {size} numbers"
+        raise MechanismError(f"must be {expected}", value=_plain(value))
+    entries = [value] if array is None else array.ravel().tolist()  # Python is faster than NumPy for so few numbers
     if not all(map(math.isfinite, entries)):
         raise MechanismError("must be finite", value=_plain(value))
     if sign == "any":
@@ -205,11 +206,11 @@ def check_value(kind: str, value: Any, components: int, sign: str = "any") -> No
 def resolved(value: Any, name: str, kind: str, components: int, parameters: Mapping[str, Any]) -> Any:
     """Return what a value of a body stands for, checked: a ``scalar``, ``vector`` or ``tensor``; `name` is dotted."""
     try:
-        found = resolve(value, parameters)
-        check_value(kind, found, components)
+        array = resolve(value, parameters)
+        check_value(kind, array, components)
     except JounceError as error:
         raise error.located(name=name) from None
-    return found
+    return array
 
 
 def _plain(value: Any) -> Any:
@@ -242,8 +243,8 @@ def resolve_element(element: Element, parameters: Mapping[str, Any], components:
             elif kind == "nested" and value is not None:  # the bodies are those of the whole
                 of_bodies = hasattr(value, "bodies")
                 place = name if of_bodies else f"{name}.{field_name}"
-                found = resolve_element(value, parameters, components, place)
-                value = unchecked(type(value), {**vars(value), **found} | ({"bodies": ()} if of_bodies else {}))
+                nested = resolve_element(value, parameters, components, place)
+                value = unchecked(type(value), {**vars(value), **nested} | ({"bodies": ()} if of_bodies else {}))
         except JounceError as error:
             raise error.located(name=f"{name}.{field_name}") from None
         values[field_name] = value
@@ -305,7 +306,7 @@ def _check_directions(values: Mapping[str, Any], never_parallel: Iterable[tuple[
 
 
 def _of_size_one(vector: np.ndarray) -> list[float]:
-    """Return entries of a vector over the largest: no product of them overflows; of so few Python is sooner done."""
+    """Return the entries of a vector over the largest, so that no product overflows; Python is faster for so few."""
     entries = vector.tolist()
     size = max(map(abs, entries))
     return [entry / size for entry in (*entries, 0.0)[:3]]
@@ -328,7 +329,7 @@ def group_key(element: Element, values: Mapping[str, Any]) -> Any:
     numbers_only = {name: value for name, value in values.items() if name not in static}
     if all(isinstance(value, float | np.ndarray | jax.Array) for value in numbers_only.values()):  # traced ones too
         shapes = tuple((name, np.shape(value)) for name, value in numbers_only.items())
-        return type(element), words, shapes  # which is all that there is to tell, told without flattening
+        return type(element), words, shapes  # the whole structure, without flattening
     leaves, structure = jax.tree.flatten(numbers_only)
     return type(element), words, structure, tuple(np.shape(leaf) for leaf in leaves)
 

@@ -68,7 +68,7 @@ class Group(Module):
         return self._acting(pose, time)[1].truncate(pose.order - 1)
 
     def finite(self, pose: Pose, time: Jet) -> Bool[Numbers, "instance batch"]:
-        """Tell where forces and the velocities they work on are finite numbers, shape (instances, batch)."""
+        """Return where forces and the velocities they work on are finite numbers, shape (instances, batch)."""
         velocity, force = (jnp.isfinite(jet.coefficients[0]).all(axis=0) for jet in self._acting(pose, time))
         return velocity & force
 
@@ -153,20 +153,20 @@ class LeftOut(AbstractMotion):
         return 0.0 * time
 
 
-def law_left_out(group: Group, *, told: bool = False) -> Group:
+def law_left_out(group: Group, *, only_if_evaluated: bool = False) -> Group:
     """Return a group without its law, unless how residuals change with bodies may depend on that.
 
     Parameters
     ----------
     group : Group
         Of joints or drivers.
-    told : bool, default False
-        Whether the law is left out only if bodies that move by it tell what it says: by `evaluate`.
+    only_if_evaluated : bool, default False
+        Whether the law is left out only if `evaluate` gives its value from the poses of bodies that move by it.
     """
     element = users_class(type(group.element))
     kind = next(kind for kind in element.__mro__ if "residual" in vars(kind))
     is_separable = vars(kind).get("law_apart", False)
-    if is_separable and told:  # `evaluate` may have been changed by a class that keeps the residual
+    if is_separable and only_if_evaluated:  # `evaluate` may have been changed by a class that keeps the residual
         is_separable = getattr(kind, "evaluate", None) is getattr(element, "evaluate", object)
     return holding(group, "motion", LeftOut()) if is_separable else group
 
@@ -261,14 +261,14 @@ class System(Module):
         return jnp.concatenate([*map(_flat, blocks), none])
 
     def admissible(self, time: Jet) -> Bool[Numbers, "driver batch"]:
-        """Tell at which instants each driver has a permitted value, shape (drivers, batch)."""
+        """Return at which instants each driver has a permitted value, shape (drivers, batch)."""
         lanes = time.coefficients[0].shape[-1]
         drivers = [group for group in self.groups if group.is_driver]
         parts = [jnp.broadcast_to(g.element.admissible(time), (g.instances, lanes)) for g in drivers]
         return jnp.concatenate([*parts, jnp.ones((0, lanes), bool)])
 
     def laws(self, time: Jet, *, periodic: bool = False) -> list[Jet]:
-        """Return the jets of the motion laws; `periodic` for those, in rad, whose drivers forget whole turns, alone."""
+        """Return the jets of the motion laws; `periodic` for only those, in rad, whose drivers ignore whole turns."""
         drivers = (
             group.element for group in self.groups if group.is_driver and (group.element.periodic or not periodic)
         )
@@ -304,9 +304,9 @@ class System(Module):
         return conjugate_series(lambda still, change: stacked(self.variation(still, change, time)), pose, multipliers)
 
     def finite_forces(self, pose: Pose, time: Jet) -> Bool[Numbers, "force batch"]:
-        """Tell where each applied force is a finite number, shape (forces, batch); the pose has velocities.
+        """Return where each applied force is a finite number, shape (forces, batch); the pose has velocities.
 
-        Where the velocity is not, as for the distance of two points that meet, the force has no direction.
+        Where the velocity is not finite, as for the distance of two points that meet, the force has no direction.
         """
         lanes = time.coefficients[0].shape[-1]
         moving = [group.finite(movable(pose.truncate(1)), time.truncate(1)) for group in self.forces]

@@ -246,7 +246,7 @@ class MotionForces:
     def driver_force(self, name: str) -> Float[Numbers, "order 1 time"]:
         """Return what a driver exerts along what it prescribes, as Taylor coefficients."""
         index = self.indices[name]
-        driver = law_left_out(self.model.system.groups[index.group], told=True).element
+        driver = law_left_out(self.model.system.groups[index.group], only_if_evaluated=True).element
 
         def chunk(lanes: np.ndarray) -> Any:
             poses, exerting = self._poses(index.group, lanes), self._of_group(index)[..., lanes]

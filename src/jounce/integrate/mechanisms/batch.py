@@ -130,13 +130,13 @@ def simulate_batch(
 
     advance, depart_others = in_callers_context(runs.advance), in_callers_context(depart)
     with ThreadPoolExecutor(os.cpu_count() or 1) as pool:  # XLA works outside of Python's lock
-        lots = runs.lots(np.arange(len(rows)))
-        depart(lots[0])  # compiles, once for all threads; so does the first advance
-        list(pool.map(depart_others, lots[1:]))
+        chunks = runs.chunks(np.arange(len(rows)))
+        depart(chunks[0])  # compiles, once for all threads; so does the first advance
+        list(pool.map(depart_others, chunks[1:]))
         if len(runs.moving):
-            runs.advance(runs.lots(runs.moving)[0])
+            runs.advance(runs.chunks(runs.moving)[0])
         while len(runs.moving):
-            list(pool.map(advance, runs.lots(runs.moving)))
+            list(pool.map(advance, runs.chunks(runs.moving)))
     status = runs.status
     for run, reason in starts.failed.items():
         status[run, 0] = int(reason)
@@ -155,7 +155,8 @@ def _of_robot(robot: Robot, values: dict[str, np.ndarray], runs: list[RobotSimul
 class _Runs:
     """The runs of a batch on their way; those that still move are marched side by side, however far they are.
 
-    What is asked for is kept, not the steps: derivatives at the instants follow from the equations of motion there.
+    Only outputs at the requested instants are stored, not the steps: derivatives there follow from the equations of
+    motion.
     """
 
     def __init__(
@@ -209,8 +210,8 @@ class _Runs:
                 values_by_name[name] = plain[..., 0] if plain.shape[-1] == 1 else plain
         return {name: values_by_name[name] for name in self.parametric.mechanism.outputs if name in values_by_name}
 
-    def lots(self, runs: np.ndarray) -> list[np.ndarray]:
-        """Return runs in lots of one size; the last repeats its last run."""
+    def chunks(self, runs: np.ndarray) -> list[np.ndarray]:
+        """Return runs in chunks of one size; the last chunk repeats its last run."""
         return [runs[np.minimum(np.arange(k, k + self.width), len(runs) - 1)] for k in range(0, len(runs), self.width)]
 
     def depart(self, runs: np.ndarray, state: State, angles: Turns) -> None:
@@ -339,7 +340,7 @@ class _Runs:
         What forces measure where the steps begin is known, and so are the series of turning outputs there, and angles
         about axes near the instants, but at the start.
         """
-        for lanes in self.lots(np.arange(len(runs))):
+        for lanes in self.chunks(np.arange(len(runs))):
             turned_by = tuple(angle[:, lanes] for angle in angles)
             shared = self._picked(runs[lanes], Turns(turned_by, self._begun_with(runs[lanes])))
             _, outputs = shared

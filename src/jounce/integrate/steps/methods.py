@@ -14,7 +14,7 @@ from jounce.base.modules import Module
 from jounce.base.shapes import Numbers
 from jounce.dynamics.forward.accelerations import Equations, Expansion, Flags, Inverse, Lanes, State
 from jounce.errors import JounceError
-from jounce.execution.translated import is_traced_alone
+from jounce.execution.translated import traces_one_instant
 
 Number = float | Float[Numbers, ""]
 Sizes = Float[Numbers, "order batch"]
@@ -112,7 +112,7 @@ def _horner(
     def added(value: Any, coefficient: Any) -> tuple[Any, None]:
         return value * step[None, None] + coefficient, None
 
-    if is_traced_alone():  # one turn is written there, instead of all of them
+    if traces_one_instant():  # one turn is written there, instead of all of them
         return jax.lax.scan(added, coefficients[-1], coefficients[:-1], reverse=True)[0]
     value = coefficients[-1]
     for coefficient in coefficients[-2::-1]:

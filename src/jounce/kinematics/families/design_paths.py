@@ -1,8 +1,8 @@
 """Many designs followed side by side, each in steps of its own, and all instants of a grid solved from their anchors.
 
-A lane is a design. What solves an instant and decides about a step is what does it for a motion alone; see
+A lane is a design. The programs that solve an instant and decide about a step are those of a single motion; see
 `instant_program` and `step_control`. A design that is out of the ordinary, as it comes to a singular position, is left
-to be solved alone.
+to be solved individually.
 """
 
 import itertools
@@ -38,7 +38,7 @@ from jounce.kinematics.status import Status
 from jounce.mechanism.transmissions.axis_angles import measures_angle, raw_angles
 from jounce.mechanism.transmissions.turn_counting import counted_along
 
-MOST_STEPS = 10_000  # of a design; one that needs more is left to be solved alone
+MOST_STEPS = 10_000  # of a design; one that needs more is left to be solved individually
 TOGETHER = 512  # designs that are followed together
 
 Lanes = Float[np.ndarray, " design"]
@@ -46,7 +46,7 @@ Indices = Int[np.ndarray, " lane"]
 
 
 class Anchors(NamedTuple):
-    """Instants of designs that one step has solved: whose they are, rising, when, s, and their states."""
+    """Instants of designs that one step has solved: the designs, rising, the instants, s, and the states."""
 
     owner: Indices
     instant: Float[np.ndarray, " lane"]
@@ -69,11 +69,11 @@ class Group(NamedTuple):
         Returns
         -------
         owner, instant : array
-            Whose they are, among these designs, and when, s.
+            The design of each, among these designs, and its instant, s.
         parts : list of list of array
             The parts of each leaf of their states.
         order : array of int
-            In which they are sorted by design and instant.
+            The order that sorts them by design and instant.
         """
         first, last = designs[0], designs[-1]
         owners, instants, states = [], [], []
@@ -94,24 +94,24 @@ class DesignPaths:
     Parameters
     ----------
     solver : Solver
-        Of the designs.
+        The solver of the designs.
     designs : Designs
-        What is solved.
+        The designs to be solved.
     instants : array of shape (designs, time)
-        Of each, s; from the first one they are followed.
+        Instants of each design, s; the motions start at the first one.
     last : float
-        To which they are followed, s.
+        The instant to which they are followed, s.
 
     Attributes
     ----------
-    apart : array of bool, shape (designs,)
-        Those that are left to be solved alone.
+    individual : array of bool, shape (designs,)
+        The designs that are left to be solved individually.
     """
 
     def __init__(self, solver: Solver, designs: Designs, instants: Float[np.ndarray, "design time"], last: float):
         self.solver, self.designs = solver, designs
         self._ends = float(instants[0, 0]), last
-        self.apart = np.zeros(len(designs.rows), bool)
+        self.individual = np.zeros(len(designs.rows), bool)
         order = np.argsort(instants, axis=1, kind="stable")
         self._instants = np.take_along_axis(instants, order, axis=1)
         self._rank = np.argsort(order, axis=1) if np.any(np.diff(order, axis=1) < 0) else None
@@ -119,7 +119,7 @@ class DesignPaths:
 
     def follow(self, coordinates: Coordinates, plain: Bool[np.ndarray, " design"], threads: int) -> None:
         """Follow the designs from where they are put together, those that are plain."""
-        self.apart |= ~plain
+        self.individual |= ~plain
         lanes = np.flatnonzero(plain)
         groups = [lanes[k : k + TOGETHER] for k in range(0, len(lanes), TOGETHER)]
         with Threads(threads, compiled=self.solver.is_compiled) as pool:
@@ -147,7 +147,7 @@ class DesignPaths:
             control, taken = decide((control, arrival.status, there))
             unlike = taken & ((arrival.status != Status.OK) | is_spoiled_outside(there, begins, last))
             ended = control.ending != StopReason.UNFINISHED
-            self.apart[lanes[unlike | ended & (control.ending != StopReason.ARRIVED)]] = True
+            self.individual[lanes[unlike | ended & (control.ending != StopReason.ARRIVED)]] = True
             reached = arrival.state(slice(None) if taken.all() else taken)
             group.steps.append(Anchors(lanes[taken], there.instant[taken], reached))
             known = solver.needed(reached) if taken.all() else _replaced(known, taken, solver.needed(reached))
@@ -155,18 +155,18 @@ class DesignPaths:
                 continue
             lanes = lanes[left]
             control, known = jax.tree.map(lambda x, some=left: x[..., some], (control, known))
-        self.apart[lanes] = True
+        self.individual[lanes] = True
         return group
 
     def solved(self, threads: int) -> tuple[list[list[np.ndarray]], Int[np.ndarray, "design time"]]:
         """Return the outputs of all designs, and their status.
 
-        Outputs are arrays of shape (designs, time, order + 1, components), for each instance of each group. A design of
-        which an instant is not solved at once is left to be solved alone, too.
+        Outputs are arrays of shape (designs, time, order + 1, components), for each instance of each group. A design
+        with an instant that is not solved at once is left to be solved individually, too.
         """
         count, times = self._instants.shape
         status = np.full((count, times), int(Status.NOT_REACHED))
-        designs = np.flatnonzero(~self.apart)
+        designs = np.flatnonzero(~self.individual)
         if not designs.size:
             return [], status
         levels, width = self.solver.finite_order + 1, self.solver.program.width
@@ -174,7 +174,7 @@ class DesignPaths:
         size -= size % width if size > width else 0
         items: list[tuple[Group, Indices]] = []
         for group in self._groups:
-            some = group.designs[~self.apart[group.designs]]
+            some = group.designs[~self.individual[group.designs]]
             items += [(group, some[k : k + size]) for k in range(0, len(some), size)]
         steps = itertools.chain(*(group.steps for group in self._groups))
         each = sum((np.bincount(step.owner, minlength=count) for step in steps), np.zeros(count, int))
@@ -199,14 +199,14 @@ class DesignPaths:
                 pass
         outputs = [[np.transpose(x, (2, 3, 0, 1)) for x in np.moveaxis(whole, 2, 0)] for whole in wholes]
         for group in self._groups:
-            some = group.designs[~self.apart[group.designs]]
+            some = group.designs[~self.individual[group.designs]]
             if some.size:
                 self._count_turns(outputs, group, some)
-        self.apart |= (status != Status.OK).any(axis=1)
+        self.individual |= (status != Status.OK).any(axis=1)
         return outputs, status
 
     def _as_given(self, values: Any, block: Indices) -> np.ndarray:
-        """Return values of some designs at their instants, (..., designs, time), in the order in which they came."""
+        """Return values of some designs at their instants, (..., designs, time), in the order of the given instants."""
         if self._rank is None:
             return values
         rank = self._rank[block]
@@ -269,7 +269,7 @@ class DesignPaths:
 
 @lru_cache(maxsize=16)
 def _rounds(count: int, times: int, length: int, width: int) -> Int[np.ndarray, "round lane"]:
-    """Return the instants of designs in the order in which they are solved, by their indices.
+    """Return the indices of the instants of designs in the order of solution.
 
     A lane takes up a piece of a motion of this length, one instant after another. At its end, and where lanes are left
     over, the last one is solved again.

@@ -60,10 +60,10 @@ def checked_values(mechanism: Mechanism, parameters: Mapping[str, Any], each: st
     values, count = {}, None
     for name, given in parameters.items():
         check_name("parameter", name, mechanism.parameters, MechanismError, name="parameters")
-        wanted = f"a list of finite numbers, one for each {each}"
-        array = real_numbers(f"parameters.{name}", given, MechanismError, wanted)
+        expected = f"a list of finite numbers, one for each {each}"
+        array = real_numbers(f"parameters.{name}", given, MechanismError, expected)
         if array.ndim != 1 or not array.size or not np.isfinite(array).all():
-            raise MechanismError(f"must be {wanted}", name=f"parameters.{name}", value=given)
+            raise MechanismError(f"must be {expected}", name=f"parameters.{name}", value=given)
         if count is not None and len(array) != count:
             message = f"must have one value for each {each}, {count} as those before"
             raise MechanismError(message, name=f"parameters.{name}", value=len(array))
@@ -81,14 +81,14 @@ def solve_batch(
     tolerance: float = 1e-12,
     progress: Callable[[int, int], None] | None = None,
     threads: int | None = None,
-    alone: bool = True,
+    alone: bool = True,  # a public name
 ) -> "xarray.Dataset":
     """Return the motions of many designs of a mechanism that differ in its parameters, solved side by side.
 
-    Each design is followed in steps of its own, as `jounce.solve` does it alone. One that locks, or that comes to a
-    singular position, is solved alone; so are all of them where outputs are forces, energies or Euler angles, where
-    constraints are redundant, where laws of pieces depend on what varies, and where the mechanism asks for one of its
-    assemblies.
+    Each design is followed in steps of its own, the same as those of `jounce.solve`. One that locks, or that comes to a
+    singular position, is solved individually; so are all of them where outputs are forces, energies or Euler angles,
+    where constraints are redundant, where laws of pieces depend on the parameters that vary, and where the mechanism
+    selects one of its assemblies.
 
     Parameters
     ----------
@@ -105,16 +105,16 @@ def solve_batch(
     threads : int, optional
         As for `jounce.solve`; results do not depend on it.
     alone : bool, default True
-        Whether designs that lock, or are out of the ordinary otherwise, are solved alone, which takes long where they
-        are many. Without, they are not reached.
+        Whether to solve designs that lock, or are out of the ordinary otherwise, individually, which takes long for
+        many of them. Otherwise their status is that they are not reached.
 
     Returns
     -------
     xarray.Dataset
         Outputs with the dimensions design, time, derivative, and component where there are some, SI; the values of the
         parameters are coordinates of the designs, ``parameter_NAME`` where something else has the NAME. ``status``
-        (design, time) tells the outcome, see `Status`: where it is not 0, outputs are NaN. An output that no design has
-        is left out.
+        (design, time) is the outcome, see `Status`: where it is not 0, outputs are NaN. An output that no design has is
+        left out.
 
     Raises
     ------
@@ -133,7 +133,7 @@ def solve_batch(
     """
     with Count("solving", "designs", progress) as tell:
         family, values = _family(mechanism, parameters, time, order, tolerance, tell)
-        family.solve(thread_count(threads), alone=alone)
+        family.solve(thread_count(threads), individually=alone)
     return family.dataset(values)
 
 
@@ -173,7 +173,7 @@ def solve_with_sides(
     tolerance: float = 1e-12,
     threads: int | None = None,
 ) -> tuple["xarray.Dataset", "Sides"]:
-    """Return what `solve_batch` does, and the same on both sides of where the laws of each design jump or bend.
+    """Return the dataset of `solve_batch`, and outputs on both sides of each jump or bend of the laws of each design.
 
     Parameters
     ----------
@@ -183,13 +183,13 @@ def solve_with_sides(
         Strictly increasing, s.
     """
     family, values = _family(mechanism, parameters, instants, order, tolerance)
-    family.look_beside_breaks()
+    family.add_sides_of_breaks()
     family.solve(thread_count(threads))
     return family.dataset(values), family.sides()
 
 
 class _Family:
-    """Designs that are being solved, and what is known of them."""
+    """Designs that are being solved, and their results so far."""
 
     def __init__(
         self,
@@ -202,29 +202,31 @@ class _Family:
         progress: Callable[[int, int], None] | None,
     ):
         self.mechanism, self.names, self.rows, self.instants = mechanism, names, rows, instants
-        self.held = with_output_drivers(mechanism)  # what is solved side by side
+        self.held = with_output_drivers(mechanism)  # solved side by side
         self.order, self.tolerance, self.progress = order, tolerance, progress
         self.outputs: dict[str, np.ndarray] = {}
-        self._take(np.zeros((len(rows), 0)), np.zeros((len(rows), 0)))
+        self._set_instants(np.zeros((len(rows), 0)), np.zeros((len(rows), 0)))
 
-    def _take(self, beside: Float[np.ndarray, "design side"], breaks: Float[np.ndarray, "design side"]) -> None:
-        """Solve at more instants, those of each design its own, which come after those of all."""
+    def _set_instants(
+        self, side_instants: Float[np.ndarray, "design side"], breaks: Float[np.ndarray, "design side"]
+    ) -> None:
+        """Set the instants: those common to all designs first, then further ones of each design."""
         self.breaks, common = breaks, np.broadcast_to(self.instants, (len(self.rows), len(self.instants)))
-        self.all_instants = np.concatenate([common, beside], axis=1)
+        self.all_instants = np.concatenate([common, side_instants], axis=1)
         self.status: Int[np.ndarray, "design time"] = np.full(self.all_instants.shape, int(Status.NOT_REACHED))
 
-    def look_beside_breaks(self) -> None:
-        """Solve at both sides of where the laws of each design jump or bend, too."""
+    def add_sides_of_breaks(self) -> None:
+        """Add the instants on both sides of each jump or bend of the laws of each design."""
         first, last = float(self.instants[0]), float(self.instants[-1])
         level = self.order + lost_orders(self.mechanism)
         designs = dict(zip(self.names, self.rows.T, strict=True))
-        breaks, beside = sides_of_designs(self.mechanism, designs, first, last, level)
-        self._take(beside, breaks)
+        breaks, side_instants = sides_of_designs(self.mechanism, designs, first, last, level)
+        self._set_instants(side_instants, breaks)
 
     def sides(self) -> Sides:
-        """Return what was found beside the breaks."""
+        """Return the outputs on both sides of the breaks."""
         count = len(self.instants)
-        return Sides(self.breaks, {name: found[:, count:] for name, found in self.outputs.items()})
+        return Sides(self.breaks, {name: values[:, count:] for name, values in self.outputs.items()})
 
     def design(self, k: int) -> Mechanism:
         """Return one of the designs."""
@@ -237,35 +239,35 @@ class _Family:
     def _values(self, k: int) -> dict[str, float]:
         return dict(zip(self.names, self.rows[k].tolist(), strict=True))
 
-    def solve(self, threads: int, *, alone: bool = True) -> None:
-        """Solve all designs: most side by side, the others alone, if they are wanted."""
+    def solve(self, threads: int, *, individually: bool = True) -> None:
+        """Solve all designs: most side by side, the others one by one unless `individually` is false."""
         count = len(self.rows)
-        apart = self.mechanism.assembly is not None or self._of_whole_motions() or self._pieces_vary()
-        apart = apart or has_ends(self.mechanism)  # which are found in whole motions
-        left = np.arange(count) if apart else self._side_by_side(threads)
-        if not (alone or apart):
+        all_individually = self.mechanism.assembly is not None or self._of_whole_motions() or self._pieces_vary()
+        all_individually = all_individually or has_ends(self.mechanism)  # ends are found in whole motions
+        left = np.arange(count) if all_individually else self._side_by_side(threads)
+        if not (individually or all_individually):
             return
         for done, k in enumerate(left.tolist()):
-            self._alone(k)
+            self._solve_individually(k)
             if self.progress is not None:
                 self.progress(count - len(left) + done + 1, count)
 
     def dataset(self, values: Mapping[str, np.ndarray]) -> Any:
         """Return the results, labeled."""
         count = len(self.instants)
-        outputs = {name: found[:, :count] for name, found in self.outputs.items()}
-        its = self.mechanism
+        outputs = {name: series[:, :count] for name, series in self.outputs.items()}
+        title, definitions = self.mechanism.title, self.mechanism.outputs
         return labeled_family(
-            "design", its.title, its.outputs, self.instants, self.order, values, outputs, self.status[:, :count]
+            "design", title, definitions, self.instants, self.order, values, outputs, self.status[:, :count]
         )
 
     def _of_whole_motions(self) -> bool:
-        """Tell whether outputs are asked for that follow from whole motions, not from one instant."""
+        """Return whether an output follows from the whole motion, not from one instant."""
         outputs = self.mechanism.outputs.values()
         return any(isinstance(output, AbstractMotionOutput) or getattr(output, "wraps", ()) for output in outputs)
 
     def _pieces_vary(self) -> bool:
-        """Tell whether laws of pieces depend on the parameters that vary: their tables have no lane for each design."""
+        """Return whether laws of pieces depend on the parameters that vary: their tables have no lane for a design."""
         tables: list[Any] = []
 
         def pieces(values: Any) -> Any:
@@ -279,7 +281,7 @@ class _Family:
         return any(isinstance(leaf, Tracer) for table in tables for leaf in jax.tree.leaves(table))
 
     def _side_by_side(self, threads: int) -> Int[np.ndarray, " design"]:
-        """Solve designs side by side; return which are left to be solved alone."""
+        """Solve designs side by side; return those that are left to be solved individually."""
         count = len(self.rows)
         first, last = float(self.instants[0]), float(self.instants[-1])
         model, known = self._first_assembled(first)
@@ -290,12 +292,11 @@ class _Family:
         levels = max(self.order + lost, LOWEST_ORDER)
         system = model.system
         if any(map(measures_angle, (*system.groups, *system.outputs))) or system.shape[0] != system.shape[1]:
-            return self._assembled_alone(levels, threads)
+            return self._individually_assembled(levels, threads)
         designs = Designs(self.held, model, self.names, self.rows)
-        found, every = designs.assembled(first, self.tolerance), np.arange(count)
-        return self._followed(
-            levels, designs, found.coordinates, np.asarray(found.plain) & ~designs.unfit(), every, threads
-        )
+        attempts = designs.assembled(first, self.tolerance)
+        plain = np.asarray(attempts.plain) & ~designs.unfit()
+        return self._followed(levels, designs, attempts.coordinates, plain, np.arange(count), threads)
 
     def _first_assembled(self, instant: float) -> tuple[Model | None, int]:
         """Return the model of the first design that can be put together, and which it is."""
@@ -308,24 +309,26 @@ class _Family:
                 raise self._located(error, k) from None
         return None, 0
 
-    def _assembled_alone(self, levels: int, threads: int) -> Int[np.ndarray, " design"]:
-        """Put designs together one by one, as those with angles about axes are, and follow them side by side."""
-        found, which = [], []
+    def _individually_assembled(self, levels: int, threads: int) -> Int[np.ndarray, " design"]:
+        """Assemble designs one by one, as angles about axes require, and follow them side by side."""
+        models, positions, assembled = [], [], []
         for k in range(len(self.rows)):
             try:
-                found.append(assemble(build(self.held_design(k)), float(self.instants[0]), self.tolerance))
-                which.append(k)
+                model, position = assemble(build(self.held_design(k)), float(self.instants[0]), self.tolerance)
             except SPOILED:
                 continue
             except JounceError as error:
                 raise self._located(error, k) from None
-        chosen = np.array(which)
-        models = [model for model, _ in found]
+            models.append(model)
+            positions.append(position)
+            assembled.append(k)
+        chosen = np.array(assembled)
         designs = Designs.of_models(self.held, models, self.names, self.rows[chosen])
         coordinates = {
-            name: np.concatenate([np.asarray(place[name]) for _, place in found], axis=-1) for name in found[0][1]
+            name: np.concatenate([np.asarray(position[name]) for position in positions], axis=-1)
+            for name in positions[0]
         }
-        return self._followed(levels, designs, coordinates, np.ones(len(which), bool), chosen, threads)
+        return self._followed(levels, designs, coordinates, np.ones(len(chosen), bool), chosen, threads)
 
     def _followed(
         self,
@@ -336,27 +339,27 @@ class _Family:
         chosen: np.ndarray,
         threads: int,
     ) -> Int[np.ndarray, " design"]:
-        """Follow designs side by side and keep what comes of them; return which are left to be solved alone."""
+        """Follow designs side by side and store their results; return those left to be solved individually."""
         solver = Solver(
             designs.model, levels, self.tolerance, refine=True, finite_order=self.order, own=designs.own(slice(1))
         )
         paths = DesignPaths(solver, designs, self.all_instants[chosen], float(self.instants[-1]))
         paths.follow(coordinates, plain, threads)
         outputs, status = paths.solved(threads)
-        whole = ~paths.apart
+        whole = ~paths.individual
         self.status[chosen[whole]] = status[whole]
         names = itertools.chain(*solver.model.outputs)
-        for name, found in zip(names, itertools.chain(*outputs), strict=bool(outputs)):
-            found[paths.apart] = np.nan
-            self._put(name, chosen, found)
+        for name, values in zip(names, itertools.chain(*outputs), strict=bool(outputs)):
+            values[paths.individual] = np.nan
+            self._put(name, chosen, values)
         if self.progress is not None:
             self.progress(int(whole.sum()), len(self.rows))
         return np.setdiff1d(np.arange(len(self.rows)), chosen[whole])
 
-    def _alone(self, k: int) -> None:
-        """Solve one design alone."""
+    def _solve_individually(self, k: int) -> None:
+        """Solve one design as `jounce.solve` does."""
         try:
-            grid, places = np.unique(self.all_instants[k], return_inverse=True)
+            grid, indices = np.unique(self.all_instants[k], return_inverse=True)
             motion: Motion = solve(self.design(k), grid, self.order, tolerance=self.tolerance, strict=False)
         except SPOILED as error:
             status = getattr(error, "status", None)
@@ -364,13 +367,13 @@ class _Family:
             return
         except JounceError as error:
             raise self._located(error, k) from None
-        self.status[k] = motion.status[places]
+        self.status[k] = motion.status[indices]
         for name, values in motion.outputs.items():
-            values = values[places]
+            values = values[indices]
             self._put(name, np.array([k]), values[None] if values.ndim == 3 else values[None, ..., None])
 
     def _put(self, name: str, designs: np.ndarray, values: np.ndarray) -> None:
-        """Keep the values of an output, (designs, time, derivative, component), of some designs in their order."""
+        """Store the values of an output, (designs, time, derivative, component), of some designs in their order."""
         values = values[..., 0] if values.shape[-1] == 1 else values
         if name not in self.outputs:
             if len(designs) == len(self.rows):
@@ -380,9 +383,9 @@ class _Family:
         self.outputs[name][designs] = values
 
     def _located(self, error: JounceError, k: int) -> JounceError:
-        """Return an error that says of which design it is."""
-        told = ", ".join(f"{name} = {value:g}" for name, value in zip(self.names, self.rows[k], strict=True))
-        error.message = f"{error.message} (design {k}: {told})"
+        """Return an error whose message names the design."""
+        values = ", ".join(f"{name} = {value:g}" for name, value in zip(self.names, self.rows[k], strict=True))
+        error.message = f"{error.message} (design {k}: {values})"
         return error
 
 

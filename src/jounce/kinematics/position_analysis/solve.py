@@ -71,8 +71,8 @@ def _differentiated(solve: Callable[..., Motion], given: Mapping[str, Any]) -> M
     def solved(mechanism: Mechanism, known: bool) -> Motion:
         return solve(mechanism, instants, order, **options, strict=known and given.get("strict", True))
 
-    found, models = differentiable_motion(mechanism, instants, levels, solved)
-    return TracedMotion(mechanism, models, instants, order, found)
+    arrays, models = differentiable_motion(mechanism, instants, levels, solved)
+    return TracedMotion(mechanism, models, instants, order, arrays)
 
 
 def lost_orders(mechanism: Mechanism) -> int:
@@ -110,17 +110,17 @@ def solve(
     tolerance : float, default 1e-12
         Largest Newton correction of an accepted position, in rad, or in sizes of the mechanism.
     refine : bool, default True
-        Correct accepted positions once more, to rounding. Without, they stay as far off as the tolerance lets them.
+        Correct accepted positions once more, to rounding. Otherwise their errors may be as large as the tolerance.
     strict : bool, default True
         Raise if an instant fails. Otherwise it is NaN and `Motion.status` says why.
     progress : callable, optional
         Called with the number of instants done and their total.
     threads : int, optional
-        That solve a grid of more than a thousand instants: as many as the process has cores, or as the environment
-        variable ``JOUNCE_THREADS`` says, unless given. Results do not depend on it.
+        Number of threads that solve a grid of more than a thousand instants: that of the cores of the process, or the
+        value of the environment variable ``JOUNCE_THREADS``, unless given. Results do not depend on it.
     keep : bool, optional
-        Whether to keep the motion of all bodies beside the outputs, for points, energies or reactions asked for later;
-        unless given, up to 65,536 instants. What is not kept is computed again when it is asked for.
+        Whether to store the motion of all bodies in addition to the outputs, for later requests of points, energies or
+        reactions; unless given, up to 65,536 instants. A motion that is not stored is computed again on request.
 
     Returns
     -------
@@ -152,11 +152,12 @@ def solve(
     instants = time_grid(mechanism.time if time is None else time, mechanism.parameter_values)
     with Count("solving", report=progress) as tell:
         solver, path = _followed(mechanism, instants, order, tolerance, refine=refine)
-        found = solve_grid(solver, path, instants, tell, count, keep=keep)
-    state, outcome = (found.coordinates, found.outputs), (found.status, found.faults, path.change_points)
-    told = path.history(), _backend(solver, path, instants)
-    _check_count(solver.model, told[0])
-    motion = actuated(Motion(mechanism, solver.model, instants, order, state, *outcome, *told))
+        solution = solve_grid(solver, path, instants, tell, count, keep=keep)
+    state = solution.coordinates, solution.outputs
+    outcome = solution.status, solution.faults, path.change_points
+    history, backend = path.history(), _backend(solver, path, instants)
+    _check_count(solver.model, history)
+    motion = actuated(Motion(mechanism, solver.model, instants, order, state, *outcome, history, backend))
     check_room(motion)
     if strict:
         raise_for_status(motion)
@@ -175,9 +176,9 @@ def solve_in_chunks(
     progress: Callable[[int, int], None] | None = None,
     threads: int | None = None,
 ) -> ChunkedMotion:
-    """Follow a motion as `jounce.solve` does, and solve its instants chunk by chunk, as many as are asked for.
+    """Follow a motion as `jounce.solve` does, and solve its instants chunk by chunk, as the caller iterates.
 
-    What is in memory at a time is one chunk, of 65,536 instants, and what following the motion takes, which grows
+    Memory contains one chunk at a time, of 65,536 instants, and the anchors of the motion, the number of which grows
     with how far the mechanism moves, not with the number of instants.
 
     Parameters
@@ -193,7 +194,7 @@ def solve_in_chunks(
     Raises
     ------
     MechanismError, AssemblyError, MobilityError, SolveError
-        As `jounce.solve`, of what is known before the first chunk.
+        As `jounce.solve`, for errors that show before the first chunk.
 
     Examples
     --------
@@ -207,8 +208,9 @@ def solve_in_chunks(
     order = checked_settings(mechanism, order, tolerance)
     count = thread_count(threads)
     instants = instants_of(mechanism.time if time is None else time, mechanism.parameter_values)
-    found = _followed(mechanism, instants, order, tolerance, refine=refine)
-    return ChunkedMotion(mechanism, found, instants, order, progress, count, _backend(*found, instants))
+    solver, path = _followed(mechanism, instants, order, tolerance, refine=refine)
+    backend = _backend(solver, path, instants)
+    return ChunkedMotion(mechanism, (solver, path), instants, order, progress, count, backend)
 
 
 def checked_settings(mechanism: Mechanism, order: Any, tolerance: float) -> int:
@@ -231,7 +233,7 @@ def checked_settings(mechanism: Mechanism, order: Any, tolerance: float) -> int:
 def _followed(
     mechanism: Mechanism, instants: Instants, order: int, tolerance: float, *, refine: bool
 ) -> tuple[Solver, FollowedPath]:
-    """Return what solves the instants of a grid: a solver, and the motion followed from the first to the last."""
+    """Return the solver of the instants of a grid, and the motion followed from the first instant to the last."""
     first, last = float(instants[0]), float(instants[-1])
     lost = lost_orders(mechanism)
     of_forces = any(output.of_forces for output in mechanism.outputs.values())
@@ -276,7 +278,7 @@ def _check_count(model: Model, history: AttitudeHistory | None) -> None:
 
 
 def _backend(solver: Solver, path: FollowedPath, instants: Instants) -> str:
-    """Return what has computed a motion: what followed it, and what solves the instants of a long grid."""
+    """Return the back ends that have followed a motion and that solve the instants of a long grid."""
     return joined({*path.backends, *([solver.backend] if len(instants) > LONG_GRID else [])})
 
 

@@ -1,9 +1,9 @@
-"""What carries gears: the body that both centers are pinned to, the axes of shafts in the frame that they turn in.
+"""Frames of gears: the body that both centers are pinned to, and the axes of shafts in the frame that they turn in.
 
-Centers of toothed gears, and of the pulleys of most belts, keep their distance where one body has both. It is found by
-the pins: a center stands on every body that is pinned there. So is the axis of a shaft in the frame m, by the joints
-that hold directions parallel. Where JAX traces values, points and directions are the same that are given by the same
-numbers or expressions.
+The centers of toothed gears, and of the pulleys of most belts, keep their distance where one body carries both. The
+pins show this body: a center stands on every body that is pinned there. The joints that hold directions parallel show
+the axis of a shaft in the frame m. Where JAX traces values, two points or directions are the same if the same numbers
+or expressions give them.
 """
 
 import dataclasses
@@ -44,7 +44,7 @@ class BodyVector(NamedTuple):
 Grouped = tuple[tuple[Group, ...], tuple[tuple[str, ...], ...]]
 """Groups, and the names of the elements of each, with their kinds before them."""
 Joined = Sequence[tuple[BodyVector, BodyVector]]
-"""Pairs of places that a joint holds together."""
+"""Pairs of points or directions that a joint holds together."""
 
 
 class Arm(NamedTuple):
@@ -55,17 +55,17 @@ class Arm(NamedTuple):
 
 
 def is_toothed(element: Any) -> bool:
-    """Tell whether an element is a pair of planar gears with teeth."""
+    """Return whether an element is a pair of planar gears with teeth."""
     return isinstance(element, planar.Gear) and element.ratio is None
 
 
 def on_line(element: Any) -> bool:
-    """Tell whether an element turns planar bodies relative to the line of their centers: teeth, or a belt."""
+    """Return whether an element, teeth or a belt, turns planar bodies relative to the line of their centers."""
     return is_toothed(element) or isinstance(element, planar.Belt)
 
 
 def grouped_with_frames(mechanism: Mechanism, elements: Mapping[str, Any]) -> Grouped:
-    """Return the groups of some elements of a mechanism, by name with their kinds; gears with what carries them."""
+    """Return the groups of some elements of a mechanism, by name with their kinds; gears with their frames."""
     index = {name: k for k, name in enumerate((GROUND, *mechanism.bodies))}
     arms = _find_arms(mechanism, elements)
     given = _with_arms(_with_slots(elements), arms)
@@ -75,8 +75,8 @@ def grouped_with_frames(mechanism: Mechanism, elements: Mapping[str, Any]) -> Gr
 
 
 def check_distances(mechanism: Mechanism) -> None:
-    """Raise MechanismError where centers of gears are not as far apart as their radii say, or those of pulleys are
-    nearer, and where a rope is longer or shorter than it can be.
+    """Raise MechanismError where the center distance of gears differs from that of their radii, where pulleys overlap,
+    and where a rope is longer or shorter than it can be.
     """
     joints = {f"joints.{name}": joint for name, joint in mechanism.joints.items()}
     if any(isinstance(joint, Rope) for joint in joints.values()):
@@ -90,12 +90,12 @@ def carriers(mechanism: Mechanism) -> set[str]:
 
 
 def _find_arms(mechanism: Mechanism, elements: Mapping[str, Any]) -> dict[str, Arm]:
-    """Return what carries the toothed gears and the belts among some elements, by their names; none that is not found.
+    """Return the arms that carry the toothed gears and the belts among some elements, by name, where there is one.
 
     Raises
     ------
     MechanismError
-        If the centers are not as far apart as the pitch radii say, or those of pulleys nearer.
+        If a center distance differs from that of the pitch radii, or pulleys overlap.
     """
     toothed = {name: element for name, element in elements.items() if on_line(element)}
     if not toothed:
@@ -112,7 +112,7 @@ def _find_arm(name: str, gear: planar.Gear | planar.Belt, parameters: Mapping[st
             _body_vector(body, p, parameters) for body, p in zip(gear.bodies, (gear.point_i, gear.point_j), strict=True)
         ]
     except JounceError:
-        return None  # which is told where all values of the gear are
+        return None  # the error is raised where all values of the gear are resolved
     plain = not any(isinstance(radius, Tracer) for radius in radii)
     if plain and not all(math.isfinite(radius) and radius for radius in radii):
         return None
@@ -144,7 +144,7 @@ def _find_arm(name: str, gear: planar.Gear | planar.Belt, parameters: Mapping[st
 
 
 def _check_gap(name: str, body: str, distance: float, radii: Sequence[float]) -> None:
-    """Raise MechanismError unless centers are as far apart on a body as pitch radii say."""
+    """Raise MechanismError unless the distance of two centers on a body is that of the pitch radii."""
     center_distance = abs(sum(radii))
     if radii[0] < 0 and radii[1] < 0:
         raise MechanismError("one gear at most is a ring, of a radius below zero", name=f"{name}.radii", value=radii)
@@ -172,7 +172,7 @@ def _check_overlap(name: str, body: str, distance: float, radii: Sequence[float]
 
 
 def _with_slots(elements: Mapping[str, Any]) -> dict[str, Any]:
-    """Return elements of which ropes with several points on a body have it once."""
+    """Return elements in which a rope with several points on a body names the body once."""
     changed = dict(elements)
     for name, element in elements.items():
         if shares_points(element):
@@ -182,7 +182,7 @@ def _with_slots(elements: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _with_arms(elements: Mapping[str, Any], arms: Mapping[str, Arm]) -> dict[str, Any]:
-    """Return elements of which gears with teeth and belts have a third body, that carries them."""
+    """Return elements in which gears with teeth and belts have a third body, which carries them."""
     changed = dict(elements)
     for name, arm in arms.items():
         changed[name] = unchecked_copy(changed[name], bodies=(*changed[name].bodies, arm.body))
@@ -200,7 +200,7 @@ def unchecked_copy(element: Any, **changed: Any) -> Any:
 def _with_carriers(
     group: Group, members: Sequence[str], arms: Mapping[str, Arm], mechanism: Mechanism, elements: Mapping[str, Any]
 ) -> Group:
-    """Return a group of gears with what is found of what carries them; others as they are."""
+    """Return a group of gears with the frames that are known; other groups as they are."""
     if on_line(group.element) and all(name in arms for name in members):
         return holding(group, "arm", along_instances(*(_number(arms[name].angle) for name in members)))
     if shares_points(elements[members[0]]):
@@ -217,7 +217,7 @@ def _number(value: Any) -> Any:
 
 
 def _on_frames(group: Group, gears: Sequence[spatial.Gear], mechanism: Mechanism) -> Group:
-    """Return shafts with the axes that they turn about in their frames, where these are found, and whole turns."""
+    """Return shafts with the axes that they turn about in their frames, where these are known, and whole turns."""
     hinges, parameters = _joined_vectors(mechanism, _held_parallel), mechanism.parameter_values
     for slot, field in enumerate(("held_i", "held_j")):
         data = []
@@ -234,7 +234,7 @@ def _on_frames(group: Group, gears: Sequence[spatial.Gear], mechanism: Mechanism
 
 
 def _on_hinges(group: Group, cams: Sequence[Cam], mechanism: Mechanism) -> Group:
-    """Return cams of which the parts that are angles in space know the axis on both bodies, where it is found."""
+    """Return cams whose parts that are angles in space have the axis on both bodies, where it is known."""
     hinges = None
     for field in ("follower", "leader"):
         if not turns_in_space(getattr(group.element, field)):
@@ -242,15 +242,15 @@ def _on_hinges(group: Group, cams: Sequence[Cam], mechanism: Mechanism) -> Group
         hinges = _joined_vectors(mechanism, _held_parallel) if hinges is None else hinges
         parts = [getattr(cam, field) for cam in cams]
         axes = [_body_vector(part.bodies[0], part.axis_i, mechanism.parameter_values) for part in parts]
-        found = [
+        other_axes = [
             _on_joined_bodies(axis, hinges, _parallel).get(part.bodies[1])
             for axis, part in zip(axes, parts, strict=True)
         ]
-        if any(there is None for there in found):
+        if any(there is None for there in other_axes):
             continue
-        first, second = (along_instances(*(_vector(x.value) for x in its if x)) for its in (axes, found))
+        first, second = (along_instances(*(_vector(x.value) for x in its if x)) for its in (axes, other_axes))
         part, datum = getattr(group.element, field), _coaxial(first, second)
-        if part.vector_j is not None:  # what of it is along the axis turns nothing
+        if part.vector_j is not None:  # its component along the axis has no effect
             datum = with_fields(datum, across=_across(part.vector_j, second))
         group = holding(group, field, with_fields(part, datum=datum))
     return group
@@ -269,7 +269,7 @@ def _coaxial(axis: Any, there: Any) -> Datum:
 
 
 def _whole_multiples(ratio: Any) -> Any:
-    """Return the smallest whole numbers, (instances, 1), by which ratios become whole; NaN where there are none."""
+    """Return the smallest whole multiples, (instances, 1), that make ratios whole; NaN where there are none."""
     namespace = jnp if isinstance(ratio, Tracer) else np
     counts = np.arange(1.0, LARGEST_WHOLE + 1)
     products = ratio[..., None] * counts
@@ -282,7 +282,7 @@ def _whole_multiples(ratio: Any) -> Any:
 def _joined_vectors(
     mechanism: Mechanism, pairs_of: Callable[[Any], Sequence[tuple[str, str]]]
 ) -> list[tuple[BodyVector, BodyVector]]:
-    """Return the places that joints hold together, by the pairs of fields that say so."""
+    """Return the pairs of points or directions that joints hold together, from the pairs of fields of each joint."""
     pairs = []
     for joint in mechanism.joints.values():
         for names in pairs_of(joint):
@@ -312,7 +312,7 @@ def _body_vector(body: str, given: Any, parameters: Mapping[str, Any]) -> BodyVe
 
 
 def _same(a: Any, b: Any, given_a: Any, given_b: Any, near: Callable[[Any, Any], bool]) -> bool:
-    """Tell whether components are the same; what JAX traces is compared as it was given."""
+    """Return whether components are the same; values that JAX traces are compared as they were given."""
     if isinstance(a, Tracer) or isinstance(b, Tracer):
         traced = isinstance(given_a, Tracer) or isinstance(given_b, Tracer)
         return a is b or (not traced and bool(given_a == given_b))
@@ -331,7 +331,7 @@ def _parallel(a: BodyVector, b: BodyVector) -> int:
 def _on_joined_bodies(
     start: BodyVector, joined: Joined, alike: Callable[[BodyVector, BodyVector], int | bool]
 ) -> dict[str, BodyVector]:
-    """Return where a place is on each body that joints hold to it, one after the other."""
+    """Return a point or direction on each body that joints connect to it, one after the other."""
     reached, waiting = {start.body: start}, [start]
     while waiting:
         here = waiting.pop(0)
