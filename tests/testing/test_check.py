@@ -100,7 +100,7 @@ class Constant(jn.joints.AbstractConstraint, space="planar"):
     [
         (Frozen, "derivatives", "derivative 1 along a motion is not that of the residual as a function of time"),
         (Mapped, "jacobian", "coefficient 1 of the residual is not its Jacobian by the coordinates"),
-        (Constant, "jacobian", "does not depend on how its bodies lie"),
+        (Constant, "jacobian", "does not depend on the poses of its bodies"),
         (Global, "frames", "changes where all bodies are moved together"),
         (Twice, "rank", "its 3 rows are 2 independent equations, not 3"),
         (Nowhere, "rank", "none was found in which the joint holds"),
@@ -108,7 +108,7 @@ class Constant(jn.joints.AbstractConstraint, space="planar"):
         (Doubled, "facts", "squared_distance 'length': the residual is not the square"),
         (Beside, "facts", "pair revolute: it does not hold"),
         (Turned, "facts", "dimensions: a joint that holds does not where all lengths are those in another unit"),
-        (Changing, "copies", "copy.copy makes of a joint is not equal to it"),
+        (Changing, "copies", "a joint from copy.copy is not equal to the original"),
     ],
 )
 def test_a_contract_that_is_broken_is_named(kind, contract, words):
@@ -143,7 +143,7 @@ def test_a_joint_of_ones_own_is_held_to_all_of_them():
     told = check_joint(Global, space="planar", contracts=["frames", "expressions", "files"], relative=False)
     assert not told.held
     assert [*told.left_out] == ["frames", "expressions", "files"]
-    assert "files: it has no type by which files name it" in str(told)
+    assert "files: it has no type name for files" in str(told)
 
 
 @pytest.mark.parametrize(

@@ -1,4 +1,4 @@
-"""Design: parameters that vary, designs in which something is least, and how tolerances spread."""
+"""Design: parameters that vary, designs with the least objective, and the spread by tolerances."""
 
 from jounce.design.optimization.optimize import optimize as optimize
 from jounce.design.optimization.result import OptimizedDesign as OptimizedDesign

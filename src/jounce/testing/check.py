@@ -1,4 +1,4 @@
-"""A class of joints or drivers held to the contracts of the library."""
+"""The check of a class of joints or drivers against the contracts of the library."""
 
 import dataclasses
 from collections.abc import Callable, Mapping, Sequence
@@ -32,12 +32,12 @@ CONTRACTS: Mapping[str, Callable[[Subject], None]] = MappingProxyType(
         "back ends": back_ends,
     }
 )
-"""What every joint of the library keeps, by name."""
+"""The contracts that every joint of the library keeps, by name."""
 
 
 @dataclasses.dataclass(frozen=True)
 class JointReport:
-    """To which contracts a class of joints or drivers was held.
+    """The contracts that a class of joints or drivers was checked against.
 
     Parameters
     ----------
@@ -46,7 +46,7 @@ class JointReport:
     held : tuple of str
         Names of the contracts that it keeps.
     left_out : mapping of str to str
-        Why contracts say nothing of it, or not all that they do, by name.
+        Why a contract does not apply to it, or not wholly, by name.
 
     Examples
     --------
@@ -80,20 +80,20 @@ def check_joint(
     contracts: Sequence[str] | None = None,
     seed: int = 0,
 ) -> JointReport:
-    """Hold a class of joints or drivers to the contracts that those of the library keep.
+    """Check a class of joints or drivers against the contracts that those of the library keep.
 
     Joints of the class with random values are put between bodies in random motions:
 
-    - ``jacobian``: of each order, the residual is affine in the coordinates of that order, with the Jacobian as slope,
-      which is that of differences;
-    - ``derivatives``: those along a motion are those of a polynomial through values of the residual;
+    - ``jacobian``: at each order, the residual is affine in the coordinates of that order, with the Jacobian as slope,
+      which agrees with differences;
+    - ``derivatives``: derivatives along a motion are those of a polynomial through values of the residual;
     - ``frames``: a common motion of all bodies changes nothing;
-    - ``instances``: many joints side by side are those alone;
+    - ``instances``: joints that are evaluated together have the same residuals as each joint by itself;
     - ``expressions``: values may be expressions of parameters;
-    - ``one program``: other values compile nothing again;
-    - ``rank``: where the joint holds, it stands for as many independent equations as it has rows;
+    - ``one program``: other values need no further compilation;
+    - ``rank``: where the joint holds, it has as many independent equations as it has rows;
     - ``facts``: `held_parallel`, `squared_distance`, `pair` and `dimensions`, as the class states them, are true;
-    - ``equilibrium``: its reactions have no resultant, and the power of its multipliers on its residual;
+    - ``equilibrium``: its reactions have no resultant, and their power is that of its multipliers on its residual;
     - ``copies``: copies and pickles are equal, with the same hash;
     - ``files``: it is the same after it was written to a file and read;
     - ``back ends``: machine code, XLA, and one operation after another agree.
@@ -103,36 +103,36 @@ def check_joint(
     kind : type
         Derived from `AbstractConstraint`.
     values : mapping, optional
-        Values of fields, of those that are not to be random: words, or lengths with which the joint can hold.
+        Values of fields that are not to be random: words, or lengths with which the joint can hold.
     space : str, optional
         planar or spatial, where the class does not say it.
     order : int
-        Up to which derivatives the residual is looked at.
+        Highest derivative of the residual that is checked.
     relative : bool
-        Whether the joint depends on how its bodies lie to each other, and on nothing else.
+        Whether the joint depends only on the relative poses of its bodies.
     equations : int, optional
-        How many independent equations it stands for, if not as many as it has rows.
+        Number of its independent equations, if not as many as it has rows.
     period : str or float, optional
-        Of the last row, where that is known up to whole periods: a number, or the field that has it; 2 pi if the
+        Period of the last row, if it is known up to whole periods: a number, or the name of its field; 2 pi if the
         class is `periodic`.
     optional : bool
         Whether fields that may be left out have values, too.
     bodies : int, optional
-        How many bodies the joint is between, where its class allows several numbers; the first of them unless given.
+        Number of bodies that the joint connects, if its class allows several numbers; the first of them unless given.
     contracts : sequence of str, optional
-        Names of those to be looked at, if not all.
+        Names of the contracts to check; all unless given.
     seed : int
-        Of the random numbers.
+        Seed of the random numbers.
 
     Returns
     -------
     JointReport
-        With the contracts kept, and with those that say nothing of the class.
+        The contracts that the class keeps, and those that do not apply to it.
 
     Raises
     ------
     ContractError
-        If the class does not keep a contract, with its name and what is wrong.
+        If the class breaks a contract; the message names it and says what is wrong.
     MechanismError
         If the class states a fact that cannot be, or values do not fit.
 

@@ -1,4 +1,4 @@
-"""Contracts of forms in which a joint exists: copies, pickles, files, and programs of both back ends."""
+"""Contracts of the forms of a joint: copies, pickles, files, and programs of both back ends."""
 
 import copy
 import dataclasses
@@ -24,24 +24,24 @@ from jounce.rigid import PlanarPose, SpatialPose
 from jounce.testing.samples import BODIES, INSTANT, group_of, pose_of, random_motion
 from jounce.testing.subject import Broken, LeftOut, Subject, evaluated
 
-LANES = 9  # instants: more than a vector holds, and a rest
+LANES = 9  # instants: more than one vector of the processor, and a remainder
 
 
 def copies(subject: Subject) -> None:
-    """Check that copies of a joint, and what pickle makes of it, are equal to it and have its hash."""
+    """Check that copies and pickles of a joint are equal to it and have the same hash."""
     element = subject.samples.element(subject.random())
     vectors = (name for name, kind in field_kinds(type(element)).items() if kind == "vector")
     given = {name: tuple(value) for name in vectors if (value := getattr(element, name)) is not None}
     several = (name for name, kind in field_kinds(type(element)).items() if kind == "points")
     given |= {name: tuple(map(tuple, getattr(element, name))) for name in several}
-    element = dataclasses.replace(element, **given)  # of lists there is no hash
+    element = dataclasses.replace(element, **given)  # lists have no hash
     copies_made = {"copy.copy": copy.copy(element), "copy.deepcopy": copy.deepcopy(element)}
     kind = type(element)
     if _by_name(kind) is kind:
         copies_made["pickle"] = pickle.loads(pickle.dumps(element))
     for method, other in copies_made.items():
         if type(other) is not kind or not bool(other == element) or hash(other) != hash(element):
-            raise Broken(f"what {method} makes of a joint is not equal to it, with its hash")
+            raise Broken(f"a joint from {method} is not equal to the original, or has another hash")
     if "pickle" not in copies_made:
         raise LeftOut(f"copies are equal; pickle finds no class {kind.__qualname__} in the module {kind.__module__}")
 
@@ -58,7 +58,7 @@ def files(subject: Subject) -> None:
     kind, space = subject.samples.kind, subject.space
     role = kind.role or "joint"
     if catalogue(space, role).get(kind.type_name) is not kind:
-        raise LeftOut("it has no type by which files name it")
+        raise LeftOut("it has no type name for files")
     element = subject.samples.element(subject.random())
     mechanism = Mechanism(
         space=space,
@@ -99,5 +99,5 @@ def back_ends(subject: Subject) -> None:
     subject.same(jax.jit(run)(group, lanes), expected, 1e-13, "XLA's program gives another residual")
     program = Mapped(run).program(group, lanes)
     if program.backend != LLVM:
-        raise LeftOut("XLA agrees; there is no machine code for what the residual does, or none is made here")
+        raise LeftOut("XLA agrees; there is no machine code for an operation of the residual, or none is made here")
     subject.same(program(lanes), expected, 1e-13, "machine code gives another residual")

@@ -1,4 +1,4 @@
-"""Contracts at positions where a joint holds: how many equations it stands for, and whether its facts are true."""
+"""Contracts at positions where a joint holds: the number of its independent equations, and the truth of its facts."""
 
 import dataclasses
 from typing import Any
@@ -24,14 +24,14 @@ from jounce.testing.subject import Broken, LeftOut, Subject, evaluated, random_s
 
 STARTS, STEPS = 8, 40
 NEEDED = 2  # positions
-CLOSED, NEARLY = 1e-13, 1e-10  # last corrections, m or rad: while they fall, and where rounding keeps them up
+CLOSED, NEARLY = 1e-13, 1e-10  # last corrections, m or rad: while they decrease, and where rounding limits them
 DEPENDENT = 1e-9  # smallest singular value over the largest
-FACTOR = 3.0  # by which lengths, and directions, are multiplied
+FACTOR = 3.0  # of lengths and directions
 PAIRS = {"revolute": planar.Revolute, "rod": planar.DoubleRevolute, "prismatic": planar.Prismatic}
 
 
 def rank(subject: Subject) -> None:
-    """Check that a joint stands for as many equations as it has rows, or as are claimed, where it holds."""
+    """Check that a joint that holds has as many independent equations as it has rows, or as are claimed."""
     group = group_of([_sample(subject)], subject.space)
     for _, slopes in _positions(subject, group):
         sizes = np.linalg.svd(slopes, compute_uv=False)
@@ -71,7 +71,7 @@ def _sample(subject: Subject) -> Any:
 
 
 def _positions(subject: Subject, group: Group) -> list[tuple[Motion, np.ndarray]]:
-    """Return some positions in which a joint holds, with the Jacobian there, shape (rows, coordinates)."""
+    """Return some positions where a joint holds, with the Jacobian there, shape (rows, coordinates)."""
     random, positions = subject.random(), subject.positions
     for _ in range(STARTS):
         if len(positions) == NEEDED:
@@ -85,7 +85,7 @@ def _positions(subject: Subject, group: Group) -> list[tuple[Motion, np.ndarray]
 
 
 def _closed(subject: Subject, group: Group, motion: Motion) -> tuple[Motion, np.ndarray] | None:
-    """Return the position near to another in which a joint holds, by Gauss-Newton, or None."""
+    """Return a position near a given one where a joint holds, by Gauss-Newton, or None."""
     unit = directions(subject.space)
     unknowns = np.stack([np.zeros_like(unit), unit])
     still = Jet.constant(jnp.full((1, unit.shape[-1]), INSTANT), 1)
@@ -162,7 +162,7 @@ def _dimensions(subject: Subject, element: Any, motion: Motion) -> None:
         if kind not in ("scalar", "vector", "points", "motion") or (value is None and not stretched):
             continue
         if value is None or not (stretched or dimension in ("angle", "ratio")):
-            return  # nothing is said of a field, or it stands for a length that is not seen
+            return  # the class states no dimension of a field, or the default of a length is unknown
         if stretched:
             changed[name] = f"{FACTOR}*({value})" if kind == "motion" else (FACTOR * np.asarray(value)).tolist()
     wide = {**motion, "position": FACTOR * motion["position"]}

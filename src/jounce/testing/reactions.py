@@ -1,6 +1,6 @@
-"""Equilibrium of what joints, drivers and forces exert, along random motions with random multipliers.
+"""Equilibrium of the reactions of joints and drivers, and of forces, along random motions with random multipliers.
 
-Nothing that they hold is held then, and nothing depends on a mechanism's being solved.
+The motions do not fulfill the constraints, so that nothing depends on the solution of a mechanism.
 """
 
 from collections.abc import Callable, Mapping
@@ -16,35 +16,35 @@ from jounce.mechanism import Body, Mechanism, build
 from jounce.testing.samples import BODIES, INDEX, INSTANT, pose_of, random_motion
 from jounce.testing.subject import Subject
 
-RATES = 1  # of reactions that are looked at
+RATES = 1  # derivatives of reactions that are checked
 
 
 def equilibrium(subject: Subject) -> None:
     """Check that the reactions of a joint have no resultant, and the power of its multipliers on its residual."""
     random = subject.random()
     element = subject.samples.element(random)
-    pose, found = acting({"joint": element}, subject.space, RATES, random)
+    pose, forces = acting({"joint": element}, subject.space, RATES, random)
     spins = spins_of(pose)
-    exerted = resultant(found, "joint", element, pose, random, spins)
+    exerted = resultant(forces, "joint", element, pose, random, spins)
     size = max(exerted.size, 1e-300)
     subject.same(exerted.force / size, 0 * exerted.force, 1e-13, "the reactions have a resultant force")
     subject.same(exerted.moment / size, 0 * exerted.moment, 1e-12, "the reactions have a resultant moment")
-    power, scale = worked(found, "joint", element, pose), size * np.abs(spins).max()
+    power, scale = worked(forces, "joint", element, pose), size * np.abs(spins).max()
     words = "the power of the reactions is not that of the multipliers on the residual"
     subject.same(exerted.power / scale, power / scale, 1e-12, words)
 
 
 class Resultant(NamedTuple):
-    """What a joint, driver or force exerts on all its bodies together, as Taylor coefficients, the levels first.
+    """The resultant of a joint, driver or force on all its bodies, as Taylor coefficients, the levels first.
 
     Attributes
     ----------
     force, moment : array
         Resultant, and moment about the origin.
     power : array
-        That goes into the bodies.
+        Power that goes into the bodies.
     size : float
-        Of the largest part of them.
+        Magnitude of the largest contribution.
     """
 
     force: Any
@@ -70,11 +70,11 @@ def acting(
     pose = pose_of({name: _with_carriages(x, len(mechanism.bodies) - len(BODIES) + 1) for name, x in series.items()})
     coordinates = {name: np.stack(jet.dense().coefficients) for name, jet in pose.coordinates().items()}
     motion = Motion(mechanism, model, np.array([INSTANT]), rates + 2, (coordinates, ()), np.zeros(1, int), {})
-    found = MotionForces(motion)
+    forces = MotionForces(motion)
     rows = len(model.rows)
-    balancing = random.normal(size=(1, rates + 1, rows + len(found.friction.names), 1))
-    found.__dict__ |= {"_balancing": balancing, "multipliers": balancing[0, :, :rows]}
-    return pose, found
+    balancing = random.normal(size=(1, rates + 1, rows + len(forces.friction.names), 1))
+    forces.__dict__ |= {"_balancing": balancing, "multipliers": balancing[0, :, :rows]}
+    return pose, forces
 
 
 def _with_carriages(series: np.ndarray, count: int) -> np.ndarray:
@@ -92,9 +92,9 @@ def spins_of(pose: Any) -> np.ndarray:
 
 
 def resultant(
-    found: MotionForces, name: str, element: Any, pose: Any, random: np.random.Generator, spins: np.ndarray
+    forces: MotionForces, name: str, element: Any, pose: Any, random: np.random.Generator, spins: np.ndarray
 ) -> Resultant:
-    """Return what a joint, driver or force exerts, from moments about random points of all bodies and the ground."""
+    """Return the resultant of a joint, driver or force, from moments about random points of bodies and the ground."""
     force: Any = 0.0
     moment: Any = 0.0
     power: Any = 0.0
@@ -105,7 +105,7 @@ def resultant(
         point, index = random.uniform(-1, 1, len(pose.position.coefficients[0])), INDEX[body]
         place = pose.take((index,)).point(point[:, None, None])
         path, speed = (np.stack(x.dense().coefficients)[..., 0] for x in (place, place.differentiate()))
-        part, turning = (np.asarray(x) for x in found.reaction(name, index, None, point))
+        part, turning = (np.asarray(x) for x in forces.reaction(name, index, None, point))
         lever = convolved(cross, path, part)
         force, moment = force + part, moment + turning + lever
         power = power + convolved(scalar, part, speed) + convolved(scalar, turning, spins[:, :, index])
@@ -113,20 +113,20 @@ def resultant(
     return Resultant(force, moment, power, size)
 
 
-def worked(found: MotionForces, name: str, element: Any, pose: Any) -> np.ndarray:
+def worked(forces: MotionForces, name: str, element: Any, pose: Any) -> np.ndarray:
     """Return Taylor coefficients of the power that a joint, driver or force puts into all bodies, (levels, time)."""
     clock = Jet.variable(np.full((1, 1), INSTANT), pose.order)
     if element.role == "force":
-        index, instance = found._force_index(name)
-        power = found.model.system.forces[index].power(pose, clock)
-        return np.stack(power.dense().coefficients)[: found.levels, instance]
-    place, frozen = found.indices[name], Jet.constant(clock.coefficients[0], pose.order)
-    rate = found.model.system.groups[place.group].residual(pose, frozen).differentiate()
+        index, instance = forces._force_index(name)
+        power = forces.model.system.forces[index].power(pose, clock)
+        return np.stack(power.dense().coefficients)[: forces.levels, instance]
+    place, frozen = forces.indices[name], Jet.constant(clock.coefficients[0], pose.order)
+    rate = forces.model.system.groups[place.group].residual(pose, frozen).differentiate()
     rates = np.stack(rate.dense().coefficients)[:, :, place.instance]
-    power = -convolved(scalar, found.multipliers[:, list(place.own_rows)], rates)
-    if name in found.friction.names:
-        taken = np.asarray(found.friction.resisted(place.group, np.zeros(1, int)))[:, place.instance]
-        power = power - convolved(scalar, found.friction.normal_force(name), taken[:, None])
+    power = -convolved(scalar, forces.multipliers[:, list(place.own_rows)], rates)
+    if name in forces.friction.names:
+        taken = np.asarray(forces.friction.resisted(place.group, np.zeros(1, int)))[:, place.instance]
+        power = power - convolved(scalar, forces.friction.normal_force(name), taken[:, None])
     return power
 
 

@@ -26,7 +26,7 @@ from jounce.testing.samples import (
 from jounce.testing.subject import Broken, LeftOut, Subject, evaluated, residual
 from jounce.trajectory import Expression
 
-NODES = 40  # through which a polynomial is put
+NODES = 40  # of an interpolating polynomial
 REACHES = (0.5, 0.25, 0.125)  # s, on either side
 
 
@@ -34,7 +34,7 @@ def jacobian(subject: Subject) -> None:
     """Check that coefficients are affine in the unknown, with the Jacobian as slope.
 
     For each order k, the k-th coefficient with the unknown x[k], less that with zero, is the Jacobian times x[k]. The
-    Jacobian, read off at order one, is that of central differences, and the one that the solver takes in blocks.
+    Jacobian, read off at order one, agrees with central differences and with the Jacobian of the solver, in blocks.
     Everything is evaluated side by side: two lanes for each order, then one for each column of the Jacobian.
     """
     random, order = subject.random(), subject.order
@@ -65,7 +65,7 @@ def jacobian(subject: Subject) -> None:
     differences = (-far + 8 * near - 8 * behind + far_behind) / (12 * step)
     subject.same(slopes, differences, 1e-9, "the Jacobian is not that of differences of the residual")
     if np.abs(slopes).max() <= 1e-9:
-        raise Broken("the residual does not depend on how its bodies lie")
+        raise Broken("the residual does not depend on the poses of its bodies")
     subject.same(jacobian_of_blocks(group, motion), slopes, 1e-14, "the Jacobian is not that in blocks")
 
 
@@ -85,7 +85,7 @@ def jacobian_of_blocks(group: Group, motion: Motion) -> np.ndarray:
 def derivatives(subject: Subject) -> None:
     """Check that derivatives along a motion are those of the residual as a function of time.
 
-    The residual at order zero on instants around, through which a Chebyshev polynomial is put, judges its jets.
+    A Chebyshev polynomial through the residual of order zero at neighboring instants is the reference for the jets.
     """
     random = subject.random()
     group = group_of([subject.samples.element(random)], subject.space)
@@ -127,7 +127,7 @@ def _around(subject: Subject, group: Group, motion: Motion, jets: Any, reach: fl
 def frames(subject: Subject) -> None:
     """Check that a common motion of all bodies changes nothing.
 
-    A joint between moving bodies knows their relative motion only; vectors of residuals turn with the bodies.
+    A joint between moving bodies depends on their relative motion only; vectors of residuals turn with the bodies.
     """
     if not subject.relative:
         raise LeftOut("it is said to depend on the global frame")
@@ -135,7 +135,7 @@ def frames(subject: Subject) -> None:
     group = group_of([subject.samples.element(random)], subject.space)
     motion = random_motion(random, subject.space, 2)
     moved = moved_together(motion, random, 2)
-    if subject.samples.kind.hidden:  # its coordinates, those of the last body, are no place that moves
+    if subject.samples.kind.hidden:  # its coordinates, those of the last body, are not a position in space
         for name, series in moved.items():
             series[..., -1, :] = motion[name][..., -1, :]
     here, there = residual(group, motion), residual(group, moved)
@@ -156,7 +156,7 @@ def _square(rows: np.ndarray) -> np.ndarray:
 
 
 def instances(subject: Subject) -> None:
-    """Check that joints evaluated together are those evaluated alone."""
+    """Check that joints evaluated together have the same residuals as each joint by itself."""
     random, samples = subject.random(), subject.samples
     count = samples.count
     slots = [BODIES[1 : 1 + count], BODIES[4 - count + 1 : 5][::-1], (*BODIES[: count - 1], BODIES[4])]
@@ -166,7 +166,8 @@ def instances(subject: Subject) -> None:
     for k, element in enumerate(elements):
         single = residual(group_of([element], subject.space), motion)
         bound = 1e-15 * (1.0 + np.abs(single[:, :, 0]))
-        subject.same(together[:, :, k] / bound, single[:, :, 0] / bound, 1.0, "joints side by side are not those alone")
+        words = "the residual of a joint among others is not that of the joint by itself"
+        subject.same(together[:, :, k] / bound, single[:, :, 0] / bound, 1.0, words)
 
 
 def expressions(subject: Subject) -> None:
@@ -199,7 +200,7 @@ def _values(element: Any) -> dict[str, Any]:
 
 
 def one_program(subject: Subject) -> None:
-    """Check that other values compile nothing again."""
+    """Check that other values need no further compilation."""
     random, calls = subject.random(), []
 
     @jax.jit

@@ -1,4 +1,4 @@
-"""Random joints of a class, by its fields and facts alone, and random motions of bodies to put them on."""
+"""Random joints of a class, from only its fields and facts, and random motions of the bodies they connect."""
 
 import dataclasses
 from collections.abc import Mapping, Sequence
@@ -44,7 +44,7 @@ class Samples:
     optional : bool, default False
         Whether fields that may be left out have values, too; an offset always has.
     joined : int, optional
-        How many bodies a joint is between, where its class allows several numbers; the first of them unless given.
+        Number of bodies that a joint connects, if its class allows several numbers; the first of them unless given.
     """
 
     kind: type[Any]
@@ -55,12 +55,12 @@ class Samples:
 
     @property
     def bodies(self) -> tuple[str, ...]:
-        """Names of the bodies that the joint is between, all of them moving."""
+        """Names of the bodies that the joint connects, all of them moving."""
         return BODIES[1 : 1 + self.count]
 
     @property
     def count(self) -> int:
-        """How many bodies the joint is between."""
+        """Number of bodies that the joint connects."""
         counts: tuple[int, ...] = self.kind.body_counts or (self.kind.body_count,)
         return self.joined or counts[0]
 
@@ -95,12 +95,12 @@ class Samples:
             return Friction(random.uniform(0.1, 0.3), random.uniform(0.01, 0.02), radius)
         if name in facts.choices:
             return facts.choices[name][0]
-        message = f"no value of this field of {self.kind.__qualname__} is known that makes sense; give one in `values`"
+        message = f"this field of {self.kind.__qualname__} has no default sample; give a value in `values`"
         raise MechanismError(message, name=name)
 
 
 def group_of(elements: Sequence[Any], space: str, parameters: Mapping[str, Any] | None = None) -> Group:
-    """Return the one group that joints of one kind are stacked in; the last body has hidden coordinates of theirs."""
+    """Return the group in which joints of one kind are stacked; the last body has their hidden coordinates."""
     named = {f"joints.{k}": e for k, e in enumerate(elements)}
     carriage = {carriage_of(str(k)): len(BODIES) - 1 for k in range(len(elements))}
     (group,), _ = group_elements(named, parameters or {}, {**INDEX, **carriage}, POSITION_COMPONENTS[space])

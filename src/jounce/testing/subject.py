@@ -1,4 +1,4 @@
-"""What contracts of joints are about: samples of a class, what is claimed of it, and how a contract fails."""
+"""The subject of contracts of joints: samples of a class, claims about it, and the ways in which a contract fails."""
 
 import dataclasses
 from functools import cached_property
@@ -12,33 +12,33 @@ from jounce.testing.samples import Motion, Samples, group_of, pose_of, random_mo
 
 
 class LeftOut(Exception):  # noqa: N818 - it is no error
-    """A contract that says nothing of a joint, and why."""
+    """A contract that does not apply to a joint, and why."""
 
 
-class Broken(Exception):  # noqa: N818 - `ContractError` says of which contract, too
-    """What is wrong where a joint does not keep a contract."""
+class Broken(Exception):  # noqa: N818 - `ContractError` names the contract, too
+    """A joint does not keep a contract, and why."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Subject:
-    """A class of joints or drivers, and what is claimed of it.
+    """A class of joints or drivers, and the claims about it.
 
     Parameters
     ----------
     samples : Samples
         Random joints of the class.
     order : int
-        Up to which derivatives are looked at.
+        Highest derivative that is checked.
     relative : bool
-        Whether it depends on how its bodies lie to each other, and on nothing else.
+        Whether it depends only on the relative poses of its bodies.
     period : str or float or None
-        Of the last row of the residual, where that is known up to whole periods: a number, or the field that has it.
+        Period of the last row of the residual, if it is known up to whole periods: a number, or the name of its field.
     equations : int or None
-        How many independent equations it stands for; None for as many as its residual has rows.
+        Number of its independent equations; None for as many as its residual has rows.
     seed : int
-        Of all random numbers.
+        Seed of all random numbers.
     positions : list
-        In which the joint holds, once they are found.
+        Positions in which the joint holds, once they are computed.
     """
 
     samples: Samples
@@ -66,7 +66,7 @@ class Subject:
 
     @cached_property
     def scale(self) -> float:
-        """Size that residuals have: all tolerances are in it."""
+        """Size of residuals, the unit of all tolerances."""
         random = self.random()
         group = group_of([self.samples.element(random)], self.space)
         largest = float(np.abs(residual(group, random_start(self, random))).max())

@@ -1,4 +1,4 @@
-"""What measures are told besides their quantity: derivatives, instants and windows of time."""
+"""The arguments of measures after their quantity: derivatives, instants and windows of time."""
 
 from collections.abc import Mapping, Sequence
 
@@ -6,7 +6,7 @@ from jounce.design.objectives.language import EXERTED, MEASURES, Node, operated
 from jounce.errors import ExpressionError
 from jounce.kinematics.position_analysis.solve import HIGHEST_ORDER
 
-MAX_DERIVATIVE = HIGHEST_ORDER - 2  # that goals may ask for: its rate and how that bends are needed, too
+MAX_DERIVATIVE = HIGHEST_ORDER - 2  # of goals: they need its first and second rate, too
 
 
 class Arguments:
@@ -21,13 +21,13 @@ class Arguments:
 
     Attributes
     ----------
-    asked : list of float
-        Instants that were asked for, s.
+    instants : list of float
+        Instants that measures name, s.
     """
 
     def __init__(self, fixed: Mapping[str, float], interval: tuple[float, float]):
         self.fixed, self.interval = fixed, interval
-        self.asked: list[float] = []
+        self.instants: list[float] = []
 
     def constant(self, node: Node) -> float | None:
         """Return the value of a number that is the same in all designs, None for one that may not be."""
@@ -57,17 +57,17 @@ class Arguments:
         return int(order)
 
     def instant(self, node: Node) -> float:
-        """Return an instant of the motion, s, and remember that it is asked for."""
+        """Return an instant of the motion, s, and add it to `instants`."""
         instant = self.argument(node, "the instant")
         first, last = self.interval
         if not first <= instant <= last:
             message = f"the instant {instant:g} s is not within the motion, which is from {first:g} to {last:g} s"
             raise ExpressionError(message)
-        self.asked.append(instant)
+        self.instants.append(instant)
         return instant
 
     def window(self, rest: Sequence[Node]) -> tuple[float | None, float | None]:
-        """Return from when to when a measure counts, which two arguments after the derivative tell."""
+        """Return the window of time of a measure, s, from two arguments after the derivative."""
         if len(rest) < 3:
             return None, None
         start, stop = self.instant(rest[1]), self.instant(rest[2])

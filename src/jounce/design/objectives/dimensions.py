@@ -17,7 +17,7 @@ def check_dimensions(relation: Relation, quantities: Quantities) -> None:
 
 
 def _dimension(node: Node, quantities: Quantities) -> Dimension | None:
-    """Return the dimension of a parameter, or of a measure of one quantity, None where it is not known."""
+    """Return the dimension of a parameter or of a measure of one quantity, or None where it is not known."""
     if node.kind == "name":
         return next(iter(quantities.mechanism.dimensions.get(node.word, ())), None)
     if node.kind != "call" or not node.parts:

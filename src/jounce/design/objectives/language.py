@@ -1,4 +1,4 @@
-"""What a designer asks for, in words: ``peak(psi, 4)``, ``span(C_x) <= 2 mm``; parsed as every other expression is."""
+"""Objectives and conditions as text: ``peak(psi, 4)``, ``span(C_x) <= 2 mm``; parsed as every other expression."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ from jounce.units.values import parse_value
 
 OVER_TIME: dict[str, tuple[int, ...]] = dict.fromkeys(
     ("peak", "maximum", "minimum", "span", "mean", "rms"),
-    (1, 2, 4),  # the quantity, its derivative, and from when to when
+    (1, 2, 4),  # the quantity, its derivative, and the two ends of the window of time
 )
 MEASURES: dict[str, tuple[int, ...]] = {**OVER_TIME, "at": (2, 3), "path_error": (2,), "path_deviation": (2,)}
-"""What makes one number of a quantity that changes in time, and how many arguments it may have."""
+"""Measures, which make one number of a quantity that changes in time, with their permitted numbers of arguments."""
 
 EXERTED: dict[str, tuple[int, ...]] = {
     f"{kind}{component}": (1,) for kind in ("force", "torque") for component in ("", "_x", "_y", "_z")
 }
-"""What drivers and joints exert, and components of it."""
+"""Forces and torques of drivers and joints, and their components."""
 
 WORDS = {**MEASURES, **EXERTED}
 _RELATION = re.compile(r"(<=|>=|==|<|>|=)")
@@ -40,7 +40,7 @@ class Node:
     word : float or str
         The number, the name, or the operation.
     parts : tuple of Node
-        What it is done to.
+        The operands.
     """
 
     kind: str
@@ -61,7 +61,7 @@ class Node:
 
     @property
     def is_measured(self) -> bool:
-        """Whether a measure of the motion is in it."""
+        """Whether it contains a measure of the motion."""
         return self.word in MEASURES or any(part.is_measured for part in self.parts)
 
     def names(self) -> set[str]:
@@ -77,12 +77,12 @@ class Relation:
     Parameters
     ----------
     text : str
-        As it was given, or one of the two that it stands for.
+        The given text, or one of the two relations of a double comparison.
     left, right : Node
     equal : bool
         Whether both must be equal.
     dimensions : tuple of Dimension or None
-        Of both sides, where a unit tells it.
+        Dimensions of both sides, where they have a unit.
     """
 
     text: str
@@ -93,7 +93,7 @@ class Relation:
 
     @property
     def bound_left(self) -> bool:
-        """Whether the left side is what the right one is compared with: a number, or the side without a measure."""
+        """Whether the left side is the bound: a number, or the only side without a measure."""
         if self.left.is_measured != self.right.is_measured:
             return self.right.is_measured
         return self.left.kind == "number"
@@ -105,7 +105,7 @@ def parsed(text: str) -> Node:
     Raises
     ------
     ExpressionError
-        Anything in it is not allowed; the message names it and its column.
+        It contains something that is not allowed; the message names it and its column.
     """
     return Expression(text, functions=WORDS).folded(
         lambda number: Node("number", number),
@@ -141,7 +141,7 @@ def parsed_relations(text: str) -> list[Relation]:
 
 
 def _side(text: str) -> tuple[Node, Dimension | None]:
-    """Return one side of a comparison, and its dimension where a unit tells it."""
+    """Return one side of a comparison, and its dimension if it has a unit."""
     try:
         return parsed(text), None
     except ExpressionError:
@@ -157,7 +157,7 @@ def _side(text: str) -> tuple[Node, Dimension | None]:
 
 
 def folded(node: Node, number: Callable[[Any], Any], name: Callable[[str], Any], call: Callable[..., Any]) -> Any:
-    """Return what comes of an expression whose numbers, names and calls have a meaning; calls get their own node."""
+    """Return the result of functions for numbers, names and calls on an expression; calls get their own node."""
     if node.kind == "number":
         return number(node.word)
     if node.kind == "name":
@@ -166,7 +166,7 @@ def folded(node: Node, number: Callable[[Any], Any], name: Callable[[str], Any],
 
 
 def operated(word: str, values: list[Any]) -> Any:
-    """Return one operation on numbers, arrays of JAX or jets."""
+    """Return the result of one operation on numbers, arrays of JAX or jets."""
     names = [f"x{k}" for k in range(len(values))]
     if word in ("pos", "neg"):
         text = f"{'-' if word == 'neg' else '+'}x0"
@@ -179,7 +179,7 @@ def operated(word: str, values: list[Any]) -> Any:
 
 
 def refuse_name(name: str, known: Mapping[str, str], text: str) -> ExpressionError:
-    """Return the error for a name that nothing has, with what there is, by kind."""
+    """Return the error for an unknown name, with the known names by kind."""
     kinds: dict[str, list[str]] = {}
     for each, kind in known.items():
         kinds.setdefault(kind, []).append(each)

@@ -1,8 +1,8 @@
-"""What makes one number of a quantity that changes in time: its largest value, its mean, its distance from points.
+"""Measures, which make one number of a quantity that changes in time: largest value, mean, distance from points.
 
-A motion is known as a Taylor series about each instant of a grid, so that it is known between instants too: every
-instant has a cell, up to halfway to its neighbors, in which its series stands for the quantity. The largest value in a
-cell is a smooth function of a design, by the envelope theorem: its slope is that of the value, at the instant held.
+A motion has a Taylor series about each instant of a grid, which gives it between instants too: every instant has a
+cell, up to halfway to its neighbors, where its series represents the quantity. The largest value in a cell is a smooth
+function of a design, by the envelope theorem: its slope is that of the value at the fixed instant.
 """
 
 import dataclasses
@@ -19,11 +19,11 @@ from jounce.base.shapes import Numbers
 from jounce.jet import Jet
 from jounce.trajectory.law_checks.breaks import with_sides
 
-SAMPLES = 9  # of a cell, in which its largest value is looked for
+SAMPLES = 9  # of a cell, from which the search for its largest value starts
 ROUNDS = 6  # of Newton's method from the best of them
 
 NO_KNOTS = np.zeros(0)
-NEAR = 1e-9  # of a span of time: instants so near to each other are one
+NEAR = 1e-9  # of the duration: instants so near to each other are one
 
 Series = Float[Numbers, "order *cell"]
 """Taylor coefficients about the instants of a grid."""
@@ -31,16 +31,16 @@ Series = Float[Numbers, "order *cell"]
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Cells:
-    """Which stretch of time the series about each instant stands for.
+    """The intervals of time that the series about the instants represent.
 
     Parameters
     ----------
     instants : array of shape (time,)
         s.
     index : array of int of shape (cells,)
-        Of those instants that have a part of the window.
+        Indices of the instants whose cells overlap the window.
     low, high : array of shape (cells,)
-        Its ends, as seen from the instant, s.
+        Ends of the cells relative to their instants, s.
     """
 
     instants: Float[np.ndarray, " time"]
@@ -159,7 +159,7 @@ def gaps(
     times: Float[np.ndarray, " point"] | None,
     cells: Cells,
 ) -> Float[Numbers, "component point"]:
-    """Return how far points are from where a point of the motion is at their times, or comes nearest."""
+    """Return the distances of points from a point of the motion at their times, or where it comes nearest."""
     if times is not None:
         positions = [cells.at(float(time)) for time in times]
         index, shift = np.array([k for k, _ in positions]), np.array([h for _, h in positions])
@@ -199,14 +199,14 @@ class PrescribedPath:
 def environment(
     instants: Float[np.ndarray, " time"], parameters: Mapping[str, Any], series: Mapping[str, Any], order: int
 ) -> dict[str, Any]:
-    """Return what names mean: time, to an order, and quantities are jets along the grid, parameters are numbers."""
+    """Return the values of names: time, to an order, and quantities are jets along the grid, parameters are numbers."""
     return {**parameters, "t": Jet.variable(instants, order), **{name: Jet(tuple(x)) for name, x in series.items()}}
 
 
 def at_instants(
     values: Sequence[float], instants: Float[np.ndarray, " given"], knots: Float[np.ndarray, " knots"] = NO_KNOTS
 ) -> Float[np.ndarray, " time"]:
-    """Return a grid that has the instants at which something is asked, and those on both sides of the knots of laws."""
+    """Return a grid with the instants that measures name, and those on both sides of the knots of laws."""
     merged = np.unique(np.concatenate([instants, np.asarray(values, float)]))
     gaps = np.diff(merged)
     close = np.concatenate([[False], gaps < NEAR * (merged[-1] - merged[0] or 1.0)])
@@ -219,6 +219,6 @@ def at_instants(
 def _near(
     some: Float[np.ndarray, " some"], others: Float[np.ndarray, " others"], grid: Float[np.ndarray, " time"]
 ) -> Bool[np.ndarray, " some"]:
-    """Tell which instants are one with one of some others."""
+    """Return which instants coincide with one of some others."""
     distances = np.abs(some[:, None] - others).min(axis=1, initial=np.inf)
     return distances < NEAR * (grid[-1] - grid[0] or 1.0)

@@ -1,4 +1,4 @@
-"""The meaning of what a designer asks for: names become quantities of a mechanism, measures become numbers."""
+"""The meaning of objectives and conditions: names become quantities of a mechanism, measures become numbers."""
 
 import dataclasses
 from collections.abc import Callable, Mapping, Sequence
@@ -41,7 +41,7 @@ from jounce.kinematics.position_analysis.solve import HIGHEST_ORDER
 from jounce.mechanism import Mechanism
 from jounce.mechanism.laws.output_drivers import with_outputs
 
-BEYOND = 5  # derivatives beyond those asked for, by which a quantity is known between instants
+BEYOND = 5  # derivatives beyond the requested ones, which give a quantity between instants
 
 Numbers = Callable[[Mapping[str, Any], Any, Any], Any]
 """A number of a design: of its parameters, the extremes of quantities, and other measures."""
@@ -54,7 +54,7 @@ class Condition:
     Parameters
     ----------
     relation : Relation
-        As it was asked for.
+        The condition as the user states it.
     number : callable
         Left side less the right one.
     left, right : callable
@@ -67,19 +67,19 @@ class Condition:
 
 
 class Goals:
-    """What is to be least, and what must hold, as functions of the motion of a mechanism.
+    """Objective and conditions as functions of the motion of a mechanism.
 
-    Quantities become numbers in two ways. Extremes are the largest of the values that some cells of time have; where a
-    goal grows with one, an optimizer may take a number of its own in its place that none of these values may exceed,
-    which is smooth where the place of the largest jumps. All other measures are smooth as they are.
+    Quantities become numbers in two ways. Extremes are the largest of the values in some cells of time; where a goal
+    grows with one, an optimizer may replace it by a variable that none of these values may exceed, which is smooth
+    where the cell of the largest changes. All other measures are smooth as they are.
 
     Parameters
     ----------
     mechanism : Mechanism
     minimize : str
-        What is to be least.
+        The objective.
     subject_to : sequence of str
-        What must hold.
+        The conditions.
     varied : sequence of str
         Parameters that differ from design to design.
     curves : dict of str to PrescribedPath
@@ -87,25 +87,25 @@ class Goals:
     instants : array of shape (time,)
         s.
     knots : array of shape (knots,), optional
-        Where derivatives of motion laws jump in all designs, s.
+        Instants at which derivatives of motion laws jump in all designs, s.
 
     Attributes
     ----------
     mechanism : Mechanism
         With the outputs that are needed.
     instants : array of shape (time,)
-        With those at which something is asked for.
+        The given instants, with those that measures name.
     order : int
-        Of the motion.
+        Order of the motion.
     objective : callable
-        What an optimizer makes least.
+        The function that an optimizer minimizes.
     objective_value : callable
-        What the designer asked for; the objective may be its square, which is smooth where it is zero.
+        The objective as stated; `objective` may be its square, which is smooth where it is zero.
     conditions : list of Condition
     bounded : list of bool
         For each extreme, whether a goal grows with it.
     gaps : range, optional
-        Which smooth measures are the distances, by coordinate, whose mean square is the objective.
+        Indices of the smooth measures that are the distances, by coordinate, whose mean square is the objective.
     """
 
     def __init__(
@@ -142,8 +142,8 @@ class Goals:
         self.mechanism = with_outputs(mechanism, {**outputs_left, **self.quantities.added})
 
     def set_instants(self, instants: Float[np.ndarray, " time"]) -> None:
-        """Take another grid."""
-        self.instants = at_instants(self._arguments.asked, instants, self._knots)
+        """Change the grid."""
+        self.instants = at_instants(self._arguments.instants, instants, self._knots)
         self._cells = [Cells.of(self.instants, *window) for window in self._windows]
         self._whole = Cells.of(self.instants)
 
@@ -170,10 +170,10 @@ class Goals:
         smooth = [jnp.asarray(measure(names), float).reshape(-1) for measure in self._smooth]
         return rows, jnp.concatenate([*smooth, jnp.zeros(0)])
 
-    def numbers(self, parameters: Mapping[str, Any], extremes: Any, smooth: Any, *, as_asked: bool = False) -> Any:
+    def numbers(self, parameters: Mapping[str, Any], extremes: Any, smooth: Any, *, as_stated: bool = False) -> Any:
         """Return the objective, then the conditions as numbers that must be zero, or not above it, (goals,)."""
         names = self._values(parameters)
-        objective = self.objective_value if as_asked else self.objective
+        objective = self.objective_value if as_stated else self.objective
         numbers = [objective(names, extremes, smooth), *(c.number(names, extremes, smooth) for c in self.conditions)]
         return jnp.stack([jnp.asarray(x, float) for x in numbers])
 
@@ -185,7 +185,7 @@ class Goals:
         ]
 
     def _values(self, parameters: Mapping[str, Any]) -> dict[str, Any]:
-        """Return the values of all parameters, of which some follow from others."""
+        """Return the values of all parameters, including those that follow from others."""
         return self._original.with_parameters(**parameters).parameter_values
 
     def _series(self, node: Node, order: int) -> Callable[[Mapping[str, Any]], Any]:
@@ -210,7 +210,7 @@ class Goals:
     # numbers
 
     def _number(self, node: Node, sign: int | None) -> Numbers:
-        """Return a number; `sign` tells whether goals grow with it (1), shrink (-1), or neither is known (None)."""
+        """Return a number; goals grow with it (`sign` 1), shrink (-1), or neither is known (None)."""
         if node.kind == "number":
             return lambda *_: float(node.word)
         if node.kind == "name":
@@ -229,7 +229,7 @@ class Goals:
         return lambda names, extremes, smooth: operated(node.word, [part(names, extremes, smooth) for part in parts])
 
     def _signs(self, node: Node, sign: int | None) -> Sequence[int | None]:
-        """Return how goals grow with the parts of an operation, as far as that is known whatever their values are."""
+        """Return how goals grow with the parts of an operation, where that holds for all values."""
         if sign is None:
             return [None] * len(node.parts)
         match node.word:
@@ -282,7 +282,7 @@ class Goals:
         return lambda *known: known[2][index]
 
     def _smooth_block(self, measure: Quantity, count: int) -> range:
-        """Take up measures that come together, and return their numbers."""
+        """Add measures that are evaluated together, and return their indices."""
         self._smooth.append(measure)
         self._smooth_count += count
         return range(self._smooth_count - count, self._smooth_count)
@@ -318,7 +318,7 @@ class Goals:
         return lambda *known: known[1][index]
 
     def _path(self, node: Node, sign: int | None) -> Numbers:
-        """Return the error of a path: the root of the mean square distance of points from it, or the largest."""
+        """Return the error of a path: the root mean square distance of points from it, or the largest distance."""
         deviation, _ = self._gaps(node)
 
         def squares(names: Mapping[str, Any]) -> Any:
@@ -329,7 +329,7 @@ class Goals:
         return self._added_extreme(lambda names, _: safe_root(squares(names)), (None, None), sign)
 
     def _gaps(self, node: Node) -> tuple[Quantity, int]:
-        """Return how far the points of a curve are from the path of a point, (component, point), and how many."""
+        """Return the distances of points of a curve from the path of a point, (component, point), and their count."""
         point, curve = (part.word for part in node.parts)
         output = self._original.outputs.get(point) if isinstance(point, str) else None
         labels = () if output is None else output.component_labels(self._original)
@@ -349,7 +349,7 @@ class Goals:
         if target.times is not None:
             for instant in (target.times.min(), target.times.max()):
                 self._arguments.instant(Node("number", float(instant)))
-            self._arguments.asked.extend(target.times.tolist())
+            self._arguments.instants.extend(target.times.tolist())
         names = [f"{point}_{label}" for label in labels]
         quantities = [self._series(Node("name", name), 0) for name in names]
 

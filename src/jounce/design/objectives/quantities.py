@@ -16,7 +16,7 @@ Quantity = Callable[[Mapping[str, Any]], Any]
 
 
 class Quantities:
-    """What names in expressions mean in a mechanism, and which of it was asked for.
+    """The meaning of names in expressions of a mechanism, and the quantities that they use.
 
     Parameters
     ----------
@@ -29,9 +29,9 @@ class Quantities:
     fixed : dict of str to float
         Parameters that are the same in all designs.
     known : dict of str to str
-        What kind of thing each name is.
+        Kind of each name.
     atoms : dict of str to (str, int or None, int)
-        Quantities that were asked for: the output, its component, and how often it is differentiated.
+        Quantities that are used: the output, its component, and how often it is differentiated.
     added : dict of str to AbstractQuantity
         Outputs that the mechanism does not have, by name.
     text : str
@@ -47,7 +47,7 @@ class Quantities:
         self.text = ""
 
     def _what_there_is(self) -> dict[str, str]:
-        """Return what names mean, by kind: a quantity, a parameter, a driver or a joint."""
+        """Return the kinds of names: a quantity, a parameter, a driver or a joint."""
         dimensions: dict[str, str] = {}
         for name, output in self.mechanism.outputs.items():
             labels = output.component_labels(self.mechanism)
@@ -58,7 +58,7 @@ class Quantities:
         return dimensions
 
     def check_meaning(self, name: str) -> None:
-        """Raise ExpressionError for a name that means several things: whichever was taken could be the wrong one."""
+        """Raise ExpressionError for a name with several meanings: a choice among them could be wrong."""
         stem, order = _derivative_name(name)
         meanings = ["the time"] * (name == "t") + ["a parameter"] * (name in self.mechanism.parameters)
         meanings += ["an output"] * (name in self.mechanism.outputs)
@@ -162,7 +162,7 @@ def _independent(mechanism: Mechanism, varied: set[str]) -> dict[str, float]:
 
 
 def _exerted_by(mechanism: Mechanism, name: str, kind: str, component: str) -> AbstractQuantity:
-    """Return the output for what a driver exerts along what it prescribes, or a joint on its second body."""
+    """Return the output for the force of a driver along its coordinate, or of a joint on its second body."""
     driver = mechanism.drivers.get(name)
     if driver is None or component:
         return JointForceOutput(name) if kind == "force" else JointTorqueOutput(name)
@@ -174,7 +174,7 @@ def _exerted_by(mechanism: Mechanism, name: str, kind: str, component: str) -> A
 
 @contextmanager
 def naming_errors(name: str, whole: bool = False) -> Iterator[None]:
-    """Give errors the place that they are about, before the one that they know, or as the whole of it."""
+    """Put a name before the location of errors, or in its place."""
     try:
         yield
     except JounceError as error:

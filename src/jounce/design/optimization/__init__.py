@@ -1,1 +1,1 @@
-"""The search for the design in which an objective is least."""
+"""The search for the design with the least objective."""

@@ -1,4 +1,4 @@
-"""Multipliers of what holds as an equality at a design, and how far it is from one that no other is better than."""
+"""Multipliers of the active constraints of a design, and the residual of its first-order conditions."""
 
 from typing import Any, NamedTuple
 
@@ -13,18 +13,18 @@ Vector = Float[np.ndarray, " _"]
 
 
 class Known(NamedTuple):
-    """What multipliers are asked of.
+    """Scales and indices that multipliers need.
 
     Attributes
     ----------
     bounded : array of int
-        Extremes that have a number of their own.
+        Extremes that have a variable of their own.
     equal : array of bool of shape (conditions,)
         Which conditions are equalities.
     sizes : array of shape (conditions,)
     extreme_sizes : array of shape (extremes,)
     owner : array of int of shape (rows,)
-        Of which extreme each row is.
+        The extreme that each row belongs to.
     clearance : float
         Bound of the smallest singular value.
     scale : float
@@ -41,7 +41,7 @@ class Known(NamedTuple):
 
 
 class Multipliers:
-    """Multipliers of what holds as an equality at a design, by least squares with the signs that they must have."""
+    """Multipliers of the active constraints of a design, by least squares with the signs that they must have."""
 
     def __init__(
         self, known: Known, here: Evaluation, numbers: Vector, slopes: list[Any], extremes: Vector, chosen: Any
@@ -85,7 +85,7 @@ class Multipliers:
         return rows
 
     def _rows(self, extra: int) -> list[tuple[Vector, str, int]]:
-        """Return the slopes of the values that are the largest, less those of the numbers in their places."""
+        """Return the slopes of the largest values, less those of the variables that replace them."""
         known, here = self.known, self.here
         rows = []
         for k, extreme in enumerate(known.bounded):

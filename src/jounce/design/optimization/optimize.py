@@ -1,4 +1,4 @@
-"""From a mechanism and a wish to the design that fulfills it best."""
+"""From a mechanism, an objective and conditions to the best design."""
 
 import dataclasses
 import math
@@ -14,7 +14,7 @@ from jounce.base.moved_names import old_keyword
 from jounce.base.shapes import ArrayLike, real_numbers, seconds
 from jounce.design.objectives.measures import PrescribedPath
 from jounce.design.optimization.result import OptimizedDesign
-from jounce.design.optimization.study import Asked, Study
+from jounce.design.optimization.study import DesignRequest, Study
 from jounce.errors import DesignError, JounceError, MechanismError, check_name, whole_number
 from jounce.kinematics import assemblies as all_assemblies
 from jounce.mechanism import Mechanism, build, check_mechanism, time_grid, with_output_drivers
@@ -40,47 +40,48 @@ def optimize(
     iterations: int = 100,
     progress: Callable[[int, int, float], None] | None = None,
 ) -> OptimizedDesign:
-    """Return the design of a mechanism in which something is least, and conditions hold.
+    """Return the design of a mechanism with the least objective for which all conditions hold.
 
-    What is asked for are expressions of measures: ``peak(psi, 4)`` is the largest magnitude of jounce of the output
-    ``psi``; ``maximum``, ``minimum``, ``span``, ``mean`` and ``rms`` take the same arguments, a quantity, a derivative
-    (0 unless given) and two instants between which it counts; ``at(psi, 1, 0.5)`` is a rate at 0.5 s. Quantities are
-    outputs, components ``C_x``, derivatives ``psi_d2``, ``torque(DRIVER)``, ``force(DRIVER)``, ``force_x(JOINT)``,
+    Objective and conditions are expressions of measures: ``peak(psi, 4)`` is the largest magnitude of jounce of the
+    output ``psi``; ``maximum``, ``minimum``, ``span``, ``mean`` and ``rms`` take the same arguments, a quantity, a
+    derivative (0 unless given) and two instants, the window of time; ``at(psi, 1, 0.5)`` is a rate at 0.5 s. Quantities
+    are outputs, components ``C_x``, derivatives ``psi_d2``, ``torque(DRIVER)``, ``force(DRIVER)``, ``force_x(JOINT)``,
     parameters, ``t``, and expressions of these. ``path_error(C, NAME)`` is the root of the mean square distance of
     points from the path of an output, ``path_deviation(C, NAME)`` the largest. Peaks are those between instants, too.
 
     The designs of a low-discrepancy sample are solved side by side; from the best of them and from the mechanism as it
-    is, SciPy's SLSQP searches with exact slopes. In the place of an extreme that goals grow with it has a number that
-    no value may exceed, so that nothing jumps where the instant of the largest does.
+    is, SciPy's SLSQP searches with exact slopes. It replaces an extreme that goals grow with by a variable that no
+    value may exceed, so that the objective stays smooth where the instant of the extreme jumps.
 
     Parameters
     ----------
     mechanism : Mechanism
         As for `jounce.solve`; constraints must not be redundant.
     minimize : str
-        What is to be least; what is to be largest has a minus before it, as ``"-span(psi)"``.
+        The objective to minimize; to maximize, put a minus before it, as ``"-span(psi)"``.
     vary : dict of str to (low, high)
-        Bounds of the parameters that may be changed, SI or text with a unit; ``"12cm:16cm"`` holds both.
+        Bounds of the parameters that may be changed, SI or text with a unit; ``"12cm:16cm"`` gives both.
     subject_to : sequence of str, optional
         Conditions by ``<=``, ``>=`` and ``==``, such as ``"span(psi) == 60 deg"``; a number may have a unit.
     time : array_like of shape (time,), optional
-        Instants, s, held in all designs; those of the mechanism unless given.
+        Instants, s, the same in all designs; those of the mechanism unless given.
     curves : dict of str to array_like, optional
         Points for paths, (points, components), m; or pairs of times (points,), s, and points.
     assemblies : sequence of int, or "all", optional
-        Which ways of putting the mechanism together are tried, as `jounce.assemblies` counts those of the mechanism
-        as it is; that of the mechanism unless given.
+        Numbers of the assemblies to try, as `jounce.assemblies` counts those of the mechanism as it is; only that of
+        the mechanism unless given.
     starts : int, default 8
-        Searches, one of them from the mechanism as it is.
+        Number of searches, one of them from the mechanism as it is.
     samples : int, optional
-        Designs that starts are chosen from, rounded up to a power of two; 64, or 16 for each parameter, unless given.
+        Number of designs from which starts are chosen, rounded up to a power of two; 64, or 16 for each parameter,
+        unless given.
     seed : int, default 0
-        Of the sample.
+        Seed of the sample.
     clearance : float, default 1e-2
         Smallest singular value of the scaled Jacobian that a design may have at any instant; it vanishes where one
         locks. Zero lifts the bound.
     iterations : int, default 100
-        Of one search between two changes of its region, at most.
+        Largest number of iterations of a search between two changes of its region.
     progress : callable, optional
         Called with the number of searches done, their total, and the least objective so far.
 
@@ -95,8 +96,8 @@ def optimize(
         If a name does not exist, bounds are not two increasing numbers, a parameter cannot have one of them, an
         expression cannot be read, or instants would differ from design to design.
     DesignError
-        If no design can be put together and moved, or conditions cannot be met: it says which, and by how much; it
-        holds the design that is nearest to meeting them.
+        If no design can be put together and moved, or conditions cannot be met: the message names them with their
+        violations, and the error has the design that is nearest to meeting them.
 
     References
     ----------
@@ -121,12 +122,12 @@ def optimize(
     targets = {name: _curve(name, given) for name, given in (curves or {}).items()}
     if isinstance(subject_to, str):
         raise MechanismError("must be a list of conditions", name="subject_to", value=subject_to)
-    asked = Asked(minimize, tuple(subject_to), bounds, targets, instants)
+    request = DesignRequest(minimize, tuple(subject_to), bounds, targets, instants)
     best, first_error = None, None
     chosen = _assemblies(mechanism, assemblies)
     with Count("optimizing", report=progress) as tell:
         for number, variant in chosen:
-            study = Study(variant, asked, clearance, iterations, seed, tell)
+            study = Study(variant, request, clearance, iterations, seed, tell)
             try:
                 best_result = study.best(starts, samples)
             except DesignError as error:
@@ -168,7 +169,7 @@ def _bounds(mechanism: Mechanism, vary: Mapping[str, Any]) -> dict[str, tuple[fl
 
 
 def _bound(mechanism: Mechanism, name: str, given: Any) -> float:
-    """Return a bound of a parameter, which a mechanism must be able to have."""
+    """Return a bound of a parameter, a value that the mechanism must be able to have."""
     try:
         changed = mechanism.with_parameters(**{name: given})
         value = float(changed.parameter_values[name])
@@ -197,7 +198,7 @@ def _instants(
 
 
 def _curve(name: str, given: Any) -> PrescribedPath:
-    """Return points, and their times where they have some."""
+    """Return a prescribed path: points, with times if they are given."""
     timed = isinstance(given, tuple) and len(given) == 2 and np.ndim(given[0]) == 1 and np.ndim(given[1]) == 2
     location, expected = f"curves.{name}", "points, (points, components), or a pair of times and points, all finite"
     times = seconds(location, given[0], MechanismError, expected) if timed else None

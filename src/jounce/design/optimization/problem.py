@@ -1,4 +1,4 @@
-"""A design problem in numbers: goals and their slopes at a design, by one solve; what locks is told, not guessed at."""
+"""A design problem in numbers: goals and their slopes from one solution of a design; one that locks is an error."""
 
 import dataclasses
 from collections.abc import Mapping
@@ -19,11 +19,11 @@ from jounce.kinematics import Status, solve
 from jounce.mechanism import Mechanism
 from jounce.mechanism.system import System
 
-ON_BOUND = 1e-12  # of the way between bounds: what is so near to one is on it
+ON_BOUND = 1e-12  # of the distance between bounds: a point so near to a bound is on it
 LOCKS = (AssemblyError, MobilityError, SolveError)
 
 
-class Locked(Exception):  # noqa: N818 - no error of a user's
+class Locked(Exception):  # noqa: N818 - not an error of the user
     """A design cannot be put together, or locks."""
 
     def __init__(self, point: Float[np.ndarray, " parameter"], error: Exception):
@@ -33,16 +33,16 @@ class Locked(Exception):  # noqa: N818 - no error of a user's
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Evaluation:
-    """A design, and how all that goals depend on changes with its parameters.
+    """The measures of a design, with their slopes by its parameters.
 
     Attributes
     ----------
     point : array of shape (parameters,)
         From 0 to 1 between the bounds.
     rows, smooth : array
-        As `Goals.measured` gives them, all rows in one array.
+        The measures of `Goals.measured`, all rows in one array.
     row_slopes, smooth_slopes : array of shape (rows, parameters), (measures, parameters)
-        By the place.
+        Slopes by the point.
     margins : array of shape (time,)
         Squares of the smallest singular values of the scaled Jacobian.
     margin_slopes : array of shape (time, parameters)
@@ -58,22 +58,22 @@ class Evaluation:
 
 
 class Problem:
-    """Goals as functions of the place of a design between its bounds.
+    """Goals as functions of the point of a design between its bounds.
 
     Parameters
     ----------
     goals : Goals
     bounds : dict of str to (low, high)
-        Of the parameters that are varied, SI.
+        Bounds of the parameters that vary, SI.
 
     Attributes
     ----------
     names : tuple of str
     low, high, width : array of shape (parameters,)
     owner : array of int of shape (rows,)
-        Of which extreme each row is; of the last evaluation.
+        The extreme that each row of the last evaluation belongs to.
     evaluations : int
-        How many designs were solved.
+        Number of designs solved.
     """
 
     def __init__(self, goals: Goals, bounds: Mapping[str, tuple[float, float]]):
@@ -87,15 +87,15 @@ class Problem:
         self._compile()
 
     def _compile(self) -> None:
-        """Compile what follows from a motion, for the grid of the goals."""
+        """Compile the measures of a motion and the goals, for the grid of the goals."""
         self._cached.clear()
-        # as functions of their own: JAX takes a method for the same as before, whatever its object holds by now
+        # as new functions: JAX takes a method for the same function, even where the values of its object have changed
         self._measured = jax.jit(lambda *known: self._with_slopes(*known))
         self._numbers = jax.jit(lambda *known: self._goals_with_slopes(*known))
         self._each = jax.jit(jax.vmap(self._one_design))
 
     def set_instants(self, instants: Float[np.ndarray, " time"]) -> None:
-        """Take another grid."""
+        """Change the grid."""
         self.goals.set_instants(instants)
         self._compile()
 
@@ -170,14 +170,14 @@ class Problem:
         )
 
     def _row_scale(self, matrix: Any) -> Float[np.ndarray, " row"]:
-        """Return what makes the largest entry of each row one, in the first design: the same for all, or slopes err."""
+        """Return factors that make the largest entry of each row one in the first design; fixed, as slopes assume."""
         if self._scale is None:
             sizes = np.abs(np.asarray(matrix)).max(axis=(1, 2), initial=0.0)
             self._scale = 1.0 / np.where(sizes > 0, sizes, 1.0)
         return self._scale
 
     def extremes(self, evaluation: Evaluation) -> tuple[Float[np.ndarray, " extreme"], Int[np.ndarray, " extreme"]]:
-        """Return the extremes of a design, and which of its rows each of them is."""
+        """Return the extremes of a design, and the index of its row for each."""
         count = len(self.goals.bounded)
         values, chosen = np.zeros(count), np.zeros(count, int)
         for k in range(count):
@@ -193,11 +193,11 @@ class Problem:
         by_parameter, *others = (np.asarray(x) for x in slopes)
         return np.asarray(goals), [by_parameter * self.width, *others]
 
-    def asked(self, point: Any, evaluation: Evaluation) -> tuple[float, np.ndarray, list[tuple[float, float]]]:
-        """Return the objective as it was asked for, the conditions as numbers, and both sides of each condition."""
+    def stated(self, point: Any, evaluation: Evaluation) -> tuple[float, np.ndarray, list[tuple[float, float]]]:
+        """Return the objective as the user states it, the conditions as numbers, and both sides of each condition."""
         values, smooth = self.values(point), jnp.asarray(evaluation.smooth)
         extremes = jnp.asarray(self.extremes(evaluation)[0])
-        numbers = np.asarray(self.goals.numbers(values, extremes, smooth, as_asked=True))
+        numbers = np.asarray(self.goals.numbers(values, extremes, smooth, as_stated=True))
         return float(numbers[0]), numbers[1:], self.goals.sides(values, extremes, smooth)
 
     def sampled(self, rows: Any, outputs: Mapping[str, Any]) -> Float[np.ndarray, "design goal"]:
@@ -232,7 +232,7 @@ def _along(width: Float[np.ndarray, " parameter"], like: Any) -> Any:
 
 
 def _bare(system: System) -> System:
-    """Return a system without what no Jacobian needs."""
+    """Return a system without forces and outputs, which a Jacobian does not need."""
     return with_fields(system, forces=(), outputs=())
 
 

@@ -1,4 +1,4 @@
-"""What an optimization found: the design, what became of it, and how sure that is."""
+"""The result of an optimization: the design, comparisons with the first one, and checks."""
 
 import dataclasses
 from collections.abc import Mapping
@@ -19,13 +19,13 @@ class Comparison:
     kind : str
         ``"objective"``, ``"condition"`` or ``"parameter"``.
     name : str
-        What was asked for, or the name of a parameter.
+        The text of the objective or condition, or the name of a parameter.
     before, after : float
         SI; of a condition, the side that is a measure; NaN where the first design locks.
     low, high : float or None
-        What it must not be below and above; both the same for what it must be.
+        Lower and upper bound; the same for an equality.
     multiplier : float
-        How much the objective changes with what bounds it, by one unit; zero where nothing does.
+        Change of the objective by one unit of the bound; zero where no bound is active.
     """
 
     kind: str
@@ -49,30 +49,30 @@ class OptimizedDesign(Displayed):
     Attributes
     ----------
     mechanism : Mechanism
-        With the parameters found; it is what was given otherwise.
+        The given mechanism with the parameters found.
     parameters : dict of str to float
-        Those that were varied, SI.
+        The parameters that were varied, SI.
     objective : float
-        What was to be least, of this design, refined between instants, SI.
+        The objective of this design, refined between instants, SI.
     status : str
         ``"optimal"``: no design nearby is better, to the first order, and all conditions hold; ``"feasible"``: all
         conditions hold, and the search ended before no better one was near; ``"infeasible"``: conditions do not hold.
     message : str
-        In words.
+        The status in words.
     comparisons : tuple of Comparison
         Objective, conditions and parameters, before and after.
     smallest_singular_value : float
-        Of the scaled Jacobian along the motion; a design locks where it vanishes.
+        Smallest singular value of the scaled Jacobian along the motion; a design locks where it vanishes.
     residual : float
-        Of the first-order conditions, relative to the slope of the objective.
+        Residual of the first-order conditions, relative to the slope of the objective.
     grid_error : float
-        By how much objective and conditions differ on a grid four times as fine, relative.
+        Difference of objective and conditions on a grid four times as fine, relative.
     searches : tuple of float
         The objective that each search ended with; NaN where conditions did not hold.
     evaluations : int
-        How many designs were solved with their slopes.
+        Number of designs solved with their slopes.
     notes : tuple of str
-        What a designer should know besides, such as bounds that no design can be put together at.
+        Remarks for the designer, such as bounds at which no design can be put together.
     """
 
     mechanism: Mechanism
@@ -95,7 +95,7 @@ class OptimizedDesign(Displayed):
 
     @property
     def multipliers(self) -> dict[str, float]:
-        """How much the objective changes with what bounds it, by one unit: active conditions and bounds, by name."""
+        """Change of the objective by one unit of each active condition or bound, by name."""
         return {row.name: row.multiplier for row in self.comparisons if row.active}
 
     @cached_property
@@ -109,5 +109,5 @@ class OptimizedDesign(Displayed):
 
     @property
     def table(self) -> list[dict[str, Any]]:
-        """What became of objective, conditions and parameters, as rows for `pandas.DataFrame` or a printout."""
+        """Objective, conditions and parameters before and after, as rows for `pandas.DataFrame` or a printout."""
         return [dataclasses.asdict(row) for row in self.comparisons]

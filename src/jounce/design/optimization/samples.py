@@ -1,4 +1,4 @@
-"""Designs all over what bounds allow, solved side by side, to start searches from."""
+"""Samples of designs within bounds, solved side by side, as starts of searches."""
 
 import dataclasses
 import math
@@ -11,24 +11,24 @@ from jounce.design.optimization.problem import Problem
 from jounce.errors import MechanismError, whole_number
 from jounce.kinematics import Status, solve_batch
 
-FEWER = 3  # derivatives that samples need not have
-PENALTY = 10.0  # of a broken condition against the objective, each by its usual size
-MIN_DISTANCE = 0.05  # of the diagonal between bounds, that starts are apart
+FEWER = 3  # derivatives that samples do not need
+PENALTY = 10.0  # of a broken condition against the objective, each over its usual size
+MIN_DISTANCE = 0.05  # of starts from each other, over the diagonal between bounds
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Samples:
-    """Places of designs, which of them move, and how good they are.
+    """Points of designs, which of them move, and their merits.
 
     Attributes
     ----------
     names : tuple of str
-        Of the parameters.
+        Names of the parameters.
     points : array of shape (designs, parameters)
         From 0 to 1 between the bounds.
     moving : array of bool of shape (designs,)
     merits : array of shape (designs,)
-        The less the better; infinite for those that do not move.
+        Smaller is better; infinite for those that do not move.
     """
 
     names: tuple[str, ...]
@@ -38,11 +38,11 @@ class Samples:
 
     @property
     def count(self) -> int:
-        """How many there are."""
+        """Number of designs."""
         return len(self.points)
 
     def best(self, count: int) -> list[Float[np.ndarray, " parameter"]]:
-        """Return the best places that are apart from each other."""
+        """Return the best points that have a least distance from each other."""
         selected: list[np.ndarray] = []
         least = MIN_DISTANCE * math.sqrt(self.points.shape[1])
         for k in np.argsort(self.merits):
@@ -53,7 +53,7 @@ class Samples:
         return selected
 
     def notes(self, bounds: Mapping[str, tuple[float, float]]) -> list[str]:
-        """Return words on designs that cannot be put together or lock, and what those that move have in common."""
+        """Return words for designs that cannot be put together or lock, and the ranges of those that move."""
         stuck = self.count - int(self.moving.sum())
         if not stuck or not self.moving.any():
             return []
@@ -103,7 +103,7 @@ def _flat(values: Float[np.ndarray, "design time derivative *axes"]) -> Float[np
 
 
 def _merits(numbers: Float[np.ndarray, "design goal"], equal: Bool[np.ndarray, " condition"]) -> np.ndarray:
-    """Return by what designs are compared: the objective, and how far conditions are broken, each by its usual size."""
+    """Return the merits of designs: the objective plus broken conditions, each over its usual size."""
     objective, conditions = numbers[:, 0], numbers[:, 1:]
     broken = np.where(equal, np.abs(conditions), np.maximum(conditions, 0.0))
     sizes = np.median(np.abs(conditions), axis=0)

@@ -1,8 +1,8 @@
-"""One search from one start: sequential quadratic programming with exact slopes, in regions that no design locks in.
+"""One search from one start: sequential quadratic programming with exact slopes, in regions where no design locks.
 
 SciPy's SLSQP works on the parameters and on one number for each extreme that a goal grows with, which none of the
-values in the cells of time may exceed. A step that leads to a design that locks is not taken: the search goes on from
-the best design so far, in a smaller region, and is kept away from there by a barrier: the smallest singular value of
+values in the cells of time may exceed. A step that leads to a design that locks is not taken: the search continues from
+the best design so far, in a smaller region. A constraint keeps designs away from there: the smallest singular value of
 the Jacobian, which vanishes where a mechanism locks, stays above a bound at every instant.
 """
 
@@ -17,18 +17,18 @@ from jounce.design.optimization.multipliers import ACTIVE, Known, Multipliers, V
 from jounce.design.optimization.problem import Evaluation, Locked, Problem
 
 ACCURACY = 1e-13  # of SLSQP, relative
-EACH = 2  # designs evaluated for each iteration that is allowed, at most
-ROUNDS = 12  # regions that are tried, at most
+EACH = 2  # most designs evaluated for each permitted iteration
+ROUNDS = 12  # most regions
 SMALLEST_REGION = 1e-7  # of the width between bounds
-CONDITION_TOLERANCE = 1e-7  # by which a condition may be broken, relative to its size
-SMALL = 1e-6  # of the first objective, below which one counts as zero
+CONDITION_TOLERANCE = 1e-7  # permitted violation of a condition, relative to its size
+SMALL = 1e-6  # of the first objective: a smaller one counts as zero
 FITTED = 1e-6  # of the residual of the first-order conditions after least squares
-LOCKED = 1e3  # what SLSQP is told of a design that locks, relative: its line search then goes back
+LOCKED = 1e3  # value that SLSQP gets for a design that locks, relative: its line search then goes back
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class SearchResult:
-    """Where a search ended.
+    """The end of a search.
 
     Attributes
     ----------
@@ -36,13 +36,13 @@ class SearchResult:
         From 0 to 1 between the bounds.
     evaluation : Evaluation
     objective : float
-        As an optimizer has it.
+        The objective of the optimizer, which may be the square of the stated one.
     broken : array of shape (conditions,)
-        By how much each condition is broken, relative to its size.
+        Violation of each condition, relative to its size.
     near_singular : float
         How far the smallest singular value is below its bound, relative.
     residual : float
-        Of the conditions of Karush, Kuhn and Tucker, relative to the slope of the objective.
+        Residual of the conditions of Karush, Kuhn and Tucker, relative to the slope of the objective.
     multipliers : array of shape (conditions,)
         Slope of the objective by each condition.
     bound_multipliers : array of shape (parameters,)
@@ -70,8 +70,8 @@ class SearchResult:
         )
 
 
-class _Enough(Exception):  # noqa: N818 - no error of a user's
-    """A run has evaluated as many designs as it may."""
+class _Enough(Exception):  # noqa: N818 - not an error of the user
+    """A run has evaluated its largest number of designs."""
 
 
 class Search:
@@ -83,7 +83,7 @@ class Search:
     clearance : float
         Bound of the smallest singular value.
     iterations : int
-        Of SLSQP in one region, at most.
+        Largest number of iterations of SLSQP in one region.
     watch : callable, optional
         Called at every design that is evaluated, with its objective and the worst broken condition.
     """
@@ -99,7 +99,7 @@ class Search:
         self.bounded = np.flatnonzero(problem.goals.bounded)
         self.equal = np.array([c.relation.equal for c in problem.goals.conditions], bool)
         self.sizes = np.ones(len(self.equal))
-        self.scale = self.asked_scale = 1.0
+        self.scale = self.stated_scale = 1.0
 
     def from_point(self, point: Vector, *, elastic: bool = False) -> SearchResult:
         """Search from a point that does not lock.
@@ -107,7 +107,7 @@ class Search:
         Parameters
         ----------
         elastic : bool, default False
-            Make the worst broken condition least, instead of the objective.
+            Minimize the worst broken condition, instead of the objective.
         """
         here = self.problem.evaluate(point)
         self._set_scales(here)
@@ -129,13 +129,13 @@ class Search:
             elif inside or (not better and moved < ACTIVE):
                 if elastic or radius <= SMALLEST_REGION or self.result_at(best).residual <= FITTED:
                     break
-                radius /= 4  # no optimum: from here on in shorter steps, which lock less
+                radius /= 4  # no optimum: shorter steps lock less
             else:
                 radius *= 4
         return self.result_at(best)
 
     def _fitted(self, point: Vector) -> Vector:
-        """Return a better point by least squares, which knows more of distances from points than their sum."""
+        """Return a better point by least squares, which uses each distance from a point, not only their sum."""
         from scipy.optimize import least_squares  # here, to start quickly
 
         chosen = np.array(self.problem.goals.gaps)
@@ -146,7 +146,7 @@ class Search:
             except Locked:
                 return np.full(len(chosen), LOCKED * np.sqrt(self.scale))
             if self.watch is not None:
-                self.watch(self.problem.asked(point, here)[0], 0.0)
+                self.watch(self.problem.stated(point, here)[0], 0.0)
             return here.smooth[chosen]
 
         def slopes(point: Vector) -> Float[np.ndarray, "gap parameter"]:
@@ -159,7 +159,7 @@ class Search:
         return min((point, fit.x, near), key=self._fitness)
 
     def _fitness(self, point: Vector) -> tuple[float, float]:
-        """Return by what points are compared: how near they are to a singular position, then the objective."""
+        """Return the key that compares points: how near they are to a singular position, then the objective."""
         try:
             here = self.problem.evaluate(point)
         except Locked:
@@ -169,7 +169,7 @@ class Search:
         return (worst if worst > CONDITION_TOLERANCE else 0.0), float(numbers[0])
 
     def result_at(self, point: Vector) -> SearchResult:
-        """Return what is known of a point: values, broken conditions, multipliers."""
+        """Return the result at a point: values, broken conditions, multipliers."""
         here = self.problem.evaluate(point)
         extremes, chosen = self.problem.extremes(here)
         numbers, slopes = self.problem.numbers(point, extremes, here.smooth)
@@ -181,19 +181,19 @@ class Search:
 
     def _known(self, objective: float) -> Known:
         goals, size = self.problem.goals, abs(objective)
-        if goals.objective is not goals.objective_value:  # a square, whose slope is as the root
+        if goals.objective is not goals.objective_value:  # a square, the slope of which is proportional to the root
             size = float(np.sqrt(size * self.scale))
         scales = self.clearance, max(size, SMALL * self.scale)
         return Known(self.bounded, self.equal, self.sizes, self.extreme_sizes, self.problem.owner, *scales)
 
     def broken(self, numbers: Vector, sizes: Vector | None = None) -> Vector:
-        """Return by how much conditions are broken, relative to their sizes, those of the start unless given."""
+        """Return the violations of conditions, relative to their sizes, those of the start unless given."""
         excess = np.where(self.equal, np.abs(numbers), np.maximum(numbers, 0.0))
         return excess / (self.sizes if sizes is None else sizes)
 
     def _sizes_at(self, here: Evaluation) -> Vector:
-        """Return the sizes of conditions at a design; where one side is zero, those of the start tell of them."""
-        pairs = np.abs(np.array(self.problem.asked(here.point, here)[2])).reshape(-1, 2)
+        """Return the sizes of conditions at a design; where one side is zero, those at the start."""
+        pairs = np.abs(np.array(self.problem.stated(here.point, here)[2])).reshape(-1, 2)
         return np.where((pairs > 0).all(axis=1), np.minimum(pairs.max(axis=1, initial=0.0), self.sizes), self.sizes)
 
     def near_singular(self, here: Evaluation) -> float:
@@ -203,10 +203,10 @@ class Search:
 
     def _set_scales(self, here: Evaluation) -> None:
         extremes, _ = self.problem.extremes(here)
-        objective, _, sides = self.problem.asked(here.point, here)
+        objective, _, sides = self.problem.stated(here.point, here)
         numbers, _ = self.problem.numbers(here.point, extremes, here.smooth)
         self.scale = abs(float(numbers[0])) or abs(objective) or 1.0
-        self.asked_scale = abs(objective) or self.scale
+        self.stated_scale = abs(objective) or self.scale
         self.sizes = np.array([max(map(abs, pair)) or 1.0 for pair in sides])
         self.extreme_sizes = np.array([_size(here.rows[self.problem.owner == k]) for k in range(len(extremes))])
 
@@ -216,7 +216,7 @@ def _size(rows: Vector) -> float:
 
 
 class _Run:
-    """SLSQP in one region: variables are the place, and one number for each extreme that has a bound of its own."""
+    """SLSQP in one region: variables are the point, and one number for each extreme that has a bound of its own."""
 
     def __init__(self, search: Search, start: Vector, radius: float, *, elastic: bool):
         self.search, self.problem, self.start, self.radius, self.elastic = (
@@ -274,12 +274,12 @@ class _Run:
         return float(numbers[0]) / self.search.scale, worst
 
     def merit_of(self, point: Vector) -> tuple[float, float]:
-        """Return by what designs are compared: how far conditions are broken, then the objective."""
+        """Return the key that compares designs: the worst broken condition, then the objective."""
         objective, worst = self.merit_parts(self.problem.evaluate(point))
         return (worst, 0.0) if self.elastic else (worst if worst > CONDITION_TOLERANCE / 2 else 0.0, objective)
 
     def _locks(self, variables: Vector) -> bool:
-        """Tell whether a design locks, of which no slopes are there."""
+        """Return whether a design locks, so that it has no slopes."""
         try:
             self._split(variables)
         except Locked:
@@ -297,16 +297,16 @@ class _Run:
             if merit < self._best_merit:
                 self.best, self._best_merit = np.array(point), merit
             if self.search.watch is not None:
-                self.search.watch(self.problem.asked(here.point, here)[0], self.merit_parts(here)[1])
+                self.search.watch(self.problem.stated(here.point, here)[0], self.merit_parts(here)[1])
         return here
 
-    # what SLSQP asks
+    # functions for SLSQP
 
     def _extremes(self, here: Evaluation) -> Vector:
         return self.problem.extremes(here)[0]
 
     def _split(self, variables: Vector) -> tuple[Evaluation, Vector]:
-        """Return the design, and the extremes: those with a number of their own have that."""
+        """Return the design, and the extremes, in which the variables of SLSQP replace those that they stand for."""
         here = self._seen(np.clip(variables[: self.count], self.low, self.high))
         extremes = self._extremes(here)
         own = variables[self.count : self.count + len(self.extremes)]
@@ -335,7 +335,7 @@ class _Run:
         return self._goals(variables)[1][0] / self.search.scale
 
     def _inequalities(self, variables: Vector) -> tuple[Vector, Float[np.ndarray, "row variable"]]:
-        """Return what must not be negative: conditions, own numbers of extremes over rows, singular values."""
+        """Return the rows that must not be negative: conditions, variables of extremes less rows, singular values."""
         search, here = self.search, self._split(variables)[0]
         numbers, slopes = self._goals(variables)
         scaled, scaled_slopes = numbers[1:] / search.sizes, slopes[1:] / search.sizes[:, None]

@@ -21,8 +21,8 @@ from jounce.kinematics import Motion, Status, assemblies as all_assemblies, solv
 from jounce.mechanism import Mechanism
 from jounce.mechanism.laws.output_drivers import with_outputs
 
-GRID = 121  # instants that a search works with at first, at most
-FINER = 4  # times as many, on which its end is looked at
+GRID = 121  # most instants of a search at first
+FINER = 4  # times as many instants, on which its end is checked
 AGREED = 1e-6  # of objective and conditions on both grids, relative
 REFINEMENTS = 3
 OPTIMAL = 1e-5  # of the residual of the first-order conditions
@@ -30,8 +30,8 @@ SAME_POSITION = 1e-6  # of the spread of the bodies, or rad
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class Asked:
-    """What was asked for."""
+class DesignRequest:
+    """The objective, the conditions, the bounds, the curves and the instants of an optimization."""
 
     minimize: str
     subject_to: tuple[str, ...]
@@ -46,18 +46,18 @@ class Study:
     def __init__(
         self,
         mechanism: Mechanism,
-        asked: Asked,
+        request: DesignRequest,
         clearance: float,
         iterations: int,
         seed: int,
         progress: Callable[[int, int, float], None] | None,
     ):
-        self.mechanism, self.asked, self.seed, self.progress = mechanism, asked, seed, progress
-        self.all_instants = asked.instants
-        arguments = asked.minimize, asked.subject_to, tuple(asked.bounds), asked.curves
-        knots = law_knots(mechanism, asked.bounds, float(asked.instants[0]), float(asked.instants[-1]))
-        self.goals = Goals(mechanism, *arguments, _thinned(asked.instants, GRID), knots)
-        self.problem = Problem(self.goals, asked.bounds)
+        self.mechanism, self.request, self.seed, self.progress = mechanism, request, seed, progress
+        self.all_instants = request.instants
+        arguments = request.minimize, request.subject_to, tuple(request.bounds), request.curves
+        knots = law_knots(mechanism, request.bounds, float(request.instants[0]), float(request.instants[-1]))
+        self.goals = Goals(mechanism, *arguments, _thinned(request.instants, GRID), knots)
+        self.problem = Problem(self.goals, request.bounds)
         self.search = Search(self.problem, clearance, iterations, self._watch)
         self.done, self.total, self.least = 0, 1, math.inf
         self.size = math.inf  # of the objective, as searches begin with it
@@ -65,7 +65,7 @@ class Study:
         self.searches: list[float] = []
 
     def _watch(self, objective: float, broken: float) -> None:
-        """Tell of a design that was evaluated, with the objective as it was asked for."""
+        """Report an evaluated design by the objective as the user states it and its worst broken condition."""
         if broken <= CONDITION_TOLERANCE:
             self.least = min(self.least, objective)
         if self.progress is not None:
@@ -93,7 +93,7 @@ class Study:
             points, lock = [], error
         if starts > 1 or not points:
             taken = sampled(self.problem, samples, self.seed)
-            self.notes += taken.notes(self.asked.bounds)
+            self.notes += taken.notes(self.request.bounds)
             points += taken.best(starts - len(points))
             if not points:
                 raise _nothing_moves(lock, taken)
@@ -113,10 +113,10 @@ class Study:
         for point in points:
             try:
                 end = self.search.from_point(point)
-            except Locked:  # a sample that moves may be one of another assembly when it is solved alone
+            except Locked:  # a sample that moves may be in another assembly when it is solved individually
                 continue
-            self.size = min(self.size, self.search.asked_scale)
-            objective = self.problem.asked(end.point, end.evaluation)[0]
+            self.size = min(self.size, self.search.stated_scale)
+            objective = self.problem.stated(end.point, end.evaluation)[0]
             self.searches.append(objective if end.feasible else math.nan)
             self.done += 1
             if self.progress is not None:
@@ -124,12 +124,12 @@ class Study:
             yield end
 
     def _made_feasible(self, ends: Sequence[SearchResult]) -> list[SearchResult]:
-        """Return designs that meet the conditions, found by meeting them first.
+        """Return designs that meet the conditions, from searches that minimize the worst broken condition first.
 
         Raises
         ------
         DesignError
-            If none is found: the worst condition is as little broken as it can be.
+            If there is none; the error has the design that breaks the worst condition least.
         """
         nearest = sorted(ends, key=lambda end: max(float(end.broken.max(initial=0.0)), end.near_singular))[:3]
         met = [self.search.from_point(end.point, elastic=True) for end in nearest]
@@ -142,8 +142,8 @@ class Study:
         raise DesignError(f"no design within the bounds was found that {self._unmet(least)}", design=design)
 
     def _unmet(self, least: SearchResult) -> str:
-        """Word which conditions the design breaks that breaks the worst of them least."""
-        _, numbers, sides = self.problem.asked(least.point, least.evaluation)
+        """Return words for the conditions that the nearest design breaks."""
+        _, numbers, sides = self.problem.stated(least.point, least.evaluation)
         words = []
         for condition, number, broken, (left, right) in zip(
             self.goals.conditions, numbers, least.broken, sides, strict=True
@@ -159,7 +159,7 @@ class Study:
         return f"{'; and none that '.join(words)} (SI, at {where}); widen the bounds or ease the conditions"
 
     def _refined(self, result: SearchResult) -> SearchResult:
-        """Search on, on finer grids, until what is found does not depend on the grid."""
+        """Continue the search on finer grids until its result does not depend on the grid."""
         for _ in range(REFINEMENTS):
             if self.grid_error(result) <= AGREED:
                 break
@@ -169,13 +169,13 @@ class Study:
 
     def grid_error(self, result: SearchResult) -> float:
         """Return by how much objective and conditions differ on a finer grid, relative; infinite if that one locks."""
-        coarse, numbers, _ = self.problem.asked(result.point, result.evaluation)
+        coarse, numbers, _ = self.problem.stated(result.point, result.evaluation)
         values = self.problem.values(result.point)
         try:
             objective, fine, _ = self._on(_split(self.goals.instants, FINER), self.goals.mechanism, values)
         except LOCKS:
             return math.inf
-        scale = abs(coarse) if abs(coarse) > SMALL * self.size else self.size  # what is zero has no size of its own
+        scale = abs(coarse) if abs(coarse) > SMALL * self.size else self.size  # zero has no size of its own
         errors = [abs(objective - coarse) / scale, *(np.abs(fine - numbers) / self.search.sizes)]
         return float(max(errors))
 
@@ -198,22 +198,22 @@ class Study:
             outputs = {name: np.asarray(x) for name, x in motion.outputs.items()}
             rows, smooth = jax.jit(lambda *known: goals.measured(*known))(values, outputs)
             extremes = np.array([float(np.max(x)) for x in rows])
-            numbers = np.asarray(goals.numbers(values, extremes, np.asarray(smooth), as_asked=True))
+            numbers = np.asarray(goals.numbers(values, extremes, np.asarray(smooth), as_stated=True))
             return float(numbers[0]), numbers[1:], goals.sides(values, extremes, np.asarray(smooth))
         finally:
             goals.set_instants(previous)
 
     def _note_bounds(self) -> None:
-        """Note what was given outside the bounds."""
+        """Note the parameters that the mechanism has outside their bounds."""
         values = self.mechanism.parameter_values
-        for name, (low, high) in self.asked.bounds.items():
+        for name, (low, high) in self.request.bounds.items():
             if not low <= values[name] <= high:
                 self.notes.append(f"{name} is {values[name]:.6g} in the mechanism, outside of its bounds")
 
     def result(
         self, original: Mechanism, end: SearchResult, *, assembly: int | None = None, infeasible: bool = False
     ) -> OptimizedDesign:
-        """Return what was found, compared with the mechanism as it is, on a finer grid."""
+        """Return the design of a search, compared with the mechanism as it is, on a finer grid."""
         fine = _split(self.goals.instants, FINER)
         error = self.grid_error(end)
         parameters = self.problem.values(end.point)
@@ -222,7 +222,7 @@ class Study:
         try:
             after = self._on(fine, self.goals.mechanism, parameters)
         except LOCKS:
-            after = self.problem.asked(end.point, end.evaluation)
+            after = self.problem.stated(end.point, end.evaluation)
         return OptimizedDesign(
             mechanism,
             parameters,
@@ -239,7 +239,7 @@ class Study:
         )
 
     def _judged(self, end: SearchResult, error: float, *, infeasible: bool) -> tuple[str, str]:
-        """Return the status of a design, and what it means."""
+        """Return the status of a design, and its meaning in words."""
         if infeasible or not end.feasible:
             return "infeasible", "conditions do not hold"
         if not error <= AGREED:
@@ -258,7 +258,7 @@ class Study:
     def _comparisons(
         self, original: Mechanism, end: SearchResult, after: tuple[float, np.ndarray, list[Any]]
     ) -> Iterator[Comparison]:
-        """Return objective, conditions and parameters, of the mechanism as it was given and of what was found."""
+        """Return objective, conditions and parameters, of the mechanism as it was given and of the design."""
         known = original.parameter_values  # also outside of the bounds
         given = {name: float(known[name]) for name in self.problem.names}
         as_given = with_outputs(original, self.goals.mechanism.outputs)  # put together as it is, not as this study does
@@ -269,7 +269,7 @@ class Study:
             before = math.nan, np.full(len(self.goals.conditions), math.nan), nothing
         root = end.objective and after[0] and self.goals.objective is not self.goals.objective_value
         factor = 0.5 / after[0] if root else 1.0  # of the slopes of a root, by those of its square
-        yield Comparison("objective", self.asked.minimize, before[0], after[0])
+        yield Comparison("objective", self.request.minimize, before[0], after[0])
         rows = zip(self.goals.conditions, before[2], after[2], end.multipliers, strict=True)
         for condition, first, last, multiplier in rows:
             relation = condition.relation
@@ -280,12 +280,12 @@ class Study:
             slope = float(multiplier * factor * (1.0 if fixed_left else -1.0))
             yield Comparison("condition", relation.text, first[measure], last[measure], low, high, slope)
         values = self.problem.values(end.point)
-        for k, (name, (low, high)) in enumerate(self.asked.bounds.items()):
+        for k, (name, (low, high)) in enumerate(self.request.bounds.items()):
             slope = float(end.bound_multipliers[k]) * factor / float(self.problem.width[k])
             yield Comparison("parameter", name, given[name], values[name], low, high, slope)
 
     def _assembled(self, mechanism: Mechanism, end: SearchResult, assembly: int | None) -> Mechanism:
-        """Return a mechanism that asks for the assembly that was optimized, by its number in the design found."""
+        """Return a mechanism that selects the optimized assembly, by its number in the design found."""
         if assembly is None:
             return mechanism
         first = self.goals.instants[:1]
@@ -306,7 +306,7 @@ def _nothing_moves(lock: Locked | None, taken: Samples) -> DesignError:
 
 
 def _configuration(motion: Motion) -> Float[np.ndarray, " entry"]:
-    """Return where all bodies of a motion are at first: positions by their spread, and attitudes without their turns.
+    """Return the first configuration of a motion: positions over their spread, and attitudes without whole turns.
 
     Bodies on fixed pivots have the same position in all assemblies.
     """
@@ -320,14 +320,14 @@ def _configuration(motion: Motion) -> Float[np.ndarray, " entry"]:
 
 
 def _thinned(instants: Float[np.ndarray, " given"], most: int) -> Float[np.ndarray, " time"]:
-    """Return at most so many of the instants, evenly taken, with both ends."""
+    """Return a number of the instants at most, evenly chosen, with both ends."""
     if len(instants) <= most:
         return instants
     return instants[np.unique(np.linspace(0, len(instants) - 1, most).round().astype(int))]
 
 
 def _split(instants: Float[np.ndarray, " given"], parts: int) -> Float[np.ndarray, " time"]:
-    """Return the instants, and others evenly between each two of them."""
+    """Return the instants, with further ones evenly between each two of them."""
     share = np.arange(parts) / parts
     between = instants[:-1, None] + np.diff(instants)[:, None] * share
     return np.concatenate([between.ravel(), instants[-1:]])

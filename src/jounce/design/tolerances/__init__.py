@@ -1,1 +1,1 @@
-"""The spread of outputs where parameters deviate."""
+"""The spread of outputs by deviations of parameters."""

@@ -1,4 +1,4 @@
-"""Designs by number: a grid of values, or a low-discrepancy sequence, made stretch by stretch when asked for."""
+"""Designs by number: a grid of values, or a low-discrepancy sequence, computed chunk by chunk on request."""
 
 import dataclasses
 import math
@@ -38,16 +38,16 @@ class Grid:
 
     @property
     def shape(self) -> tuple[int, ...]:
-        """How many values each parameter has."""
+        """Number of values of each parameter."""
         return tuple(len(values) for values in self._axes)
 
     @property
     def count(self) -> int:
-        """How many designs there are."""
+        """Number of designs."""
         return math.prod(int(getattr(variation, "count", 0) or 0) for variation in self.variations.values())
 
     def values(self, start: int, stop: int) -> dict[str, Float[np.ndarray, " design"]]:
-        """Return the parameters of a stretch of designs."""
+        """Return the parameters of a chunk of designs."""
         indices = np.unravel_index(np.arange(start, stop), self.shape)
         return {name: axis[index] for (name, axis, index) in zip(self.variations, self._axes, indices, strict=True)}
 
@@ -67,7 +67,7 @@ class Sobol:
     nominal : dict of str to float
         Values about which they are spread, SI.
     count : int
-        How many designs there are; powers of two are best.
+        Number of designs; powers of two are best.
     """
 
     variations: Mapping[str, Variation]
@@ -81,7 +81,7 @@ class Sobol:
             raise MechanismError(message, name="sample", value=self.count)
 
     def values(self, start: int, stop: int) -> dict[str, Float[np.ndarray, " design"]]:
-        """Return the parameters of a stretch of designs."""
+        """Return the parameters of a chunk of designs."""
         shares = sobol_shares(len(self.variations), start, stop).T
         return {
             name: variation.quantile(share, self.nominal.get(name, math.nan))
@@ -90,7 +90,7 @@ class Sobol:
 
 
 def sobol_shares(dimension: int, start: int, stop: int) -> Float[np.ndarray, "point {dimension}"]:
-    """Return a stretch of a scrambled Sobol sequence, every number above 0 and below 1.
+    """Return a chunk of a scrambled Sobol sequence, every number above 0 and below 1.
 
     Examples
     --------
@@ -104,12 +104,12 @@ def sobol_shares(dimension: int, start: int, stop: int) -> Float[np.ndarray, "po
     if start:
         sequence.fast_forward(start)
         return sequence.random(stop - start) + 2.0 ** -(BITS + 1)
-    whole = sequence.random(1 << max(stop - 1, 0).bit_length())  # other numbers of first points are warned of
+    whole = sequence.random(1 << max(stop - 1, 0).bit_length())  # SciPy warns for other numbers of first points
     return whole[:stop] + 2.0 ** -(BITS + 1)
 
 
 def sample_space(variations: Mapping[str, Variation], sample: Any, nominal: Mapping[str, float]) -> Grid | Sobol:
-    """Return the designs that are meant: a grid, or ``sobol:COUNT``.
+    """Return the designs that variations and a sample describe: a grid, or ``sobol:COUNT``.
 
     Raises
     ------

@@ -50,8 +50,8 @@ def tolerance(
 ) -> "xarray.Dataset":
     """Return how far outputs and their derivatives spread where parameters deviate independently of one another.
 
-    Twice: to first order, by exact gradients; and by a Monte Carlo method on a scrambled Sobol sequence with a fixed
-    seed, in which every design is solved, so that what is not linear shows.
+    It is computed twice: to first order, by exact gradients; and by a Monte Carlo method on a scrambled Sobol sequence
+    with a fixed seed, which solves every design and so includes nonlinear effects.
 
     Parameters
     ----------
@@ -59,20 +59,19 @@ def tolerance(
         The nominal design.
     vary : dict of str to object
         Parameters by name: ``"normal:0.1mm"`` (a standard deviation), ``"uniform:0.1mm"`` (a half-width), both about
-        the nominal value, or the ends of a range, ``"14.1cm:14.3cm"`` or (0.141, 0.143), in which all values are
-        equally likely.
+        the nominal value, or the ends of a range of equally likely values, ``"14.1cm:14.3cm"`` or (0.141, 0.143).
     time : array_like of shape (time,), optional
         Instants, s; those of the mechanism unless given.
     order : int, default 4
-        Highest derivative, unless `of` says.
+        Highest derivative, unless `of` is given.
     of : sequence of str, optional
-        What is looked at, by the names of columns: ``"psi"``, ``"psi_d3"``, ``"C_x_d2"``; all unless given.
+        Names of the columns to compute: ``"psi"``, ``"psi_d3"``, ``"C_x_d2"``; all unless given.
     samples : int, default 1024
         Designs that are solved; powers of two fill the ranges best. 0 leaves the Monte Carlo method out.
     linear : bool, default True
         Whether gradients are computed.
     indices : bool, default False
-        Whether Sobol's indices of the peaks are estimated by SALib, with ``samples * (parameters + 2)`` designs more.
+        Whether SALib estimates Sobol's indices of the peaks, from ``samples * (parameters + 2)`` further designs.
     progress : callable, optional
         Called with the number of designs done and their total.
 
@@ -83,9 +82,9 @@ def tolerance(
         design; NAME_linear_std, a standard deviation to first order; NAME_mean, NAME_std, NAME_low and NAME_high, the
         mean, the standard deviation, and the percentiles 2.5 and 97.5 of the samples. NAME_gradient (parameter, ...)
         has its derivatives by the parameters, NAME_share (parameter, ...) the part of the variance that each causes to
-        first order. NAME_peak, NAME_peak_mean, and so on tell of the largest magnitude at the instants; with indices
-        NAME_peak_first_order and NAME_peak_total_order (Saltelli 2010). ``solved`` (time) is how many samples were
-        solved: the others, which lock or cannot be put together, are left out of means.
+        first order. NAME_peak, NAME_peak_mean, and so on are for the largest magnitude at the instants; with indices
+        NAME_peak_first_order and NAME_peak_total_order (Saltelli 2010). ``solved`` (time) is the number of samples
+        solved: means leave out the others, which lock or cannot be put together.
 
     Raises
     ------
@@ -175,7 +174,7 @@ def check_salib(samples: int) -> None:
 
 
 class _Spread:
-    """What is known of the spread of the outputs of a mechanism about its nominal motion."""
+    """The spread of the outputs of a mechanism about its nominal motion."""
 
     def __init__(self, nominal: Motion, variations: Mapping[str, Variation], selected: tuple[str, ...]):
         self.nominal, self.mechanism = nominal, nominal.mechanism
@@ -221,8 +220,8 @@ class _Spread:
         numbers = count * sum(math.prod(shape) for shape in shapes)
         if numbers > MOST_NUMBERS:
             message = (
-                f"so many samples are {numbers:.3g} numbers in memory, at most {MOST_NUMBERS:.3g} are kept; ask for "
-                "fewer samples, instants or outputs, or sweep them (jn.sweep), which keeps peaks only"
+                f"so many samples need {numbers:.3g} numbers in memory, and the limit is {MOST_NUMBERS:.3g}; use "
+                "fewer samples, instants or outputs, or sweep them (jn.sweep), which stores peaks only"
             )
             raise MechanismError(message, name="samples", value=count)
         space = Sobol(self.variations, self.space, count)
@@ -243,7 +242,7 @@ class _Spread:
             self._add_statistics(f"{name}_peak", name, dims[1:], peaks[name][solved.all(axis=1)])
 
     def add_indices(self, count: int, progress: Progress | None) -> None:
-        """Estimate how much of the variance of the peaks each parameter causes, alone and with others."""
+        """Estimate the part of the variance of the peaks that each parameter causes, alone and with others."""
         from SALib.analyze import sobol as analyze
         from SALib.sample import sobol as sample
 
@@ -279,7 +278,7 @@ class _Spread:
                 self._put(f"{name}_peak_{kind}_order", ("parameter", *dims), x.reshape(shape), "", indices, name)
 
     def dataset(self) -> Any:
-        """Return all that was found, labeled."""
+        """Return all results, labeled."""
         import xarray
 
         whole = self.nominal.dataset
@@ -291,7 +290,7 @@ class _Spread:
         return xarray.Dataset(variables, coordinates, {"title": whole.attrs.get("title", ""), "source": "jounce"})
 
     def _solved_designs(self, values: Mapping[str, np.ndarray]) -> tuple[Any, Sides]:
-        """Return designs solved side by side, always as many, so that all is compiled once."""
+        """Return designs solved side by side, always the same number, so that programs are compiled once."""
         count = len(next(iter(values.values())))
         filled = {name: np.concatenate([x, np.repeat(x[-1:], TOGETHER - count)]) for name, x in values.items()}
         solved, sides = solve_with_sides(self.mechanism, filled, self.nominal.time, self.nominal.order)
@@ -300,7 +299,7 @@ class _Spread:
     def _peaks(
         self, name: str, values: Float[np.ndarray, "sample time derivative *axes"], sides: Sides
     ) -> Float[np.ndarray, "sample derivative *axes"]:
-        """Return the largest magnitudes of samples of an output, at the instants and beside the breaks of laws."""
+        """Return the largest magnitudes of samples of an output, at the instants and on both sides of breaks."""
         peaks = np.abs(values).max(axis=1)
         one_sided = sides.values.get(name)
         if one_sided is None or not one_sided.shape[1]:
@@ -324,7 +323,7 @@ class _Spread:
         return values
 
     def _add_statistics(self, name: str, of: str, dims: tuple[str, ...], values: np.ndarray) -> None:
-        """Keep the statistics of samples, those that are not known left out."""
+        """Store the statistics of samples, without those that were not solved."""
         import warnings
 
         with warnings.catch_warnings():
@@ -354,7 +353,7 @@ class _Spread:
 
 
 def _batches(count: int, progress: Progress | None) -> Iterator[tuple[int, int]]:
-    """Yield the bounds of designs that are solved together, and tell how many are done."""
+    """Yield the bounds of designs that are solved together, and report how many are done."""
     for start in range(0, count, TOGETHER):
         stop = min(start + TOGETHER, count)
         yield start, stop

@@ -1,4 +1,4 @@
-"""What varies in a design, and how: forms such as ``3cm:5cm:101``, ``12cm:16cm`` and ``normal:0.1mm``."""
+"""Variations of the parameters of a design: forms such as ``3cm:5cm:101``, ``12cm:16cm`` and ``normal:0.1mm``."""
 
 import dataclasses
 import math
@@ -28,7 +28,7 @@ class Interval:
     low, high : float
         SI.
     count : int, optional
-        How many values there are; without it any value is meant.
+        Number of values; unless given, any value between the bounds.
     """
 
     low: float
@@ -42,7 +42,7 @@ class Interval:
         return np.linspace(self.low, self.high, self.count)
 
     def quantile(self, share: Float[np.ndarray, "*batch"], nominal: float) -> Float[np.ndarray, "*batch"]:
-        """Return the values below which shares of all values are."""
+        """Return the quantiles of shares of all values."""
         del nominal
         return self.low + (self.high - self.low) * share
 
@@ -58,7 +58,7 @@ class Uniform:
     halfwidth: float
 
     def quantile(self, share: Float[np.ndarray, "*batch"], nominal: float) -> Float[np.ndarray, "*batch"]:
-        """Return the values below which shares of all values are."""
+        """Return the quantiles of shares of all values."""
         return nominal + self.halfwidth * (2 * share - 1)
 
     def deviation(self) -> float:
@@ -73,7 +73,7 @@ class Normal:
     sigma: float
 
     def quantile(self, share: Float[np.ndarray, "*batch"], nominal: float) -> Float[np.ndarray, "*batch"]:
-        """Return the values below which shares of all values are."""
+        """Return the quantiles of shares of all values."""
         from scipy.special import ndtri
 
         return nominal + self.sigma * ndtri(share)
@@ -107,9 +107,9 @@ def read_variations(given: Any, read: Reader, option: str = "vary") -> dict[str,
         For each parameter, by name: a text of one of the forms, a pair of bounds, bounds and a count, or a list or an
         array of values; numbers SI.
     read : callable
-        Reads one value of a parameter from a text, and refuses names that there are not.
+        Reads one value of a parameter from a text, and refuses unknown names.
     option : str
-        What they are given by, for messages.
+        Name of the option or argument that gives them, for messages.
 
     Raises
     ------
@@ -146,7 +146,7 @@ def named_forms(texts: Iterable[str]) -> dict[str, str]:
 
 
 def reader_of(mechanism: Mechanism) -> Reader:
-    """Return what reads values of the parameters of a mechanism, with the units that they may have.
+    """Return a reader of values of the parameters of a mechanism, with the units that they may have.
 
     Examples
     --------
@@ -235,7 +235,7 @@ def _interval(low: float, high: float, count: Any = None) -> Interval:
 
 
 def spreads(variations: Mapping[str, Variation]) -> dict[str, Normal | Uniform | Interval]:
-    """Return variations that say how likely values are.
+    """Return variations as probability distributions.
 
     Raises
     ------
