@@ -1,5 +1,6 @@
 """Promises that the project makes about itself: the two commands, the pins, the size of files, plain text."""
 
+import ast
 import importlib.util
 import pathlib
 import re
@@ -11,6 +12,8 @@ import pytest
 
 ROOT = pathlib.Path(__file__).parents[2]
 SOURCES = sorted((ROOT / "src").rglob("*.py"))
+PACKAGES = sorted(path.parent for path in (ROOT / "src" / "jounce").rglob("__init__.py"))
+MOST_MODULES = 12  # of a package, without its `__init__`
 
 
 def sh_blocks():
@@ -68,6 +71,48 @@ def test_source_file_is_short_and_plain(path):
     assert text.isascii()
     assert text.count("\n") <= 420
     assert text.lstrip().startswith('"""'), "a module starts with its docstring"
+
+
+def modules_of(package):
+    """Return the names of the modules and packages in a package."""
+    folders = {path.parent.name for path in package.glob("*/__init__.py")}
+    return {path.stem for path in package.glob("*.py")} - {"__init__", "__main__"} | folders
+
+
+def exports_of(package):
+    """Return the names that the `__init__` of a package or its stub binds, other than modules of any package."""
+    names = set()
+    for node in (node for file in package.glob("__init__.py*") for node in ast.walk(ast.parse(file.read_text()))):
+        if isinstance(node, ast.ImportFrom):
+            source = package.joinpath(*[".."] * (node.level - 1)) if node.level else ROOT / "src"
+            origin = source.joinpath(*(node.module or "").split("."))
+            modules = modules_of(origin) if origin.is_dir() else set()
+            names |= {alias.asname or alias.name for alias in node.names if alias.name not in modules}
+        elif isinstance(node, ast.FunctionDef | ast.ClassDef):
+            names.add(node.name)
+        elif isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store):
+            names.add(node.id)
+    return names
+
+
+@pytest.mark.parametrize("package", PACKAGES, ids=lambda p: str(p.relative_to(ROOT / "src")))
+def test_a_package_has_at_most_a_dozen_modules(package):
+    modules = [path.stem for path in package.glob("*.py") if path.stem != "__init__"]
+    assert len(modules) <= MOST_MODULES, f"put some of {', '.join(sorted(modules))} into a package of their own"
+
+
+@pytest.mark.parametrize("package", PACKAGES, ids=lambda p: str(p.relative_to(ROOT / "src")))
+def test_no_function_or_class_hides_a_module_of_its_name(package):
+    assert sorted(exports_of(package) & modules_of(package)) == []
+
+
+def test_exports_that_hide_a_module_are_seen(tmp_path):
+    (tmp_path / "solve.py").touch()
+    (tmp_path / "trace.py").touch()
+    (tmp_path / "__init__.py").write_text("from .solve import solve\n\n\ndef trace():\n    pass\n")
+    assert exports_of(tmp_path) & modules_of(tmp_path) == {"solve", "trace"}
+    (tmp_path / "__init__.py").write_text("from . import solve, trace\n")
+    assert exports_of(tmp_path) & modules_of(tmp_path) == set()
 
 
 def test_links_between_pages_lead_somewhere():
