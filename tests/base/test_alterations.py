@@ -9,7 +9,7 @@ from jounce.base import alterations
 from jounce.base.alterations import altered
 from jounce.execution import structure
 from jounce.execution.store.programs import Store
-from jounce.execution.structure import UndescribedError, program_key
+from jounce.execution.structure import UndescribedError, cache_key
 from jounce.integrate.marching import marching
 from jounce.io import json_schema
 from jounce.jet.programs import operations
@@ -40,7 +40,7 @@ def test_what_is_replaced_is_named_until_it_is_back(monkeypatch, thing, name, va
         patch.setattr(thing, name, value)
         assert str(altered()).endswith(f".{name}")
         with pytest.raises(UndescribedError, match=name):
-            program_key((altered,), None, (), {})
+            cache_key((altered,), None, (), {})
     assert altered() is None
 
 

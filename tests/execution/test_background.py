@@ -165,7 +165,7 @@ class Shelf(dict):
 def test_a_program_is_made_from_shapes_alone(monkeypatch, kept):
     shelf = Shelf()
     monkeypatch.setattr("jounce.execution.compilation._store_of_xla", lambda: shelf)
-    monkeypatch.setattr("jounce.execution.compilation.program_key", lambda *given: repr(given[2]))
+    monkeypatch.setattr("jounce.execution.compilation.cache_key", lambda *given: repr(given[2]))
 
     def new():
         return compiled("times")(lambda x, times: {"sum": times * x[0].sum() + x[1]})
@@ -188,7 +188,7 @@ def test_a_program_is_made_from_shapes_alone(monkeypatch, kept):
 def test_a_function_of_an_instant_is_made_from_shapes_alone(monkeypatch, rows, native):
     monkeypatch.setenv("JOUNCE_NATIVE", native)
     monkeypatch.setattr("jounce.execution.compilation._store_of_xla", Shelf)
-    monkeypatch.setattr("jounce.execution.compilation.program_key", lambda *given: repr(given[2]))
+    monkeypatch.setattr("jounce.execution.compilation.cache_key", lambda *given: repr(given[2]))
     doubled = Mapped(lambda shared, lanes: shared * lanes, rows=rows)
     shape = (4, 2) if rows else (2, 4)
     program = doubled.program(np.array(2.0), jax.ShapeDtypeStruct(shape, float))

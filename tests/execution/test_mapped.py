@@ -50,7 +50,7 @@ def test_what_is_kept_is_not_made_again(monkeypatch):
     store, made = Shelf(), []
     monkeypatch.setattr(store_, "_store", store)
     function = example.function
-    monkeypatch.setattr(translated, "program_key", lambda *given: repr(given[2]))  # it has no name in the package
+    monkeypatch.setattr(translated, "cache_key", lambda *given: repr(given[2]))  # it has no name in the package
     monkeypatch.setattr(translated, "object_file", lambda *a, **k: made.append(1) or object_file(*a, **k))
     for _ in range(3):
         results(Mapped(function))

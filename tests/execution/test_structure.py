@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import jounce as jn
-from jounce.execution.structure import UndescribedError, description, program_key, tree_description
+from jounce.execution.structure import UndescribedError, cache_key, description, tree_description
 from jounce.kinematics import Status
 from jounce.kinematics.continuation.correct_and_differentiate import advance
 from jounce.mechanism import build
@@ -100,7 +100,7 @@ def test_a_function_has_what_it_computes_in_its_name():
 def test_a_program_is_named_by_all_that_it_depends_on():
     tree, leaves = jax.tree.structure((1, {"a": 2})), (((3,), "float64", False), ("float",))
     told = {
-        program_key((function,), tree, kinds, static)
+        cache_key((function,), tree, kinds, static)
         for function, kinds, static in itertools.product(
             (advance, tree_description),
             (leaves, (((4,), "float64", False), ("float",)), (((3,), "float64", True), ("float",))),
@@ -109,16 +109,16 @@ def test_a_program_is_named_by_all_that_it_depends_on():
     }
     assert len(told) == 18
     with jax.default_matmul_precision("float32"):
-        assert program_key((advance,), tree, leaves, {"order": 4}) not in told
+        assert cache_key((advance,), tree, leaves, {"order": 4}) not in told
 
 
 @pytest.mark.slow
 def test_the_name_is_the_same_in_another_process():
     code = """
 import jax, jounce as jn
-from jounce.execution.structure import program_key, tree_description
+from jounce.execution.structure import cache_key, tree_description
 tree = jax.tree.structure(jn.forces.ExpressionLaw("-x*a", {"a": 1.0}))
-print(program_key((tree_description,), tree, (("float",),), {"s": frozenset(map(str, range(20)))}))"""
+print(cache_key((tree_description,), tree, (("float",),), {"s": frozenset(map(str, range(20)))}))"""
     found = {
         subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout for _ in "ab"
     }

@@ -25,7 +25,7 @@ from jounce.base.jax_internals import description_reader, runs_at_once, without_
 from jounce.execution.background import ByKey
 from jounce.execution.device import on_processor
 from jounce.execution.store.programs import Descriptions, Store, current_store, is_wanted_soon, packed, unpacked
-from jounce.execution.structure import UndescribedError, program_key, settings
+from jounce.execution.structure import UndescribedError, cache_key, settings
 from jounce.execution.translated import Translated, shaped
 from jounce.settings import check_process, under_own_settings
 
@@ -230,7 +230,7 @@ class Compiled:
         """Return a program from the store, or one that is compiled, and kept there if it has a name."""
         level = self._level()
         try:
-            key = program_key(self.made_of, tree, (*kinds, level), static)
+            key = cache_key(self.made_of, tree, (*kinds, level), static)
         except UndescribedError:
             return partial(self.jitted, **static)
 

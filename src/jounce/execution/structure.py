@@ -106,17 +106,17 @@ def tree_description(tree: Any) -> str:
     return f"{name}<{description(static)}>({', '.join(map(tree_description, tree.children()))})"
 
 
-def program_key(
+def cache_key(
     functions: tuple[Callable[..., Any], ...], tree: Any, leaves: Sequence[Any], static: Mapping[str, Any]
 ) -> str:
-    """Return the name of the program of functions for arguments of a structure, on this machine.
+    """Return the cache key of the program of functions for arguments of a structure, on this machine.
 
     Parameters
     ----------
     functions : tuple of callable
-        Of this package.
+        Functions of this package.
     tree, leaves
-        Of its arguments; of each leaf, what JAX compiles for: its shape and its type.
+        The structure of the arguments, and the shape and the type of each leaf.
     static : mapping
         Arguments that are compiled in.
 

@@ -22,7 +22,7 @@ from jounce.execution.llvm.programs import Program, Single
 from jounce.execution.llvm.text.scalars import MOST_LINES
 from jounce.execution.llvm.text.values import NoRuleError, UnsupportedOperationError
 from jounce.execution.store.programs import current_store, made_or_kept
-from jounce.execution.structure import UndescribedError, program_key, settings
+from jounce.execution.structure import UndescribedError, cache_key, settings
 
 Group = tuple[Sequence[np.ndarray | jax.ShapeDtypeStruct], Any]  # leaves of a tree, or their forms, and its structure
 LITTLE = 20_000  # numbers that a program is given: of more, even one call takes long
@@ -160,5 +160,5 @@ class Translated:
         leaves, tree = jax.tree.flatten(given)
         kinds = [*((leaf.shape, str(leaf.dtype)) for leaf in leaves), *indices.values()]
         with suppress(UndescribedError):
-            return program_key(self.made_of, tree, [*kinds, "single" if self._single else "side by side"], static)
+            return cache_key(self.made_of, tree, [*kinds, "single" if self._single else "side by side"], static)
         return None

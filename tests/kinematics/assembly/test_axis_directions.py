@@ -50,9 +50,9 @@ def cosines(mechanism, coordinates):
 
 def assembled(name):
     mechanism = jn.load(f"examples/{name}.yaml")
-    model, trial = find_assembly(build(mechanism), 0.0, TOLERANCE)
-    assert trial.closed
-    return mechanism, model, trial.coordinates
+    model, attempt = find_assembly(build(mechanism), 0.0, TOLERANCE)
+    assert attempt.closed
+    return mechanism, model, attempt.coordinates
 
 
 # from some of these guesses a hinge was put together turned over before, and from others nothing was
@@ -69,12 +69,12 @@ def test_no_hinge_is_turned_over_from_rough_guesses(name):
     random, closed = np.random.default_rng(1), 0
     for _ in range(12):
         guess = tilted(model, start, random, 2.0)
-        _, trial = find_assembly(dataclasses.replace(model, guess=guess), 0.0, TOLERANCE)
+        _, attempt = find_assembly(dataclasses.replace(model, guess=guess), 0.0, TOLERANCE)
         if min(cosines(mechanism, guess).values()) < -0.8:
             continue  # drawn the other way round
-        assert trial.closed
+        assert attempt.closed
         closed += 1
-        assert min(cosines(mechanism, trial.coordinates).values()) == pytest.approx(1.0, abs=1e-9)
+        assert min(cosines(mechanism, attempt.coordinates).values()) == pytest.approx(1.0, abs=1e-9)
     assert closed >= 6
 
 
@@ -84,9 +84,9 @@ def test_no_block_is_turned_over_in_its_guide():
     for away in (-2.0, -1.7, 1.7, 2.0):  # half a turn is nearer than none to all but one of the first steps
         guess = {**start, "angle": start["angle"].copy()}
         guess["angle"][number] += away
-        _, trial = find_assembly(dataclasses.replace(model, guess=guess), 0.0, TOLERANCE)
-        assert trial.closed
-        assert trial.coordinates["angle"][number] == pytest.approx(start["angle"][number], abs=1e-9)
+        _, attempt = find_assembly(dataclasses.replace(model, guess=guess), 0.0, TOLERANCE)
+        assert attempt.closed
+        assert attempt.coordinates["angle"][number] == pytest.approx(start["angle"][number], abs=1e-9)
 
 
 def test_a_hinge_drawn_with_opposite_axes_stays_so():

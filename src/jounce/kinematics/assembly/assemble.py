@@ -115,11 +115,11 @@ def find_assembly(model: Model, instant: float, tolerance: float) -> tuple[Model
     for signs in candidates:
         for start in starts_with_axis_signs(model, signs, instant, tolerance):
             drawn, _ = with_reference(dataclasses.replace(model, guess=start), start, instant, model.prescribed)
-            other, trial = _assemble_near_guess(drawn, instant, tolerance)
-            signs_match = trial.closed and np.array_equal(axis_signs(model.system, trial.coordinates), signs)
-            if signs_match and trial.jacobian.rank > rank:
-                best, rank = (dataclasses.replace(other, guess=model.guess), trial), trial.jacobian.rank
-            if rank == trial.jacobian.shape[1]:
+            other, attempt = _assemble_near_guess(drawn, instant, tolerance)
+            signs_match = attempt.closed and np.array_equal(axis_signs(model.system, attempt.coordinates), signs)
+            if signs_match and attempt.jacobian.rank > rank:
+                best, rank = (dataclasses.replace(other, guess=model.guess), attempt), attempt.jacobian.rank
+            if rank == attempt.jacobian.shape[1]:
                 return best
         if best[1] is not initial:
             break

@@ -221,18 +221,18 @@ class _Search:
         if model.system.shape[0] < model.system.shape[1]:
             message = "joints and drivers leave degrees of freedom, so that there are infinitely many assemblies"
             raise MobilityError(f"{message}: add drivers")
-        self.first, trial = find_assembly(model, instant, TOLERANCE)
-        self.trial = trial
-        system = with_fields(self.first.system, row_scale=trial.scale[:, None])
+        self.first, attempt = find_assembly(model, instant, TOLERANCE)
+        self.attempt = attempt
+        system = with_fields(self.first.system, row_scale=attempt.scale[:, None])
         self.system = resident(with_fields(system, outputs=(), forces=(), fronts=None))
         self.model = dataclasses.replace(self.first, system=system)
         self.tracker = PathTracker(self.model, driven=False)
         self.configurations: list[_Configuration] = []
-        self.axis_signs = axis_signs(self.system, trial.coordinates) if trial.closed else drawn_axis_signs(model)
+        self.axis_signs = axis_signs(self.system, attempt.coordinates) if attempt.closed else drawn_axis_signs(model)
         self.starts = self.since_last_new = self.movable = 0
-        if trial.closed:
-            check_mobility(self.model, redundancy_of(self.first, trial, instant)[1])
-            self.add({name: x[..., 0] for name, x in trial.coordinates.items()}, hits=0)
+        if attempt.closed:
+            check_mobility(self.model, redundancy_of(self.first, attempt, instant)[1])
+            self.add({name: x[..., 0] for name, x in attempt.coordinates.items()}, hits=0)
 
     def from_starts(self, count: int, random: np.random.Generator) -> None:
         """Look from random starts, until each assembly was found often enough."""
@@ -240,7 +240,7 @@ class _Search:
         while self.starts < count or (self.starts < most and any(x.hits < OFTEN for x in self.configurations)):
             self._round(min(BATCH, most - self.starts), random)
         if not self.configurations and not self.movable:
-            check_assembled(self.first, self.trial, self.instant)
+            check_assembled(self.first, self.attempt, self.instant)
             raise AssemblyError(f"no assembly was found from {self.starts} starts at t = {self.instant:g} s")
         if not self.configurations:
             message = (
@@ -302,11 +302,11 @@ class _Search:
     def _polished(self, coordinates: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
         """Return an assembly to rounding, its planar angles with the whole turns that are nearest to the guess."""
         begun = {name: x[..., None] for name, x in coordinates.items()}
-        trial = assemble_from_guess(self.first, self.instant, TOLERANCE, begun)
-        if not trial.closed:
+        attempt = assemble_from_guess(self.first, self.instant, TOLERANCE, begun)
+        if not attempt.closed:
             return coordinates  # next to a singular position, as good as it gets
-        trial = nearest_to_guess(self.first, trial, self.instant) if "angle" in coordinates else trial
-        return {name: x[..., 0] for name, x in trial.coordinates.items()}
+        attempt = nearest_to_guess(self.first, attempt, self.instant) if "angle" in coordinates else attempt
+        return {name: x[..., 0] for name, x in attempt.coordinates.items()}
 
     def along_circuits(self, driver: str | None) -> tuple[Curve, ...]:
         """Trace the circuits of all assemblies, and add what else is on them."""

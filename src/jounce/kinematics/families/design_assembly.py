@@ -19,21 +19,21 @@ from jounce.mechanism.system import System
 from jounce.rigid.pose import Pose
 
 HALVINGS = 12
-CLEARLY_REGULAR = 1e-6  # smallest pivot over the largest of a Jacobian that is looked at no closer
+CLEARLY_REGULAR = 1e-6  # smallest pivot over the largest of a Jacobian that needs no closer check
 
 Coordinates = dict[str, Float[Numbers, "_ ... _"]]
 
 
-class Trials(NamedTuple):
-    """How designs could be put together, each from its own starting guess.
+class AssemblyAttempts(NamedTuple):
+    """Assembly attempts of many designs, each from its own starting guess.
 
     Attributes
     ----------
     coordinates : dict of str to array
-        Of all bodies, (..., bodies, designs).
+        Coordinates of all bodies, (..., bodies, designs).
     plain : array of bool, shape (designs,)
-        Whether there is nothing to it but Gauss-Newton: all is closed, no body turned by more than half a turn, and the
-        Jacobian is regular by far. What is not plain is looked at alone.
+        Whether Gauss-Newton is sufficient: all gaps are closed, no body turned by more than half a turn, and the
+        Jacobian is regular by far. Other designs are assembled individually.
     """
 
     coordinates: Coordinates
@@ -47,7 +47,7 @@ def _assembled(
     tolerance: Float[Numbers, ""],
     driven: Bool[Numbers, "row 1"],
     pose_type: type[Pose],
-) -> Trials:
+) -> AssemblyAttempts:
     """Put designs together side by side, a lane for each; see `assemble_from_guess`."""
     time = Jet([instant[None]])
     unscaled = with_fields(system, row_scale=np.ones(system.row_scale.shape))
@@ -102,16 +102,16 @@ def _assembled(
     plain &= factored(system, pose, time).pivot_ratio() > CLEARLY_REGULAR
     if "angle" in coordinates:
         plain &= jnp.max(jnp.abs(coordinates["angle"] - guess["angle"]), axis=0) < np.pi
-    return Trials(coordinates, plain)
+    return AssemblyAttempts(coordinates, plain)
 
 
-def _of_many(shared: Any, designs: Any, *, pose_type: type[Pose]) -> Trials:
+def _of_many(shared: Any, designs: Any, *, pose_type: type[Pose]) -> AssemblyAttempts:
     (system, tolerance, driven), (guess, instant, own) = shared, designs
     return _assembled(of_design(system, own), guess, instant, tolerance, driven, pose_type)
 
 
 @mapped(by_xla=_of_many, made_of=(_assembled,))
-def assemble_from_guess(shared: Any, designs: Any, *, pose_type: type[Pose]) -> Trials:
+def assemble_from_guess(shared: Any, designs: Any, *, pose_type: type[Pose]) -> AssemblyAttempts:
     """Assemble a design by damped Gauss-Newton; see `assembly.gauss_newton.assemble_from_guess`.
 
     Parameters

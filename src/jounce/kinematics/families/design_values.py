@@ -13,7 +13,7 @@ from jaxtyping import Bool, Float, Int
 
 from jounce.base.modules import with_fields
 from jounce.constraints.facts import facts_of, field_kinds, has_other_sign
-from jounce.kinematics.families.design_assembly import Trials, assemble_from_guess
+from jounce.kinematics.families.design_assembly import AssemblyAttempts, assemble_from_guess
 from jounce.mechanism import Mechanism, Model
 from jounce.mechanism.building.starting_guess import starting_guess
 from jounce.mechanism.building.traced import traced_model
@@ -99,7 +99,7 @@ class Designs:
         constant = jax.tree.map(lambda _: False, self.model.system)
         return tuple(np.flatnonzero(jax.tree.leaves(with_fields(constant, groups=groups, outputs=outputs))).tolist())
 
-    def assembled(self, instant: float, tolerance: float) -> Trials:
+    def assembled(self, instant: float, tolerance: float) -> AssemblyAttempts:
         """Assemble all designs at an instant, s, to a tolerance, rad or sizes of the mechanism."""
         count, model = len(self.rows), self.model
         driven = np.array([[name.startswith("drivers.")] for name in model.rows])
