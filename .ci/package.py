@@ -10,7 +10,7 @@ PACKED = (
     "jounce/py.typed",
     "jounce/examples/four_bar.yaml",
     "jounce/examples/robots/panda.urdf",
-    "jounce/io/mechanisms/mechanism.schema.json",
+    "jounce/io/mechanisms/schema/mechanism.schema.json",
     "jounce/plot/jounce.mplstyle",
     "jounce/plot/page/report.html",
     "jounce/plot/page/report.js",

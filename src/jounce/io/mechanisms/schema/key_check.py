@@ -85,7 +85,7 @@ def unknown_type(
 def _schema() -> dict[str, Any]:
     """Return the definitions of the published schema; none where the package was copied without it."""
     name = "mechanism.schema.json"
-    for path in (Path(__file__).with_name(name), Path(__file__).parents[4] / "docs" / "schema" / name):
+    for path in (Path(__file__).with_name(name), Path(__file__).parents[5] / "docs" / "schema" / name):
         if path.is_file():
             return json.loads(path.read_text(encoding="utf-8"))["$defs"]
     return {}
