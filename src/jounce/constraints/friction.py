@@ -8,6 +8,7 @@ import operator
 from collections.abc import Sequence
 from typing import Any
 
+import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Float
 
@@ -172,13 +173,43 @@ def _at(body: Pose, moving: tuple[Jet, Jet], place: Jet) -> Jet:
     return velocity + turning.cross(lever)
 
 
+class UnitFriction(Module):
+    """Friction of one along a direction of slip, whatever slips: what any friction at rest is made of.
+
+    Parameters
+    ----------
+    radius : float, optional
+        As of `Friction`.
+    direction : int
+        Of slip.
+    """
+
+    radius: Any
+    direction: int = eqx.field(static=True)
+
+    def resisting(self, slip: Float[Jet, "direction *batch"]) -> Float[Jet, "direction *batch"]:
+        """Return one in that direction, and nothing in the others."""
+        none = jnp.zeros_like(slip.coefficients[0])
+        return Jet.constant(none.at[self.direction].set(1.0), slip.order)
+
+
+def pressing_force(
+    joint: Any, bodies: Sequence[Pose], force: Float[Jet, "component *batch"]
+) -> Float[Jet, "component *batch"]:
+    """Return what presses the surfaces of a joint, N, as a vector, from what it exerts on its second body, global.
+
+    It is that force, unless the class has a `pressing` of its own.
+    """
+    return force if not hasattr(joint, "pressing") else joint.pressing(bodies, force)
+
+
 def normal_force(joint: Any, bodies: Sequence[Pose], force: Float[Jet, "component *batch"]) -> Float[Jet, "*batch"]:
     """Return what presses the surfaces of a joint together, N, from what it exerts on its second body, global.
 
-    It is the size of that force, unless the class has a `pressing` of its own. Where there is none, its rates are not
-    determined, and those of zero are returned.
+    It is the size of `pressing_force`. Where there is none, its rates are not determined, and those of zero are
+    returned.
     """
-    pressing = force if not hasattr(joint, "pressing") else joint.pressing(bodies, force)
+    pressing = pressing_force(joint, bodies, force)
     square = pressing.dot(pressing)
     none = square.coefficients[0] == 0
     return _where(~none, sqrt(_where(~none, square, 1.0)), 0.0)

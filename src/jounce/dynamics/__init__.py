@@ -58,6 +58,7 @@ from jounce.dynamics.limits.check_limits import check_limits as check_limits
 from jounce.dynamics.limits.limit_report import LimitReport as LimitReport, LimitRow as LimitRow
 from jounce.dynamics.limits.motion_ends import TrajectoryEnd as TrajectoryEnd, trajectory_ends as trajectory_ends
 from jounce.dynamics.limits.trajectories import trajectory_torques as trajectory_torques
+from jounce.dynamics.statics.holding_forces import holding_forces as holding_forces
 from jounce.dynamics.statics.many_equilibria import equilibria as equilibria
 from jounce.dynamics.statics.static_equilibrium import Equilibrium as Equilibrium, equilibrium as equilibrium
 from jounce.dynamics.vibration.linearization import Linearization as Linearization, StateSpace as StateSpace

@@ -164,7 +164,8 @@ class Coupling(Module):
             return forces + change, jnp.max(jnp.abs(change), axis=0) > CLOSE * size, step + 1
 
         first = normal_now(fixed[0])
-        start = first, jnp.ones(first.shape[-1], bool), jnp.zeros((), jnp.int32)
+        # from none: the first step takes what presses on the side on which it does without friction
+        start = jnp.zeros_like(first), jnp.ones(first.shape[-1], bool), jnp.zeros((), jnp.int32)
         forces, _, _ = jax.lax.while_loop(lambda carry: jnp.any(carry[1]) & (carry[2] < STEPS), improved, start)
         forces = jax.lax.stop_gradient(forces)
         multipliers = with_friction(forces, free, response)

@@ -15,7 +15,7 @@ from jaxtyping import Float
 
 from jounce.base.modules import with_fields
 from jounce.base.shapes import Numbers
-from jounce.constraints.friction import slip_velocity
+from jounce.constraints.friction import pressing_force, slip_velocity
 from jounce.dynamics.forward.accelerations import Lanes
 from jounce.dynamics.forward.loads import loads, mass_matrices
 from jounce.dynamics.friction.coupling import friction_slope, rubs
@@ -55,11 +55,44 @@ def friction_slopes(element: Any, poses: Sequence[Coordinates], pose_type: type[
     return friction_slope(element, [pose_of(pose, pose_type, levels) for pose in poses], slot)
 
 
+def slip_directions(element: Any, poses: Sequence[Coordinates], pose_type: type[Pose]) -> int:
+    """Return in how many directions the surfaces of joints slip."""
+
+    def slip(poses: Sequence[Coordinates]) -> Any:
+        return slip_velocity(element, [pose_of(pose, pose_type, 1) for pose in poses]).coefficients[0]
+
+    return jax.eval_shape(slip, poses).shape[0]
+
+
 @compiled("pose_type", "levels", brief=True)
 def resisted(element: Any, poses: Sequence[Coordinates], pose_type: type[Pose], levels: int) -> Any:
     """Return the power that friction takes for a normal force of one, Taylor coefficients, (levels, joints, time)."""
     slip = slip_velocity(element, [pose_of(pose, pose_type, levels) for pose in poses])
     return stacked(element.friction.resisting(slip).dot(slip))
+
+
+@compiled(brief=True)
+def responses(system: System, blocks: Slopes, loads: Float[Numbers, "load coordinate body batch"]) -> Any:
+    """Return the multipliers that balance each of some loads, (loads, rows, time), of a system that is driven whole."""
+
+    def of_lot(blocks: Slopes, loads: Numbers) -> Any:
+        return jax.vmap(constraint_forces.load_solver(system, blocks, None))(loads)
+
+    return of_lot(blocks, loads) if system.fronts is not None else in_lots(of_lot, LOT, blocks, loads)
+
+
+@compiled("pose_type", brief=True)
+def pressing(
+    element: Any,
+    poses: Sequence[Coordinates],
+    slope: Slope,
+    forces: Float[Numbers, "row instance batch"],
+    pose_type: type[Pose],
+) -> Any:
+    """Return what presses joints with friction, (components, instances, time), for multipliers of order zero."""
+    bodies = [pose_of(pose, pose_type, 0) for pose in poses]
+    held = constraint_forces.wrench(slope[:1], forces[None])[0][: bodies[0].shifts]
+    return pressing_force(element, bodies, Jet([held])).coefficients[0]
 
 
 @compiled("pose_type", brief=True)

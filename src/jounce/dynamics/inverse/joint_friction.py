@@ -6,8 +6,10 @@ import numpy as np
 from jaxtyping import Float
 
 from jounce.base.shapes import Numbers
+from jounce.constraints.friction import UnitFriction
 from jounce.dynamics.friction.coupling import rubs
 from jounce.dynamics.inverse import force_programs as programs
+from jounce.mechanism.system import holding
 
 __all__ = ["JointFriction"]
 
@@ -61,6 +63,74 @@ class JointFriction:
         own = multipliers[:, place.rows].reshape(len(multipliers), -1, group.instances, len(lanes))
         works = programs.wrenches(self.forces._slopes(place.group, group.moving_slots[-1], lanes), own)
         return np.asarray(works)[:, : self.forces.pose_type.shifts, place.instance]
+
+    @property
+    def coefficients(self) -> Float[np.ndarray, " joint"]:
+        """Coefficients of friction, in the order of the joints by their groups."""
+        groups = [self.forces._joined.groups[k] for k in self.first_rows]
+        values = [np.broadcast_to(np.ravel(g.element.friction.coefficient), g.instances) for g in groups]
+        return np.concatenate([np.zeros(0), *values])
+
+    def directions(self) -> list[int]:
+        """Return the joint of each direction of slip, in the order of the joints."""
+        found: list[int] = []
+        for index in self.first_rows:
+            count = self._slips(index)
+            first = found[-1] + 1 if found else 0
+            found += [first + k for k in range(self.forces._joined.groups[index].instances) for _ in range(count)]
+        return found
+
+    def _slips(self, index: int) -> int:
+        """Return in how many directions the joints of a group slip."""
+        lanes = np.zeros(1, int)
+        moving = [self.forces.coordinates_at(slot, lanes, 2) for slot in self.forces._joined.groups[index].bodies]
+        return programs.slip_directions(self.forces._joined.groups[index].element, moving, self.forces.pose_type)
+
+    def responses(self) -> Float[np.ndarray, "direction row time"]:
+        """Return the multipliers that balance friction of one in each direction of slip, at rest."""
+        forces = self.forces
+
+        def chunk(lanes: np.ndarray) -> Any:
+            loads = np.concatenate([self._unit_loads(index, lanes) for index in self.first_rows])
+            return programs.responses(forces._joined, forces._blocks(lanes), loads)
+
+        return np.asarray(forces.in_chunks(chunk))
+
+    def _unit_loads(self, index: int, lanes: np.ndarray) -> Float[np.ndarray, "direction coordinate body time"]:
+        """Return what friction of one in each direction of slip does to bodies, of the joints of a group."""
+        forces, group = self.forces, self.forces._joined.groups[index]
+        moving = [forces.coordinates_at(slot, lanes, 2) for slot in group.bodies]
+        count, bodies = self._slips(index), len(forces.model.bodies)
+        components = forces.pose_type.shifts + forces.pose_type.turns
+        loads = np.zeros((group.instances, count, components, bodies + 1, len(lanes)))
+        for direction in range(count):
+            unit = holding(group, "friction", UnitFriction(group.element.friction.radius, direction)).element
+            for slot in group.moving_slots:
+                slope = np.asarray(programs.friction_slopes(unit, moving, forces.pose_type, slot, 1))[0, :, 0]
+                for instance, body in enumerate(group.bodies[slot]):
+                    loads[instance, direction, :, body] += slope[:, instance]
+        return loads[:, :, :, 1:].reshape(-1, components, bodies, len(lanes))
+
+    def pressing(self, multipliers: Float[Numbers, "row time"]) -> Float[np.ndarray, "joint component time"]:
+        """Return what presses the surfaces of each joint, N, for multipliers of order zero; zeros fill it up."""
+        forces = self.forces
+
+        def chunk(lanes: np.ndarray) -> Any:
+            found = []
+            for index in self.first_rows:
+                group = forces._joined.groups[index]
+                own = multipliers[self._rows(index)][:, lanes].reshape(-1, group.instances, len(lanes))
+                slope = forces._slopes(index, group.moving_slots[-1], lanes)
+                poses = [forces.coordinates_at(slot, lanes, 1) for slot in group.bodies]
+                part = np.asarray(programs.pressing(group.element, poses, slope, own, forces.pose_type))
+                found.append(np.pad(part, [(0, forces.pose_type.shifts - len(part)), (0, 0), (0, 0)]))
+            return np.concatenate(found, axis=1).swapaxes(0, 1)
+
+        return forces.in_chunks(chunk)
+
+    def _rows(self, index: int) -> slice:
+        """Return the rows of a group."""
+        return next(place.rows for place in self.forces.indices.values() if place.group == index)
 
     def normal_force(self, name: str) -> Float[Numbers, "order 1 time"]:
         """Return what presses the surfaces of a joint with friction together, N, as Taylor coefficients."""

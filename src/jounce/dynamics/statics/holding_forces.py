@@ -1,0 +1,160 @@
+"""The force of a driver that holds a mechanism at rest: with friction, any within a range."""
+
+import copy
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from jounce.constraints.spin_hold import SpinHold
+from jounce.dynamics.friction.extreme_friction import ExtremeFriction
+from jounce.dynamics.inverse.motion_forces import MotionForces
+from jounce.dynamics.inverse.tooth_flanks import listed
+from jounce.dynamics.motion_values import check_motion
+from jounce.dynamics.statics.variations import at_rest
+from jounce.errors import MechanismError, UnsupportedError
+from jounce.kinematics import Motion, Status
+from jounce.mechanism.driver_outputs import is_turning
+from jounce.shapes import Numbers
+from jounce.units.shown_units import time_axes
+
+if TYPE_CHECKING:
+    import xarray
+
+BOUNDS = ("least", "frictionless", "greatest")
+
+
+def holding_forces(motion: Motion) -> "xarray.Dataset":
+    """Return between which forces of each driver a mechanism stays at rest, in the positions of a motion.
+
+    The mechanism is held still in each of these positions, under weights and applied forces as they are at that instant
+    and without velocity. In each joint, friction at rest is any within its cone, ``|f| <= mu |R|``; what it can do at
+    most, for and against the driver, is found over all friction in all joints together. Where zero lies between, the
+    mechanism stays without the driver: it locks by itself. A force beyond the range moves it.
+
+    Of several drivers each has its own range, whatever the others exert meanwhile. What is least and greatest is mostly
+    what slow motions one way and the other take, but not where a joint hardly slips in these motions.
+
+    Parameters
+    ----------
+    motion : Motion
+        As `solve` or `Equilibrium.motion` give it, of a mechanism with masses or applied forces, whose drivers hold
+        all that can move.
+
+    Returns
+    -------
+    xarray.Dataset
+        One variable for each driver, N m where its law is an angle, else N; dimensions time and bound: ``least``,
+        ``frictionless`` and ``greatest``. Infinite where friction locks, so that no force moves the mechanism that way.
+        NaN at instants that were not solved, and where the range is not known, with the reason as the attribute
+        ``comment``.
+
+    Raises
+    ------
+    MechanismError
+        If nothing has a mass and no force is applied, or there is no driver.
+    UnsupportedError
+        If some motion is free, constraints are redundant, or teeth press on their flanks, where joints have friction.
+
+    Examples
+    --------
+    >>> import jounce as jn
+    >>> guide = jn.joints.Friction(coefficient=0.5, speed=1e-3)
+    >>> sled = jn.Mechanism(
+    ...     space="planar",
+    ...     gravity=[0, -10.0],
+    ...     bodies={"sled": jn.Body([0, 0], mass=5.0)},
+    ...     joints={"G": jn.planar.Prismatic(("ground", "sled"), [0, 0], [0, 0], [4, 3], [1, 0], friction=guide)},
+    ...     drivers={"push": jn.drivers.SlideDriver(("ground", "sled"), [0, 0], [0, 0], [4, 3], "0*t")},
+    ... )
+    >>> found = jn.holding_forces(jn.solve(sled, [0.0], order=0))  # on a slope of 3 in 4: 30 N and 0.5 * 40 N
+    >>> found["push"].values.round(9).tolist()
+    [[10.0, 30.0, 50.0]]
+    """
+    import xarray
+
+    check_motion(motion)
+    mechanism = motion.mechanism
+    if motion.traced:
+        raise UnsupportedError("holding forces have kinks: they are not differentiated by JAX", name="motion")
+    if not mechanism.drivers:
+        raise MechanismError("holding forces are those of drivers, and there are none", name="drivers")
+    forces = MotionForces.of(_at_rest(motion))
+    joints = forces.friction.names
+    if joints:
+        _check_determined(forces, f"joints.{joints[0]}.friction")
+    plain = {name: forces.driver_force(name)[0, 0] for name in mechanism.drivers}
+    ranges = _ranges(forces, plain) if joints else {name: ([x, x, x], []) for name, x in plain.items()}
+    failed = motion.status != Status.OK
+    variables = {}
+    for name, (bounds, unproven) in ranges.items():
+        values = np.where(failed, np.nan, np.asarray(bounds, float)).T
+        attributes = {"units": "N*m" if is_turning(mechanism.drivers[name]) else "N"}
+        solved = np.flatnonzero(~failed)
+        if words := _comment(motion.time, values, np.intersect1d(unproven, solved), solved):
+            attributes["comment"] = words
+        variables[name] = (("time", "bound"), values, attributes)
+    time = time_axes(motion.time, 1)["time"]
+    title = {"title": mechanism.title} if mechanism.title else {}
+    return xarray.Dataset(variables, {"time": time, "bound": list(BOUNDS)}, title)
+
+
+def _comment(time: np.ndarray, values: np.ndarray, unproven: np.ndarray, solved: np.ndarray) -> str:
+    """Say where a range is infinite or not known, if anywhere."""
+    unknown = np.isnan(values[unproven]).any(axis=1)
+    words = {
+        "friction locks, no force moves it one way": np.flatnonzero(np.isinf(values).any(axis=1)),
+        "forces are not determined": solved[np.isnan(values[solved, 1])],
+        "not determined, as friction locks for some of its signs": unproven[unknown],
+        "the widest that a search found, which does not prove that there is none wider": unproven[~unknown],
+    }
+    return "; ".join(f"{what}, at t = {listed(time[lanes])}" for what, lanes in words.items() if len(lanes))
+
+
+def _at_rest(motion: Motion) -> Motion:
+    """Return a motion that stands still in all positions of another one."""
+    still = at_rest({name: values[0] for name, values in motion.poses[1].items() if name != "angular_velocity"})
+    nothing = tuple(() for _ in motion.model.outputs)
+    return Motion(
+        motion.mechanism, motion.model, motion.time, 2, (still, nothing), motion.status, motion.faults,
+        motion.passages, motion.history, motion.backend,
+    )  # fmt: skip
+
+
+def _check_determined(forces: MotionForces, name: str) -> None:
+    """Raise UnsupportedError, by the name of a friction, where holding forces do not follow from friction alone."""
+    model, reasons = forces.model, []
+    if forces._joined.shape[0] != forces._joined.shape[1]:
+        reasons.append("drivers do not hold all that can move: drive it, and look whether zero is within the range")
+    if forces.flanks:
+        reasons.append("teeth press on either flank: give gears without pressure_angle")
+    if any(isinstance(group.element, SpinHold) for group in model.system.groups):
+        reasons.append("a body may spin about an axis of itself: hold it by a joint")
+    if reasons:
+        raise UnsupportedError(
+            f"the range of holding forces cannot be computed where {'; and '.join(reasons)}", name=name
+        )
+
+
+def _ranges(forces: MotionForces, plain: dict[str, Numbers]) -> dict[str, Any]:
+    """Return the bounds of the force of each driver, and the instants at which they are not proven."""
+    friction = forces.friction
+    responses = friction.responses()
+    changes = np.array([friction.pressing(response) for response in responses])
+    extreme = ExtremeFriction(
+        friction.pressing(forces.multipliers[0]), changes, friction.directions(), friction.coefficients
+    )
+    columns = [_with_multipliers(forces, response) for response in responses]
+    found = {}
+    for name, free in plain.items():
+        along = -np.array([of_one.driver_force(name)[0, 0] for of_one in columns])
+        (more, sure), (less, sure_too) = extreme.most(along), extreme.most(-along)
+        found[name] = [free - less, free, free + more], np.flatnonzero(~(sure & sure_too))
+    return found
+
+
+def _with_multipliers(forces: MotionForces, multipliers: Numbers) -> MotionForces:
+    """Return the forces in a mechanism at rest whose multipliers are these, (rows, time)."""
+    twin = copy.copy(forces)
+    twin._kept = {}
+    twin.__dict__["multipliers"] = multipliers[None]
+    return twin
