@@ -18,10 +18,10 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Bool, Float
 
+from jounce.base.shapes import Numbers
 from jounce.dynamics.friction.coupling import Coupling
 from jounce.execution.chunks import in_chunks
 from jounce.execution.compilation import compiled
-from jounce.shapes import Numbers
 
 IMPROVEMENTS = 100  # of the directions of friction, one after the other
 ALL_SIGNS = 12  # joints: as many have 4096 combinations of signs

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from jounce.base.shapes import Numbers
 from jounce.constraints.spin_hold import SpinHold
 from jounce.dynamics.friction.extreme_friction import ExtremeFriction
 from jounce.dynamics.inverse.motion_forces import MotionForces
@@ -13,8 +14,7 @@ from jounce.dynamics.motion_values import check_motion
 from jounce.dynamics.statics.variations import at_rest
 from jounce.errors import MechanismError, UnsupportedError
 from jounce.kinematics import Motion, Status
-from jounce.mechanism.driver_outputs import is_turning
-from jounce.shapes import Numbers
+from jounce.mechanism.laws.driver_outputs import is_turning
 from jounce.units.shown_units import time_axes
 
 if TYPE_CHECKING:
