@@ -195,7 +195,7 @@ class UnitFriction(Module):
 
 def pressing_force(
     joint: Any, bodies: Sequence[Pose], force: Float[Jet, "component *batch"]
-) -> Float[Jet, "component *batch"]:
+) -> Float[Jet, "direction *batch"]:
     """Return what presses the surfaces of a joint, N, as a vector, from what it exerts on its second body, global.
 
     It is that force, unless the class has a `pressing` of its own.
