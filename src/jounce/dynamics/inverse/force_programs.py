@@ -90,7 +90,7 @@ def pressing(
     pose_type: type[Pose],
 ) -> Any:
     """Return what presses joints with friction, (components, instances, time), for multipliers of order zero."""
-    bodies = [pose_of(pose, pose_type, 0) for pose in poses]
+    bodies = tuple(pose_of(pose, pose_type, 0) for pose in poses)
     held = constraint_forces.wrench(slope[:1], forces[None])[0][: bodies[0].shifts]
     return pressing_force(element, bodies, Jet([held])).coefficients[0]
 
