@@ -44,6 +44,7 @@ RANKS = {
         "constant_velocity": 4,
         "tripod": 3,
         "oldham": 4,
+        "rolling": 1,
         "curve": 8,
         "surface": 7,
         "gear": 1,
@@ -220,6 +221,14 @@ def spatial_joints(c):
             c.points | c.pair("axis") | {"lead": LEAD, "offset": -LEAD / (2 * np.pi) * c.twist},
             [([STILL, STILL, screwed], spin)],
             [(up, still), (none, spin), (none, tilt)],
+        ),
+        "rolling": (
+            spatial.Rolling,
+            c.points
+            | c.pair("axis")
+            | {"vector_i": (0.6 * c.C_i[:, 0]).tolist(), "radius": RADIUS, "offset": -RADIUS * c.twist},
+            [([RADIUS * TURN, OTHER, TRAVEL], spin)],
+            [(aside, still), (none, spin)],
         ),
         "planar": (
             spatial.PlaneOnPlane,

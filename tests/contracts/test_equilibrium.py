@@ -166,6 +166,7 @@ MOTIONS = {
     "plane": lambda: jn.solve(MECHANISMS["plane"](), [0.0, 0.3, 0.8], ORDER),
     "teeth": lambda: jn.solve(MECHANISMS["teeth"](), [0.0, 0.3, 0.8], ORDER),
     "lines": lambda: jn.solve(MECHANISMS["lines"](), [0.0, 0.3, 0.8], ORDER),
+    "shafts": lambda: jn.solve(MECHANISMS["shafts"](), [0.0, 0.3, 0.8], ORDER),
     "robot with a loop": lambda: jn.solve(loop(), [0.0, 0.8], ORDER),
 }
 

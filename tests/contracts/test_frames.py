@@ -297,16 +297,19 @@ def tracks():
 
 
 def shafts():
-    """A cage that turns, with a shaft on it about another axis that rolls on a gear beside it."""
-    across = [0.3, 1.0, -0.2]
+    """A cage that turns, with a shaft on it about another axis that rolls on a gear beside it, and this on a rack."""
+    across, along, x = [0.3, 1.0, -0.2], [1.0, 0.5, 0.0], [1.0, 0.0, 0.0]
+    line = np.array([0, 0.5, 0.2]) - 0.3 * np.cross(along, Z) / np.linalg.norm(np.cross(along, Z))
     return in_space(
         9,
-        {"cage": [0, 1, 0], "sun": [0, 1.5, 0.2], "planet": [0.5, 1.2, 0.1]},
+        {"cage": [0, 1, 0], "sun": [0, 1.5, 0.2], "planet": [0.5, 1.2, 0.1], "rack": [0, 1.8, 0.2]},
         joints={
             "C": spatial.Revolute(("ground", "cage"), [0, 1, 0], ZERO, Z, Z),
             "S": spatial.Revolute(("cage", "sun"), [0, 0.5, 0.2], ZERO, Z, Z),
             "P": spatial.Revolute(("cage", "planet"), [0.5, 0.2, 0.1], ZERO, across, across),
             "mesh": spatial.Gear(("sun", "planet", "cage"), Z, [0.6, 2.0, -0.4], -3 / 7),
+            "guide": spatial.Prismatic(("cage", "rack"), line.tolist(), ZERO, along, along, x, x),
+            "teeth": spatial.Rolling(("rack", "sun"), [0.42, 0.16, 0.2], ZERO, along, Z, Z, 0.3, None, 0.35),
         },
         drivers={
             "turn": drivers.RotationDriver(("ground", "cage"), Z, wave(0.3, 0.2, 0.4, 1.5), A, [1.0, 0.3, 0.5]),

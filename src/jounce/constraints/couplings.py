@@ -1,6 +1,9 @@
-"""Couplings of shafts in space: constant velocity, tripod and Oldham."""
+"""Couplings in space: of shafts, by constant velocity, tripod and Oldham; of a pinion and its rack."""
 
 from typing import Any
+
+import equinox as eqx
+import jax.numpy as jnp
 
 from jounce.constraints.angles import Vectors, coaxial, parallel_rows, relative_angle
 from jounce.constraints.base import AbstractConstraint, Scalar, Vector, rows
@@ -83,6 +86,42 @@ class Oldham(AbstractConstraint, type="oldham", space="spatial"):
         second, _ = _frame_of(self.axis_j, self.vector_j)
         turned = body_i.direction(first).dot(body_j.direction(second))
         return rows(offset, *parallel_rows(body_i, body_j, self.axis_i, self.axis_j), turned)
+
+
+class Rolling(AbstractConstraint, type="rolling", space="spatial"):
+    """Rack and pinion: a pinion j rolls along a line of body i, about an axis across the line.
+
+    A pinion that turns about the axis goes along the line: its center lies on the side of ``vector x axis``, seen from
+    the line. Other joints hold the axis on both bodies, and keep the distance of the center from the line. The force of
+    a tooth acts along the line at the pitch point, one radius from the center; a pressure angle presses both apart.
+
+    Travel is counted over turns, as that of a nut on its screw.
+    """
+
+    point_i: Vector  # m, on the line, in the frame of body i
+    point_j: Vector  # m, center of the pinion, in the frame of body j
+    vector_i: Vector  # along the line
+    axis_i: Vector  # of the pinion, across the line
+    axis_j: Vector
+    radius: Scalar  # m, of the pitch circle
+    offset: Scalar = None  # m
+    pressure_angle: Scalar = None  # rad
+    flank: Any = eqx.field(default=None, init=False)  # 1 or -1, the sign of the multiplier; zero for neither
+
+    dimensions = {"offset": "length", "pressure_angle": "angle"}
+    signs = {"pressure_angle": "pressure angle"}
+    never_parallel = (("axis_i", "vector_i"),)
+    symbol = "rolling"
+
+    def residual(self, body_i: SpatialPose, body_j: SpatialPose, time: Jet) -> Jet:
+        travel = slide(body_i, body_j, self.point_i, self.point_j, self.vector_i)
+        turn = relative_angle(body_i, body_j, self.axis_i, datum=coaxial(self.axis_i, self.axis_j))
+        rolled = wrap(travel - self.radius * turn - self.offset, 2 * jnp.pi * self.radius)
+        if self.flank is None or self.pressure_angle is None:
+            return rolled
+        beside = cross(self.vector_i, self.axis_i)
+        beyond = slide(body_i, body_j, self.point_i, self.point_j, beside) - self.radius
+        return rolled - self.flank * jnp.tan(self.pressure_angle) * beyond
 
 
 def _frame_of(axis: Vectors, normal: Vectors) -> tuple[Any, Any]:

@@ -77,6 +77,7 @@ _MACHINES = {
         "prismatic",
         "screw",
         "gear",
+        "rolling",
         "curve",
         "surface",
         "wheel",

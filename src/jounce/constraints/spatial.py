@@ -14,6 +14,7 @@ from jounce.constraints.base import AbstractConstraint, Curve, Nested, Scalar, V
 from jounce.constraints.couplings import (
     ConstantVelocity as ConstantVelocity,
     Oldham as Oldham,
+    Rolling as Rolling,
     Tripod as Tripod,
 )
 from jounce.constraints.friction import Velocities, check_friction, relative_turn, relative_velocity

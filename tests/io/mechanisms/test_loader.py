@@ -119,6 +119,7 @@ KEYS = {  # the table of the documentation
     ("spatial", "joint", "curve"): "curve point start?",
     ("spatial", "joint", "surface"): "surface point start_u? start_v?",
     ("spatial", "joint", "gear"): "axes ratio offset?",
+    ("spatial", "joint", "rolling"): "points vector axes radius offset? pressure_angle?",
     ("spatial", "joint", "wheel"): "point axis radius plane",
     ("spatial", "joint", "rope"): "points length",
     ("spatial", "driver", "rotation"): "axis vectors? motion",

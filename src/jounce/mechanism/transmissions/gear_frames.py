@@ -2,13 +2,12 @@
 
 The centers of toothed gears, and of the pulleys of most belts, keep their distance where one body carries both. The
 pins show this body: a center stands on every body that is pinned there. The joints that hold directions parallel show
-the axis of a shaft in the frame m. Where JAX traces values, two points or directions are the same if the same numbers
-or expressions give them.
+the axis of a shaft in the frame m, and that of a pinion on its rack.
 """
 
 import dataclasses
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 import jax.numpy as jnp
@@ -19,32 +18,34 @@ from jounce.base.modules import with_fields
 from jounce.constraints import planar, spatial
 from jounce.constraints.angles import Datum, coaxial
 from jounce.constraints.cams import Cam, turns_in_space
-from jounce.constraints.facts import PAIRS, facts_of
 from jounce.constraints.ropes import Rope, distinct, shares_points
 from jounce.errors import JounceError, MechanismError
 from jounce.mechanism.mechanism import GROUND, Mechanism
 from jounce.mechanism.resolve import along_instances, resolve
 from jounce.mechanism.system import POSITION_COMPONENTS, Group, group_elements, holding
+from jounce.mechanism.transmissions.held_places import (
+    BodyVector,
+    Joined,
+    as_array,
+    body_vector,
+    constant_attitudes,
+    held_parallel,
+    joined_vectors,
+    on_joined_bodies,
+    parallel,
+    pinned,
+    same_component,
+)
 from jounce.mechanism.transmissions.rope_lengths import check_ropes
 
 LARGEST_GAP = 1e-6  # of the distance of centers, as written numbers are rounded
-SAME_DIRECTION = 1e-9  # largest sine
 LARGEST_WHOLE = 1000  # of the whole numbers in a ratio of turns in space
+ACROSS = 1e-6  # largest cosine between the axis of a pinion and its rack, as written numbers are rounded
 WHOLE = 1e-9  # how near to a whole number a multiple of a ratio is
-
-
-class BodyVector(NamedTuple):
-    """A point or a direction of a body: its components, and as they were given."""
-
-    body: str
-    value: tuple[Any, ...]
-    given: tuple[Any, ...]
 
 
 Grouped = tuple[tuple[Group, ...], tuple[tuple[str, ...], ...]]
 """Groups, and the names of the elements of each, with their kinds before them."""
-Joined = Sequence[tuple[BodyVector, BodyVector]]
-"""Pairs of points or directions that a joint holds together."""
 
 
 class Arm(NamedTuple):
@@ -100,7 +101,7 @@ def _find_arms(mechanism: Mechanism, elements: Mapping[str, Any]) -> dict[str, A
     toothed = {name: element for name, element in elements.items() if on_line(element)}
     if not toothed:
         return {}
-    pins = _joined_vectors(mechanism, _pinned)
+    pins = joined_vectors(mechanism, pinned)
     arms = {name: _find_arm(name, element, mechanism.parameter_values, pins) for name, element in toothed.items()}
     return {name: arm for name, arm in arms.items() if arm is not None}
 
@@ -109,7 +110,7 @@ def _find_arm(name: str, gear: planar.Gear | planar.Belt, parameters: Mapping[st
     try:
         radii = [resolve(radius, parameters) for radius in (gear.radius_i, gear.radius_j)]
         points = [
-            _body_vector(body, p, parameters) for body, p in zip(gear.bodies, (gear.point_i, gear.point_j), strict=True)
+            body_vector(body, p, parameters) for body, p in zip(gear.bodies, (gear.point_i, gear.point_j), strict=True)
         ]
     except JounceError:
         return None  # the error is raised where all values of the gear are resolved
@@ -123,9 +124,9 @@ def _find_arm(name: str, gear: planar.Gear | planar.Belt, parameters: Mapping[st
 
     def coincide(a: BodyVector, b: BodyVector) -> bool:
         pairs = zip(a.value, b.value, a.given, b.given, strict=True)
-        return all(_same(x, y, of_x, of_y, same) for x, y, of_x, of_y in pairs)
+        return all(same_component(x, y, of_x, of_y, same) for x, y, of_x, of_y in pairs)
 
-    first, second = (_on_joined_bodies(point, pins, coincide) for point in points)
+    first, second = (on_joined_bodies(point, pins, coincide) for point in points)
     shared = [body for body in first if body in second and body not in gear.bodies]
     if not shared:
         return None
@@ -209,6 +210,8 @@ def _with_carriers(
         return _on_frames(group, [elements[name] for name in members], mechanism)
     if isinstance(group.element, Cam):
         return _on_hinges(group, [elements[name] for name in members], mechanism)
+    if isinstance(group.element, spatial.Rolling):
+        _check_racks({name: elements[name] for name in members}, mechanism)
     return group
 
 
@@ -218,19 +221,59 @@ def _number(value: Any) -> Any:
 
 def _on_frames(group: Group, gears: Sequence[spatial.Gear], mechanism: Mechanism) -> Group:
     """Return shafts with the axes that they turn about in their frames, where these are known, and whole turns."""
-    hinges, parameters = _joined_vectors(mechanism, _held_parallel), mechanism.parameter_values
+    hinges, parameters = joined_vectors(mechanism, held_parallel), mechanism.parameter_values
     for slot, field in enumerate(("held_i", "held_j")):
         data = []
         for gear in gears:
-            axis = _body_vector(gear.bodies[slot], (gear.axis_i, gear.axis_j)[slot], parameters)
-            there = _on_joined_bodies(axis, hinges, _parallel).get(gear.bodies[2])
+            axis = body_vector(gear.bodies[slot], (gear.axis_i, gear.axis_j)[slot], parameters)
+            there = on_joined_bodies(axis, hinges, parallel).get(gear.bodies[2])
             if there is None:
                 break
-            data.append((_vector(axis.value), _vector(there.value)))
+            data.append((as_array(axis.value), as_array(there.value)))
         if len(data) == len(gears):
             axis, there = (along_instances(*vectors) for vectors in zip(*data, strict=True))
             group = holding(group, field, _coaxial(axis, there))
     return holding(group, "whole", _whole_multiples(group.element.ratio))
+
+
+def _check_racks(racks: Mapping[str, spatial.Rolling], mechanism: Mechanism) -> None:
+    """Raise MechanismError where a pinion does not turn about its axis on the rack, or this is not across the rack."""
+    hinges, parameters = joined_vectors(mechanism, held_parallel), mechanism.parameter_values
+    for name, rack in racks.items():
+        on_rack, own, line = (
+            body_vector(body, vector, parameters)
+            for body, vector in zip(
+                (*rack.bodies, rack.bodies[0]), (rack.axis_i, rack.axis_j, rack.vector_i), strict=True
+            )
+        )
+        if any(isinstance(x, Tracer) for vector in (on_rack, own, line) for x in vector.value):
+            continue
+        u, v = (np.asarray(vector.value, float) for vector in (on_rack, line))
+        if abs(u @ v) > ACROSS * np.linalg.norm(u) * np.linalg.norm(v):
+            tilt = math.degrees(math.asin(min(1.0, abs(u @ v) / (np.linalg.norm(u) * np.linalg.norm(v)))))
+            message = (
+                f"the axis of a pinion is across its rack, and this one leans along it by {tilt:.3g} deg: give it at "
+                "right angles to the vector, both on the first body"
+            )
+            raise MechanismError(message, name=f"{name}.axes", value=[float(x) for x in u])
+        there = on_joined_bodies(own, hinges, parallel, constant_attitudes(mechanism)).get(rack.bodies[0])
+        if there is None or not _same_direction(np.asarray(there.value, float), u):
+            message = (
+                "the pinion does not turn about this axis on the rack: hinge it, and guide the rack so that it keeps "
+                "its attitude, by joints that have the axes, such as a revolute and a prismatic joint to one body"
+            )
+            if there is not None:
+                found = ", ".join(f"{float(x):.6g}" for x in there.value)
+                message = (
+                    f"by the joints between them, the axis of the pinion is [{found}] on the rack: give that one, or "
+                    "the opposite on both bodies"
+                )
+            raise MechanismError(message, name=f"{name}.axes", value=[float(x) for x in u])
+
+
+def _same_direction(first: Any, second: Any) -> bool:
+    sizes = np.linalg.norm(first) * np.linalg.norm(second)
+    return bool(first @ second > 0 and np.linalg.norm(np.cross(first, second)) <= ACROSS * sizes)
 
 
 def _on_hinges(group: Group, cams: Sequence[Cam], mechanism: Mechanism) -> Group:
@@ -239,16 +282,15 @@ def _on_hinges(group: Group, cams: Sequence[Cam], mechanism: Mechanism) -> Group
     for field in ("follower", "leader"):
         if not turns_in_space(getattr(group.element, field)):
             continue
-        hinges = _joined_vectors(mechanism, _held_parallel) if hinges is None else hinges
+        hinges = joined_vectors(mechanism, held_parallel) if hinges is None else hinges
         parts = [getattr(cam, field) for cam in cams]
-        axes = [_body_vector(part.bodies[0], part.axis_i, mechanism.parameter_values) for part in parts]
+        axes = [body_vector(part.bodies[0], part.axis_i, mechanism.parameter_values) for part in parts]
         other_axes = [
-            _on_joined_bodies(axis, hinges, _parallel).get(part.bodies[1])
-            for axis, part in zip(axes, parts, strict=True)
+            on_joined_bodies(axis, hinges, parallel).get(part.bodies[1]) for axis, part in zip(axes, parts, strict=True)
         ]
         if any(there is None for there in other_axes):
             continue
-        first, second = (along_instances(*(_vector(x.value) for x in its if x)) for its in (axes, other_axes))
+        first, second = (along_instances(*(as_array(x.value) for x in its if x)) for its in (axes, other_axes))
         part, datum = getattr(group.element, field), _coaxial(first, second)
         if part.vector_j is not None:  # its component along the axis has no effect
             datum = with_fields(datum, across=_across(part.vector_j, second))
@@ -277,78 +319,3 @@ def _whole_multiples(ratio: Any) -> Any:
         1.0, namespace.abs(products)
     )
     return namespace.where(fits.any(axis=-1), 1.0 + namespace.argmax(fits, axis=-1), np.nan)
-
-
-def _joined_vectors(
-    mechanism: Mechanism, pairs_of: Callable[[Any], Sequence[tuple[str, str]]]
-) -> list[tuple[BodyVector, BodyVector]]:
-    """Return the pairs of points or directions that joints hold together, from the pairs of fields of each joint."""
-    pairs = []
-    for joint in mechanism.joints.values():
-        for names in pairs_of(joint):
-            try:
-                first, second = (
-                    _body_vector(body, getattr(joint, name), mechanism.parameter_values)
-                    for body, name in zip(joint.bodies, names, strict=False)
-                )
-            except JounceError:
-                continue
-            pairs.append((first, second))
-    return pairs
-
-
-def _pinned(joint: Any) -> list[tuple[str, str]]:
-    facts = facts_of(type(joint))
-    return [("point_i", "point_j")] if facts.pair == "revolute" and PAIRS["revolute"] else []
-
-
-def _held_parallel(joint: Any) -> Sequence[tuple[str, str]]:
-    return facts_of(type(joint)).held_parallel
-
-
-def _body_vector(body: str, given: Any, parameters: Mapping[str, Any]) -> BodyVector:
-    entries = tuple(given.tolist() if isinstance(given, np.ndarray) else given)
-    return BodyVector(body, tuple(resolve(entry, parameters) for entry in entries), entries)
-
-
-def _same(a: Any, b: Any, given_a: Any, given_b: Any, near: Callable[[Any, Any], bool]) -> bool:
-    """Return whether components are the same; values that JAX traces are compared as they were given."""
-    if isinstance(a, Tracer) or isinstance(b, Tracer):
-        traced = isinstance(given_a, Tracer) or isinstance(given_b, Tracer)
-        return a is b or (not traced and bool(given_a == given_b))
-    return bool(near(a, b))
-
-
-def _parallel(a: BodyVector, b: BodyVector) -> int:
-    """Return 1 for the same direction, -1 for the opposite one, else 0."""
-    if any(isinstance(x, Tracer) for x in (*a.value, *b.value)):
-        pairs = zip(a.value, b.value, a.given, b.given, strict=True)
-        return int(all(_same(x, y, of_x, of_y, lambda p, q: p == q) for x, y, of_x, of_y in pairs))
-    u, v = (np.asarray(x.value, float) / (np.linalg.norm(x.value) or 1.0) for x in (a, b))
-    return int(np.sign(u @ v)) if np.linalg.norm(np.cross(u, v)) <= SAME_DIRECTION else 0
-
-
-def _on_joined_bodies(
-    start: BodyVector, joined: Joined, alike: Callable[[BodyVector, BodyVector], int | bool]
-) -> dict[str, BodyVector]:
-    """Return a point or direction on each body that joints connect to it, one after the other."""
-    reached, waiting = {start.body: start}, [start]
-    while waiting:
-        here = waiting.pop(0)
-        for pair in joined:
-            for near, far in (pair, pair[::-1]):
-                if near.body != here.body or far.body in reached:
-                    continue
-                if sign := int(alike(here, near)):
-                    there = far if sign > 0 else BodyVector(far.body, tuple(-x for x in far.value), far.given)
-                    reached[far.body] = there
-                    waiting.append(there)
-    return reached
-
-
-def _vector(value: tuple[Any, ...]) -> Any:
-    return (
-        jnp.stack([jnp.asarray(x, float) for x in value])
-        if any(isinstance(x, Tracer) for x in value)
-        else np.array(value, float)
-    )

@@ -146,6 +146,8 @@ def _rolling(drawing: Drawing, symbol: Symbol) -> None:
     frame = drawing.frames[body]
     touch = frame[:, :, 0] + np.einsum("tck,tk->tc", frame[:, :, 1:], start + travel[:, None] * along)
     parts.rail(drawing, body, touch, axis, start=start)
+    if not drawing.planar:
+        _shafts(drawing, symbol)
 
 
 def _belt(drawing: Drawing, symbol: Symbol) -> None:
@@ -292,6 +294,7 @@ _SPATIAL: dict[str, Callable[[Drawing, Symbol], None]] = {
     "surface": _curve,
     "gear": _shafts,
     "wheel": _shafts,
+    "rolling": _rolling,
     "rope": _rope,
     "none": _nothing,
 }

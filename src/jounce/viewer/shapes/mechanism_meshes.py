@@ -172,8 +172,9 @@ def spatial_meshes(motion: Motion, skeleton: Skeleton, colors: Mapping[str, Colo
         elif symbol.kind == "rope":
             for body, point in zip(symbol.bodies, symbol.points, strict=True):
                 yield body, sphere(1.1 * radius, point), DARK
-        elif symbol.kind in ("gear", "wheel"):
+        elif symbol.kind in ("gear", "wheel", "rolling"):
             yield from _shaft_wheels(symbol, skeleton.size, colors)
+            yield from _rack(motion, symbol, skeleton.size, colors)
         else:
             yield from _spatial_joint(symbol, skeleton.size)
 
@@ -205,6 +206,16 @@ def _shaft_wheels(symbol: Symbol, size: float, colors: Mapping[str, Color]) -> P
         yield body, cylinder(radius, thick, axis, center), colors[body]
         mark = rotation_to(axis) @ np.array([0.5 * radius, 0.0, 0.0])
         yield body, box([0.9 * radius, 0.1 * radius, 1.1 * thick], center + mark, rotation_to(axis)), DARK
+
+
+def _rack(motion: Motion, symbol: Symbol, size: float, colors: Mapping[str, Color]) -> Pieces:
+    """Give the rack on the first body along which a pinion rolls, as long as it travels; nothing of wheels."""
+    if symbol.kind != "rolling":
+        return
+    body, thin = symbol.bodies[0], 0.7 * BAR * size
+    middle, length = _rail(motion, symbol, 0.08 * size)
+    color = GRAY if body == GROUND else colors[body]
+    yield body, box([1.6 * thin, 1.6 * thin, length], middle, rotation_to(symbol.axis_on(0))), color
 
 
 def _spatial_slide(motion: Motion, symbol: Symbol, size: float) -> Pieces:

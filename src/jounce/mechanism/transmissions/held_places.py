@@ -1,0 +1,169 @@
+"""Places and directions that joints hold together: a center that is pinned to several bodies, an axis they turn about.
+
+Where JAX traces values, points and directions are the same that are given by the same numbers or expressions.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, NamedTuple
+
+import jax.numpy as jnp
+import numpy as np
+from jax.core import Tracer
+from jaxtyping import Float
+
+from jounce.constraints.facts import PAIRS, facts_of
+from jounce.errors import JounceError
+from jounce.mechanism.mechanism import Mechanism
+from jounce.mechanism.resolve import resolve
+
+SAME_DIRECTION = 1e-9  # largest sine
+
+
+class BodyVector(NamedTuple):
+    """A point or a direction of a body: its components, and as they were given."""
+
+    body: str
+    value: tuple[Any, ...]
+    given: tuple[Any, ...]
+
+
+class Triad(NamedTuple):
+    """Three directions of a body at right angles, in the rows of a matrix."""
+
+    body: str
+    triad: Float[np.ndarray, "3 3"]
+
+
+Joined = Sequence[tuple[BodyVector, BodyVector]]
+"""Pairs of places that a joint holds together."""
+
+
+def joined_vectors(
+    mechanism: Mechanism, pairs_of: Callable[[Any], Sequence[tuple[str, str]]]
+) -> list[tuple[BodyVector, BodyVector]]:
+    """Return the places that joints hold together, by the pairs of fields that say so."""
+    pairs = []
+    for joint in mechanism.joints.values():
+        for names in pairs_of(joint):
+            try:
+                first, second = (
+                    body_vector(body, getattr(joint, name), mechanism.parameter_values)
+                    for body, name in zip(joint.bodies, names, strict=False)
+                )
+            except JounceError:
+                continue
+            pairs.append((first, second))
+    return pairs
+
+
+def constant_attitudes(mechanism: Mechanism) -> list[tuple[Triad, Triad]]:
+    """Return the bodies that do not turn against each other, by joints that hold two directions of each parallel."""
+    found = []
+    for joint in mechanism.joints.values():
+        pairs = held_parallel(joint)
+        if len(pairs) < 2:
+            continue
+        try:
+            vectors = [
+                [body_vector(body, getattr(joint, pair[slot]), mechanism.parameter_values).value for pair in pairs]
+                for slot, body in enumerate(joint.bodies[:2])
+            ]
+        except JounceError:
+            continue
+        if any(isinstance(x, Tracer) for part in vectors for vector in part for x in vector):
+            continue
+        triads = [_triad(*(np.asarray(vector, float) for vector in part[:2])) for part in vectors]
+        if all(np.isfinite(triad).all() for triad in triads):
+            found.append(tuple(Triad(*pair) for pair in zip(joint.bodies, triads, strict=False)))
+    return found
+
+
+def _triad(axis: Float[np.ndarray, " 3"], normal: Float[np.ndarray, " 3"]) -> Float[np.ndarray, "3 3"]:
+    """Return unit vectors, in rows, along an axis, toward a second direction across it, and across both."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        first = axis / np.linalg.norm(axis)
+        second = normal - (normal @ first) * first
+        second = second / np.linalg.norm(second)
+    return np.stack([first, second, np.cross(first, second)])
+
+
+def pinned(joint: Any) -> list[tuple[str, str]]:
+    """Return the fields of the points that a planar pin holds together; none of other joints."""
+    facts = facts_of(type(joint))
+    return [("point_i", "point_j")] if facts.pair == "revolute" and PAIRS["revolute"] else []
+
+
+def held_parallel(joint: Any) -> Sequence[tuple[str, str]]:
+    """Return the pairs of fields of directions that a joint holds parallel."""
+    return facts_of(type(joint)).held_parallel
+
+
+def body_vector(body: str, given: Any, parameters: Mapping[str, Any]) -> BodyVector:
+    """Return a point or a direction of a body with numbers in the place of parameters."""
+    entries = tuple(given.tolist() if isinstance(given, np.ndarray) else given)
+    return BodyVector(body, tuple(resolve(entry, parameters) for entry in entries), entries)
+
+
+def same_component(a: Any, b: Any, given_a: Any, given_b: Any, near: Callable[[Any, Any], bool]) -> bool:
+    """Tell whether components are the same; what JAX traces is compared as it was given."""
+    if isinstance(a, Tracer) or isinstance(b, Tracer):
+        traced = isinstance(given_a, Tracer) or isinstance(given_b, Tracer)
+        return a is b or (not traced and bool(given_a == given_b))
+    return bool(near(a, b))
+
+
+def parallel(a: BodyVector, b: BodyVector) -> int:
+    """Return 1 for the same direction, -1 for the opposite one, else 0."""
+    if any(isinstance(x, Tracer) for x in (*a.value, *b.value)):
+        pairs = zip(a.value, b.value, a.given, b.given, strict=True)
+        return int(all(same_component(x, y, of_x, of_y, lambda p, q: p == q) for x, y, of_x, of_y in pairs))
+    u, v = (np.asarray(x.value, float) / (np.linalg.norm(x.value) or 1.0) for x in (a, b))
+    return int(np.sign(u @ v)) if np.linalg.norm(np.cross(u, v)) <= SAME_DIRECTION else 0
+
+
+def on_joined_bodies(
+    start: BodyVector,
+    joined: Joined,
+    alike: Callable[[BodyVector, BodyVector], int | bool],
+    fixed: Sequence[tuple[Triad, Triad]] = (),
+) -> dict[str, BodyVector]:
+    """Return where a place is on each body that joints hold to it, one after the other.
+
+    Parameters
+    ----------
+    start : BodyVector
+        The place.
+    joined : sequence of tuple of BodyVector
+        Pairs of places that joints hold together.
+    alike : callable
+        Tells whether two places of a body are the same: 1, or -1 for the opposite direction.
+    fixed : sequence of tuple of Triad, optional
+        Of bodies that do not turn against each other: every direction stays the same.
+    """
+    reached, waiting = {start.body: start}, [start]
+    while waiting:
+        here = waiting.pop(0)
+        for pair in joined:
+            for near, far in (pair, pair[::-1]):
+                if near.body != here.body or far.body in reached:
+                    continue
+                if sign := int(alike(here, near)):
+                    there = far if sign > 0 else BodyVector(far.body, tuple(-x for x in far.value), far.given)
+                    reached[far.body] = there
+                    waiting.append(there)
+        for first, second in () if any(isinstance(x, Tracer) for x in here.value) else fixed:
+            for near, far in ((first, second), (second, first)):
+                if near.body == here.body and far.body not in reached:
+                    there = far.triad.T @ (near.triad @ np.asarray(here.value, float))
+                    reached[far.body] = BodyVector(far.body, tuple(there.tolist()), tuple(there.tolist()))
+                    waiting.append(reached[far.body])
+    return reached
+
+
+def as_array(value: tuple[Any, ...]) -> Any:
+    """Return components as an array, of JAX where it traces one of them."""
+    return (
+        jnp.stack([jnp.asarray(x, float) for x in value])
+        if any(isinstance(x, Tracer) for x in value)
+        else np.array(value, float)
+    )
