@@ -119,9 +119,9 @@ class Rolling(AbstractConstraint, type="rolling", space="spatial"):
         rolled = wrap(travel - self.radius * turn - self.offset, 2 * jnp.pi * self.radius)
         if self.flank is None or self.pressure_angle is None:
             return rolled
-        beside = cross(self.vector_i, self.axis_i)
-        beyond = slide(body_i, body_j, self.point_i, self.point_j, beside) - self.radius
-        return rolled - self.flank * jnp.tan(self.pressure_angle) * beyond
+        across = cross(self.vector_i, self.axis_i)
+        clearance = slide(body_i, body_j, self.point_i, self.point_j, across) - self.radius
+        return rolled - self.flank * jnp.tan(self.pressure_angle) * clearance
 
 
 def _frame_of(axis: Vectors, normal: Vectors) -> tuple[Any, Any]:

@@ -263,10 +263,10 @@ def _check_racks(racks: Mapping[str, spatial.Rolling], mechanism: Mechanism) -> 
                 "its attitude, by joints that have the axes, such as a revolute and a prismatic joint to one body"
             )
             if there is not None:
-                found = ", ".join(f"{float(x):.6g}" for x in there.value)
+                components = ", ".join(f"{float(x):.6g}" for x in there.value)
                 message = (
-                    f"by the joints between them, the axis of the pinion is [{found}] on the rack: give that one, or "
-                    "the opposite on both bodies"
+                    f"by the joints between them, the axis of the pinion is [{components}] on the rack: give that "
+                    "one, or the opposite on both bodies"
                 )
             raise MechanismError(message, name=f"{name}.axes", value=[float(x) for x in u])
 

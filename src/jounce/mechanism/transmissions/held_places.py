@@ -58,7 +58,7 @@ def joined_vectors(
 
 def constant_attitudes(mechanism: Mechanism) -> list[tuple[Triad, Triad]]:
     """Return the bodies that do not turn against each other, by joints that hold two directions of each parallel."""
-    found = []
+    attitude_pairs = []
     for joint in mechanism.joints.values():
         pairs = held_parallel(joint)
         if len(pairs) < 2:
@@ -74,8 +74,8 @@ def constant_attitudes(mechanism: Mechanism) -> list[tuple[Triad, Triad]]:
             continue
         triads = [_triad(*(np.asarray(vector, float) for vector in part[:2])) for part in vectors]
         if all(np.isfinite(triad).all() for triad in triads):
-            found.append(tuple(Triad(*pair) for pair in zip(joint.bodies, triads, strict=False)))
-    return found
+            attitude_pairs.append(tuple(Triad(*pair) for pair in zip(joint.bodies, triads, strict=False)))
+    return attitude_pairs
 
 
 def _triad(axis: Float[np.ndarray, " 3"], normal: Float[np.ndarray, " 3"]) -> Float[np.ndarray, "3 3"]:
