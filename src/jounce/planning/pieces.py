@@ -11,11 +11,11 @@ class JoinedPieces(SplineMotion):
     Parameters
     ----------
     begins : array_like of shape (pieces,)
-        Where they begin, increasing.
+        Begins of the pieces, increasing.
     powers : array_like of shape (powers, pieces)
-        Coefficients, lowest power first, of what the argument exceeds the beginning by.
+        Coefficients, lowest power first, of the argument less the begin of its piece.
     stop : float
-        Where the last one ends.
+        End of the last piece.
     """
 
     def __init__(self, begins: np.ndarray, powers: np.ndarray, stop: float):
@@ -23,12 +23,12 @@ class JoinedPieces(SplineMotion):
 
 
 class SmoothPieces(JoinedPieces):
-    """Polynomials of a spline, of which all derivatives below its degree are continuous."""
+    """Polynomials of a spline with all derivatives below its degree continuous."""
 
     def __init__(self, begins: np.ndarray, powers: np.ndarray, stop: float):
         super().__init__(begins, powers, stop)
 
     @property
     def joined(self) -> int:
-        """Up to which derivative its pieces are known to meet smoothly."""
+        """Highest derivative that is known to be continuous where pieces meet."""
         return self.degree - 1

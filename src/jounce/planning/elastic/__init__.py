@@ -1,1 +1,1 @@
-"""Motors behind springs: what they must do for a wanted motion, and what the links do under it."""
+"""Motors behind springs: the motion of motors for a required motion of links, and the motion of links under torques."""

@@ -1,4 +1,4 @@
-"""What drives move, in one form for robots and mechanisms: coordinates, and the forces that ask for them."""
+"""Driven systems, robots and mechanisms in one form: coordinates, and the forces that they need."""
 
 import abc
 import dataclasses
@@ -28,10 +28,10 @@ from jounce.robot.recursions.drive_forces import passive_forces
 from jounce.robot.robot import Robot
 from jounce.trajectory.joint_trajectory import JointTrajectory
 
-BLOCK = 2048  # instants at once, always as many, so that all is compiled once
+BLOCK = 2048  # instants at once, always the same number, so that programs are compiled once
 
 Moved = tuple[Float[np.ndarray, "time level joint"], Float[np.ndarray, "time level joint"]]
-"""Coordinates and the forces on the links that they need, with their derivatives; of both the same number."""
+"""Coordinates and the forces on the links that they need, with their derivatives, the same number of both."""
 
 
 class DrivenSystem(abc.ABC):
@@ -129,7 +129,7 @@ def _passive(tree: Tree, arrays: tuple[Numbers], _: object) -> Numbers:
 
 
 def _lossless(robot: Robot) -> Robot:
-    """Return a robot whose springs alone are left of its drives."""
+    """Return a robot whose drives have springs only, without losses."""
     joints = [dataclasses.replace(joint, damping=0.0, friction=0.0) for joint in robot.joints.values()]
     couplings = [dataclasses.replace(x, damping=0.0, friction=0.0) for x in robot.couplings.values()]
     return robot.changed(joints=joints, couplings=couplings)
@@ -153,14 +153,14 @@ class DrivenMechanism(DrivenSystem):
     def moved(self, times: Float[np.ndarray, " time"], levels: int) -> Moved:
         """Return coordinates and forces of the drivers; the motion is followed from its start each time."""
         known = _filled_up(np.union1d(self.instants, times))
-        asked = np.searchsorted(known, times)
+        indices = np.searchsorted(known, times)
         motion = solve(self.mechanism, known, order=levels + 1)
         each = [(motion.driver(name), driver_force(motion, name)) for name in self.arrays.names]
         for name, (_, force) in zip(self.arrays.names, each, strict=True):
             if not np.isfinite(force.values).all():
                 message = f"its force is not determined: {force.attrs.get('comment', 'it is not finite')}"
                 raise MechanismError(message, name=f"drivers.{name}")
-        q, force = (np.stack([pair[k].values[asked, :levels] for pair in each], axis=-1) for k in (0, 1))
+        q, force = (np.stack([pair[k].values[indices, :levels] for pair in each], axis=-1) for k in (0, 1))
         return q, force
 
 

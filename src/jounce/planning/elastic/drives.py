@@ -28,7 +28,7 @@ class Drive:
     stiffness : float, optional
         Of the spring; the joint is rigid unless given.
     damping : float, default 0
-        Beside the spring.
+        Of a damper parallel to the spring.
     rotor_inertia : float, optional
         Of the motor about its own axis, kg m^2, or its mass, kg, where it slides. The armature of the joint in the
         robot file unless given: that is the same seen at the joint.
@@ -99,7 +99,7 @@ class Drive:
 
     @property
     def time_constant(self) -> float:
-        """Damping over stiffness, s: how fast a deflection that the torque does not ask for fades; 0 undamped."""
+        """Damping over stiffness, s, the time constant with which a free deflection decays; 0 undamped."""
         return 0.0 if self.stiffness is None else self.damping / self.stiffness
 
 

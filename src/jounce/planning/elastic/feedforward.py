@@ -66,9 +66,9 @@ def feedforward(
 
     With q of the links, the torque tau that they need and theta of a motor, seen at the joint:
     ``K (theta - q) + D (theta' - q') = tau`` and ``B theta'' + tau = u``. Undamped, ``theta = q + tau / K``, so that
-    the motor torque u needs the fourth derivative of q. Rotors turn about their own axes alone (Spong 1987): what their
-    gyroscopic torques and the motion of the links that carry them add is left out. With damping the deflection is
-    solved for along the trajectory, see `jounce.planning.SpringDeflection`.
+    the motor torque u needs the fourth derivative of q. Rotors have only the spin about their own axes (Spong 1987):
+    their gyroscopic torques, and the effect of the motion of the links that carry them, are left out. With damping, the
+    deflection is integrated along the trajectory, see `jounce.planning.SpringDeflection`.
 
     Parameters
     ----------
@@ -77,19 +77,19 @@ def feedforward(
         motor prescribes one end of a spring in the place of the driver.
     motion : JointTrajectory, or array_like of shape (..., order + 1, n)
         Of a robot. Joints that a trajectory does not name stand still at zero, or at the end of their range that is
-        nearest to it. Derivatives ``q, q', q'', ...`` alone, to the order 4 + rates or more, do without instants: with
-        damping the regular expansion in the time constant D / K is then all that is known. Of a mechanism, the instants
-        to look at, those of its file unless given.
+        nearest to it. Derivatives ``q, q', q'', ...``, to the order 4 + rates or more, need no instants: with damping,
+        the deflection is then the regular expansion in the time constant D / K. Of a mechanism, the instants of the
+        results, those of its file unless given.
     drives : dict of str to Drive
-        By names of joints or drivers; what is not named is rigid.
+        By names of joints or drivers; all others are rigid.
     rates : int, default 0
-        How many rates of the motor torques are wanted.
+        Number of rates of the motor torques.
     times : array_like of shape (time,), optional
-        Instants to look at, s; those of the trajectory unless given.
+        Instants of the results, s; those of the trajectory unless given.
     losses : bool, default True
         Whether damping and friction of the robot file count: damping on the links, Coulomb friction on the motors.
     tolerance : float, default 1e-6
-        With damping and derivatives alone: largest last term of the expansion, as part of the deflection, and likewise
+        With damping, for given derivatives: largest last term of the expansion, as part of the deflection, and likewise
         of its derivatives.
 
     Returns

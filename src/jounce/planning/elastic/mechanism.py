@@ -30,14 +30,14 @@ from jounce.trajectory import AbstractMotion
 
 
 class _DriveSpring(AbstractForce):
-    """Spring and damper between what a driver prescribes, of the first two bodies, and the place of a rotor."""
+    """Spring and damper between the coordinate of a driver, of the first two bodies, and the position of a rotor."""
 
     stiffness: Scalar
     damping: Scalar
-    across: Vector  # direction in which the rotor slides
+    across: Vector  # direction of the slide of the rotor
 
     body_count = 3
-    prescribed: ClassVar[Callable[..., Any]]  # what the driver prescribes, from the first two bodies
+    prescribed: ClassVar[Callable[..., Any]]  # the coordinate that the driver prescribes, of the first two bodies
 
     def displacement(self, body_i: Any, body_j: Any, rotor: Any, time: Any) -> Any:
         coordinate = sum(rotor.position[k] * self.across[k] for k in range(len(self.across)))
@@ -159,7 +159,7 @@ def _elastic(
 
 
 def _of_driver(output: Any, drivers: Mapping[str, Any], names: tuple[str, ...]) -> bool:
-    """Tell whether an output is of a driver that a spring has taken the place of."""
+    """Return whether an output belongs to a driver that a spring replaces."""
     owners = {getattr(output, field, None) for field in ("driver", "joint")}
     return any(name in names and name not in drivers for name in owners)
 

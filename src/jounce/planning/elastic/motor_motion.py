@@ -169,7 +169,7 @@ class Feedforward(MotorMotion, Displayed):
 
     @cached_property
     def report(self) -> DriveReport:
-        """Deflections, motor velocities and motor torques at their worst instants, beside their limits."""
+        """Deflections, motor velocities and motor torques at their worst instants, with their limits."""
         grid = self.system.instants
         steps = max(1, -(-INSTANTS // (len(grid) - 1)))
         between = grid[:-1, None] + np.diff(grid)[:, None] * (np.arange(steps) / steps)
@@ -263,7 +263,7 @@ class Feedforward(MotorMotion, Displayed):
 
 
 class _Bounds:
-    """Limits of the same size to both sides, as `worst_instants` asks for them."""
+    """Limits of the same size to both sides, in the form for `worst_instants`."""
 
     def __init__(self, limits: Float[np.ndarray, "3 joint"]):
         self.limits = np.where(np.isnan(limits), 1.0, limits)

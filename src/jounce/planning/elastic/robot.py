@@ -84,8 +84,7 @@ def elastic_robot(robot: Robot, drives: Mapping[str, Drive], *, losses: bool = T
         kind = "continuous" if arrays.turning[k] else "prismatic"
         armature, rubbing = float(arrays.inertia[k]), float(arrays.friction[k]) if rubs else 0.0
         joints.append(Joint(name, robot.base, name, kind, armature=armature, friction=rubbing))
-    kept = {"damping": None if losses else 0.0, "friction": None if rubs else 0.0}
-    changes = {key: value for key, value in kept.items() if value is not None}
+    changes = {key: 0.0 for key, counts in {"damping": losses, "friction": rubs}.items() if not counts}
     couplings = [dataclasses.replace(x, **changes) for x in robot.couplings.values()]
     return Robot(robot.name, links, joints, robot.gravity, strict=False, couplings=couplings)
 

@@ -57,7 +57,7 @@ def simulate_elastic(
 ) -> RobotSimulation | Simulation:
     """Return the motion of a robot or mechanism with elastic drives under torques of its motors.
 
-    The model is that of `feedforward`: each rotor turns about its own axis alone, and pushes what it moves through a
+    The model is that of `feedforward`: each rotor has only the spin about its own axis, and drives its link through a
     spring and a damper.
 
     Parameters
@@ -81,7 +81,8 @@ def simulate_elastic(
     losses : bool, default True
         Whether damping and friction of the robot file count, as in `feedforward`.
     friction : bool, default True
-        Whether Coulomb friction does; a motor that turns back sticks, where torques of time alone take it through zero.
+        Whether Coulomb friction counts; a motor that turns back sticks where torques that depend only on time take it
+        through zero.
     **options
         As of `simulate`: method, tolerance, events, longest_step, strict, progress.
 

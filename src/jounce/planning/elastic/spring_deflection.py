@@ -37,8 +37,7 @@ class SpringDeflection:
     stiffness, time_constant : array of shape (joints,)
         Of the springs.
     nodes : array of shape (nodes,)
-        Increasing instants from the start to the stop, s, to begin with: those of knots, and those that will be asked
-        for.
+        First nodes: increasing instants from the start to the stop, s, among them knots and the instants of results.
     names : tuple of str
         Of the joints, for messages.
 

@@ -16,10 +16,10 @@ from jounce.trajectory import ExpressionMotion, FollowingMotion, PiecewiseMotion
 
 FIELDS = ("velocity", "acceleration", "jerk")
 MET = 4  # positions to jerk of the path, where it is joined
-SHARES = (0.05, 0.1, 0.2, 0.4, 0.8)  # of the path, at which it may be joined
-ROUNDING = 1e-6  # of a limit, or of a rate: what noise of rounding makes of a state
-ALONG = 1e-5  # of a state: what is less beside a path is on it
-STILL = 1e-9  # of a limit: what is less stands still
+SHARES = (0.05, 0.1, 0.2, 0.4, 0.8)  # of the path before the point where it may be joined
+ROUNDING = 1e-6  # of a limit, or of a rate: rounding of a state
+ALONG = 1e-5  # of a state: a smaller deviation from a path is on it
+STILL = 1e-9  # of a limit: a smaller speed stands still
 LOOKS = 401
 STEADY = "at + rate*(t - begin)"
 
@@ -27,7 +27,7 @@ State = Float[np.ndarray, "_ joint"]  # position, velocity, ...
 
 
 def clean_state(given: ArrayLike, names: Sequence[str], limits: dict[str, Limits]) -> State:
-    """Return the state of a running robot without what is but rounding: below a billionth of a limit, or just above it.
+    """Return the state of a running robot without rounding errors: below a billionth of a limit, or just above one.
 
     Parameters
     ----------
@@ -62,7 +62,7 @@ def clean_state(given: ArrayLike, names: Sequence[str], limits: dict[str, Limits
             elif value > limit * (1 - 2 * ROUNDING):  # a search needs a little to spare
                 state[level, joint] *= (1 - 2 * ROUNDING) * limit / value
     if not state[1].any() and state[2:].any():
-        message = "has accelerations or jerks at rest, as where a motion begins or turns; take an instant beside it"
+        message = "has accelerations or jerks at rest, as where a motion begins or turns; take a neighboring instant"
         raise TrajectoryError(message, name="state", value=state[2:].tolist())
     return state
 
@@ -84,7 +84,7 @@ def rates_along(path: Path, state: State) -> tuple[float, ...] | None:
 
 
 def _following(p: np.ndarray, rates: Sequence[float], level: int) -> Float[np.ndarray, " joint"]:
-    """Return what curvature adds to the derivative of a level, but for that of s itself."""
+    """Return the contribution of curvature to the derivative of a level, without that of s itself."""
     if level == 2:
         return p[2] * rates[0] ** 2
     if level == 3:
@@ -98,11 +98,11 @@ def joined(path: Path, state: State, share: float) -> Path:
     Parameters
     ----------
     path : Path
-        To be joined.
+        The path to join.
     state : array of shape (derivative, joint)
-        Positions, velocities, ...; at rest the path begins straight toward the place at which it joins the other.
+        Positions, velocities, ...; at rest the path begins straight toward the point at which it joins the other.
     share : float
-        Of the parameter of the path that is left out.
+        Part of the parameter of the path that is left out.
     """
     at = path.start + share * (path.stop - path.start)
     p = path.derivatives(np.array([at]), MET - 1)[0]
@@ -126,15 +126,15 @@ def joined(path: Path, state: State, share: float) -> Path:
     own = whole.derivatives(np.linspace(0.0, duration, LOOKS), 0)[:, 0]
     there = path.derivatives(np.linspace(path.start, path.stop, LOOKS), 0)[:, 0]
     away = float(np.sqrt(((own[:, None] - there) ** 2).sum(axis=2)).min(axis=1).max())
-    words = f"from the running state onto the path, joined at s = {at:.6g}, at most {away:.2g} rad or m beside it"
+    words = f"from the running state onto the path, joined at s = {at:.6g}, at most {away:.2g} rad or m away from it"
     return dataclasses.replace(whole, deviation=path.deviation, allowed=path.allowed, words=words)
 
 
 def _between(begins: State, ends: State, duration: float) -> Float[np.ndarray, "power joint"]:
     """Return the coefficients, lowest power first, of a polynomial with some derivatives at its two ends."""
     count = len(begins) + len(ends)
-    places = [(0.0, level) for level in range(len(begins))] + [(1.0, level) for level in range(len(ends))]
-    rows = [[perm(k, level) * at ** max(k - level, 0) for k in range(count)] for at, level in places]
+    conditions = [(0.0, level) for level in range(len(begins))] + [(1.0, level) for level in range(len(ends))]
+    rows = [[perm(k, level) * at ** max(k - level, 0) for k in range(count)] for at, level in conditions]
     scale = duration ** np.arange(count)
     right = np.concatenate([begins * scale[: len(begins), None], ends * scale[: len(ends), None]])
     return np.linalg.solve(np.array(rows), right) / scale[:, None]

@@ -22,7 +22,7 @@ from jounce.trajectory.law_checks.seen_jumps import level_sizes, unexplained
 from jounce.trajectory.splines import HIGHEST_DEGREE
 
 DEGREE = 5  # of the splines through waypoints
-KINK_CELLS = 2000  # cells in which kinks are looked for
+KINK_CELLS = 2000  # cells of the search for kinks
 CELLS = (160, 320, 640, 1280)  # of the spline of a time law
 POINTS_IN_CELL = 4
 FINEST = 4 * POINTS_IN_CELL * CELLS[-1]  # places at which a path is looked at

@@ -101,7 +101,7 @@ def path_of_samples(
 
 
 def _are_few(trajectory: JointTrajectory) -> bool:
-    """Tell whether samples are points to be led by rather than a log of a motion."""
+    """Return whether samples are a few points that guide a path rather than a log of a motion."""
     counts = [len(own[0]) for law in trajectory.laws.values() if (own := sampled(law)) is not None]
     return min(counts) < FEWEST
 

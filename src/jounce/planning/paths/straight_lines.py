@@ -23,8 +23,8 @@ from jounce.trajectory.splines import local_powers
 DEGREE = 5
 LEAST, MOST = 32, 8192  # pieces
 LOOKS = 8  # in each piece
-GRADED = 2.5  # ratio of the lengths of pieces beside each other, at most
-TOGETHER = 0.25  # of the deviation: how far lines may be from the many that they take the place of
+GRADED = 2.5  # largest ratio of the lengths of neighboring pieces
+TOGETHER = 0.25  # of the deviation: largest distance of lines from the many that they replace
 ADJACENT = 2  # lines before and after one, among which the nearest is sought
 
 _Points = Float[np.ndarray, "point joint"]
@@ -133,14 +133,14 @@ def _off(points: _Points, near: float) -> float:
 
 
 def rounded(lines: Lines, deviation: float, *, timed: bool = False) -> Path:
-    """Return a path within a deviation of straight lines, of which four derivatives are continuous.
+    """Return a path with four continuous derivatives within a deviation of straight lines.
 
     Parameters
     ----------
     lines : Lines
-        Which the path is to follow from the first to the last point.
+        Lines that the path follows from the first to the last point.
     deviation : float
-        How far from the lines it may be, rad or m.
+        Largest distance from the lines, rad or m.
     timed : bool, default False
         Whether it runs over the instants of the points, and is near them at each; it then stands still where they do.
         Otherwise it runs from 0 to 1, over about the length of the lines.
@@ -198,7 +198,7 @@ def _on(at: np.ndarray, knots: np.ndarray, points: _Points) -> Float[np.ndarray,
 
 
 def _graded(begins: np.ndarray) -> np.ndarray:
-    """Halve pieces that are much longer than one beside them."""
+    """Halve pieces that are much longer than a neighbor."""
     while True:
         lengths = np.diff(begins)
         adjacent = np.minimum(np.append(lengths[1:], np.inf), np.append(np.inf, lengths[:-1]))

@@ -1,9 +1,9 @@
-"""Where a trajectory leads: its path over a parameter in which it turns back, and stops at corners, smoothly.
+"""The path of a trajectory over a parameter with which it turns back, and stops at corners, smoothly.
 
 The length of the path is a parameter that does not depend on the times of the trajectory, but at a turning point the
-positions have a tip over it. Near a turning point the length is therefore a square of the parameter, near a corner at
+positions have a cusp over it. Near a turning point the length is therefore a square of the parameter, near a corner at
 which the trajectory stands still a higher power: the positions are smooth over that parameter, and a motion whose
-parameter goes on there stops exactly as long as it has to.
+parameter continues there stops exactly as long as it has to.
 """
 
 import dataclasses
@@ -22,13 +22,13 @@ from jounce.trajectory import AbstractMotion, FollowingMotion, JointTrajectory, 
 REST_SPEED = 1e-3  # of the largest speed: a trajectory that is slower than this at its ends stands still there
 RESTING = 1e-5  # of the largest speed: what is slower within stands still
 SLOW = 0.2  # of the largest speed: where the lowest speed is sought closely
-INTERVALS = 4000  # intervals in which a trajectory is looked at to begin with
+INTERVALS = 4000  # intervals of the first look at a trajectory
 ZOOM, ZOOMS = 9, 20  # instants about each lowest speed, and how often they are laid closer
 NODES = (250, 500, 1000, 2000)  # of the splines along the whole path; more where fewer do not come near
 PART = 24  # of them at least between two stops
-NEAR = 1e-9  # of the length: as near as the splines are to come
-GAIN = 8.0  # by which twice the nodes have to come nearer, or they are not worth it
-AWAY = 1e-7  # of the length: how far from a stop its directions are taken
+NEAR = 1e-9  # of the length: target error of the splines
+GAIN = 8.0  # least reduction of the error by twice the nodes
+AWAY = 1e-7  # of the length: distance from a stop at which its directions are taken
 BEND = 2e-3  # rad: a smaller change of direction at a stop is none
 BACK = 0.05  # rad: so near to half a turn it is a reversal
 WIDEST = 0.1  # of the length: how far a power reaches on each side of a stop
@@ -36,7 +36,7 @@ FLAT = 4  # derivatives to which a power joins the length
 DEGREE = 5
 TURNING = 1e-2  # of the largest acceleration: more at a rest turns a trajectory smoothly
 NEWTON = 12  # steps
-HALVINGS = 60  # of the interval in which a trajectory leaves a stop
+HALVINGS = 60  # of the interval that contains the end of a stop
 GAUSS_NODES, WEIGHTS = np.polynomial.legendre.leggauss(6)
 
 
@@ -139,7 +139,7 @@ def path_of_trajectory(trajectory: JointTrajectory, order: int) -> Path:
 
 
 def turns_back_within(trajectory: JointTrajectory, size: float) -> bool:
-    """Tell whether a trajectory turns back, or stops at a corner, twice within a way that is shorter than a size."""
+    """Return whether a trajectory turns back, or stops at a corner, twice within a path shorter than a size."""
     path = Path(dict(trajectory.laws), trajectory.start, trajectory.stop)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", SampleWarning)

@@ -9,14 +9,14 @@ import numpy as np
 from jaxtyping import Float
 
 DEGREE, PENALIZED = 7, 4
-"""Of the splines, and which derivative of them is to be small: jounce; natural splines for it have this degree."""
+"""Degree of the splines, that of natural splines for jounce, and the order of the derivative to keep small: jounce."""
 PART = 50_000
 """Samples or cells whose splines are evaluated at once."""
 _Knots = Float[np.ndarray, " knot"]
 
 
 def whole(knots: _Knots) -> Float[np.ndarray, " repeated"]:
-    """Return knots with those at the ends as often as B-splines ask for."""
+    """Return knots with those at the ends repeated, as B-splines need them."""
     return np.concatenate([np.full(DEGREE, knots[0]), knots, np.full(DEGREE, knots[-1])])
 
 
@@ -33,9 +33,9 @@ def penalty_root(repeated: _Knots, weights: Float[np.ndarray, " cell"]) -> Any:
     Parameters
     ----------
     repeated : array of shape (cell + 1 + 2 * degree,)
-        Not decreasing: the ends of the cells, and as many knots before and after them as splines there ask for.
+        Not decreasing: the ends of the cells, and the knots before and after them that splines there need.
     weights : array of shape (cell,)
-        Of each cell.
+        Weight of each cell.
     """
     from scipy import sparse
     from scipy.interpolate import BSpline
@@ -56,7 +56,7 @@ def penalty_root(repeated: _Knots, weights: Float[np.ndarray, " cell"]) -> Any:
 
 
 def parts_of(count: int) -> Iterator[slice]:
-    """Yield parts of many samples or cells, so that what is made of each needs little memory."""
+    """Yield parts of many samples or cells, so that matrices of each part need little memory."""
     for first in range(0, count, PART):
         yield slice(first, min(first + PART, count))
 
@@ -97,9 +97,9 @@ def cost(
 
 
 def banded(matrix: Any) -> Float[np.ndarray, "diagonal spline"]:
-    """Return the upper diagonals of a symmetric sparse matrix, as SciPy's banded solvers take them."""
-    found = np.zeros((DEGREE + 1, matrix.shape[0]))
+    """Return the upper diagonals of a symmetric sparse matrix, in the form of SciPy's banded solvers."""
+    bands = np.zeros((DEGREE + 1, matrix.shape[0]))
     for k in range(DEGREE + 1):
         if k < matrix.shape[0]:
-            found[DEGREE - k, k:] = matrix.diagonal(k)
-    return found
+            bands[DEGREE - k, k:] = matrix.diagonal(k)
+    return bands

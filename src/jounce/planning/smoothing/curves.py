@@ -17,19 +17,19 @@ from jounce.planning.smoothing.dwells import Dwell
 from jounce.planning.smoothing.weights import Stretch
 
 CELL = np.pi / 4  # length of a cell times the cutoff frequency
-GRADED = 1.6  # ratio of the lengths of cells beside each other
+GRADED = 1.6  # ratio of the lengths of neighboring cells
 FEWEST = 8  # cells of a time between dwells
-INSIDE = 1 - 1e-6  # of the deviation: what a solver leaves
+INSIDE = 1 - 1e-6  # of the deviation, less the tolerance of the solver
 ROUNDS, HALVINGS = 12, 12
-LOOKS = 8  # at the density of knots in a stretch
+LOOKS = 8  # at the density of knots in an interval
 HALVED = 3  # cells on each side of one that is halved
-PADDING = 24  # splines beside those at samples that are too far, which move with them
+PADDING = 24  # neighboring splines that move with those at samples that are too far
 TOGETHER = 400  # splines that are moved at once, about
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Curve:
-    """A spline, as it is found.
+    """The spline of one joint.
 
     Parameters
     ----------
@@ -58,21 +58,21 @@ def smoothed_curve(
     times: Float[np.ndarray, " sample"],
     values: Float[np.ndarray, " sample"],
     deviation: float,
-    stretches: Sequence[Stretch],
+    estimates: Sequence[Stretch],
     dwells: Sequence[Dwell],
 ) -> Curve:
-    """Return the spline that is within a deviation of every sample, and otherwise as smooth as samples say.
+    """Return the spline within a deviation of every sample that is as smooth as the estimated weights require.
 
     Raises
     ------
     SolveError
-        If none is: the value is the instant.
+        If there is none: the value is the instant.
     """
-    knots = laid_knots(times, stretches, dwells)
+    knots = laid_knots(times, estimates, dwells)
     far = np.zeros(1, int)
     for _ in range(HALVINGS):
         try:
-            return _on_knots(times, values, deviation, knots, stretches, dwells)
+            return _on_knots(times, values, deviation, knots, estimates, dwells)
         except TooFarError as reason:
             far = reason.samples
             knots = _halved(knots, times, far)
@@ -81,15 +81,15 @@ def smoothed_curve(
 
 
 def laid_knots(
-    times: Float[np.ndarray, " sample"], stretches: Sequence[Stretch], dwells: Sequence[Dwell]
+    times: Float[np.ndarray, " sample"], estimates: Sequence[Stretch], dwells: Sequence[Dwell]
 ) -> Float[np.ndarray, " knot"]:
-    """Return knots as near one another as what is followed asks for, among them the ends of dwells."""
+    """Return knots, among them the ends of dwells, with distances by the cutoff frequency."""
     ends = [times[0], *(t for d in dwells for t in (times[d.first], times[d.last])), times[-1]]
     ends = np.unique(ends)
-    at = np.array([(s.start + s.stop) / 2 for s in stretches])
-    logarithms = np.log(CELL / np.array([s.cutoff for s in stretches]))
+    at = np.array([(s.start + s.stop) / 2 for s in estimates])
+    logarithms = np.log(CELL / np.array([s.cutoff for s in estimates]))
     shortest = float(np.median(np.diff(times)))
-    least = min(s.stop - s.start for s in stretches) / LOOKS
+    least = min(s.stop - s.start for s in estimates) / LOOKS
     still = {(float(times[d.first]), float(times[d.last])) for d in dwells}
     parts = []
     for a, b in itertools.pairwise(ends):
@@ -111,8 +111,8 @@ def _halved(
     """Return knots twice as near one another about samples, but no nearer than half of the time between samples."""
     cells = np.clip(np.searchsorted(knots, times[samples], side="right") - 1, 0, len(knots) - 2)
     near = np.zeros(len(knots) - 1, bool)
-    for beside in range(-HALVED, HALVED + 1):
-        near[np.clip(cells + beside, 0, len(near) - 1)] = True
+    for offset in range(-HALVED, HALVED + 1):
+        near[np.clip(cells + offset, 0, len(near) - 1)] = True
     near &= np.diff(knots) > np.median(np.diff(times)) / 2
     return np.sort(np.append(knots, ((knots[:-1] + knots[1:]) / 2)[near]))
 
@@ -122,40 +122,40 @@ def _on_knots(
     values: np.ndarray,
     deviation: float,
     knots: np.ndarray,
-    stretches: Sequence[Stretch],
+    estimates: Sequence[Stretch],
     dwells: Sequence[Dwell],
 ) -> Curve:
     scale = float(np.median(np.diff(knots)))
     local = (knots - knots[0]) / scale
     instants = np.clip((times - knots[0]) / scale, 0.0, local[-1])
     middles = (knots[:-1] + knots[1:]) / 2
-    at = np.array([(s.start + s.stop) / 2 for s in stretches])
-    weights = np.exp(np.interp(middles, at, np.log([s.weight for s in stretches]))) / scale**DEGREE
+    at = np.array([(s.start + s.stop) / 2 for s in estimates])
+    weights = np.exp(np.interp(middles, at, np.log([s.weight for s in estimates]))) / scale**DEGREE
     middle = float(values.mean())
     system, right = cost(instants, values - middle, local, weights)
-    found, free = np.zeros(len(right)), np.ones(len(right), bool)
+    coefficients, free = np.zeros(len(right)), np.ones(len(right), bool)
     for dwell in dwells:
         first = int(np.searchsorted(knots, times[dwell.first]))
         last = int(np.searchsorted(knots, times[dwell.last]))
         own = slice(first, last + DEGREE)
-        found[own], free[own] = dwell.position - middle, False
+        coefficients[own], free[own] = dwell.position - middle, False
     for run in _runs(free):
-        found[run] = _solved(system, right, found, run)
+        coefficients[run] = _solved(system, right, coefficients, run)
     problem = _Problem(instants, values - middle, local, system, right, deviation)
-    return Curve(knots, problem.within(found, free) + middle, problem.away)
+    return Curve(knots, problem.within(coefficients, free) + middle, problem.away)
 
 
 def _runs(chosen: Bool[np.ndarray, " spline"]) -> list[slice]:
-    """Return stretches of splines that are chosen."""
+    """Return the runs of chosen splines."""
     edges = np.flatnonzero(np.diff(np.concatenate([[0], chosen.astype(int), [0]])))
     return [slice(int(a), int(b)) for a, b in edges.reshape(-1, 2)]
 
 
-def _solved(system: Any, right: np.ndarray, found: np.ndarray, run: slice) -> Float[np.ndarray, " spline"]:
-    """Return coefficients of a run that minimize the cost, those beside it being what they are."""
+def _solved(system: Any, right: np.ndarray, coefficients: np.ndarray, run: slice) -> Float[np.ndarray, " spline"]:
+    """Return the coefficients of a run that minimize the cost, with all others fixed."""
     from scipy.linalg import solveh_banded
 
-    fixed = found.copy()
+    fixed = coefficients.copy()
     fixed[run] = 0.0
     target = right[run] - system[run] @ fixed
     bands = banded(system[run, run])
@@ -165,7 +165,7 @@ def _solved(system: Any, right: np.ndarray, found: np.ndarray, run: slice) -> Fl
 
 @dataclasses.dataclass
 class _Problem:
-    """The least cost within a deviation of the samples: only where that is not kept already."""
+    """The problem of the least cost within a deviation of the samples, solved only where the spline exceeds it."""
 
     times: np.ndarray
     values: np.ndarray
@@ -175,13 +175,13 @@ class _Problem:
     deviation: float
     away: float = 0.0
 
-    def within(self, found: np.ndarray, free: np.ndarray) -> Float[np.ndarray, " spline"]:
+    def within(self, coefficients: np.ndarray, free: np.ndarray) -> Float[np.ndarray, " spline"]:
         """Return coefficients within the deviation."""
         for _ in range(ROUNDS):
-            far = self._far(found)
+            far = self._far(coefficients)
             if not len(far):
-                return found
-            moved = np.zeros(len(found), bool)
+                return coefficients
+            moved = np.zeros(len(coefficients), bool)
             for cell in np.unique(self._cells(far)):
                 moved[max(cell - PADDING, 0) : cell + DEGREE + 1 + PADDING] = True
             moved &= free
@@ -189,32 +189,32 @@ class _Problem:
                 raise TooFarError(far)
             for run in _runs(moved):
                 for part in _parts(run):
-                    self._move(found, part)
-        raise TooFarError(self._far(found))
+                    self._move(coefficients, part)
+        raise TooFarError(self._far(coefficients))
 
     def _cells(self, samples: Int[np.ndarray, " some"]) -> Int[np.ndarray, " some"]:
-        """Return the cells of samples: the first of the splines that reach each."""
+        """Return the cells of samples, which are also the first splines that are not zero there."""
         return np.clip(np.searchsorted(self.knots, self.times[samples], side="right") - 1, 0, len(self.knots) - 2)
 
-    def _far(self, found: np.ndarray) -> Int[np.ndarray, " far"]:
-        """Return the samples that are farther away than the deviation, and note how far the farthest is."""
+    def _far(self, coefficients: np.ndarray) -> Int[np.ndarray, " far"]:
+        """Return the samples that are farther away than the deviation, and store the largest distance."""
         from scipy.interpolate import BSpline
 
-        spline, far, self.away = BSpline(whole(self.knots), found, DEGREE), [np.zeros(0, int)], 0.0
+        spline, far, self.away = BSpline(whole(self.knots), coefficients, DEGREE), [np.zeros(0, int)], 0.0
         for some in parts_of(len(self.times)):
-            apart = np.abs(spline(self.times[some]) - self.values[some])
-            self.away = max(self.away, float(apart.max()))
-            far.append(some.start + np.flatnonzero(apart > self.deviation))
+            distances = np.abs(spline(self.times[some]) - self.values[some])
+            self.away = max(self.away, float(distances.max()))
+            far.append(some.start + np.flatnonzero(distances > self.deviation))
         return np.concatenate(far)
 
-    def _move(self, found: np.ndarray, run: slice) -> None:
-        """Solve for a run of coefficients, all samples that they reach being within the deviation."""
+    def _move(self, coefficients: np.ndarray, run: slice) -> None:
+        """Solve for a run of coefficients such that all samples that they affect are within the deviation."""
         clarabel, sparse = _solver()
         ends = self.knots[[max(run.start - DEGREE, 0), min(run.stop, len(self.knots) - 1)]]
         last = "right" if run.stop >= len(self.knots) - 1 else "left"
         rows = np.arange(np.searchsorted(self.times, ends[0]), np.searchsorted(self.times, ends[1], side=last))
         matrix = values_at(self.times[rows], self.knots)
-        fixed = found.copy()
+        fixed = coefficients.copy()
         fixed[run] = 0.0
         own = matrix[:, run]
         rest = self.values[rows] - matrix @ fixed
@@ -235,9 +235,9 @@ class _Problem:
         )
         solution = solver.solve()
         if "Solved" not in str(solution.status):
-            far = rows[np.abs(own @ found[run] - rest) > self.deviation]
+            far = rows[np.abs(own @ coefficients[run] - rest) > self.deviation]
             raise TooFarError(far if len(far) else rows[:1])
-        found[run] = np.array(solution.x) * size
+        coefficients[run] = np.array(solution.x) * size
 
 
 def _parts(run: slice) -> list[slice]:

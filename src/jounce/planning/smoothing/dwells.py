@@ -1,4 +1,4 @@
-"""Where samples stand still: as far as their noise, or the steps in which they were written, can tell."""
+"""Dwells: times at which samples stand still, within their noise or the steps in which they were written."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ SLOPE = 3.0  # standard deviations of the drift over a dwell
 SHARES = (1.0, 0.95, 0.9, 0.8, 0.65, 0.5)  # of a run, that are tried
 NEAR = 5  # blocks between dwells that are one
 LEAST_LEFT = 2  # samples
-MARGIN = 1.5  # blocks at each end of a dwell that may be of the motion beside it
-LONGER = 4  # times as long a run of equal samples is than those beside it, if it is a dwell
+MARGIN = 1.5  # blocks at each end of a dwell that may belong to the neighboring motion
+LONGER = 4  # least ratio of the length of a dwell of equal samples to that of neighboring runs
 EQUAL = 16  # samples in a run of equal ones
-SEEN = 20_000  # samples in which noise and steps are looked for
-AGREE = 1e-3  # of a step, to which all differences are whole numbers of steps
+SEEN = 20_000  # samples from which noise and steps are estimated
+AGREE = 1e-3  # of a step: tolerance for differences that are whole numbers of steps
 QUANTA = 4096  # steps in the range of the samples at most
 
 
@@ -32,7 +32,7 @@ class Dwell:
     Parameters
     ----------
     first, last : int
-        Of its samples, both included.
+        Indices of its first and last sample.
     position : float
         rad or m.
     """
@@ -43,7 +43,7 @@ class Dwell:
 
 
 def step_of(values: Float[np.ndarray, " sample"]) -> float:
-    """Return the step in which samples were written; 0 where there is none to be seen."""
+    """Return the step in which samples were written; 0 where none is visible."""
     differences = np.abs(np.diff(values[:SEEN]))
     differences = differences[differences > 0]
     if len(differences) < 8:
@@ -57,13 +57,13 @@ def step_of(values: Float[np.ndarray, " sample"]) -> float:
 
 
 def noise_of(times: Float[np.ndarray, " sample"], values: Float[np.ndarray, " sample"]) -> float:
-    """Return the standard deviation of the noise of samples, that of their steps included."""
-    found = noise(times[:SEEN], values[:SEEN])
-    return max(found, step_of(values) / np.sqrt(12))
+    """Return the standard deviation of the noise of samples, including that of their steps."""
+    estimate = noise(times[:SEEN], values[:SEEN])
+    return max(estimate, step_of(values) / np.sqrt(12))
 
 
 def dwells(times: Float[np.ndarray, " sample"], values: Float[np.ndarray, " sample"], sigma: float) -> list[Dwell]:
-    """Return the dwells of samples, without what may be of the motions beside them.
+    """Return the dwells of samples, without margins that may belong to the neighboring motions.
 
     Parameters
     ----------
@@ -72,31 +72,31 @@ def dwells(times: Float[np.ndarray, " sample"], values: Float[np.ndarray, " samp
     sigma : float
         Standard deviation of their noise.
     """
-    found: list[Dwell] = []
+    chosen: list[Dwell] = []
     taken = np.zeros(len(values), bool)
     for dwell in sorted([*_of_equal(values), *_of_noise(times, values, sigma)], key=lambda x: x.first - x.last):
         own = slice(dwell.first, dwell.last + 1)
         if not taken[own].any():  # the longest first
-            found.append(dwell)
+            chosen.append(dwell)
             taken[own] = True
-    return _together(sorted(found, key=lambda dwell: dwell.first), values, sigma)
+    return _joined(sorted(chosen, key=lambda dwell: dwell.first), values, sigma)
 
 
 def without_margins(
     dwells: Sequence[Dwell], times: Float[np.ndarray, " sample"], scales: Sequence[tuple[float, float]]
 ) -> list[Dwell]:
-    """Return dwells without the times next to motions in which these may begin or end unseen.
+    """Return dwells without the times at their ends where the neighboring motions may already change unseen.
 
     Parameters
     ----------
     dwells : sequence of Dwell
-        In their sequence.
+        In the order of time.
     times : array of shape (sample,)
         s.
     scales : sequence of (float, float)
         The time in which the motion before a dwell, and the one after it, may change, s.
     """
-    found = []
+    inner = []
     for dwell, (before, after) in zip(dwells, scales, strict=True):
         first, last = dwell.first, dwell.last
         if first > 0:
@@ -105,14 +105,14 @@ def without_margins(
             last = int(np.searchsorted(times, times[last] - after, side="right")) - 1
         whole = first == 0 and last == len(times) - 1
         if whole or (last - first >= LEAST_LEFT and times[last] - times[first] >= min(before, after)):
-            found.append(dataclasses.replace(dwell, first=first, last=last))
-    return found
+            inner.append(dataclasses.replace(dwell, first=first, last=last))
+    return inner
 
 
-def _together(found: list[Dwell], values: np.ndarray, sigma: float) -> list[Dwell]:
-    """Join dwells between which there is little more than a margin, and no motion."""
+def _joined(dwells: list[Dwell], values: np.ndarray, sigma: float) -> list[Dwell]:
+    """Join dwells at one position with little more than a margin between them."""
     result: list[Dwell] = []
-    for dwell in found:
+    for dwell in dwells:
         if result and dwell.first - result[-1].last <= NEAR * BLOCK:
             before = result[-1]
             counts = before.last - before.first + 1, dwell.last - dwell.first + 1
@@ -125,19 +125,19 @@ def _together(found: list[Dwell], values: np.ndarray, sigma: float) -> list[Dwel
 
 
 def _of_equal(values: np.ndarray) -> list[Dwell]:
-    """Return runs of equal samples, if they are much longer than those beside: others are steps of a slow motion."""
+    """Return runs of equal samples that are much longer than neighboring runs: others are steps of a slow motion."""
     begins = np.flatnonzero(np.append(True, np.diff(values) != 0))
     lengths = np.diff(np.append(begins, len(values)))
-    found = []
+    runs = []
     for k in np.flatnonzero(lengths >= EQUAL).tolist():
-        beside = max((int(lengths[j]) for j in (k - 1, k + 1) if 0 <= j < len(lengths)), default=0)
-        if len(lengths) > 1 and lengths[k] < LONGER * beside:
+        neighbor = max((int(lengths[j]) for j in (k - 1, k + 1) if 0 <= j < len(lengths)), default=0)
+        if len(lengths) > 1 and lengths[k] < LONGER * neighbor:
             continue
         first, last = int(begins[k]), int(begins[k] + lengths[k] - 1)
-        first, last = _within(first, last, len(values), max(beside, int(lengths[k]) // 8))
+        first, last = _within(first, last, len(values), max(neighbor, int(lengths[k]) // 8))
         if last - first >= 2:
-            found.append(Dwell(first, last, float(values[first])))
-    return found
+            runs.append(Dwell(first, last, float(values[first])))
+    return runs
 
 
 def _of_noise(times: np.ndarray, values: np.ndarray, sigma: float) -> list[Dwell]:
@@ -147,7 +147,7 @@ def _of_noise(times: np.ndarray, values: np.ndarray, sigma: float) -> list[Dwell
         return []
     means = values[: count * BLOCK].reshape(count, BLOCK).mean(axis=1)
     near = SURE * sigma / np.sqrt(BLOCK)
-    found, first = [], 0
+    runs, first = [], 0
     while first < count - 1:
         last, low, high = first, means[first], means[first]
         while last + 1 < count and max(high, means[last + 1]) - min(low, means[last + 1]) <= 2 * near:
@@ -163,23 +163,23 @@ def _of_noise(times: np.ndarray, values: np.ndarray, sigma: float) -> list[Dwell
             end = begin + still - 1
             begin, end = _within(begin, end, len(values), int(MARGIN * BLOCK))
             if end - begin >= 2:
-                found.append(Dwell(begin, end, float(values[begin : end + 1].mean())))
+                runs.append(Dwell(begin, end, float(values[begin : end + 1].mean())))
             first = first + max(1, still // BLOCK)
         else:
             first += max(1, (last - first) // 8)
-    return found
+    return runs
 
 
 def _still(times: np.ndarray, values: np.ndarray, sigma: float) -> bool:
-    """Tell whether samples drift and scatter no more than noise about one position does."""
+    """Return whether samples drift and scatter no more than noise about one position."""
     since = times - times.mean()
     span = float(times[-1] - times[0])
     slope = float(since @ values) / float(since @ since)
     certain = SLOPE * sigma / np.sqrt(float(since @ since)) * span
     half = len(values) // 2
-    apart = abs(values[:half].mean() - values[half:].mean())
+    difference = abs(values[:half].mean() - values[half:].mean())
     scatter = float(values.std())
-    return bool(abs(slope) * span <= certain and scatter <= 1.3 * sigma and apart <= SURE * sigma / np.sqrt(half))
+    return bool(abs(slope) * span <= certain and scatter <= 1.3 * sigma and difference <= SURE * sigma / np.sqrt(half))
 
 
 def _within(first: int, last: int, count: int, margin: int) -> tuple[int, int]:

@@ -64,8 +64,8 @@ def follow_tool_path(
     hold : mapping of str to law, optional
         Joints with a law of their own: a number, an expression of ``t``, or a motion.
     posture : array_like of shape (n,), optional
-        Of a redundant robot: the coordinates are those of the task that are nearest to it, a function of the path
-        alone, so that a closed path ends where it began. The middle of the ranges of the joints unless given.
+        For a redundant robot: the coordinates are those of the task that are nearest to it. They depend on the path
+        only, so that a closed path ends where it began. The middle of the ranges of the joints unless given.
     weights : array_like of shape (n,), optional
         Of the squared distances of the joints from the posture; 1 unless given.
     limits : bool, default True

@@ -28,8 +28,8 @@ if TYPE_CHECKING:
 
 STATIONARY = 1e-5  # of the slope that what is missed could have: less is none
 WIDTHS = {"position": (3,), "rotation": (3, 3), "direction": (3,)}
-SOON = 16  # steps in which most poses are reached; the others take twice as many, and so on
-FINER = 1e-3  # of the tolerance, to which steps go on
+SOON = 16  # steps that reach most poses; the others take twice as many, and so on
+FINER = 1e-3  # of the tolerance: steps end below it
 
 
 def inverse_kinematics(
@@ -89,7 +89,7 @@ def inverse_kinematics(
     Raises
     ------
     RobotError
-        If an argument does not fit the robot, nothing is wanted of the tool, or both an orientation and a direction.
+        If an argument does not fit the robot, the tool has no goal, or both an orientation and a direction.
 
     Notes
     -----
@@ -226,7 +226,7 @@ def _away(robot: Robot, link: str, point: Any, q: Any, goal: Any, tool: Tool) ->
 
 
 def _checked_goal(position: Any, orientation: Any, direction: Any) -> tuple[dict[str, Any], tuple[int, ...]]:
-    """Return what is wanted of a tool, by its kinds, and the shape of the batch."""
+    """Return the goals of a tool by kind, and the shape of the batch."""
     if orientation is not None and direction is not None:
         raise RobotError("give an orientation or a direction, not both", name="direction")
     goal: dict[str, Any] = {}

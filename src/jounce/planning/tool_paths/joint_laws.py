@@ -100,7 +100,7 @@ class _Kinks:
         self.after: np.ndarray = self.before
 
     def add(self, times: _Times, *, only_if_kinked: bool = False) -> None:
-        """Add instants; if asked for, only those at which a derivative jumps."""
+        """Add instants, with `only_if_kinked` only those at which a derivative jumps."""
         times = np.unique(times)
         times = times[np.diff(times, prepend=-np.inf) > 2 * self.side]
         new = times[(np.abs(times[:, None] - self.times) > 2 * self.side).all(axis=1)]
@@ -127,7 +127,7 @@ class _Kinks:
 
 
 def _jumped(before: _Motion, after: _Motion) -> np.ndarray:
-    """Tell where derivatives differ by more than rounding."""
+    """Return where derivatives differ by more than rounding."""
     size = np.maximum(np.abs(before), np.abs(after)).max(axis=(0, 2))
     size = np.maximum.accumulate(np.append(1.0, size))[1:, None]
     return np.any(np.abs(after - before) > KINKED * size, axis=(1, 2))
@@ -193,14 +193,13 @@ def _kink(exact: Callable[[_Times], _Motion], ends: Float[np.ndarray, " 2"], q: 
 
 
 def _clear(nodes: _Times, times: _Times, kinks: _Times) -> np.ndarray:
-    """Tell which instants were given, or are not in an interval between given ones that has a kink."""
+    """Return which instants were given, or are not in an interval between given ones that has a kink."""
     cells = np.clip(np.searchsorted(times, kinks, side="right") - 1, 0, len(times) - 2)
     inside = np.clip(np.searchsorted(times, nodes, side="right") - 1, 0, len(times) - 2)
     return np.isin(nodes, times) | ~np.isin(inside, np.concatenate([cells - 1, cells]))
 
 
 def _among(intervals: Float[np.ndarray, "interval 2"], done: Float[np.ndarray, "known 2"]) -> np.ndarray:
-    """Tell which intervals are among others."""
+    """Return which intervals are among others."""
     known = np.sort(done[:, 0] + 1j * done[:, 1])
-    asked = intervals[:, 0] + 1j * intervals[:, 1]
-    return np.isin(asked, known)
+    return np.isin(intervals[:, 0] + 1j * intervals[:, 1], known)

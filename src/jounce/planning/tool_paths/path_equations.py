@@ -21,11 +21,11 @@ Unknowns = Float[Numbers, "order unknown batch"]
 
 
 class PathEquations(Module):
-    """What the coordinates meet along a path.
+    """The equations of the coordinates along a path.
 
-    With fewer rows than joints, the coordinates are those of the task that are nearest to a posture: the gradient of
-    the squared distance is balanced by multipliers of the rows, as many further unknowns. So they depend on the instant
-    of the path alone, not on the way there, and have all its derivatives.
+    With fewer rows than joints, the coordinates are those of the task that are nearest to a posture: multipliers of the
+    rows, as many further unknowns, balance the gradient of the squared distance. So they depend only on the instant of
+    the path, not on the way there, and have all its derivatives.
 
     Attributes
     ----------
@@ -33,16 +33,16 @@ class PathEquations(Module):
         Of the robot.
     tool : Tool
         What follows the path.
-    basis : array of shape (rows, kept)
-        The rows that the joints can move, those of joints held included.
+    basis : array of shape (rows, independent)
+        The rows that the joints can move, including those of held joints.
     scale, weights : array of shape (n,)
-        What counts as one in a coordinate, and the weight of its distance from the posture.
+        Scale of each coordinate, and the weight of its distance from the posture.
     fixed_joints : tuple of int
         Joints that have laws of their own.
     kinds : tuple of str
-        What is followed.
+        Kinds of the goals.
     count : int
-        Of coordinates.
+        Number of coordinates.
     """
 
     tree: Tree

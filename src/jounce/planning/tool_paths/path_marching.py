@@ -128,7 +128,7 @@ def followed(
 
 
 def _marched(equations: PathEquations, start: Any, time: Any, target: Any, order: int) -> list[np.ndarray]:
-    """Return what `march` tells of nodes, whose number is filled up to one that is compiled for."""
+    """Return the results of `march` for nodes, which are padded to a multiple of the compiled length."""
     count = BLOCK * -(-len(time) // BLOCK)
     filled = np.concatenate([time, np.full(count - len(time), time[-1])])
     steps = np.append(np.diff(filled), 0.0)

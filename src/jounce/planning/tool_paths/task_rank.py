@@ -12,7 +12,7 @@ from jounce.robot.model.tree import Tree
 from jounce.robot.recursions.batches import Batched
 from jounce.robot.recursions.kinematics import link_frame
 
-CONFIGURATIONS = 16  # configurations at random that tell what joints can do in general
+CONFIGURATIONS = 16  # random configurations that show the general rank
 RANK = 1e-9  # of the largest singular value: less is none
 SINGULAR = 1e-3  # of the largest singular value: a position where the least one is below counts as singular
 NOTABLE = 0.1  # of the largest share: joints with less have no part in a motion that is lost

@@ -107,7 +107,7 @@ class ToolPath(Displayed):
         positions : array_like of shape (samples, 3)
             m, in the frame of the base.
         orientations : optional
-            One for each instant, (samples, 4) or (samples, 3, 3), or a rotation of SciPy; a single one is kept.
+            One for each instant, (samples, 4) or (samples, 3, 3), or a rotation of SciPy; a single one is constant.
         degree : int, default 7
             Of the splines, odd; derivatives to one less are continuous.
         **settings

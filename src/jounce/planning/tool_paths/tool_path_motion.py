@@ -34,7 +34,7 @@ MET = 1e-9  # rad, or sizes of the robot: what may be missed
 RATES = 1e-6  # of a derivative of the path that the tool has to have
 WEAK = 0.05  # of the largest singular value: where a path ends, less is why
 JUMP = 1e-3  # m or rad within the shortest interval
-LIMIT = 1e-9  # by which a coordinate may be out of its range
+LIMIT = 1e-9  # largest permitted excess of a coordinate over its range
 
 
 @Batched
@@ -196,9 +196,9 @@ class ToolPathMotion(Displayed):
             return self.ending or f"singular at t = {time:.6g} s"
         if status == Status.NOT_ASSEMBLED:
             words.append(
-                f"the joints cannot keep the tool on the path at t = {time:.6g} s: {self.residual[index, 0]:.3g} rad, "
-                "or sizes of the robot, are missed, or a derivative; ask for less, as a direction in the place of an "
-                "orientation"
+                f"the joints cannot keep the tool on the path at t = {time:.6g} s: the pose misses it by "
+                f"{self.residual[index, 0]:.3g} rad, or sizes of the robot, or a derivative does; prescribe less, as a "
+                "direction in the place of an orientation"
             )
         if status == Status.NOT_CONVERGED:
             words.append(f"not converged at t = {time:.6g} s")

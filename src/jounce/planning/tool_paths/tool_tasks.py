@@ -22,10 +22,10 @@ from jounce.robot.recursions.kinematics import frame_at, link_frame
 if TYPE_CHECKING:
     from scipy.spatial.transform import Rotation
 
-UNIT = 1e-6  # by which a quaternion or a direction may miss the length of one: printed digits
+UNIT = 1e-6  # largest deviation of a quaternion or a direction from the length of one: printed digits
 
 Goal = dict[str, Any]
-"""Series of what is wanted: "position" and "direction" (order, 3, batch), "rotation" (order, 3, 3, batch)."""
+"""Series of the goals: "position" and "direction" (order, 3, batch), "rotation" (order, 3, 3, batch)."""
 
 
 class Tool(NamedTuple):
