@@ -45,11 +45,11 @@ def masses_of(mechanism: Mechanism) -> Masses:
     columns: list[tuple[Any, ...]] = [(0.0, np.zeros(size), np.zeros((3, 3)) if tensor else 0.0)]
     for name, body in mechanism.bodies.items():
         if body.mass is None and body.inertia is not None:
-            raise MechanismError("an inertia needs a mass beside it", name=f"bodies.{name}.mass")
+            raise MechanismError("a body with an inertia needs a mass, too", name=f"bodies.{name}.mass")
         mass, center, inertia = body_mass(name, body, mechanism.parameter_values, size, solid=False)
         columns.append((mass, center, inertia * np.eye(3) if tensor and np.ndim(inertia) < 2 else inertia))
     masses, centers, inertias = (along_instances(*part) for part in zip(*columns, strict=True))
-    # those of a plane body about its axes are not known apart; only their sum counts
+    # the two of a plane body about its axes are not known individually; only their sum counts
     moments = second_moments(inertias) if tensor else np.eye(2)[..., None, None] * (0.5 * inertias)[None, None]
     return Masses(masses, centers, moments)
 

@@ -467,7 +467,7 @@ def test_a_mechanism_without_masses_or_with_half_of_them():
     with pytest.raises(jn.errors.MechanismError, match="no body has a mass"):
         acceleration_energy(motion)
     half = jn.solve(with_masses("four_bar", {"crank": {"inertia": 0.1}}), TIMES[:1], order=2)
-    with pytest.raises(jn.errors.MechanismError, match="an inertia needs a mass beside it"):
+    with pytest.raises(jn.errors.MechanismError, match="a body with an inertia needs a mass, too"):
         kinetic_energy(half)
 
 

@@ -25,7 +25,7 @@ class AbstractEnergyOutput(AbstractMotionOutput):
 
     @property
     def single_body(self) -> str | None:
-        """The body alone whose energy it is; None for all of them."""
+        """The single body whose energy it is; None for all bodies."""
         return getattr(self, "body", None)
 
     def check(self, mechanism: Mechanism) -> None:

@@ -169,7 +169,7 @@ def _along(columns: Float[Numbers, "component coordinate body batch"], vectors: 
 
 
 class _Products:
-    """Products ``sum S_ik a_i x a_k`` of coefficients of the axes of bodies, each of which is made once."""
+    """Products ``sum S_ik a_i x a_k`` of coefficients of the axes of bodies; each is computed once."""
 
     def __init__(self, axes: list[Float[Numbers, "component axis body batch"]], moments: Any):
         self.axes = axes

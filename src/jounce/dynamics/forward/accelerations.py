@@ -152,7 +152,7 @@ class Equations(Module):
         origins = Jet([with_ground(position)])
         if self.pose_type is PlanarPose:
             return PlanarPose.from_jets(origins, Jet([with_ground(attitude)[0]]))
-        quaternion = turns_with_ground(attitude)  # of unit length already: it is kept so
+        quaternion = turns_with_ground(attitude)  # the integrator keeps its length one
         spins, axes = (tuple(Jet([x]) for x in f(quaternion)) for f in (quaternion_spins, body_axes))
         return SpatialPose(origins, Jet([quaternion]), spins, axes, None)
 
@@ -261,7 +261,7 @@ class Equations(Module):
     def begun(
         self, solve: Callable[[Rows], Rows], state: State, time: Instants, forces: ByBody, second: Rows
     ) -> tuple[ByBody, Rows, Callable[[ByBody, Rows], tuple[ByBody, Rows]]]:
-        """Return accelerations and multipliers of a state, and what solves for their coefficients of higher orders.
+        """Return accelerations and multipliers of a state, and the solver for their coefficients of higher orders.
 
         Parameters
         ----------
@@ -273,15 +273,15 @@ class Equations(Module):
             The instant, s.
         """
         solved = partial(self.unknowns, solve)
-        found = solved(forces, second)
+        frictionless = solved(forces, second)
         if not any(map(rubs, self.system.groups)):
-            return *found, solved
+            return *frictionless, solved
         friction = FreeFriction(self.system, self.pose(state), Jet([time]))
 
         def felt(normal: Any) -> Any:
             return conjugate(friction.slips, self.pose(state).truncate(0), friction.resisting(normal))[:, 1:]
 
-        return with_friction(solved, found, friction, felt)
+        return with_friction(solved, frictionless, friction, felt)
 
     def least_change(self, factor: Factor, gap: Rows) -> Column:
         """Return the change of coordinates of least kinetic energy that closes a gap of the scaled rows, scaled."""

@@ -290,7 +290,7 @@ def _checked_jacobian(equations: Equations, model: Model, facts: _Facts, instant
 
 
 def _loose(whole: Float[np.ndarray, "size size"], columns: int) -> Float[np.ndarray, "direction size"]:
-    """Return the unknowns that the matrix of the equations leaves open, the first of which belong to columns."""
+    """Return the null space of the matrix of the equations; the first entries of its vectors belong to columns."""
     scale, tolerance = even_scale(whole, columns), 1e-3 * RANK_TOLERANCE
     even = whole * scale * scale[:, None]
     if is_clearly_regular(even, tolerance):
@@ -303,7 +303,7 @@ def _loose(whole: Float[np.ndarray, "size size"], columns: int) -> Float[np.ndar
 
 
 def _is_solid(masses: Masses) -> bool:
-    """Tell whether no body has a negative mass or moment of inertia: then no motion has a negative kinetic energy.
+    """Return whether no body has a negative mass or moment of inertia: then no motion has a negative kinetic energy.
 
     The least moment about an axis through the center of mass is the sum of the two lowest second moments.
     """

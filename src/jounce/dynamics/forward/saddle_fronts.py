@@ -1,8 +1,8 @@
-"""The matrix of constrained motion, eliminated body by body: the multipliers of a row stand beside one of its bodies.
+"""The matrix of constrained motion, eliminated body by body: the multiplier of a row is assigned to one of its bodies.
 
-So the equations of motion of a large mechanism go through the same fronts as its Jacobian: a body has its coordinates
-and the multipliers of a few rows as its columns, and as its rows its balance of forces and those rows. Bodies with
-fewer multipliers than others have some that are zero instead.
+So the equations of motion of a large mechanism go through the same fronts as its Jacobian: the columns of a body are
+its coordinates and the multipliers of a few rows, and its rows are its balance of forces and those rows. Bodies with
+fewer multipliers than others are padded with zeros.
 """
 
 import itertools
@@ -164,7 +164,7 @@ class SaddleInverse(Module):
 def _planned(
     key: tuple[tuple[tuple[int, ...], str, bytes], ...], body_count: int, entry_count: int, _: float
 ) -> SaddleFronts | None:
-    """Return the plan for a pattern of these arrays: the same for all values, so is kept."""
+    """Return the plan for a pattern of these arrays, which does not depend on values."""
     bodies, positions = (np.frombuffer(data, kind).reshape(shape) for shape, kind, data in key)
     fronts = SaddleFronts.anew(Pattern(bodies, positions, body_count, entry_count))
     for array in jax.tree.leaves(fronts):
@@ -219,7 +219,7 @@ def _as_pattern(entries: Meeting, count: int, whole: int, nothing: int) -> Patte
 
 
 def _owners(bodies: Sequence[Sequence[int]], count: int) -> list[int]:
-    """Return the body beside which the multiplier of each row stands: of those that it touches, the one with fewest."""
+    """Return the body that the multiplier of each row is assigned to: that of the fewest multipliers in the row."""
     load, owners = [0] * count, []
     for touched in bodies:
         owner = min((body for body in touched if body < count), key=load.__getitem__)

@@ -34,10 +34,10 @@ def saddle_point(mass: MassMatrix, jacobian: Jacobian) -> Float[Numbers, "size s
 
 
 def even_scale(whole: Float[np.ndarray, "size size"], columns: int) -> Float[np.ndarray, " size"]:
-    """Return by what to scale rows and columns of such a matrix, to tell whether it is singular.
+    """Return the scales of rows and columns of such a matrix for a test of its rank.
 
-    Each of the first columns is measured by its own mass, or moment of inertia, and each row of the Jacobian by its
-    size then: a small mass beside large ones is not none.
+    The scale of each of the first columns follows from its own mass, or moment of inertia, and that of each row of the
+    Jacobian from its size then: a small mass among large ones does not count as zero.
     """
     mass = np.abs(np.diag(whole))[:columns]
     scale = np.ones(len(whole))
@@ -119,7 +119,7 @@ class DenseInverse(Module):
 
 
 def in_basis(basis: Float[Numbers, "row rank batch"], jacobian: Jacobian) -> Float[Numbers, "rank column batch"]:
-    """Return the combinations of the rows of a Jacobian that a basis tells."""
+    """Return the combinations of the rows of a Jacobian by the vectors of a basis."""
     return jnp.sum(basis[:, :, None] * jacobian[:, None], axis=0)
 
 

@@ -129,7 +129,7 @@ def load_solver(
 
 
 def _solver(system: System, blocks: Slopes, mass: BodyMatrices | None) -> Callable[[Any], Any]:
-    """Return what solves for the multipliers of scaled rows: by the Jacobian alone where there are no masses."""
+    """Return the solver for the multipliers of scaled rows; without masses it uses only the Jacobian."""
     if mass is None and system.fronts is not None:
         entries = _entries(system, blocks)
         factor = FrontalFactor.of(system.fronts, jax.lax.stop_gradient(entries), system.row_scale)
@@ -182,7 +182,7 @@ def onto_bodies(
 
 
 class _Shifted(AbstractMotion):
-    """A law moved by a constant: how the residual of a driver changes with it tells what the driver exerts."""
+    """A law moved by a constant: the change of the residual with it gives the force of the driver."""
 
     law: Callable[[Jet], Jet]
     shift: Any
@@ -205,7 +205,7 @@ def exerted(
     Parameters
     ----------
     driver : AbstractConstraint
-        Its values have shape (..., instances, 1). Where its law is left out, it is what the bodies tell.
+        Its values have shape (..., instances, 1). Where its law is left out, the poses give its value.
     poses, time
         As `slopes` takes them.
     forces : array of shape (levels, rows, instances, batch)

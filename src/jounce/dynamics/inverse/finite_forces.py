@@ -13,16 +13,16 @@ __all__ = ["check_finite_forces", "check_finite_values"]
 
 
 def check_finite_values(forces: Any, values: Numbers, name: str | None = None) -> None:
-    """Raise MechanismError for the first instant that was solved and at which Taylor coefficients are not finite.
+    """Raise MechanismError for the first solved instant at which Taylor coefficients are not finite.
 
     Parameters
     ----------
     forces : MotionForces
-        Of which they are.
+        The forces of the motion.
     values : array of shape (levels, ..., time)
         Taylor coefficients.
     name : str, optional
-        Of the force; the applied force that is not finite there is looked for unless given.
+        Name of the force; that of an applied force that is not finite there unless given.
     """
     if forces.motion.traced:
         return
@@ -40,7 +40,7 @@ def check_finite_values(forces: Any, values: Numbers, name: str | None = None) -
         name = f"forces.{unfit[0]}" if unfit else "joints"
     at, advice = f"no finite value at t = {forces.motion.time[lane]:g} s", "check its law there"
     if level:
-        raise MechanismError(f"its derivative {level} has {at}; {advice}, or ask for fewer derivatives", name=name)
+        raise MechanismError(f"its derivative {level} has {at}; {advice}, or take fewer derivatives", name=name)
     raise MechanismError(f"has {at}; {advice}", name=name)
 
 

@@ -1,4 +1,4 @@
-"""Whether forces depend on idle motions: whether anything would spin a body about an axis that no joint holds."""
+"""The check that forces do not depend on idle motions: torques that would spin a body about an axis no joint holds."""
 
 from typing import Any
 
@@ -9,30 +9,30 @@ from jounce.constraints.spin_hold import SpinHold
 from jounce.errors import MechanismError
 from jounce.kinematics import Status
 
-NOTHING = 1e-9  # of the largest multiplier: what is less is rounding
+NOTHING = 1e-9  # of the largest multiplier: less is rounding
 
 
 def checked(forces: Any) -> Any:
-    """Return forces, or raise MechanismError where something would spin a body about an axis that no joint holds.
+    """Return forces, or raise MechanismError where torques would spin a body about an axis that no joint holds.
 
     Parameters
     ----------
     forces : MotionForces
-        Of a motion, in which idle motions are held by the least motion.
+        Forces of a motion in which idle bodies move least.
     """
     model, motion = forces.model, forces.motion
     if not any(isinstance(group.element, SpinHold) for group in model.system.groups):
         return forces
-    found, solved = np.nan_to_num(forces.multipliers), motion.status == Status.OK
-    most = np.abs(found[..., solved]).max(axis=(1, 2), initial=0.0) * model.length
+    multipliers, solved = np.nan_to_num(forces.multipliers), motion.status == Status.OK
+    most = np.abs(multipliers[..., solved]).max(axis=(1, 2), initial=0.0) * model.length
     rate = _rate(forces, solved)
-    for level in range(1, len(most)):  # what vanishes at a level is as exact as that of the level before
+    for level in range(1, len(most)):  # a level that vanishes is as exact as the level before
         most[level] = max(most[level], rate * most[level - 1])
     for place in forces.indices.values():
         group = model.system.groups[place.group]
         if not isinstance(group.element, SpinHold):
             continue
-        torque = np.abs(found[:, list(place.own_rows)][..., solved]).max(axis=(1, 2), initial=0.0)
+        torque = np.abs(multipliers[:, list(place.own_rows)][..., solved]).max(axis=(1, 2), initial=0.0)
         if (torque > NOTHING * most).any():
             body = model.bodies[group.bodies[0][place.instance] - 1]
             message = (
@@ -44,7 +44,7 @@ def checked(forces: Any) -> Any:
 
 
 def _rate(forces: Any, solved: Numbers) -> float:
-    """Return how fast the motion changes, 1/s: how large its Taylor coefficients are."""
+    """Return how fast the motion changes, 1/s, from the sizes of its Taylor coefficients."""
     parts = {"position": forces.model.length, "angle": 1.0, "quaternion": 1.0}
     sizes = [
         np.nan_to_num(np.abs(forces.coordinates[name][1:, ..., solved])).reshape(forces.levels + 1, -1) / scale

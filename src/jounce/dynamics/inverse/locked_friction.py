@@ -1,4 +1,4 @@
-"""What friction in a motion needs, and where it locks: told by the names of its joints."""
+"""Where friction in a motion locks, and where its rates are not determined, by the names of joints."""
 
 from typing import Any
 
@@ -20,59 +20,60 @@ def friction_left_out(group: Group) -> Group:
     return holding(group, "friction", None) if rubs(group) else group
 
 
-def check_not_locked(motion: Motion, system: System, found: Float[Numbers, "order row time"]) -> None:
+def check_not_locked(motion: Motion, system: System, multipliers: Float[Numbers, "order row time"]) -> None:
     """Raise MechanismError at the first instant at which no forces fulfill the laws of friction."""
     names = [] if motion.traced else joints_with_friction(motion.model, system)
     if not names:
         return
-    locked = np.isnan(np.asarray(found)[0, -len(names) :]).any(axis=0) & (motion.status == Status.OK)
+    locked = np.isnan(np.asarray(multipliers)[0, -len(names) :]).any(axis=0) & (motion.status == Status.OK)
     if locked.any():
         lane = int(np.argmax(locked))
         message = (
             f"friction locks at t = {motion.time[lane]:g} s: no force of the drivers moves the mechanism as they "
-            "prescribe, as friction grows as fast as what presses the joints; give a smaller coefficient or radius, or "
-            "more advantage to what drives"
+            "prescribe, as friction grows as fast as the normal forces in joints; give a smaller coefficient or "
+            "radius, or drivers with more mechanical advantage"
         )
         raise MechanismError(message, name=", ".join(f"{name}.friction" for name in names))
 
 
-def without_open_rates(forces: Any, found: Float[Numbers, "case order row time"]) -> Numbers:
-    """Return multipliers and normal forces, of which rates are NaN where the force that presses a joint passes zero.
+def without_open_rates(forces: Any, multipliers: Float[Numbers, "case order row time"]) -> Numbers:
+    """Return multipliers and normal forces with rates NaN where the force that presses a joint passes zero.
 
-    Its size has no derivative there. Where it is zero with all its rates, there is no friction, and none is missing.
+    Its magnitude has no derivative there. Where it is zero with all its rates, there is no friction, and its rates are
+    zero.
 
     Parameters
     ----------
     forces : MotionForces
-        Of which they are.
-    found : array of shape (1, levels, rows, time)
+        The forces of the motion.
+    multipliers : array of shape (1, levels, rows, time)
         Multipliers, and below them normal forces.
     """
     names = [] if forces.motion.traced else forces.friction.names
-    if not names or found.shape[1] == 1:
-        return found
-    normal = np.asarray(found)[0, 0, -len(names) :]
+    if not names or multipliers.shape[1] == 1:
+        return multipliers
+    normal = np.asarray(multipliers)[0, 0, -len(names) :]
     size = np.abs(normal).max(initial=0.0)
     lanes = np.flatnonzero((normal <= NONE * size).any(axis=0))
     if not len(lanes):
-        return found
-    open_ = np.zeros(found.shape[-1], bool)
+        return multipliers
+    open_ = np.zeros(multipliers.shape[-1], bool)
     for name in names:
         held = forces.friction.pressing_force(
-            name, found[0, :, : len(forces.model.rows), lanes].transpose(1, 2, 0), lanes
+            name, multipliers[0, :, : len(forces.model.rows), lanes].transpose(1, 2, 0), lanes
         )
         sizes = np.abs(held).max(axis=1) / forces.rates[lanes] ** np.arange(len(held))[:, None]
         passed = (sizes[0] <= NONE * size) & (sizes[1:].max(axis=0, initial=0.0) > NONE * size)
         open_[lanes[passed]] = True
         forces.passing.setdefault(name, forces.motion.time[lanes[passed]])
-    return np.where(open_ & (np.arange(found.shape[1]) > 0)[:, None, None], np.nan, found)
+    return np.where(open_ & (np.arange(multipliers.shape[1]) > 0)[:, None, None], np.nan, multipliers)
 
 
 def passing_words(forces: Any) -> str:
-    """Say where rates of friction are open, as `without_open_rates` found them; nothing where none are."""
-    told = [
+    """Return words for the instants at which `without_open_rates` leaves rates of friction open; empty if none."""
+    phrases = [
         f"what presses {name} passes zero at t = {listed(times)}: rates of its friction are not determined"
         for name, times in forces.passing.items()
         if len(times)
     ]
-    return "; ".join(told)
+    return "; ".join(phrases)

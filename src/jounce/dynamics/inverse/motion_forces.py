@@ -327,7 +327,7 @@ class MotionForces:
                 return held + programs.wrenches(slopes[group.moving_slots.index(slot)], pressing)
 
             found = self._once(of_constraint, "joint", place.group, slot)[:, :, place.instance]
-            return teeth.told(found, self._reversals.get(place.group), place.instance)
+            return teeth.without_open_rates(found, self._reversals.get(place.group), place.instance)
         index, instance = self._force_index(name)
 
         def of_force(lanes: np.ndarray) -> Any:

@@ -3,7 +3,7 @@
 With more rows than the Jacobian has independent ones, the balance ``Phi_q^T lambda = load`` leaves multipliers open by
 the null space of ``Phi_q^T`` (Wojtyra 2005, Joint reaction forces in multibody systems with redundant constraints). Of
 all that balance the load, one has the least energy ``lambda^T C lambda / 2`` in joints of a compliance C, as elastic
-ones have it (Wojtyra and Fraczek 2013); C may be a measure alone, and that energy a norm. It obeys
+ones have it (Wojtyra and Fraczek 2013); C may also be a mere weight, and that energy a norm. It obeys
 
     C lambda + Phi_q mu = 0,    Phi_q^T lambda = load,
 
@@ -112,7 +112,7 @@ class OpenMultipliers:
 
     @cached_property
     def words(self) -> str:
-        """Which joint repeats equations of which others."""
+        """Words for the joints that repeat equations of others."""
         return "; ".join(map(str, repetitions(self.model.rows, self._basis)))
 
     @cached_property
@@ -160,7 +160,7 @@ class OpenMultipliers:
 
     @cached_property
     def _sizes(self) -> tuple[RowNumbers, RowNumbers]:
-        """Force and couple by which a multiplier of one acts on a body: a row has a force, or a couple alone."""
+        """Force and couple of a unit multiplier on a body: a row has a force, or only a couple."""
         scale = np.asarray(self.model.system.column_scale)
         shifts = self.model.pose_type.shifts
         scaled = np.abs((self._jacobian / self._row_scale).reshape(len(self._jacobian), -1, len(scale)) / scale)

@@ -1,7 +1,7 @@
-"""Which flanks of teeth bear the load: the side to which a tooth force has its part along the line of centers.
+"""Flanks of teeth that bear the load: the direction of the component of a tooth force along the line of centers.
 
-That part presses gears apart, whichever way the load is, so that it follows the absolute value of the multiplier. With
-the flank known, the tooth force is along its line of action, and the residual that says so has all forces and their
+That component separates the gears for either direction of the load, so that it follows the absolute value of the
+multiplier. With the flank known, the tooth force is along its line of action, and its residual gives all forces and
 rates as any other. It moves nothing, as the centers keep their distance: the multipliers of gears are the same with
 either flank, those of bearings are not. Where the multiplier passes zero, its absolute value has no derivative.
 """
@@ -27,31 +27,31 @@ from jounce.mechanism.system import Group, holding
 Flanks = Mapping[int, Float[Numbers, "instance time"]]
 """1 or -1 for each pair of teeth, by the index of its group."""
 
-NONE = 1e-11  # of the largest multiplier, or of what its rates make of it: less is rounding
-SLOWEST = 1e-3  # 1/s: motions are taken to be no slower where it is judged what rates make of a force
+NONE = 1e-11  # of the largest multiplier, or of its largest scaled rate: less is rounding
+SLOWEST = 1e-3  # 1/s: lower bound of the rate of motions in scales of rates
 MOST_CHANGES = 8  # of flanks, where the multipliers of redundant constraints depend on them
-MOST_TOLD = 4  # instants
-APART = 1e-6  # of the pitch radius: further from the pitch line, a wheel does not mesh
+MOST_LISTED = 4  # instants
+OFF_PITCH = 1e-6  # of the pitch radius: further from the pitch line, a wheel does not mesh
 
 
 def has_flanks(group: Group) -> bool:
-    """Tell whether the elements of a group are teeth with a pressure angle."""
+    """Return whether the elements of a group are teeth with a pressure angle."""
     return hasattr(group.element, "flank") and group.element.pressure_angle is not None
 
 
 def either_flank(groups: Sequence[Group], count: int) -> dict[int, Any]:
-    """Return flanks to begin with, for as many instants."""
+    """Return initial flanks for a number of instants."""
     return {k: np.ones((group.instances, count)) for k, group in enumerate(groups) if has_flanks(group)}
 
 
 def with_flanks(groups: Sequence[Group], flanks: Sequence[Numbers]) -> tuple[Group, ...]:
-    """Return groups of which teeth have flanks, (instances, batch) for each group that has some."""
+    """Return groups with flanks of teeth, (instances, batch) for each group that has some."""
     left = iter(flanks)
     return tuple(holding(group, "flank", next(left)) if flanks and has_flanks(group) else group for group in groups)
 
 
 def by_chance(flanks: Flanks) -> dict[int, Any]:
-    """Return other numbers for flanks: what depends on which teeth bear what changes with them."""
+    """Return random numbers for flanks: forces that change with them depend on the distribution of loads."""
     random = np.random.default_rng(1)
     return {k: random.uniform(0.3, 0.7, flank.shape[:1])[:, None] * flank for k, flank in flanks.items()}
 
@@ -59,18 +59,18 @@ def by_chance(flanks: Flanks) -> dict[int, Any]:
 def settled(
     solve: Callable[[Flanks], Numbers], flanks: Flanks, model: Model, motion: Motion
 ) -> tuple[Numbers, Flanks, dict[int, Any]]:
-    """Return multipliers with the flanks that they press on, and from which rate on these are not known.
+    """Return multipliers with the flanks that they press on, and the first rates that are not determined.
 
     Parameters
     ----------
     solve : callable
         Returns multipliers, (cases, levels, rows, time), for flanks.
     flanks : mapping
-        To begin with.
+        Initial flanks.
     model : Model
-        Says which rows are those of a group.
+        The model of the motion.
     motion : Motion
-        Of which they are.
+        The motion with these multipliers.
 
     Returns
     -------
@@ -79,52 +79,52 @@ def settled(
     reversals : dict of int to array of int, shape (instances, time)
         The first level whose rate is open, the number of levels where there is none.
     """
-    rows, found = group_rows(model), solve(flanks)
+    rows, multipliers = group_rows(model), solve(flanks)
 
     def of_group(multipliers: Numbers, index: int) -> Numbers:
         return multipliers[:, rows[index]]
 
     if motion.traced:
-        flanks = {k: jnp.where(jax.lax.stop_gradient(of_group(found[0], k)[0]) < 0, -1.0, 1.0) for k in flanks}
+        flanks = {k: jnp.where(jax.lax.stop_gradient(of_group(multipliers[0], k)[0]) < 0, -1.0, 1.0) for k in flanks}
         return solve(flanks), flanks, {}
     rate, reversals, unsettled = rate_of(motion), {}, []
     for _ in range(MOST_CHANGES):
-        told = {k: _signs(of_group(found[0], k), found[0], rate) for k in flanks}
-        now, reversals = ({k: pair[part] for k, pair in told.items()} for part in (0, 1))
+        pairs = {k: _signs(of_group(multipliers[0], k), multipliers[0], rate) for k in flanks}
+        now, reversals = ({k: pair[part] for k, pair in pairs.items()} for part in (0, 1))
         unsettled = [(now[k] != flanks[k]).any(axis=0) for k in flanks]
         if not np.any(unsettled):
             break
-        flanks, found = now, solve(now)
+        flanks, multipliers = now, solve(now)
     else:
-        found = np.where(np.any(unsettled, axis=0), np.nan, found)
-    levels = found.shape[1]
+        multipliers = np.where(np.any(unsettled, axis=0), np.nan, multipliers)
+    levels = multipliers.shape[1]
     if any((level < levels).any() for level in reversals.values()):
-        beside = solve({k: np.where(reversals[k] < levels, -flank, flank) for k, flank in flanks.items()})
-        away = np.abs(beside[0] - found[0]) > 1e-9 * np.abs(found[0]).max(axis=1, keepdims=True)
+        other_multipliers = solve({k: np.where(reversals[k] < levels, -flank, flank) for k, flank in flanks.items()})
+        away = np.abs(other_multipliers[0] - multipliers[0]) > 1e-9 * np.abs(multipliers[0]).max(axis=1, keepdims=True)
         first = np.min([level.min(axis=0) for level in reversals.values()], axis=0)
         away &= np.arange(levels)[:, None, None] >= first
-        found = np.where(np.logical_or.accumulate(away, axis=0), np.nan, found)
+        multipliers = np.where(np.logical_or.accumulate(away, axis=0), np.nan, multipliers)
     return found, flanks, reversals
 
 
-def told(work: Numbers, first: Numbers | None, instance: int) -> Numbers:
-    """Return what teeth do to a body, (levels, coordinates, time), NaN from where a reversal leaves it open."""
+def without_open_rates(work: Numbers, first: Numbers | None, instance: int) -> Numbers:
+    """Return the force of teeth on a body, (levels, coordinates, time), NaN for rates that a reversal leaves open."""
     return work if first is None else np.where(np.arange(len(work))[:, None, None] >= first[instance], np.nan, work)
 
 
 def rate_of(motion: Motion) -> Float[np.ndarray, " time"]:
     """Return how fast a motion changes, 1/s: the largest root of a Taylor term, in rad or sizes of the mechanism."""
-    found = np.full(len(motion.time), SLOWEST)
+    rate = np.full(len(motion.time), SLOWEST)
     for name, series in motion.poses[1].items():
         scale = motion.model.length if name == "position" else 1.0
         for k, level in enumerate(np.asarray(series)[1:], 1):
             size = np.abs(np.nan_to_num(level)).reshape(-1, len(motion.time)).max(axis=0) / scale
-            found = np.maximum(found, size ** (1.0 / k))
-    return found
+            rate = np.maximum(rate, size ** (1.0 / k))
+    return rate
 
 
 def _signs(own: Numbers, whole: Numbers, rate: Float[np.ndarray, " time"]) -> tuple[np.ndarray, np.ndarray]:
-    """Return flanks, and the level from which on the absolute value of a multiplier has no derivative, if any."""
+    """Return flanks, and the first level at which the absolute value of a multiplier has no derivative, if any."""
     levels = len(own)
     scaled = np.nan_to_num(np.asarray(own)) / rate ** np.arange(levels)[:, None, None]
     size = np.maximum(np.abs(np.nan_to_num(whole[0])).max(), np.abs(scaled).max(axis=0))
@@ -136,7 +136,7 @@ def _signs(own: Numbers, whole: Numbers, rate: Float[np.ndarray, " time"]) -> tu
 
 
 def flank_words(forces: Any, bodies: set[str]) -> str:
-    """Say where loads change flanks, of teeth of some bodies, by the `MotionForces`; nothing where none does."""
+    """Return words for where loads of teeth of some bodies change flanks, from `MotionForces`; empty if none does."""
     motion, words = forces.motion, []
     for name, place in forces.indices.items():
         if place.group in forces.flanks and bodies & {*motion.mechanism.joints[name].bodies}:
@@ -145,26 +145,29 @@ def flank_words(forces: Any, bodies: set[str]) -> str:
 
 
 def _reversal_words(name: str, forces: Numbers, motion: Motion) -> str:
-    """Say where the load of teeth changes flanks, by their multipliers, (time,); nothing where it does not."""
+    """Return words for where the load of teeth changes flanks, from multipliers, (time,); empty if it does not."""
     solved = (motion.status == Status.OK) & np.isfinite(forces)
     times, sign = motion.time[solved], np.sign(forces[solved])
     sign[np.abs(forces[solved]) <= NONE * np.max(np.abs(forces[solved]), initial=0.0)] = 0.0
     zero = times[sign == 0] if sign.any() else times[:0]
     if zero.size:
         where = listed(zero)
-        return f"the load of {name} changes flanks at t = {where}: rates of what it presses apart are not determined"
+        return (
+            f"the load of {name} changes flanks at t = {where}: rates of the bearing forces that it causes are not "
+            "determined"
+        )
     changes = times[1:][sign[1:] != sign[:-1]]
     return f"the load of {name} changes flanks before t = {listed(changes)}" if changes.size else ""
 
 
 def listed(times: Float[np.ndarray, " time"]) -> str:
     """List the first of some instants."""
-    return ", ".join(f"{t:.4g} s" for t in times[:MOST_TOLD]) + (", ..." if len(times) > MOST_TOLD else "")
+    return ", ".join(f"{t:.4g} s" for t in times[:MOST_LISTED]) + (", ..." if len(times) > MOST_LISTED else "")
 
 
 @compiled("pose_type", brief=True)
 def _parted(element: Any, poses: Any, instants: Any, pose_type: Any) -> Any:
-    """Return how a residual with a flank differs from that without."""
+    """Return the difference of a residual with and without a flank."""
     built = [pose_type.from_coordinates({name: Jet([c[0]]) for name, c in pose.items()}) for pose in poses]
     group = Group(element, ())
     time = Jet([instants[None]])
@@ -181,9 +184,9 @@ def check_pitch(motion: Motion, groups: Sequence[Group], poses: Callable[[int], 
     Parameters
     ----------
     motion : Motion
-        Along which it is looked at.
+        The motion to check.
     groups : sequence of Group
-        Of joints and drivers.
+        Groups of joints and drivers.
     poses : callable
         Returns the coordinates of the bodies of a group at all instants.
     """
@@ -197,7 +200,7 @@ def check_pitch(motion: Motion, groups: Sequence[Group], poses: Callable[[int], 
         away = np.asarray(_parted(group.element, poses(index), motion.time, motion.poses[0]))
         away = np.where(slope > 0, away / np.where(slope > 0, slope, 1.0), 0.0)
         radius = np.asarray(group.element.radius)
-        bad = (np.abs(away) > APART * radius) & solved
+        bad = (np.abs(away) > OFF_PITCH * radius) & solved
         if bad.any():
             instance, lane = np.argwhere(bad)[0]
             size = radius[instance, 0]

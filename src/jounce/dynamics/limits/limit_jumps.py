@@ -52,7 +52,7 @@ class Infinite:
     signs : ndarray of shape (jump, 6, joint)
         Of position to torque rate: 0 where it is finite, else the sign.
     before : ndarray of shape (jump, 6, joint)
-        Velocities before the jumps, and signs: what tells whether an acceleration slows a joint down.
+        Velocities before the jumps, and signs, which show whether an acceleration slows a joint down.
     """
 
     times: Float[np.ndarray, " jump"]
@@ -115,7 +115,7 @@ def jumps_of(
     inside = (where > first + SAME * duration) & (where < last - SAME * duration) & heights.any(axis=(1, 2))
     where, heights = where[inside], heights[inside]
     after = evaluate(where + SAME * duration / 2) if len(where) else np.zeros((0, order + 1, joints))
-    after = np.where(np.isfinite(after), after, 0.0)  # beside a kink that has no derivatives, as of asin(sin(t))
+    after = np.where(np.isfinite(after), after, 0.0)  # next to a kink without derivatives, as of asin(sin(t))
     before = after.copy()
     before[:, :-1] -= heights
     return Jumps(where, before, after)

@@ -17,11 +17,11 @@ SMALL = 1e-6  # of the size of a derivative: less is rest
 LEAST = np.array([0.0, 1e-9, 1e-6, 1e-3])  # the same, by s to the power of the order: rad or m
 LOOKS = 201
 INSIDE = 1e-10  # of the duration: how long before the stop it is looked at, too
-UNSUPPORTED = 0.5  # of its peak: the error of a derivative that samples say nothing of
+UNSUPPORTED = 0.5  # of its peak: the error of a derivative that samples do not support
 SAFE = 3.0  # times the estimated error: less is none
 SLOW, FAR = 0.02, 4.0  # of the largest velocity, and deviations: less is none where noise hides what splines say
-FITTED, PART = 12, 20  # samples at each end that tell its velocity then: so many, or so small a part of all
-FEW = 2  # times the degree: of fewer samples it is not noise that hides the derivatives, the spline tells what it makes
+FITTED, PART = 12, 20  # samples at each end that give its velocity: this number, or this small a part of all
+FEW = 2  # times the degree: with fewer samples not noise but the spline decides the derivatives
 
 
 @dataclasses.dataclass(frozen=True)
@@ -100,7 +100,7 @@ def end_jumps(followed: FollowedTrajectory, values: Float[np.ndarray, "time deri
     followed : FollowedTrajectory
         The robot on its trajectory.
     values : array of shape (time, derivative, joint)
-        Coordinates and derivatives to jerk at least at many instants, which tell how large they are.
+        Coordinates and derivatives to jerk at least at many instants, which show their sizes.
     """
     trajectory, order = followed.trajectory, values.shape[1] - 1
     times = np.array([trajectory.start, trajectory.stop])

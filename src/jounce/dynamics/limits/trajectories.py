@@ -44,7 +44,7 @@ class FollowedTrajectory:
         Joints that the trajectory does not name, and where they stand: at zero, or at the end of their range that is
         nearest to it.
     doubts : list of str
-        Warnings about samples that do not support derivatives that were asked for.
+        Warnings about samples that do not support requested derivatives.
 
     Raises
     ------

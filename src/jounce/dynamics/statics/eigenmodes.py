@@ -73,7 +73,7 @@ def eigenmodes(mass: Square, damping: Square, stiffness: Square, noise: tuple[Sq
 
 
 def is_symmetric(matrix: Square, noise: Square) -> bool:
-    """Tell whether a matrix is symmetric but for rounding."""
+    """Return whether a matrix is symmetric up to rounding."""
     size = np.abs(matrix).max(initial=0.0)
     return bool((np.abs(matrix - matrix.T) <= np.maximum(noise + noise.T, SYMMETRIC * size)).all())
 
@@ -118,7 +118,7 @@ def _of_state_matrix(
 
 
 def _upper(values: Complex[np.ndarray, " value"]) -> Bool[np.ndarray, " value"]:
-    """Tell which eigenvalues stand for a pair: those that are real, and the upper ones of the others."""
+    """Return which eigenvalues represent a pair: those that are real, and the upper ones of the others."""
     return np.imag(values) >= -REAL * np.abs(values)
 
 

@@ -110,7 +110,7 @@ def search(start: OperatingPoint, *, settle: bool) -> SearchResult:
 
 
 def _is_flat(stiffness: np.ndarray, step: np.ndarray, left: np.ndarray) -> bool:
-    """Tell whether the forces left hardly change along the longest step that is taken."""
+    """Return whether the forces left hardly change along the longest permitted step."""
     change = stiffness @ step * (LONGEST / np.abs(step).max())
     return bool(np.linalg.norm(change) < 1e-3 * np.linalg.norm(left))
 

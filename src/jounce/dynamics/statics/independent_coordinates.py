@@ -49,7 +49,7 @@ class Reduction:
     matrices : array of shape (coordinates, lanes)
         Generalized forces of the coordinates that these changes need.
     sizes : array of shape (coordinates, lanes)
-        What they would be if nothing canceled: the comparison tells what is rounding.
+        The same with absolute values of all terms: a scale for rounding.
     """
 
     point: OperatingPoint
@@ -137,7 +137,7 @@ def reduced(
 
 
 def rolls(point: OperatingPoint) -> bool:
-    """Tell whether rows of joints hold velocities: then there are more positions than small motions."""
+    """Return whether rows of joints constrain velocities: then there are more positions than small motions."""
     return any(joint.nonholonomic for joint in point.mechanism.joints.values())
 
 
@@ -146,8 +146,8 @@ def _check_nowhere(
 ) -> None:
     """Raise MechanismError unless small motions are the same wherever wheels have rolled to.
 
-    Positions that the coordinates do not tell, such as where a bicycle is and which way it heads, are changed one after
-    the other, with the velocities that the rows then ask for: what the bodies have to balance must not change.
+    Positions that the coordinates do not determine, such as the place and heading of a bicycle, are changed one after
+    the other, with the velocities that the rows then require: the balance of forces must not change.
     """
     gradients, inverse, basis, sizes = reduction
     count, chosen = len(point.scale), names[released:]
@@ -163,7 +163,7 @@ def _check_nowhere(
     if released or (np.abs(left) > NOWHERE * sizes[:, None]).any():
         message = (
             "small motions of wheels that roll are known where they do not depend on the places that wheels have "
-            "rolled to: name coordinates that tell how bodies move whichever way they head, release no driver, and "
+            "rolled to: name coordinates that determine the motion of bodies for any heading, release no driver, and "
             "look at a steady motion"
         )
         raise MechanismError(message, name="coordinates", value=list(names))
@@ -193,7 +193,7 @@ def column_names(point: OperatingPoint) -> list[str]:
 
 
 def chosen_outputs(point: OperatingPoint) -> tuple[str, ...]:
-    """Return outputs that together tell how all bodies move."""
+    """Return outputs that together determine the motion of all bodies."""
     return _chosen(point, point.free, True)
 
 
@@ -249,7 +249,7 @@ def _gradients(
         values = np.linalg.svd(gradients @ free / sizes[:, None], compute_uv=False)
         if not values.min() > 1e-6:
             suggested = ", ".join(_chosen(point, free, False))
-            message = f"are not independent here, and do not tell how all bodies move; {suggested} would do"
+            message = f"are not independent here, and do not determine the motion of all bodies; use {suggested}"
             raise MechanismError(message, name="coordinates", value=list(names))
     return gradients
 
@@ -279,7 +279,7 @@ def _laws_varied(point: OperatingPoint, names: Sequence[str], laws: np.ndarray) 
 def _measured(
     point: OperatingPoint, names: Sequence[str], changes: Lanes, level: int
 ) -> Float[np.ndarray, "coordinate lane"]:
-    """Return the Taylor coefficients that coordinates have by changes, of which this level may be incomplete."""
+    """Return the Taylor coefficients of coordinates under changes, which may be incomplete at this level."""
     varied = point.outputs_varied(changes)
     components, columns = point.components([x.shape[1] for x in varied]), column_names(point)
     rows = []

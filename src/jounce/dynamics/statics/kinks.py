@@ -47,7 +47,7 @@ def kinked(reduction: Reduction) -> list[str]:
 
 
 def _that_count(reduction: Reduction, sizes: np.ndarray) -> np.ndarray:
-    """Return by how much a slope must differ to count beside stiffness and damping, N m and N m s, for each lane."""
+    """Return the least difference of slopes that matters among stiffness and damping, N m and N m s, for each lane."""
     count = len(reduction.names)
     stiffness, mass = (
         float(np.max(np.diag(reduction.noise(level)) / ROUNDING / sizes[:count] ** 2, initial=1e-300))

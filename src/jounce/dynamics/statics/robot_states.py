@@ -23,7 +23,7 @@ from jounce.robot.model.arguments import floats
 DRIVE = "_drive"
 
 GivenState = Mapping[str, float] | ArrayLike | None
-"""Coordinates, alone or with their rates and second derivatives, or by name of the joint; those not given are zero."""
+"""Coordinates, with or without their rates and second derivatives, or by name of the joint; others are zero."""
 
 
 def standing(

@@ -58,8 +58,8 @@ class Linearization(Displayed):
     mass, damping, stiffness : numpy.ndarray of shape (coordinates, coordinates)
         SI. The stiffness holds that of applied forces, of weight, and of all that joints and drivers bear.
     inputs : tuple of str
-        Names of u: what drivers that were released exert beside their force, N or N m; what applied forces do, beside
-        what their law says, each component of them.
+        Names of u: forces of released drivers in addition to their force in the motion, N or N m, and components of
+        applied forces in addition to their law.
     input_matrix : numpy.ndarray of shape (coordinates, inputs)
         Generalized forces by those.
     held : tuple of str
@@ -107,7 +107,7 @@ class Linearization(Displayed):
 
     @property
     def inputs(self) -> tuple[str, ...]:
-        """Names of forces and torques that act beside those that are there."""
+        """Names of forces and torques that act in addition to those of the operating point."""
         return self._inputs[0]
 
     @property
@@ -176,7 +176,7 @@ class Linearization(Displayed):
 
 
 def named(kind: str, names: str | Sequence[str] | Refused) -> tuple[str, ...]:
-    """Return names given one by one or alone, or raise MechanismError."""
+    """Return names, given as a sequence or as a single one, or raise MechanismError."""
     if isinstance(names, str):
         return (names,)
     if not isinstance(names, Sequence) or not all(isinstance(name, str) for name in names):

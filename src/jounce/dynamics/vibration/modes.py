@@ -109,7 +109,7 @@ class Modes(Displayed):
         duration : float, optional
             Of the swing, s: its period unless given, and 1 s where the mode does not swing.
         frames : int, default 61
-            Instants, the last of which shows what the first does.
+            Number of instants; the last shows the same position as the first.
 
         Raises
         ------

@@ -116,7 +116,7 @@ class DriverTorqueOutput(_DriverOutput):
 
 class _Reaction(AbstractForceOutput):
     def is_vector(self, mechanism: Mechanism) -> bool:
-        """Tell whether the reaction has components: a torque has in space."""
+        """Return whether the reaction has components, as a torque in space."""
         return self.unit == "N" or mechanism.space == "spatial"
 
 
@@ -150,8 +150,8 @@ class _JointOutput(_Reaction):
         belts = [name for name, x in joints.items() if isinstance(x, Belt) and bodies & {*x.bodies}]
         forces = MotionForces.of(motion)
         loaded, pressed, pulled = ([x for x in names if forces.is_loaded(x)] for names in (gears, cams, belts))
-        told = ratio_words(loaded), cam_words(pressed), belt_words(pulled), flank_words(forces, bodies)
-        words = super().remark(motion, values), *told
+        remarks = ratio_words(loaded), cam_words(pressed), belt_words(pulled), flank_words(forces, bodies)
+        words = super().remark(motion, values), *remarks
         return "; ".join(filter(None, words))
 
     def _values(self, motion: Motion, point: ArrayLike | None, part: int, size: float) -> Numbers:
@@ -175,7 +175,7 @@ def _exerting(mechanism: Mechanism, name: str) -> Any:
 
 
 def _is_load(element: Any) -> bool:
-    """Tell whether a force comes from outside: it acts on one body, and on nothing else in turn."""
+    """Return whether a force comes from outside: it acts on one body, without a reaction on another."""
     return isinstance(element, AbstractForce) and len(element.bodies) == 1
 
 
@@ -200,7 +200,7 @@ class JointForceOutput(_JointOutput):
         return self.body is None and hasattr(mechanism.joints.get(self.joint), "line_force")
 
     def is_vector(self, mechanism: Mechanism) -> bool:
-        """Tell whether the force has components: that along a rope or a belt has none."""
+        """Return whether the force has components; that along a rope or a belt has none."""
         return not self._is_line(mechanism)
 
     def check(self, mechanism: Mechanism) -> None:
@@ -226,22 +226,22 @@ class JointForceOutput(_JointOutput):
 
 
 def slack_ropes(motion: Motion) -> dict[str, str]:
-    """Return of each rope that has no output of its tension where it is slack in a motion; nothing where none is.
+    """Return the ropes without an output of their tension that are slack in a motion, with words for the instants.
 
-    What rests on a rope that would have to push is wrong there, whatever is asked for. Nothing is told of a mechanism
-    without masses and applied forces, nor of a motion without accelerations.
+    All results that rest on a rope that would have to push are wrong there. The tension is not checked in a mechanism
+    without masses and applied forces, nor in a motion without accelerations.
     """
-    mechanism, found = motion.mechanism, {}
+    mechanism, slack = motion.mechanism, {}
     ropes = [name for name, joint in mechanism.joints.items() if isinstance(joint, Rope)]
-    told = {x.joint for x in mechanism.outputs.values() if isinstance(x, JointForceOutput) and x.body is None}
+    reported = {x.joint for x in mechanism.outputs.values() if isinstance(x, JointForceOutput) and x.body is None}
     loaded = mechanism.forces or any(body.mass is not None for body in mechanism.rigid_bodies.values())
     if not loaded or len(motion.poses[1]["position"]) < 3:
         return {}
-    for name in (name for name in ropes if name not in told):
+    for name in (name for name in ropes if name not in reported):
         tension = JointForceOutput(name).coefficients(motion)
         if words := slack_words(motion.time, np.asarray(tension)[0, 0]):
-            found[name] = f"its tension {words}"
-    return found
+            slack[name] = f"its tension {words}"
+    return slack
 
 
 class JointTorqueOutput(_JointOutput):
@@ -316,7 +316,7 @@ class _AppliedOutput(AbstractForceOutput):
     source = "force"
 
     def is_vector(self, mechanism: Mechanism) -> bool:
-        """Tell whether the applied force has several components."""
+        """Return whether the applied force has several components."""
         return len(mechanism.forces[self.force].velocity_names) > 1
 
     def coefficients(self, motion: Motion) -> Numbers:

@@ -1,4 +1,4 @@
-"""What is told beside the values of forces: where they change sign, and what they leave out."""
+"""Remarks on the values of forces: where they change sign, and what they leave out."""
 
 from collections.abc import Sequence
 
@@ -69,8 +69,8 @@ def slack_words(time: np.ndarray, tensions: np.ndarray) -> str:
     edges = np.flatnonzero(np.diff(np.concatenate([[False], pushes, [False]]).astype(int)))
     parts = []
     for first, last in zip(edges[::2], edges[1::2] - 1, strict=True):
-        alone = first == last
-        parts.append(f"at {times[first]:.4g} s" if alone else f"from {times[first]:.4g} s to {times[last]:.4g} s")
+        is_single = first == last
+        parts.append(f"at {times[first]:.4g} s" if is_single else f"from {times[first]:.4g} s to {times[last]:.4g} s")
     if not parts:
         return ""
     parts[0] = parts[0].replace(" ", " t = ", 1)
