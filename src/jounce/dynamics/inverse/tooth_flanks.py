@@ -104,7 +104,7 @@ def settled(
         first = np.min([level.min(axis=0) for level in reversals.values()], axis=0)
         away &= np.arange(levels)[:, None, None] >= first
         multipliers = np.where(np.logical_or.accumulate(away, axis=0), np.nan, multipliers)
-    return found, flanks, reversals
+    return multipliers, flanks, reversals
 
 
 def without_open_rates(work: Numbers, first: Numbers | None, instance: int) -> Numbers:
