@@ -10,7 +10,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
 # rooms whose names are still to be changed
-NOT_YET = ("dynamics", "planning", "written_equations")
+NOT_YET = ("dynamics", "planning")
 
 
 def read_words(path: Path) -> dict[str, str]:

@@ -39,18 +39,22 @@ def coordinates(equations):
 
 
 def differences(module, equations):
-    """Return by how much code differs from numbers: residual, Jacobian, right sides, each over the size of its row."""
+    """Return by how much code differs from numbers: residual, Jacobian, right sides, each over the size of its row.
+
+    The size of right sides is that of the terms of ``Phi_q q^(k)``, which may cancel.
+    """
     q, found = coordinates(equations), []
     moving, sides = (from_one(x) for x in (equations.velocities, equations.right_side))
     for k, t in enumerate(equations.time.values.tolist()):
+        terms = np.nan_to_num(np.abs(moving[k])) @ np.abs(equations.jacobian.values[k]).T
         pairs = (
-            (module["residual"](t, q[k]), equations.residual.values[k], ()),
-            (module["jacobian"](t, q[k]), equations.jacobian.values[k], (1,)),
-            (module["right_side"](t, q[k], moving[k])[: len(sides[k])], sides[k], (0,)),
+            (module["residual"](t, q[k]), equations.residual.values[k], (), 1.0),
+            (module["jacobian"](t, q[k]), equations.jacobian.values[k], (1,), 1.0),
+            (module["right_side"](t, q[k], moving[k])[: len(sides[k])], sides[k], (0,), terms.max(axis=0, initial=1.0)),
         )
-        for got, expected, axis in pairs:
+        for got, expected, axis, least in pairs:
             expected = np.nan_to_num(expected[: len(got)], nan=0.0)
-            size = np.max(np.abs(expected), axis=axis, keepdims=True, initial=1.0)
+            size = np.maximum(np.max(np.abs(expected), axis=axis, keepdims=True, initial=1.0), least)
             assert got.shape == expected.shape
             found.append(np.max(np.abs(got - expected) / size, initial=0.0))
     return np.array(found).reshape(-1, 3)

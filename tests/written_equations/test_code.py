@@ -13,7 +13,7 @@ from jounce.errors import MechanismError
 from tests.problems.bank import cases
 from tests.problems.mechanisms import example
 from tests.problems.own_types import taken_back
-from tests.problems.written import at, between_free_bodies, coordinates, differences, random_states, run
+from tests.problems.written import at, between_free_bodies, coordinates, differences, from_one, random_states, run
 
 QUICK = "planar-joint-parallel2"
 CASES = [
@@ -51,7 +51,7 @@ def assert_same_in_c(code, call, equations, tolerance=1e-14):
     """Compare C with Python, whose operations are the same, at the instants of equations."""
     q = coordinates(equations)
     for k, t in enumerate(equations.time.values.tolist()):
-        velocities = np.nan_to_num(equations.velocities.values[k])
+        velocities = np.nan_to_num(from_one(equations.velocities)[k])
         for what, *more in (("residual", q[k]), ("jacobian", q[k]), ("right_side", q[k], velocities)):
             expected = code[what](t, *more)
             size = np.max(np.abs(expected), initial=1.0)
@@ -169,11 +169,10 @@ def test_mechanisms_along_their_motions(name, tmp_path):
     whole = code["right_side"](
         motion_equations.time.values,
         coordinates(motion_equations).T,
-        np.moveaxis(motion_equations.velocities.values, 0, -1),
+        np.moveaxis(from_one(motion_equations.velocities), 0, -1),
     )
-    np.testing.assert_allclose(
-        np.moveaxis(whole, -1, 0), motion_equations.right_side.values, rtol=1e-9, atol=1e-9 * abs(whole).max()
-    )
+    expected = from_one(motion_equations.right_side)
+    np.testing.assert_allclose(np.moveaxis(whole, -1, 0), expected, rtol=1e-9, atol=1e-9 * abs(whole).max())
     if COMPILER:
         assert_same_in_c(code, compiled(jn.equations(mechanism, format="c", order=6), tmp_path), motion_equations)
 

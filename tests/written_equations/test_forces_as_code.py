@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import jounce as jn
-from jounce.errors import MechanismError
+from jounce.errors import MechanismError, UnsupportedError
 from tests.contracts.test_frames import INSTANTS, MECHANISMS
 from tests.problems.mechanisms import example
 from tests.problems.own_types import taken_back
@@ -21,7 +21,14 @@ def bank(name):
     return jn.solve(dataclasses.replace(MECHANISMS[name](), redundant_reactions="least_norm"), INSTANTS, order=5)
 
 
-@pytest.mark.parametrize("name", [x if x == "arm" else pytest.param(x, marks=pytest.mark.slow) for x in MECHANISMS])
+FRICTION = tuple(
+    name for name, make in MECHANISMS.items() if any(getattr(x, "friction", None) for x in make().joints.values())
+)
+
+
+@pytest.mark.parametrize(
+    "name", [x if x == "arm" else pytest.param(x, marks=pytest.mark.slow) for x in MECHANISMS if x not in FRICTION]
+)
 def test_every_joint_and_force_balances_what_moves(name, tmp_path):
     motion = bank(name)
     equations = jn.constraint_equations(motion)
@@ -37,6 +44,15 @@ def test_every_joint_and_force_balances_what_moves(name, tmp_path):
         np.testing.assert_allclose(found, expected, rtol=0, atol=1e-13 * np.abs(expected).max())
         mass = code["mass_matrix"](motion.time[0], q)
         np.testing.assert_allclose(call("mass_matrix", mass.shape, motion.time[0], q), mass, rtol=0, atol=1e-14)
+
+
+@pytest.mark.parametrize("name", FRICTION)
+def test_friction_is_refused_by_name(name):
+    """It follows from the multipliers of the same instant; the constraints do not depend on it."""
+    mechanism = MECHANISMS[name]()
+    with pytest.raises(UnsupportedError, match=r"^joints\.\w+\.friction: forces as code of a mechanism whose joints"):
+        jn.equations(mechanism, order=2, quantities=("constraints", "forces"))
+    assert "def residual" in jn.equations(mechanism, order=1)
 
 
 def test_accelerations_and_multipliers_follow_from_one_matrix():

@@ -1,5 +1,6 @@
 """LaTeX of the joints of Sommer 2024, read as numbers and compared with the equations of the paper."""
 
+import jax.numpy as jnp
 import numpy as np
 import pytest
 
@@ -256,6 +257,44 @@ def test_the_rotation_driver_reads_as_101_to_103_are_printed(vectors):
     assert found[r"\theta"] == rf"{'' if vectors else '2 '}\operatorname{{atan2}}\left( {inside} \right)"
     assert found[r"\Phi_{qj}"] == rf"\left[ \mathbf{{0}}, {axis} \right]"
     assert [found[side] for side in SIDES] == ["f_{t}", "f_{tt}", "f_{ttt}", "f_{tttt}"]
+
+
+class Steps(jn.joints.AbstractConstraint):
+    """Of what is rounded."""
+
+    point_j: jn.joints.Vector
+
+    def residual(self, body_i, body_j, time):
+        d = body_j.point(self.point_j) - body_i.position
+        step = jnp.round(d[0].coefficients[0]) + jnp.floor(d[1].coefficients[0])
+        return d[1] - jn.jet.Jet.constant(step, d.order)
+
+
+def test_what_is_rounded_is_written():
+    found = dict(equations_of(Steps(BODIES, S_J), "planar", order=2))
+    assert r"- \operatorname{round}\left( x_j" in found[r"\Phi"]
+    assert r"- \operatorname{floor}\left( y_j" in found[r"\Phi"]
+
+
+class Tilted(jn.joints.AbstractConstraint):
+    def residual(self, body_i, body_j, time):
+        d = body_j.position - body_i.position
+        return jn.jet.atan2(d[1], d[0]) - body_j.angle
+
+
+def test_an_angle_of_a_line_is_refused_by_name():
+    mechanism = between_free_bodies(Tilted(BODIES), "planar")
+    with pytest.raises(MechanismError, match=r"^it: cannot be written out: it takes a function of \d+ long terms"):
+        jn.equations(mechanism, "it", format="latex")
+    assert "Left out, as nobody would read it" in jn.equations(mechanism, format="latex")
+
+
+def test_what_nobody_would_read_is_left_out_within_seconds():
+    text = jn.equations(jn.load(example("belt_drive")), format="latex")
+    assert_well_formed(text)
+    assert "Left out, as nobody would read it: it takes a function of" in text
+    with pytest.raises(MechanismError, match=r"^belt\w*: cannot be written out: it takes a function of"):
+        jn.equations(jn.load(example("belt_drive")), "belt", format="latex")
 
 
 def test_documents_of_mechanisms(tmp_path):

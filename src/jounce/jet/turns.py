@@ -17,7 +17,16 @@ WHOLE_TURN = 2 * math.pi
 def whole_periods(value: Real, period: Real = WHOLE_TURN) -> Any:
     """Return the whole number of periods (turns by default) nearest to a value, in the unit of the value."""
     count: Any = value / period
-    return period * (jnp if isinstance(count, jax.Array) else np).round(count)
+    return period * (nearest_whole if isinstance(count, jax.Array) else np.round)(count)
+
+
+def _nearest_whole(count: Any) -> Any:
+    """Return `jnp.round`, under a name by which programs that are read know turns from what is rounded otherwise."""
+    return jax.lax.round(count, jax.lax.RoundingMethod.TO_NEAREST_EVEN)
+
+
+ROUNDING_OF_TURNS = _nearest_whole.__name__
+nearest_whole = jax.jit(_nearest_whole)
 
 
 def wrap(x: Quantity, period: Real = WHOLE_TURN) -> Any:

@@ -4,7 +4,15 @@ import numpy as np
 import pytest
 
 import jounce as jn
-from jounce.dynamics import gibbs_appell, higher_order, lagrange, mangeron_nielsen
+from jounce.dynamics import (
+    gibbs_appell,
+    gravity_forces,
+    higher_order,
+    lagrange,
+    mangeron_nielsen,
+    newton_euler,
+    virtual_work,
+)
 from tests.problems.mechanisms import example
 
 TIMES = [0.0, 0.2, 0.5]
@@ -13,6 +21,8 @@ FORMS = {
     "gibbs": lambda motion: gibbs_appell(motion)[:, 0],
     "gibbs_4": lambda motion: gibbs_appell(motion, m=4)[:, 0],
     "higher": lambda motion: higher_order(motion, k=1, m=3),
+    "newton": lambda motion: newton_euler(motion)[:, 0],
+    "work": lambda motion: virtual_work(motion)[:, 0],
 }
 
 
@@ -54,8 +64,20 @@ def test_a_free_body_feels_weight_and_spring():
     for form in FORMS.values():
         close(form(motion).values, found[:, 0].values)
     close(higher_order(motion, k=2).values, found[:, 1].values)
-    with pytest.raises(jn.errors.MechanismError, match="order: this needs a motion of order"):
-        lagrange(motion, rates=9)
+    further = lagrange(motion, rates=2)
+    for balance in (newton_euler(motion, rates=2), virtual_work(motion, rates=2)):
+        assert balance.column.equals(found.column)
+        assert balance.unit.equals(found.unit)
+        for rate in (1, 2):
+            close(balance[:, rate].values, further[:, rate].values)
+    held = gravity_forces(motion, rates=1)
+    close(held[:, 0].values, -np.column_stack([np.tile(weight, (3, 1)), arm[:, 0] * weight[1]]))
+    speed = equations.velocities.sel(derivative=1).values[:, 2]
+    turning = 2.0 * 9.81 * turned(0.05, 0.1)[:, 0] * speed  # of the center of mass about the origin
+    close(held[:, 1].values, np.column_stack([np.zeros((3, 2)), turning]))
+    for form in (lagrange, newton_euler):
+        with pytest.raises(jn.errors.MechanismError, match="order: this needs a motion of order"):
+            form(motion, rates=9)
 
 
 @pytest.mark.parametrize(
@@ -98,5 +120,11 @@ def test_a_free_body_in_space():
     turns = Rotation.from_quat(equations.attitude.values[:, 0, [1, 2, 3, 0]])
     bias = np.hstack([turns.apply(2.0 * np.cross(w, np.cross(w, center))), np.cross(w, w @ about)])
     close(found, np.einsum("tij,tj->ti", mass, second) + bias)
+    further = lagrange(motion, rates=2)
+    for rate in (1, 2):
+        close(newton_euler(motion, rates=2)[:, rate].values, further[:, rate].values)
+    weight = turns.inv().apply([0.0, 0.0, 2.0 * 9.81])
+    held = np.hstack([np.tile([0.0, 0.0, 2.0 * 9.81], (3, 1)), np.cross(center, weight)])
+    close(gravity_forces(motion)[:, 0].values, held)
     for form in FORMS.values():
         close(form(motion).values, found, 1e-10)

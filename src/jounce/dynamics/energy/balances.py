@@ -5,9 +5,10 @@ from typing import Any
 import jax.numpy as jnp
 
 from jounce.base.shapes import ArrayLike
-from jounce.dynamics.energy.driver_coordinates import balanced
+from jounce.dynamics.energy.body_coordinates import balanced_bodies
+from jounce.dynamics.energy.driver_coordinates import balanced, is_driven
 from jounce.dynamics.energy.energies import error_for
-from jounce.errors import whole_number
+from jounce.errors import MechanismError, whole_number
 from jounce.kinematics import Motion
 from jounce.robot.algorithms.equations_of_motion import (
     centers_of,
@@ -38,10 +39,24 @@ def _virtual_work(tree: Tree, arrays: tuple[Series], _: Any, inertial: bool) -> 
     return to_coordinates(tree, work(partial_velocities(tree, frames), force, moment))
 
 
+def _of_motion(motion: Motion, q: ArrayLike | None, rates: int, *, gravity: bool) -> Any:
+    """Return what inertia, and on request weight, asks of the drivers, or of the bodies where these prescribe less.
+
+    Raises
+    ------
+    MechanismError
+        If coordinates are given, no body has a mass, or the motion has too few derivatives.
+    """
+    if q is not None:
+        raise MechanismError("a motion has its coordinates already", name="q", value=q)
+    return (balanced if is_driven(motion) else balanced_bodies)(motion, rates, gravity=gravity)
+
+
 def newton_euler(system: Robot | Motion, q: ArrayLike | None = None, rates: int = 0) -> Any:
     """Return the generalized inertia forces by recursive Newton-Euler on jets: `inverse_dynamics` without gravity.
 
-    For the motion of a mechanism the balances of momentum are those of all bodies together, by multipliers.
+    For the motion of a mechanism the balances of momentum are those of all bodies together, by multipliers; where
+    drivers do not prescribe all that moves, those of each body.
 
     Parameters
     ----------
@@ -56,7 +71,7 @@ def newton_euler(system: Robot | Motion, q: ArrayLike | None = None, rates: int 
     Raises
     ------
     RobotError, MechanismError
-        If q does not fit the robot or has too few derivatives, or the motion is not that of a driven mechanism.
+        If q does not fit the robot or has too few derivatives, or the motion has too few.
 
     Examples
     --------
@@ -67,7 +82,7 @@ def newton_euler(system: Robot | Motion, q: ArrayLike | None = None, rates: int 
     """
     rates = whole_number("rates", rates, error=error_for(system))
     if isinstance(system, Motion):
-        return balanced(system, rates, gravity=False)
+        return _of_motion(system, q, rates, gravity=False)
     falling, q = system.with_gravity((0.0, 0.0, 0.0)), checked_coordinates(system, q, rates + 2, rates + 2)
     return inverse_dynamics(falling, q, drives=False)
 
@@ -77,6 +92,7 @@ def virtual_work(system: Robot | Motion, q: ArrayLike | None = None, rates: int 
 
     The work that inertia forces and moments of all bodies do along each coordinate, ``sum J^T F``. For the motion of
     a mechanism, J is how the bodies move with the laws of the drivers: the transposed Jacobian of the constraints.
+    Where drivers do not prescribe all that moves, it is how a body moves with its own coordinates.
 
     Parameters
     ----------
@@ -91,7 +107,7 @@ def virtual_work(system: Robot | Motion, q: ArrayLike | None = None, rates: int 
     Raises
     ------
     RobotError, MechanismError
-        If q does not fit the robot or has too few derivatives, or the motion is not that of a driven mechanism.
+        If q does not fit the robot or has too few derivatives, or the motion has too few.
 
     Examples
     --------
@@ -102,7 +118,7 @@ def virtual_work(system: Robot | Motion, q: ArrayLike | None = None, rates: int 
     """
     rates = whole_number("rates", rates, error=error_for(system))
     if isinstance(system, Motion):
-        return balanced(system, rates, gravity=False)
+        return _of_motion(system, q, rates, gravity=False)
     return _virtual_work(system, (checked_coordinates(system, q, rates + 2, rates + 2),), (), (True,))
 
 
@@ -124,7 +140,7 @@ def gravity_forces(system: Robot | Motion, q: ArrayLike | None = None, rates: in
     Raises
     ------
     RobotError, MechanismError
-        If q does not fit the robot or has too few derivatives, or the motion is not that of a driven mechanism.
+        If q does not fit the robot or has too few derivatives, or the motion has too few.
 
     Examples
     --------
@@ -135,5 +151,6 @@ def gravity_forces(system: Robot | Motion, q: ArrayLike | None = None, rates: in
     """
     rates = whole_number("rates", rates, error=error_for(system))
     if isinstance(system, Motion):
-        return balanced(system, rates, gravity=True) - balanced(system, rates, gravity=False)
+        heavy, light = (_of_motion(system, q, rates, gravity=gravity) for gravity in (True, False))
+        return heavy - light
     return _virtual_work(system, (checked_coordinates(system, q, rates, rates),), (), (False,))

@@ -1,10 +1,11 @@
-"""A mechanism in the coordinates of its bodies: slopes of energies where drivers do not prescribe all that moves.
+"""A mechanism in the coordinates of its bodies: equations of motion where drivers do not prescribe all that moves.
 
 The coordinates of a body are the place of its origin and, in the plane, its angle; in space, turns about the axes of
 the body, away from the motion. Each changes a whole motion by a constant, and how the points of the body change with
 it is a jet: the column of a Jacobian.
 """
 
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 import jax
@@ -14,13 +15,15 @@ from jaxtyping import Float
 
 from jounce.base.shapes import Numbers
 from jounce.dynamics.energy.slopes import Columns, Form, column_of, slope_values
+from jounce.dynamics.forward.loads import inertia_forces
 from jounce.dynamics.inverse.constraint_equations import COLUMNS
-from jounce.dynamics.masses import Masses, required_masses
+from jounce.dynamics.masses import Gravity, Masses, gravity_of, required_masses
 from jounce.dynamics.motion_values import Coordinates, cut, labeled, pose_of
 from jounce.errors import MechanismError
 from jounce.execution.chunks import in_chunks
 from jounce.execution.compilation import compiled
 from jounce.jet import Jet
+from jounce.jet.algebra import stacked
 from jounce.kinematics import Motion
 from jounce.kinematics.continuation.change_points import spoiled
 from jounce.mechanism.system import movable
@@ -53,23 +56,79 @@ def in_body_coordinates(motion: Motion, form: Form, *, power: int = 0) -> "xarra
     MechanismError
         If no body has a mass, or the motion has too few derivatives.
     """
-    mechanism, (pose_type, coordinates) = motion.mechanism, motion.poses
-    masses = required_masses(mechanism)
-    known = len(coordinates["position"]) - 1
-    if known < form.order:
-        raise MechanismError(f"this needs a motion of order {form.order} or higher", name="order", value=motion.order)
-    start = cut(coordinates, form.order)
+    masses = required_masses(motion.mechanism)
+
+    def chunk(coordinates: Coordinates) -> Any:
+        return _evaluated(coordinates, masses, motion.poses[0], form)
+
+    return _of_bodies(motion, chunk, form.order, power)
+
+
+def balanced_bodies(motion: Motion, rates: int, *, gravity: bool) -> "xarray.DataArray":
+    """Return what inertia asks of all that acts on each body, and on request weight too, by its balances of momentum.
+
+    Parameters
+    ----------
+    motion : Motion
+        Of a mechanism whose bodies have masses.
+    rates : int
+        How many rates are requested.
+    gravity : bool
+        Whether the bodies have weight.
+
+    Returns
+    -------
+    xarray.DataArray
+        As of `in_body_coordinates`: forces, global, and moments about the origins, in space in the axes of the body.
+
+    Raises
+    ------
+    MechanismError
+        If no body has a mass, or the motion has too few derivatives.
+    """
+    masses, order = required_masses(motion.mechanism), rates + 2
+    falling = gravity_of(motion.mechanism)
+
+    def chunk(coordinates: Coordinates) -> Any:
+        return _momentum(coordinates, masses, falling if gravity else np.zeros_like(falling), motion.poses[0], order)
+
+    return _of_bodies(motion, chunk, order)
+
+
+def _of_bodies(
+    motion: Motion, function: Callable[[Coordinates], Any], order: int, power: int = 0
+) -> "xarray.DataArray":
+    """Return what a function of the coordinates of bodies, to an order, gives along a motion, labeled.
+
+    Raises
+    ------
+    MechanismError
+        If the motion has too few derivatives.
+    """
+    mechanism, coordinates = motion.mechanism, motion.poses[1]
+    if len(coordinates["position"]) - 1 < order:
+        raise MechanismError(f"this needs a motion of order {order} or higher", name="order", value=motion.order)
+    start = cut(coordinates, order)
 
     def chunk(lanes: np.ndarray) -> Any:
-        return _evaluated({name: values[..., lanes] for name, values in start.items()}, masses, pose_type, form)
+        return function({name: values[..., lanes] for name, values in start.items()})
 
     values = in_chunks(chunk, len(motion.time))
-    values = np.where(spoiled(motion.passages, motion.time, form.order), np.nan, values)
+    values = np.where(spoiled(motion.passages, motion.time, order), np.nan, values)
     names = COLUMNS[mechanism.space]
     efforts = ["N" if name in "xyz" else "N*m" for name in names] * len(mechanism.bodies)
     units = [derivative_unit(unit, power) if power >= 0 else f"{unit}*s^{-power}" for unit in efforts]
     columns = [f"{body}.{name}" for body in mechanism.bodies for name in names]
     return labeled(motion, values, column=columns).assign_coords(unit=("column", units))
+
+
+@compiled("pose_type", "order")
+def _momentum(
+    coordinates: Coordinates, masses: Masses, gravity: Gravity, pose_type: type[Pose], order: int
+) -> Float[Numbers, "level coordinate time"]:
+    pose = movable(pose_of(coordinates, pose_type, order).truncate(order))
+    found = jnp.concatenate([stacked(part) for part in inertia_forces(pose, masses, gravity)], axis=1)[:, :, 1:]
+    return jnp.swapaxes(found, 1, 2).reshape(found.shape[0], -1, found.shape[-1])
 
 
 @compiled("pose_type", "form")

@@ -60,7 +60,7 @@ def in_driver_coordinates(
     Parameters
     ----------
     motion : Motion
-        Of a mechanism whose bodies have masses.
+        Of a mechanism whose bodies have masses, and whose drivers prescribe all that moves.
     form : Form
         The sum, with its rates.
     power : int, default 0
@@ -75,9 +75,9 @@ def in_driver_coordinates(
     Raises
     ------
     MechanismError
-        If no body has a mass, or something moves that no driver prescribes.
+        If no body has a mass.
     """
-    model, names = motion.model, drivers_of(motion)
+    model, names = motion.model, tuple(motion.mechanism.drivers)
     indices = element_indices(model)
     order = tuple((indices[name].group, indices[name].instance) for name in names)
     pose_type, coordinates = motion.poses
@@ -108,28 +108,13 @@ def is_driven(motion: Motion) -> bool:
     return (rows if system.rank is None else system.rank) == columns and bool(motion.mechanism.drivers)
 
 
-def drivers_of(motion: Motion) -> tuple[str, ...]:
-    """Return the names of the drivers of a motion.
-
-    Raises
-    ------
-    MechanismError
-        If something moves that no driver prescribes.
-    """
-    names = tuple(motion.mechanism.drivers)
-    if not is_driven(motion):
-        message = "the coordinates here are the laws of the drivers, and they do not prescribe all that can move"
-        raise MechanismError(message, name="drivers", value=list(names))
-    return names
-
-
 def balanced(motion: Motion, rates: int, *, gravity: bool) -> "xarray.DataArray":
     """Return what inertia asks of the drivers, and on request weight too, by multipliers: nothing applied acts.
 
     Parameters
     ----------
     motion : Motion
-        Of a mechanism whose bodies have masses.
+        Of a mechanism whose bodies have masses, and whose drivers prescribe all that moves.
     rates : int
         How many rates are requested.
     gravity : bool
@@ -143,14 +128,13 @@ def balanced(motion: Motion, rates: int, *, gravity: bool) -> "xarray.DataArray"
     Raises
     ------
     MechanismError
-        If no body has a mass, the motion has too few derivatives, or something moves that no driver prescribes.
+        If no body has a mass, or the motion has too few derivatives.
     """
-    names = drivers_of(motion)
     required_masses(motion.mechanism)
     if motion.order < rates + 2:
         raise MechanismError(f"this needs a motion solved to order {rates + 2}", name="order", value=motion.order)
     forces = MotionForces(motion, gravity=gravity, applied=False, friction=False)
-    values = np.stack([forces.driver_force(name)[: rates + 1, 0] for name in names], axis=1)
+    values = np.stack([forces.driver_force(name)[: rates + 1, 0] for name in motion.mechanism.drivers], axis=1)
     return _of_drivers(motion, values)
 
 

@@ -90,10 +90,10 @@ def _derivatives(group: Group, order: int, *, turning: bool) -> list[Polynomial]
         return with_rows(changed.residual(*bodies, time)).dense().coefficients
 
     instant = Entries(np.array([[graph.input(("t",))]]), float)
-    found = NamingReader(graph).function(residual, law, poses, instant)
+    coefficients = NamingReader(graph).function(residual, law, poses, instant)
     read = Expansion(graph)
     factorials = [float(np.prod(np.arange(1, n + 1))) for n in range(order + 1)]
-    return [read.of(int(x.numbers.ravel()[0])) * int(f) for x, f in zip(found, factorials, strict=True)]
+    return [read.of(int(x.numbers.ravel()[0])) * int(f) for x, f in zip(coefficients, factorials, strict=True)]
 
 
 def _pose(graph: Graph, body: str, order: int, *, turning: bool) -> dict[str, list[Entries]]:

@@ -36,13 +36,13 @@ def _planar(atom: Atom) -> Polynomial:
 def _spatial(atom: Atom, known: dict[Atom, Polynomial]) -> Polynomial:
     """Return a derivative of an entry of an attitude matrix or of an Euler parameter, by lower ones."""
     kind, body, n, *place = atom
-    found = Polynomial({})
+    derivative = Polynomial({})
     for j in range(n):
         for factor, other, c in _rates(kind, place):
             rate = Polynomial.atom(("w", body, n - 1 - j, c)) * (factor * math.comb(n - 1, j))
-            found = found + Polynomial.atom((kind, body, j, *other)) * rate
+            derivative = derivative + Polynomial.atom((kind, body, j, *other)) * rate
     del known
-    return found
+    return derivative
 
 
 def _rates(kind: str, place: list[int]) -> list[tuple[Fraction, list[int], int]]:

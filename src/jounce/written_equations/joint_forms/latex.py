@@ -32,8 +32,8 @@ def source_of(kind: type) -> str:
     """Return which equations of Sommer 2024 a joint is, as its class says; nothing for others."""
     for each in kind.__mro__:
         text = " ".join(inspect.cleandoc(vars(each).get("__doc__") or "").split())
-        if found := SOURCE.search(text):
-            return found[1].strip(" ,-").removesuffix(" and")
+        if match := SOURCE.search(text):
+            return match[1].strip(" ,-").removesuffix(" and")
     return ""
 
 
@@ -47,7 +47,7 @@ def latex_document(given: Mechanism | Motion, joint: str | None, order: int) -> 
     for group, names in _groups(model):
         chosen = [name for name in names if joint in (None, name)]
         if chosen:
-            body += _section(mechanism, model, group, names, chosen, order, alone=joint is not None)
+            body += _section(mechanism, model, group, names, chosen, order, is_only=joint is not None)
     planar = mechanism.space == "planar"
     head = [
         f"% written by jounce {__version__}", r"\documentclass{article}", r"\usepackage{amsmath,amssymb}",
@@ -89,7 +89,7 @@ def _groups(model: Model) -> Iterator[tuple[Group, list[str]]]:
 
 
 def _section(
-    mechanism: Mechanism, model: Model, group: Group, members: list[str], names: list[str], order: int, *, alone: bool
+    mechanism: Mechanism, model: Model, group: Group, members: list[str], names: list[str], order: int, *, is_only: bool
 ) -> list[str]:
     elements = {**mechanism.joints, **mechanism.drivers}
     kind = type(elements[names[0]])
@@ -105,7 +105,7 @@ def _section(
         rows = joint_equations(joint)
     except (NotWrittenError, TooManyTermsError) as error:
         reason = str(error) if isinstance(error, NotWrittenError) else f"it takes {error}"
-        if alone:
+        if is_only:
             message = f"cannot be written out: {reason}; lower the order, or take python or c"
             raise MechanismError(message, name=names[0]) from None
         lines += [rf"\item {escaped(name)}: {_instance(elements[name])}" for name in names]
@@ -149,12 +149,12 @@ def joint_equations(joint: SymbolicJoint) -> list[tuple[str, str]]:
     NotWrittenError
         If a right side has more terms than a person reads.
     """
-    words, found = Words(joint.planar), recognized(joint)
-    if found is None:
+    words, vector_rows = Words(joint.planar), recognized(joint)
+    if vector_rows is None:
         return _in_components(joint, words)
     equations = []
-    for k, (_, levels) in enumerate(found, 1):
-        mark, within = (f"_{{{k}}}", f",{k}") if len(found) > 1 else ("", "")
+    for k, (_, levels) in enumerate(vector_rows, 1):
+        mark, within = (f"_{{{k}}}", f",{k}") if len(vector_rows) > 1 else ("", "")
         equations.append((rf"\Phi{mark}", words.polynomial(_turned(joint, levels[0]))))
         for body in joint.slots:
             blocks = ", ".join(total(x) for x in _jacobian(joint, words, levels[1], body))
@@ -163,7 +163,12 @@ def joint_equations(joint: SymbolicJoint) -> list[tuple[str, str]]:
             side = _turned(joint, right_side(levels[n], n))
             equations.append((words.side(n) + mark, words.polynomial(_checked(side, n))))
     if any(
-        v[0] == "d" for _, levels in found for m in levels[0].terms for a in m for v in a[1:] if isinstance(v, tuple)
+        v[0] == "d"
+        for _, levels in vector_rows
+        for m in levels[0].terms
+        for a in m
+        for v in a[1:]
+        if isinstance(v, tuple)
     ):
         equations += _of_points(joint, words, len(joint.rows))
     return equations

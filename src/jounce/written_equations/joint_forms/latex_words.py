@@ -86,10 +86,10 @@ def in_brackets(text: str) -> str:
 
 def total(terms: Sequence[tuple[int, str]]) -> str:
     """Return the sum of terms, each a sign and a text; zero where there are none."""
-    found = ""
+    sum_text = ""
     for sign, text in terms:
-        found += (f" {'-' if sign < 0 else '+'} " if found else "-" if sign < 0 else "") + text
-    return found or "0"
+        sum_text += (f" {'-' if sign < 0 else '+'} " if sum_text else "-" if sign < 0 else "") + text
+    return sum_text or "0"
 
 
 class Words:

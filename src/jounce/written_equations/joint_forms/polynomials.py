@@ -5,6 +5,7 @@ from fractions import Fraction
 from typing import Any
 
 MOST_TERMS = 5000
+LONGEST_ATOM = 3000  # characters of Python
 Atom = tuple[Any, ...]
 Monomial = tuple[Atom, ...]
 
@@ -65,8 +66,17 @@ class Polynomial:
         return Polynomial.atom(("inverse", ("sum", self.frozen())))
 
     def frozen(self) -> tuple[tuple[Monomial, Fraction], ...]:
-        """Return the terms in their order."""
-        return tuple(sorted(self.terms.items(), key=repr))
+        """Return the terms in their order, of which an atom is made.
+
+        Raises
+        ------
+        TooManyTermsError
+            If the atom is too long to be read.
+        """
+        rows = sorted((repr(term), term) for term in self.terms.items())
+        if sum(len(text) for text, _ in rows) > LONGEST_ATOM:
+            raise TooManyTermsError(f"a function of {len(rows)} long terms")
+        return tuple(term for _, term in rows)
 
     def replaced(self, rule: Callable[[Monomial], "Polynomial | None"]) -> "Polynomial":
         """Return the polynomial with terms replaced until a rule has nothing to say of any."""

@@ -13,6 +13,8 @@ from jax.extend.core import JaxprEqn
 from jounce.base.modules import with_fields
 from jounce.constraints.facts import field_kinds, value_fields
 from jounce.jet import Jet
+from jounce.jet.programs.reader import inner_program
+from jounce.jet.turns import ROUNDING_OF_TURNS
 from jounce.mechanism.system import Group, with_rows
 from jounce.rigid import PlanarPose, SpatialPose
 from jounce.rigid.spatial import quaternion_spins
@@ -100,11 +102,11 @@ def symbolic_joint(group: Group, pose_type: type, order: int) -> SymbolicJoint:
         return with_rows(with_fields(element, **values).residual(*bodies, time)).dense().coefficients
 
     reader = NamingReader(graph)
-    found = reader.function(residual, fields, law, poses, _entries(graph, [("t",)], (1, 1)))
+    levels_of_rows = reader.function(residual, fields, law, poses, _entries(graph, [("t",)], (1, 1)))
     read = Expansion(graph)
     rows = [
         [read.of(int(x)) * math.factorial(n) for x in level.numbers.reshape(len(level.numbers), -1)[:, 0]]
-        for n, level in enumerate(found)
+        for n, level in enumerate(levels_of_rows)
     ]
     values = [_values(group, fields, vectors, k) for k in range(group.instances)]
     derived = [
@@ -163,13 +165,13 @@ def _coefficients(graph: Graph, body: str, order: int, *, planar: bool) -> dict[
             levels.append(Entries(np.array([int(x.numbers) for x in parts]).reshape(shape), float))
         return levels
 
-    found = {"position": jet("r", [(c,) for c in range(count)], (count, 1, 1))}
+    jets = {"position": jet("r", [(c,) for c in range(count)], (count, 1, 1))}
     if planar:
-        found["angle"] = jet("phi", [()], (1, 1))
-        return found | {"cosine": jet("A", [(0, 0)], (1, 1)), "sine": jet("A", [(1, 0)], (1, 1))}
-    found["quaternion"] = jet("e", [(c,) for c in range(4)], (4, 1, 1))
-    found["angular_velocity"] = jet("w", [(c,) for c in range(3)], (3, 1, 1), order - 1)
-    return found | {f"axis_{k}": jet("A", [(c, k) for c in range(3)], (3, 1, 1)) for k in range(3)}
+        jets["angle"] = jet("phi", [()], (1, 1))
+        return jets | {"cosine": jet("A", [(0, 0)], (1, 1)), "sine": jet("A", [(1, 0)], (1, 1))}
+    jets["quaternion"] = jet("e", [(c,) for c in range(4)], (4, 1, 1))
+    jets["angular_velocity"] = jet("w", [(c,) for c in range(3)], (3, 1, 1), order - 1)
+    return jets | {f"axis_{k}": jet("A", [(c, k) for c in range(3)], (3, 1, 1)) for k in range(3)}
 
 
 @jax.tree_util.register_dataclass
@@ -206,30 +208,29 @@ class NamingReader(GraphReader):
         self.derived: dict[tuple[int, ...], str] = {}
 
     def results(self, equation: JaxprEqn, operands: list[Any]) -> list[Any]:
-        """Return the results of one operation."""
+        """Return the results of one operation; how many whole turns an angle has is left out."""
+        called = equation.params.get("name") if inner_program(equation.params) is not None else None
+        if called == ROUNDING_OF_TURNS:
+            shape = equation.outvars[0].aval.shape  # pyright: ignore[reportAttributeAccessIssue] - of an array
+            return [Entries(np.full(shape, self.graph.constant(0.0)), float)]
         given = operands[0] if equation.primitive.name == "name" else None
         if not isinstance(given, Entries) or not str(equation.params["name"]).startswith(MARK):
             return super().results(equation, operands)
+        return [self._vector(given, str(equation.params["name"])[-1])]
+
+    def _vector(self, given: Entries, slot: str) -> Entries:
+        """Return a constant vector of a body, under a name of its own where it is made of fields."""
         numbers = tuple(int(x) for x in given.numbers.ravel())
         fixed = all(self._is_of_fields(x) for x in numbers)
         if not fixed or all(self.graph.nodes[x].operation in ("input", "constant") for x in numbers):
-            return [given]
-        slot = str(equation.params["name"])[-1]
+            return given
         if numbers not in self.derived:
             letters = iter(DERIVED)
             taken = set(self.derived.values())
             self.derived[numbers] = next(name for x in letters if (name := f"{x}_{slot}") not in taken)
         name = self.derived[numbers]
         parts = [self.graph.input(("v", name, c)) for c in range(len(numbers))]
-        return [Entries(np.array(parts, np.int64).reshape(given.shape), given.dtype)]
-
-    def applied(self, equation: JaxprEqn, operands: list[Any]) -> list[Any]:
-        """Return what an operation makes of values; what is rounded is how many whole turns an angle has."""
-        if equation.primitive.name == "round":
-            zero = self.graph.constant(0.0)
-            made: list[Any] = [v.aval for v in equation.outvars]
-            return [Entries(np.full(aval.shape, zero), aval.dtype) for aval in made]
-        return super().applied(equation, operands)
+        return Entries(np.array(parts, np.int64).reshape(given.shape), given.dtype)
 
     def _is_of_fields(self, number: int) -> bool:
         inputs = (self.graph.nodes[x] for x in self.graph.reached([number]))
@@ -293,6 +294,8 @@ class Expansion:
             return parts[0] * parts[1]
         if node.operation == "div":
             return parts[0] * parts[1].inverse()
+        if node.operation == "hypot":
+            return Polynomial.atom(("function", "sqrt", ((parts[0] * parts[0] + parts[1] * parts[1]).frozen(),)))
         return Polynomial.atom(("function", node.operation, tuple(part.frozen() for part in parts)))
 
 
@@ -314,6 +317,14 @@ def length_of(row: Polynomial) -> str:
 
 
 def as_fraction(value: float) -> Fraction:
-    """Return the simple fraction that a number is the nearest double to, or the number itself."""
+    """Return the simple fraction that a number is the nearest double to, or the number itself.
+
+    Raises
+    ------
+    NotWrittenError
+        If it is not finite.
+    """
+    if not math.isfinite(value):
+        raise NotWrittenError(f"it has the number {value}, or compares with it")
     simple = Fraction(value).limit_denominator(40320)
     return simple if float(simple) == value else Fraction(value)

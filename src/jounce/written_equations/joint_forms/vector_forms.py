@@ -22,11 +22,11 @@ def recognized(joint: SymbolicJoint) -> list[tuple[int, list[Polynomial]]] | Non
     """
     count = 2 if joint.planar else 3
     levels = [[_in_vectors(joint, row) for row in level] for level in joint.rows]
-    found, k = [], 0
+    equations, k = [], 0
     while k < len(levels[0]):
         scalar = [_in_products(level[k], count) for level in levels]
         if not any(_has_components(p) for p in scalar):
-            found.append((1, scalar))
+            equations.append((1, scalar))
             k += 1
             continue
         rows = [
@@ -34,18 +34,18 @@ def recognized(joint: SymbolicJoint) -> list[tuple[int, list[Polynomial]]] | Non
         ]
         if any(row[0] is None or any(other is None or other.terms != row[0].terms for other in row) for row in rows):
             return None
-        found.append((count, [row[0] for row in rows]))
+        equations.append((count, [row[0] for row in rows]))
         k += count
-    return found
+    return equations
 
 
 def _in_vectors(joint: SymbolicJoint, row: Polynomial) -> Polynomial:
     """Return a polynomial of components of d and of the vectors of the joint."""
     points = {frame: name for name, frame in joint.vectors.items() if name.startswith("point")}
     if {"i", "j"} <= points.keys():
-        apart = row.replaced(lambda m: _with_distance(joint, m, points))
-        if not any(atom[0] == "r" for m in apart.terms for atom in m):
-            row = apart
+        by_distance = row.replaced(lambda m: _with_distance(joint, m, points))
+        if not any(atom[0] == "r" for m in by_distance.terms for atom in m):
+            row = by_distance
     return row.replaced(lambda m: _with_turned(joint, m))
 
 
@@ -129,16 +129,16 @@ def turning(order: int, *, known: bool = False) -> tuple[Polynomial, Polynomial]
 
     The atoms are ("phi", n). Each follows from those below by A' = phi' B, as poses do; `known` leaves phi^(n) out.
     """
-    found = [(Polynomial.number(1), Polynomial.number(0))]
+    factors = [(Polynomial.number(1), Polynomial.number(0))]
     for k in range(order):
         a, b = Polynomial.number(0), Polynomial.number(0)
-        for j, (aj, bj) in enumerate(found):
+        for j, (aj, bj) in enumerate(factors):
             rate = Polynomial.atom(("phi", k - j + 1)) * math.comb(k, j)
             if known and k == order - 1 and j == 0:
                 continue
             a, b = a + bj * rate * -1, b + aj * rate
-        found.append((a, b))
-    return found[-1]
+        factors.append((a, b))
+    return factors[-1]
 
 
 def of_body(row: Polynomial, body: str) -> Polynomial:

@@ -19,14 +19,19 @@ from jounce.written_equations.operations.statements import (
 _CALLED = {
     "max": "sp.Max", "min": "sp.Min", "rem": "rem", "abs": "sp.Abs", "ceil": "sp.ceiling", "eq": "sp.Eq", "ne": "sp.Ne",
     "and": "sp.And", "or": "sp.Or", "not": "sp.Not", "round": "rounded", "expm1": "expm1", "log1p": "log1p",
-    "pow": "sp.Pow", "is_finite": "is_finite",
+    "pow": "sp.Pow", "is_finite": "is_finite", "hypot": "hypot",
 }  # fmt: skip
 _HELPERS = {
-    "rem": ("x, y", "sp.sign(x) * sp.Mod(sp.Abs(x), sp.Abs(y))"),
-    "rounded": ("x", "sp.floor(x + sp.Rational(1, 2))"),
-    "expm1": ("x", "sp.exp(x) - 1"),
-    "log1p": ("x", "sp.log(1 + x)"),
-    "is_finite": ("x", "sp.true"),
+    "rem": ("x, y", "return sp.sign(x) * sp.Mod(sp.Abs(x), sp.Abs(y))"),
+    "rounded": (  # halves to the even number
+        "x",
+        "low, high = sp.ceiling(x - sp.Rational(1, 2)), sp.floor(x + sp.Rational(1, 2))",
+        "return low + sp.Mod(low, 2) * (high - low)",
+    ),
+    "hypot": ("x, y", "return sp.sqrt(x**2 + y**2)"),
+    "expm1": ("x", "return sp.exp(x) - 1"),
+    "log1p": ("x", "return sp.log(1 + x)"),
+    "is_finite": ("x", "return sp.true"),
 }
 
 
@@ -54,8 +59,8 @@ class SymPyModule(NumPyModule):
             if argument.by_order:
                 lines += [f"    {_symbols(names, row)}," for row in argument.labels] + [")"]
         for name in sorted(self._vectorized):
-            given, text = _HELPERS[name]
-            lines += ["", "", f"def {name}({given}):", f"    return {text}"]
+            given, *body = _HELPERS[name]
+            lines += ["", "", f"def {name}({given}):", *(f"    {line}" for line in body)]
         return lines
 
     def parameter(self, argument: Argument) -> str:

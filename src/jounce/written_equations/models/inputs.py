@@ -45,8 +45,8 @@ class Inputs:
     def place(self) -> dict[str, Entries]:
         """Return the coordinates of a place, as `Motion.poses` has them: the ground first, one instant."""
         position, attitude = self._place[:, : self._shifts], self._place[:, self._shifts :]
-        found = {"position": position.T, self._attitude: attitude.T if attitude.shape[1] > 1 else attitude[:, 0]}
-        return {name: Entries(x[None, ..., None], float) for name, x in found.items()}
+        arrays = {"position": position.T, self._attitude: attitude.T if attitude.shape[1] > 1 else attitude[:, 0]}
+        return {name: Entries(x[None, ..., None], float) for name, x in arrays.items()}
 
     def series(self, unknown: Sequence[int], order: int | None = None) -> dict[str, Entries]:
         """Return the coefficients of the coordinates, an instant for each order from which on they are zero there.

@@ -73,8 +73,8 @@ def mechanism_code(given: Mechanism | Motion, joint: str | None, order: int, qua
     if FORCES in quantities:
         functions += force_functions(mechanism, model, inputs)
     if OUTPUTS in quantities:
-        found, names = output_function(mechanism, model, inputs)
-        functions, labels = [*functions, found], {"OUTPUTS": names}
+        function, names = output_function(mechanism, model, inputs)
+        functions, labels = [*functions, function], {"OUTPUTS": names}
     named = {"COORDINATES": tuple(inputs.coordinates), "COLUMNS": inputs.columns, "ROWS": own} | labels
     about = tuple(" ".join(text.split()) for text in (*(_ABOUT[x] for x in quantities), _PLACE, "SI units."))
     subject = "constraint equations" if quantities == (CONSTRAINTS,) else "equations"
@@ -90,12 +90,12 @@ def rows_of(mechanism: Mechanism, model: Model, joint: str | None) -> tuple[str,
 def _constraints(mechanism: Mechanism, model: Model, inputs: Inputs, own: tuple[str, ...]) -> list[Function]:
     """Return residual, Jacobian and right sides."""
     rows = equation_labels(mechanism, model)["row"].tolist()
-    order_of_rows, places = row_order(mechanism, model).tolist(), group_rows(model)
+    order_of_rows, spans = row_order(mechanism, model).tolist(), group_rows(model)
     chosen = [order_of_rows[rows.index(row)] for row in own]
     numbers: dict[int, tuple[Any, Any, Any]] = {}
-    for group, span in zip(model.system.groups, places, strict=True):
+    for group, span in zip(model.system.groups, spans, strict=True):
         if any(row in range(span.start, span.stop) for row in chosen):
-            residual, jacobian, sides = _read(alone(model, group, span), model, inputs, span)
+            residual, jacobian, sides = _read(of_one_group(model, group, span), model, inputs, span)
             for k, row in enumerate(range(span.start, span.stop)):
                 numbers[row] = residual[k], jacobian[k], sides[:, k]
     residual, jacobian, sides = (np.array([numbers[row][k] for row in chosen], np.int64) for k in range(3))
@@ -121,7 +121,7 @@ def put_together(mechanism: Mechanism) -> Model:
     return assemble(model, instant, TOLERANCE, free=True)[0]
 
 
-def alone(model: Model, group: Group, rows: slice) -> System:
+def of_one_group(model: Model, group: Group, rows: slice) -> System:
     """Return the system of the joints of one group."""
     count = rows.stop - rows.start
     width = model.pose_type.shifts + model.pose_type.turns

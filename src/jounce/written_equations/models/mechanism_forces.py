@@ -9,6 +9,7 @@ import numpy as np
 
 from jounce.dynamics.forward.loads import constraint_loads, loads, mass_matrices
 from jounce.dynamics.forward.saddle_point import block_diagonal
+from jounce.dynamics.friction.coupling import check_no_friction
 from jounce.dynamics.inverse.constraint_equations import equation_labels, in_si_units, row_order
 from jounce.dynamics.masses import check_loads, gravity_of, masses_of
 from jounce.dynamics.motion_values import pose_of
@@ -28,8 +29,11 @@ def force_functions(mechanism: Mechanism, model: Model, inputs: Inputs) -> list[
     ------
     MechanismError
         If nothing has a mass or a force; if a force cannot be written out; or if the order is below 2.
+    UnsupportedError
+        If a joint has friction, which follows from the multipliers of the same instant.
     """
     check_loads(mechanism)
+    check_no_friction(mechanism, "forces as code")
     if inputs.order < 2:
         raise MechanismError("must be 2 or more: forces give accelerations", name="order", value=inputs.order)
     masses, gravity, pose_type = masses_of(mechanism), gravity_of(mechanism), model.pose_type

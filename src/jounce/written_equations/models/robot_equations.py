@@ -95,8 +95,8 @@ class _Reading:
     def read(self, function: Callable[[Any], Any], levels: int | None = None) -> np.ndarray:
         """Return the plain derivatives of what a function of Taylor coefficients of the coordinates returns."""
         given = Entries(self.q.numbers[:levels], float)
-        (found,) = GraphReader(self.graph).function(function, given)
-        return np.array([self.times(row[..., 0], math.factorial(k)) for k, row in enumerate(found.numbers)])
+        (coefficients,) = GraphReader(self.graph).function(function, given)
+        return np.array([self.times(row[..., 0], math.factorial(k)) for k, row in enumerate(coefficients.numbers)])
 
     def times(self, numbers: np.ndarray, factor: float | int) -> np.ndarray:
         """Return the nodes of a factor times some others."""
@@ -112,24 +112,24 @@ class _Reading:
 
 def _torque(reading: _Reading, *, drives: bool) -> Function:
     tree = reading.robot.tree
-    found = reading.read(lambda q: generalized_forces.function(tree, (q,), (), (), drives))
+    torques = reading.read(lambda q: generalized_forces.function(tree, (q,), (), (), drives))
     text = "Return the torques and their rates"
-    return Function("torque", (reading.argument(3),), found, ("order", "joint"), text)
+    return Function("torque", (reading.argument(3),), torques, ("order", "joint"), text)
 
 
 def _mass_matrix(reading: _Reading, *, drives: bool) -> Function:
     tree = reading.robot.tree
-    found = reading.read(lambda q: mass_matrix_of_tree.function(tree, (q,), (), drives), 1)[0]
+    matrix = reading.read(lambda q: mass_matrix_of_tree.function(tree, (q,), (), drives), 1)[0]
     place = Argument("q", reading.labels[0], "q, (joint,)")
-    return Function("mass_matrix", (place,), found, ("joint", "joint"), "Return the mass matrix")
+    return Function("mass_matrix", (place,), matrix, ("joint", "joint"), "Return the mass matrix")
 
 
 def _energy(reading: _Reading, p: int, *, drives: bool) -> Function:
     robot = reading.robot
     static = (p, body_energy, *rotors_of(robot, drives=drives))
-    found = reading.read(lambda q: sum(x.sum(axis=1) for x in energies_of_tree.function(robot.tree, (q,), (), *static)))
+    rates = reading.read(lambda q: sum(x.sum(axis=1) for x in energies_of_tree.function(robot.tree, (q,), (), *static)))
     what = "kinetic energy" if p == 0 else f"acceleration energy of order {p}"
-    return Function(f"energy_{p}", (reading.argument(p + 2),), found, ("order",), f"Return the {what} and its rates")
+    return Function(f"energy_{p}", (reading.argument(p + 2),), rates, ("order",), f"Return the {what} and its rates")
 
 
 def _regressor(reading: _Reading, *, drives: bool) -> tuple[Function, dict[str, float]]:
@@ -153,12 +153,12 @@ def _regressor(reading: _Reading, *, drives: bool) -> tuple[Function, dict[str, 
 
         return jax.vmap(column, out_axes=2)(stacked)  # levels, joints, parameters, batch
 
-    found = reading.read(columns)
+    regressor = reading.read(columns)
     for k in range(len(robot.moving_links)):
         for axis in range(1, 4):
-            found[..., 10 * k + axis] = reading.minus(found[..., 10 * k + axis], found[..., 10 * k])
+            regressor[..., 10 * k + axis] = reading.minus(regressor[..., 10 * k + axis], regressor[..., 10 * k])
     text = "Return the matrix of the parameters, and its rates"
-    return Function("regressor", (reading.argument(3),), found, ("order", "joint", "parameter"), text), values
+    return Function("regressor", (reading.argument(3),), regressor, ("order", "joint", "parameter"), text), values
 
 
 def _parameters(robot: Robot, *, drives: bool) -> tuple[list[dict[str, Any]], dict[str, float]]:

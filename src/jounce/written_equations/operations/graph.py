@@ -44,6 +44,7 @@ FUNCTIONS: dict[str, tuple[Callable[..., Any], str]] = {
     "sign": (np.sign, ""),
     "pow": (np.power, REAL),
     "atan2": (np.arctan2, REAL),
+    "hypot": (np.hypot, REAL),
     "lt": (operator.lt, TRUTH),
     "le": (operator.le, TRUTH),
     "gt": (operator.gt, TRUTH),
@@ -69,7 +70,7 @@ FUNCTIONS: dict[str, tuple[Callable[..., Any], str]] = {
 }  # fmt: skip
 """Operations: what they do to numbers, and the kind of the result, that of the last operand where it is empty."""
 
-SYMMETRIC = frozenset({"add", "mul", "max", "min", "eq", "ne", "and", "or"})
+SYMMETRIC = frozenset({"add", "mul", "max", "min", "hypot", "eq", "ne", "and", "or"})
 
 
 class Graph:
@@ -108,13 +109,13 @@ class Graph:
     def lookup(self, table: Sequence[Any], index: int) -> int:
         """Return the node of an entry of a table, by the node of its index."""
         low, high = self.ranges[index]
-        found = set(table[low : high + 1])
-        if len(found) == 1:
-            return self.constant(next(iter(found)))
+        entries = set(table[low : high + 1])
+        if len(entries) == 1:
+            return self.constant(next(iter(entries)))
         kind = TRUTH if isinstance(table[0], bool) else WHOLE if isinstance(table[0], int) else REAL
         number = self._node(Node("lookup", (index,), tuple(table), kind))
         if kind == WHOLE:
-            self.ranges[number] = (min(found), max(found))
+            self.ranges[number] = (min(entries), max(entries))
         return number
 
     def is_constant(self, *numbers: int) -> bool:
@@ -133,8 +134,8 @@ class Graph:
         kind = kind or self.nodes[operands[-1]].kind
         if self.is_constant(*operands):
             with np.errstate(all="ignore"):
-                found = function(*map(self.value, operands))
-            return self.constant({REAL: float, WHOLE: int, TRUTH: bool}[kind](found))
+                value = function(*map(self.value, operands))
+            return self.constant({REAL: float, WHOLE: int, TRUTH: bool}[kind](value))
         if name in SYMMETRIC:
             operands = tuple(sorted(operands))
         number = self._node(Node(name, tuple(operands), None, kind))
@@ -147,10 +148,10 @@ class Graph:
         whole = list(numbers)
         if not whole:
             return self.constant(0.0)
-        found = whole[0]
+        result = whole[0]
         for number in whole[1:]:
-            found = self.apply("add", found, number)
-        return found
+            result = self.apply("add", result, number)
+        return result
 
     def reached(self, roots: Iterable[int]) -> list[int]:
         """Return all nodes that some need, themselves among them, each after those that it reads."""
@@ -248,7 +249,25 @@ class Graph:
     def _selected(self, condition: int, yes: int, no: int) -> int | None:
         if yes == no:
             return yes
-        return (yes if self.value(condition) else no) if self.is_constant(condition) else None
+        if self.is_constant(condition):
+            return yes if self.value(condition) else no
+        return self._length(condition, no) if self.nodes[yes].detail == math.inf else None
+
+    def _length(self, condition: int, otherwise: int) -> int | None:
+        """Return the root of two squares that a choice is, as `jnp.hypot` makes it: the same nodes, made once more."""
+        either = [self.nodes[x] for x in self.nodes[condition].operands]
+        if self.nodes[condition].operation != "or" or any(node.operation != "eq" for node in either):
+            return None
+        sizes = [x for node in either for x in node.operands if self.nodes[x].operation == "abs"]
+        if len(sizes) != 2:
+            return None
+        one, (large, small) = self.constant(1.0), (self.apply(name, *sizes) for name in ("max", "min"))
+        no_length = self.apply("eq", large, self.constant(0.0))
+        ratio = self.apply("div", small, self.apply("where", no_length, one, large))
+        root = self.apply("sqrt", self.apply("add", one, self.apply("mul", ratio, ratio)))
+        if self.apply("where", no_length, large, self.apply("mul", large, root)) != otherwise:
+            return None
+        return self.apply("hypot", *(self.nodes[x].operands[0] for x in sizes))
 
     def _joined(self, name: str, known: int, other: int) -> int | None:
         if not self.is_constant(known):

@@ -177,7 +177,7 @@ class GraphReader(ProgramReader):
         return self._each(dtype, converted, given)
 
     def _rounded(self, parameters: dict[str, Any]) -> Callable[[int], int]:
-        if "EVEN" in str(parameters["rounding_method"]):
+        if parameters["rounding_method"] == jax.lax.RoundingMethod.TO_NEAREST_EVEN:
             return lambda x: self.graph.apply("round", x)
 
         def away(x: int) -> int:  # from zero
@@ -189,24 +189,26 @@ class GraphReader(ProgramReader):
         return away
 
     def _selected(self, which: int, *cases: int) -> int:
-        found = cases[-1]
+        selected = cases[-1]
         if self.graph.nodes[which].kind == TRUTH:
             return self.graph.apply("where", which, cases[1], cases[0])
         for k in reversed(range(len(cases) - 1)):
-            found = self.graph.apply("where", self.graph.apply("eq", which, self.graph.constant(k)), cases[k], found)
-        return found
+            selected = self.graph.apply(
+                "where", self.graph.apply("eq", which, self.graph.constant(k)), cases[k], selected
+            )
+        return selected
 
     def _reduced(self, name: str, given: Entries, axes: Sequence[int], dtype: Any) -> Entries:
-        kept = [axis for axis in range(given.numbers.ndim) if axis not in axes]
-        shape = [given.shape[axis] for axis in kept]
-        rows = np.transpose(given.numbers, [*kept, *axes]).reshape(math.prod(shape), -1).tolist()
-        found = []
+        remaining = [axis for axis in range(given.numbers.ndim) if axis not in axes]
+        shape = [given.shape[axis] for axis in remaining]
+        rows = np.transpose(given.numbers, [*remaining, *axes]).reshape(math.prod(shape), -1).tolist()
+        totals = []
         for row in rows:
             result = row[0] if row else self.graph.constant(np.zeros((), dtype).item())
             for number in row[1:]:
                 result = self.graph.apply(name, result, number)
-            found.append(result)
-        return Entries(np.array(found, np.int64).reshape(shape), dtype)
+            totals.append(result)
+        return Entries(np.array(totals, np.int64).reshape(shape), dtype)
 
     def _summed_up(self, given: Entries, axis: int, *, reverse: bool) -> Entries:
         rows = np.moveaxis(given.numbers, axis, 0)
@@ -231,11 +233,11 @@ class GraphReader(ProgramReader):
 
     def _put_at_places(self, equation: JaxprEqn, given: list[Entries]) -> Entries:
         """Return an array with entries replaced by others, or with others added to them, at places that are known."""
-        target, places, parts = given
-        if not self.graph.is_constant(*places.numbers.ravel().tolist()):
+        target, indices, parts = given
+        if not self.graph.is_constant(*indices.numbers.ravel().tolist()):
             raise NotWrittenError("it writes at an index that changes")
-        known = np.array([self.graph.value(n) for n in places.numbers.ravel().tolist()], places.dtype)
-        known = jnp.asarray(known.reshape(places.shape))
+        known = np.array([self.graph.value(n) for n in indices.numbers.ravel().tolist()], indices.dtype)
+        known = jnp.asarray(known.reshape(indices.shape))
 
         def added(updates: Any) -> Any:
             words = ("dimension_numbers", "indices_are_sorted", "unique_indices", "mode")
@@ -261,11 +263,11 @@ class GraphReader(ProgramReader):
             return [self._looked_up(equation, operands[0], indices, dtypes[0])]
         known = [np.array([self.graph.value(int(n)) for n in x.numbers.ravel()]).reshape(x.shape) for x in indices]
         known = [np.asarray(x, i.dtype) for x, i in zip(known, indices, strict=True)]
-        places = [x.numbers for x in given[: len(given) - len(indices)]]
+        positions = [x.numbers for x in given[: len(given) - len(indices)]]
         if name in _BY_NUMPY:
-            return [Entries(_BY_NUMPY[name](*places, **equation.params), dtypes[0])]
+            return [Entries(_BY_NUMPY[name](*positions, **equation.params), dtypes[0])]
         filled = {"fill_value": 0} if name == "gather" else {}  # the number of no operation: beyond the ends
-        results = equation.primitive.bind(*map(jnp.asarray, [*places, *known]), **(equation.params | filled))
+        results = equation.primitive.bind(*map(jnp.asarray, [*positions, *known]), **(equation.params | filled))
         results = [np.asarray(x) for x in (results if equation.primitive.multiple_results else [results])]
         if name == "gather" and (results[0] == 0).any():
             beyond = self.graph.constant(np.full((), np.nan, dtypes[0]).item() if dtypes[0].kind == "f" else 0)
@@ -291,16 +293,16 @@ class GraphReader(ProgramReader):
                 else:
                     values[(slice(None), *place)] = self.graph.value(number)
         function = jax.vmap(lambda *at: equation.primitive.bind(table, *at, **equation.params))
-        found = np.asarray(function(*tried))
-        if found.size > MOST_ENTRIES:
-            raise NotWrittenError(f"it has a table of {found.size} numbers, more than {MOST_ENTRIES}")
-        owners = self._owners(equation, indices, found.shape[1:])
-        numbers = np.zeros(found.shape[1:], np.int64)
+        entries = np.asarray(function(*tried))
+        if entries.size > MOST_ENTRIES:
+            raise NotWrittenError(f"it has a table of {entries.size} numbers, more than {MOST_ENTRIES}")
+        owners = self._owners(equation, indices, entries.shape[1:])
+        numbers = np.zeros(entries.shape[1:], np.int64)
         for place in np.ndindex(*numbers.shape):
             row = sorted({n for n in owners[place] if n in ranges})
             if len(row) > 1:
                 raise NotWrittenError("it reads a table at two indices that change")
-            column = found[(slice(None), *place)]
+            column = entries[(slice(None), *place)]
             if not row:
                 numbers[place] = self.graph.constant(column[0].item())
                 continue
