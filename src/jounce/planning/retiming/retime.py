@@ -167,7 +167,7 @@ def retime(
         warn_of_degrees(robot, JointTrajectory(dict(chosen_path.laws), chosen_path.start, chosen_path.stop))
     conditions = Conditions(chosen, _rates(rates))
 
-    def found(along: Path, conditions: Conditions) -> _Found:
+    def fastest_along(along: Path, conditions: Conditions) -> _Fastest:
         source = RobotQuantities(robot, along, limits, drives=drives)
         checked(along, chosen)
         source.check_range()
@@ -175,9 +175,9 @@ def retime(
         return source, *fastest(source, source.labels, along.start, along.stop, conditions, own_cells)
 
     if state is None:
-        source, law, search = found(chosen_path, conditions)
+        source, law, search = fastest_along(chosen_path, conditions)
     else:
-        chosen_path, (source, law, search) = _from_state(robot, chosen_path, state, limits, conditions, found)
+        chosen_path, (source, law, search) = _from_state(robot, chosen_path, state, limits, conditions, fastest_along)
         conditions = search.conditions
     certified = functools.partial(
         _certified, robot, chosen_path, search=search, source=source, drives=drives, hand_over=any(conditions.rates)
@@ -207,7 +207,7 @@ def _check_not_repaired(**given: Any) -> None:
             raise TrajectoryError(message, name=name, value=value)
 
 
-_Found = tuple[RobotQuantities, RateLaw, Search]
+_Fastest = tuple[RobotQuantities, RateLaw, Search]
 
 
 def _from_state(
@@ -216,8 +216,8 @@ def _from_state(
     given: ArrayLike,
     limits: GivenLimits | None,
     conditions: Conditions,
-    found: Callable[[Path, Conditions], _Found],
-) -> tuple[Path, _Found]:
+    fastest_along: Callable[[Path, Conditions], _Fastest],
+) -> tuple[Path, _Fastest]:
     """Return the path that begins with a running state, and the fastest law along it.
 
     Raises
@@ -231,7 +231,7 @@ def _from_state(
     state = clean_state(given, path.names, dict(limits_of(robot, limits).joints))
     if along := rates_along(path, state):
         own = dataclasses.replace(conditions, rates=(along[0], conditions.rates[1]), further=along[1:])
-        return path, found(path, own)
+        return path, fastest_along(path, own)
     own = conditions
     if state[1].any():
         further = tuple(0.0 for _ in state[2:])
@@ -240,7 +240,7 @@ def _from_state(
     for share in SHARES:
         onto = joined(path, state, share)
         try:
-            return onto, found(onto, own)
+            return onto, fastest_along(onto, own)
         except (SolveError, TrajectoryError) as error:
             reason = error
     assert reason is not None
@@ -363,11 +363,11 @@ def _order(order: int | None, limits: MotionLimits, robot: Robot) -> int:
         least = 3
     if order is None:
         return least
-    asked = whole_number("order", order, 1, MAX_ORDER, error=TrajectoryError)
-    if asked < least:
+    requested = whole_number("order", order, 1, MAX_ORDER, error=TrajectoryError)
+    if requested < least:
         message = f"the limits are kept by motions whose derivatives are continuous to {least} at least"
         raise TrajectoryError(message, name="order", value=order)
-    return asked
+    return requested
 
 
 def _rates(rates: Any) -> tuple[float, float]:

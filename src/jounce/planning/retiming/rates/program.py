@@ -87,11 +87,11 @@ def solve_program(program: Program, *, elastic: bool = False) -> Solution:
         quadratic = wide(sparse.triu(program.nodes.T @ sparse.diags(0.75 * curved) @ program.nodes))
         objective = program.nodes.T @ (-1.25 * curved * about)
 
-    def widened(matrix: Any, beside: Any = None) -> Any:
-        """Return a matrix over the coefficients, and what is beside it over the other unknowns."""
+    def widened(matrix: Any, unknowns: Any = None) -> Any:
+        """Return a matrix over the coefficients, with the columns of the other unknowns, which are zero unless given."""
         if not extra:
             return matrix
-        return sparse.hstack([matrix, wide((matrix.shape[0], extra)) if beside is None else beside])
+        return sparse.hstack([matrix, wide((matrix.shape[0], extra)) if unknowns is None else unknowns])
 
     blocks: list[Any] = [widened(program.equal)]
     sides: list[Any] = [program.equal_right]
