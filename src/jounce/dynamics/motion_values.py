@@ -39,7 +39,7 @@ def along_motion(motion: Motion, function: Callable[[Int[np.ndarray, " chunk"]],
     return function(np.arange(count)) if motion.traced else in_chunks(function, count)
 
 
-def in_lots(function: Callable[..., Values], size: int, *arrays: Any) -> Values:
+def in_small_chunks(function: Callable[..., Values], size: int, *arrays: Any) -> Values:
     """Return what a function of arrays with the instants last gives, for a few of these after another.
 
     What is factored is read many times over: the matrices of a few instants stay in the processor's cache meanwhile.
@@ -56,15 +56,15 @@ def in_lots(function: Callable[..., Values], size: int, *arrays: Any) -> Values:
     count = jax.tree.leaves(arrays)[0].shape[-1]
     if count <= size or not on_processor():
         return function(*arrays)
-    lots = -(-count // size)
-    filled = np.minimum(np.arange(lots * size), count - 1)
+    chunk_count = -(-count // size)
+    filled = np.minimum(np.arange(chunk_count * size), count - 1)
 
     def split(array: Any) -> Any:
         whole = array if count % size == 0 else array[..., filled]
-        return jnp.moveaxis(whole.reshape(*array.shape[:-1], lots, size), -2, 0)
+        return jnp.moveaxis(whole.reshape(*array.shape[:-1], chunk_count, size), -2, 0)
 
     def joined(parts: Any) -> Any:
-        return jnp.moveaxis(parts, 0, -2).reshape(*parts.shape[1:-1], lots * size)[..., :count]
+        return jnp.moveaxis(parts, 0, -2).reshape(*parts.shape[1:-1], chunk_count * size)[..., :count]
 
     return jax.tree.map(joined, jax.lax.map(lambda some: function(*some), jax.tree.map(split, arrays)))
 

@@ -299,9 +299,9 @@ def energies_of_tree(
         rotors = dot(spin, spin) * (0.5 * jnp.asarray(tree.balls.armature)[:, None])
         last = last.at[:, np.array(turned)].add(stacked(rotors.truncate(len(last) - 1)))
     if lined:  # the bodies that the first coordinates of tendons move
-        tendons, places = (np.array(x) for x in zip(*lined, strict=True))
+        tendons, columns = (np.array(x) for x in zip(*lined, strict=True))
         energy = stacked(tendon_energy(tree, differentiated(Jet(tuple(arrays[0])), order + 1)))
-        last = last.at[:, places].add(energy[: len(last), tendons])
+        last = last.at[:, columns].add(energy[: len(last), tendons])
     return *parts, last
 
 

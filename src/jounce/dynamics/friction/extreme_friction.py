@@ -105,7 +105,7 @@ class ExtremeFriction:
         return value, proven
 
     def _locks_unloaded(self, along: np.ndarray, lane: int) -> bool:
-        """Tell whether friction that nothing presses yet locks: whether it does so under some loads."""
+        """Return whether friction without a normal force locks: whether it does so under some loads."""
         loads = np.random.default_rng(0).normal(size=(*self.pressing.shape[:2], LOADS))
         loads = np.concatenate([loads, -loads], axis=-1)
         changes = np.repeat(self.changes[..., lane : lane + 1], 2 * LOADS, axis=-1)
@@ -114,9 +114,9 @@ class ExtremeFriction:
 
     def _blocks(self, values: np.ndarray) -> np.ndarray:
         """Return the sums over the directions of each joint."""
-        found = np.zeros((len(self.coefficients), *values.shape[1:]))
-        np.add.at(found, self.joints, values)
-        return found
+        sums = np.zeros((len(self.coefficients), *values.shape[1:]))
+        np.add.at(sums, self.joints, values)
+        return sums
 
     def _directions_of(self, along: np.ndarray, otherwise: np.ndarray) -> np.ndarray:
         """Return unit vectors along, for each joint; where nothing is along, as otherwise given."""

@@ -24,7 +24,7 @@ from jounce.dynamics.inverse.constraint_forces import Multipliers, Slope, Slopes
 from jounce.dynamics.inverse.friction_of_motion import Rubbed, rubbing_of, with_friction
 from jounce.dynamics.inverse.tooth_flanks import with_flanks
 from jounce.dynamics.masses import Gravity, Masses
-from jounce.dynamics.motion_values import Coordinates, in_lots, part_of, pose_of
+from jounce.dynamics.motion_values import Coordinates, in_small_chunks, part_of, pose_of
 from jounce.execution.compilation import compiled
 from jounce.execution.mapped import Mapped, OnLlvm
 from jounce.execution.store.programs import is_wanted_soon
@@ -37,7 +37,7 @@ from jounce.mechanism.transmissions.axis_angles import with_turns
 from jounce.rigid.pose import Pose
 
 LARGE = 16  # numbers of an array that stays in memory in machine code of an instant
-LOT = 16  # instants whose dense matrices are factored together
+SMALL_CHUNK = 16  # instants whose dense matrices are factored together
 
 
 @compiled("pose_type", "slot", "levels", brief=True)
@@ -75,10 +75,12 @@ def resisted(element: Any, poses: Sequence[Coordinates], pose_type: type[Pose], 
 def responses(system: System, blocks: Slopes, loads: Float[Numbers, "load coordinate body batch"]) -> Any:
     """Return the multipliers that balance each of some loads, (loads, rows, time), of a system that is driven whole."""
 
-    def of_lot(blocks: Slopes, loads: Numbers) -> Any:
+    def of_chunk(blocks: Slopes, loads: Numbers) -> Any:
         return jax.vmap(constraint_forces.load_solver(system, blocks, None))(loads)
 
-    return of_lot(blocks, loads) if system.fronts is not None else in_lots(of_lot, LOT, blocks, loads)
+    return (
+        of_chunk(blocks, loads) if system.fronts is not None else in_small_chunks(of_chunk, SMALL_CHUNK, blocks, loads)
+    )
 
 
 @compiled("pose_type", brief=True)
@@ -119,13 +121,17 @@ def multipliers(
     """Return the multipliers that balance a load, and normal forces, Taylor coefficients, (levels, rows, time)."""
     mass = None if at_rest is None else mass_matrices(pose_of(at_rest, pose_type, 0), masses)[:, :, 1:]
 
-    def of_lot(blocks: Slopes, load: Numbers, mass: Any, rubbed: Sequence[Rubbed]) -> Any:
+    def of_chunk(blocks: Slopes, load: Numbers, mass: Any, rubbed: Sequence[Rubbed]) -> Any:
         if not rubbed:
             return constraint_forces.multipliers(system, blocks, load, mass)
         return with_friction(system, blocks, load, mass, rubbing_of(system, blocks, rubbed, pose_type))
 
     dense = mass is not None or system.fronts is None
-    return in_lots(of_lot, LOT, blocks, load, mass, rubbed) if dense else of_lot(blocks, load, mass, rubbed)
+    return (
+        in_small_chunks(of_chunk, SMALL_CHUNK, blocks, load, mass, rubbed)
+        if dense
+        else of_chunk(blocks, load, mass, rubbed)
+    )
 
 
 @Mapped
@@ -191,13 +197,13 @@ def least_multipliers(
 ) -> Any:
     """Return multipliers of redundant rows for some cases: a weight of the load, and what is bent, in each."""
 
-    def of_lot(blocks: Slopes, load: Numbers) -> Any:
+    def of_chunk(blocks: Slopes, load: Numbers) -> Any:
         def of_case(weight: Any, bent: Numbers) -> Any:
             return redundant_forces.least_multipliers(system, blocks, weight * load, compliance, bent)
 
         return jax.vmap(of_case)(weights, bent)  # all cases by one factorization
 
-    return in_lots(of_lot, LOT, blocks, load)
+    return in_small_chunks(of_chunk, SMALL_CHUNK, blocks, load)
 
 
 @compiled(brief=True)

@@ -73,12 +73,12 @@ class JointFriction:
 
     def directions(self) -> list[int]:
         """Return the joint of each direction of slip, in the order of the joints."""
-        found: list[int] = []
+        joints: list[int] = []
         for index in self.first_rows:
             count = self._slips(index)
-            first = found[-1] + 1 if found else 0
-            found += [first + k for k in range(self.forces._joined.groups[index].instances) for _ in range(count)]
-        return found
+            first = joints[-1] + 1 if joints else 0
+            joints += [first + k for k in range(self.forces._joined.groups[index].instances) for _ in range(count)]
+        return joints
 
     def _slips(self, index: int) -> int:
         """Return in how many directions the joints of a group slip."""
@@ -116,15 +116,15 @@ class JointFriction:
         forces = self.forces
 
         def chunk(lanes: np.ndarray) -> Any:
-            found = []
+            components = []
             for index in self.first_rows:
                 group = forces._joined.groups[index]
                 own = multipliers[self._rows(index)][:, lanes].reshape(-1, group.instances, len(lanes))
                 slope = forces._slopes(index, group.moving_slots[-1], lanes)
                 poses = [forces.coordinates_at(slot, lanes, 1) for slot in group.bodies]
                 part = np.asarray(programs.pressing(group.element, poses, slope, own, forces.pose_type))
-                found.append(np.pad(part, [(0, forces.pose_type.shifts - len(part)), (0, 0), (0, 0)]))
-            return np.concatenate(found, axis=1).swapaxes(0, 1)
+                components.append(np.pad(part, [(0, forces.pose_type.shifts - len(part)), (0, 0), (0, 0)]))
+            return np.concatenate(components, axis=1).swapaxes(0, 1)
 
         return forces.in_chunks(chunk)
 

@@ -93,12 +93,12 @@ class MotionForces:
         Where constraints are redundant, those of least norm, or by the stiffnesses that the mechanism has for it. NaN
         at change points, where they are not determined, and next to them where rounding decides them.
         """
-        found = self._balancing[0][:, : len(self.model.rows)]
+        multipliers = self._balancing[0][:, : len(self.model.rows)]
         passages, time = self.motion.passages, self.motion.time
         if passages:  # a distance d away they grow as 1 / d, and so does what rounding makes of them
-            unknown = [spoiled(passages, time, level + 1) for level in range(len(found))]
-            found = np.where(np.array(unknown)[:, None], np.nan, found)
-        return found
+            unknown = [spoiled(passages, time, level + 1) for level in range(len(multipliers))]
+            multipliers = np.where(np.array(unknown)[:, None], np.nan, multipliers)
+        return multipliers
 
     @cached_property
     def _balancing(self) -> Float[Numbers, "case level row time"]:
@@ -106,11 +106,11 @@ class MotionForces:
         if not self.flanks:
             return self._balanced({})
         teeth.check_pitch(self.motion, self._joined.groups, lambda k: self._poses(k, np.arange(len(self.motion.time))))
-        found, known, self._reversals = teeth.settled(self._balanced, self.flanks, self.model, self.motion)
+        multipliers, known, self._reversals = teeth.settled(self._balanced, self.flanks, self.model, self.motion)
         if self._looks_for_open:  # what is open presses on no flank that is known: any others tell what depends on it
-            found = np.stack([found[0], self._balanced(teeth.by_chance(known))[1]])
+            multipliers = np.stack([multipliers[0], self._balanced(teeth.by_chance(known))[1]])
         self.flanks = known
-        return found
+        return multipliers
 
     def prepare(self) -> None:
         """Make machine code that balances loads, of any motion of this form."""
@@ -126,9 +126,9 @@ class MotionForces:
 
         def chunk(lanes: np.ndarray) -> Any:
             if code is not None:
-                found, finite = code(self._lanes(lanes))
+                multipliers, finite = code(self._lanes(lanes))
                 check_finite_forces(self, finite, lanes)
-                return found
+                return multipliers
             blocks, (bodies, *_, instants) = self._blocks(lanes), self._lanes(lanes)
             forces = programs.without_constraints(self._joined, at_lanes(self.forces, lanes))
             load, finite = programs.body_loads(forces, bodies, instants, self.masses, self.gravity, self.pose_type)
@@ -139,10 +139,10 @@ class MotionForces:
             rubbed = [self.friction.slopes(k, lanes) for k in self.friction.first_rows]
             return programs.multipliers(self._joined, blocks, load, still, self.masses, self.pose_type, rubbed)[None]
 
-        found = self.in_chunks(chunk)
-        check_not_locked(self.motion, self._joined, found[0])
-        check_finite_values(self, found[0])
-        return without_open_rates(self, found)
+        multipliers = self.in_chunks(chunk)
+        check_not_locked(self.motion, self._joined, multipliers[0])
+        check_finite_values(self, multipliers[0])
+        return without_open_rates(self, multipliers)
 
     def _balancing_code(self, choice: tuple[Numbers, Numbers, Numbers] | None) -> Any:
         """Return what `balance_of_instant` does, for a choice among multipliers of redundant rows."""
@@ -201,10 +201,10 @@ class MotionForces:
             return None
         twin = copy.copy(self)
         twin._kept = {}
-        found = self._balancing[1]
+        multipliers = self._balancing[1]
         solved = self.motion.status == Status.OK
-        size = np.abs(found[0][:, solved] * self.open.weights[:, None]).max(initial=0.0)
-        twin.__dict__["multipliers"] = found / (size or 1.0)
+        size = np.abs(multipliers[0][:, solved] * self.open.weights[:, None]).max(initial=0.0)
+        twin.__dict__["multipliers"] = multipliers / (size or 1.0)
         twin.flanks = teeth.by_chance(self.flanks)
         return twin
 
@@ -326,8 +326,8 @@ class MotionForces:
                 pressing = self._balancing[0][:, None, first : first + group.instances, lanes]
                 return held + programs.wrenches(slopes[group.moving_slots.index(slot)], pressing)
 
-            found = self._once(of_constraint, "joint", place.group, slot)[:, :, place.instance]
-            return teeth.without_open_rates(found, self._reversals.get(place.group), place.instance)
+            wrench = self._once(of_constraint, "joint", place.group, slot)[:, :, place.instance]
+            return teeth.without_open_rates(wrench, self._reversals.get(place.group), place.instance)
         index, instance = self._force_index(name)
 
         def of_force(lanes: np.ndarray) -> Any:

@@ -144,12 +144,12 @@ def _ranges(forces: MotionForces, plain: dict[str, Numbers]) -> dict[str, Any]:
         friction.pressing(forces.multipliers[0]), changes, friction.directions(), friction.coefficients
     )
     columns = [_with_multipliers(forces, response) for response in responses]
-    found = {}
+    ranges = {}
     for name, free in plain.items():
         along = -np.array([of_one.driver_force(name)[0, 0] for of_one in columns])
         (more, sure), (less, sure_too) = extreme.most(along), extreme.most(-along)
-        found[name] = [free - less, free, free + more], np.flatnonzero(~(sure & sure_too))
-    return found
+        ranges[name] = [free - less, free, free + more], np.flatnonzero(~(sure & sure_too))
+    return ranges
 
 
 def _with_multipliers(forces: MotionForces, multipliers: Numbers) -> MotionForces:

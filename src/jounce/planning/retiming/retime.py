@@ -32,7 +32,7 @@ from jounce.trajectory import FollowingMotion, JointTrajectory
 from jounce.trajectory.checks import positive
 
 CELLS = 160
-ATTEMPTS = 4  # to keep limits as the derivatives in time tell them
+ATTEMPTS = 4  # to keep limits of the derivatives in time
 LIMIT_TOLERANCE = 1e-9  # of a limit, which rounding may take
 MAX_ORDER = 6
 NEAR_LEAST = 1.01  # times the least time: a duration below it is compared with that exactly
@@ -81,7 +81,7 @@ def retime(
         Rates of s at the beginning and at the end, 1/s; 0 is rest.
     order : int, optional
         Highest derivative of the positions that is continuous, 1 to 6, also where the motion comes from rest. Unless
-        given, as many as the limits ask for: 3 with limits of jounce, 2 of jerk or torque rate, 1 otherwise.
+        given, as many as the limits require: 3 with limits of jounce, 2 of jerk or torque rate, 1 otherwise.
     cells : int, optional
         Cells of the spline, 20 or more. Unless given, 160, or as many as resolve how the path waves, up to 1280. With a
         number that is given, and for a mechanism, which has 160, that is not looked at: between the instants of the
@@ -118,7 +118,7 @@ def retime(
     -------
     RetimedTrajectory
         A `JointTrajectory` that starts at 0 s, exact between samples. Its ``report`` is what `check_limits` finds, its
-        ``active`` tells which limit binds where, and what it costs.
+        ``active`` says which limit binds where, and how much time it costs.
 
     Raises
     ------
@@ -310,7 +310,7 @@ def _ends(robot: Robot, given: JointTrajectory, source: RobotQuantities, drives:
 
 
 def within_limits(source: RobotQuantities, s: np.ndarray) -> np.ndarray:
-    """Tell where a motion whose parameter is the time keeps its limits."""
+    """Return where a motion whose parameter is the time keeps its limits."""
     shape, law = np.zeros((5, len(s))), np.zeros((4, len(s)))
     shape[0], shape[1], law[0] = s, 1.0, 1.0
     return np.all(Curves(source(s), shape).ratios(law) <= 1, axis=1)
@@ -326,7 +326,7 @@ def _certified(
     drives: bool,
     hand_over: bool,
 ) -> RetimedTrajectory:
-    """Return the trajectory of a law, once it keeps the limits as its own derivatives in time tell them."""
+    """Return the trajectory of a law, once its own derivatives in time keep the limits."""
     for attempt in range(ATTEMPTS):
         motion = RateMotion(np.linspace(0.0, 1.0, law.basis.cells + 1), law.basis.pieces(law.coefficients))
         if search.duration is not None and not any(search.conditions.rates):

@@ -70,7 +70,7 @@ def active_limits(search: Search, law: RateLaw, motion: RateMotion) -> Any:
 
     shares = search.curves.ratios(law.at(search.points))
     u, s = search.points, search.shape[0]
-    knots = np.interp(u, motion.begins, motion.instants)  # near enough to tell the time of a point to a figure
+    knots = np.interp(u, motion.begins, motion.instants)  # accurate enough for the time of a point in a figure
     names = [f"{label.owner} {label.word}" for label in search.labels.every]
     variables = {
         "share": (("s", "limit"), shares),

@@ -1,4 +1,4 @@
-"""Retimed trajectories as samples for a controller: whole periods, and limits kept by splines through the samples."""
+"""Retimed trajectories as samples for a controller: whole periods, and splines through samples within the limits."""
 
 import dataclasses
 import warnings

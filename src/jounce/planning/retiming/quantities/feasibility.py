@@ -46,7 +46,7 @@ def _spare(bound: np.ndarray, at_rest: np.ndarray) -> np.ndarray:
 
 
 def bounded_everywhere(source: Source, start: float, stop: float) -> bool:
-    """Tell whether on the whole path something moves whose velocity, acceleration or force has a limit."""
+    """Return whether something with a limit of velocity, acceleration or force moves on the whole path."""
     return bool((_moving(source(np.linspace(start, stop, POINTS)), rates=False) >= IDLE).all())
 
 

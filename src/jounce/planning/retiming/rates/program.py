@@ -88,7 +88,7 @@ def solve_program(program: Program, *, elastic: bool = False) -> Solution:
         objective = program.nodes.T @ (-1.25 * curved * about)
 
     def widened(matrix: Any, unknowns: Any = None) -> Any:
-        """Return a matrix over the coefficients, with the columns of the other unknowns, which are zero unless given."""
+        """Return a matrix over the coefficients, with columns for the other unknowns, zero unless given."""
         if not extra:
             return matrix
         return sparse.hstack([matrix, wide((matrix.shape[0], extra)) if unknowns is None else unknowns])

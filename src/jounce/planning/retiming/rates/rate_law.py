@@ -1,4 +1,4 @@
-"""A rate along a path, and what is asked of it besides its limits."""
+"""A rate along a path, and its conditions in addition to limits."""
 
 import dataclasses
 
@@ -45,7 +45,7 @@ class RateLaw:
 
 @dataclasses.dataclass(frozen=True)
 class Conditions:
-    """What is asked of a law besides the limits.
+    """Conditions of a law in addition to the limits.
 
     Parameters
     ----------
@@ -56,7 +56,7 @@ class Conditions:
     max_rate : float or None
         Rate of s that is not to be exceeded, 1/s; for a parametrization by s itself.
     further : tuple of float
-        Second and third derivative of s at the start, where these are given beside the rate.
+        Second and third derivative of s at the start, where they are given in addition to the rate.
     """
 
     order: int
