@@ -182,8 +182,9 @@ def _dwells_and_stretches(times: np.ndarray, values: np.ndarray, sigma: float) -
     A dwell of which nothing is left was a slow part of a motion: what is beside it is one motion then.
     """
     whole_dwells = dwells(times, values, sigma)
+    known: dict[tuple[int, int], list[Stretch]] = {}
     while True:
-        found = _moving(times, values, whole_dwells)
+        found = _moving(times, values, whole_dwells, known)
         scales = [_scales(times, dwell, found) for dwell in whole_dwells]
         inner = [without_margins([d], times, [scale]) for d, scale in zip(whole_dwells, scales, strict=True)]
         if all(inner):
@@ -213,13 +214,17 @@ def _scales(times: np.ndarray, dwell: Dwell, found: list[Stretch]) -> tuple[floa
     return UNSEEN / ends[0].cutoff, UNSEEN / ends[1].cutoff
 
 
-def _moving(times: np.ndarray, values: np.ndarray, still: list[Dwell]) -> list[Stretch]:
-    """Return what samples between dwells say; of dwells, what those beside them do."""
+def _moving(
+    times: np.ndarray, values: np.ndarray, still: list[Dwell], known: dict[tuple[int, int], list[Stretch]]
+) -> list[Stretch]:
+    """Return what samples between dwells say, and note it; of dwells, what those beside them do."""
     edges = [0, *(k for dwell in still for k in (dwell.first, dwell.last)), len(times) - 1]
     found: list[Stretch] = []
     for first, last in zip(edges[::2], edges[1::2], strict=True):
         if last - first >= FEWEST:
-            found += stretches(times[first : last + 1], values[first : last + 1])
+            if (first, last) not in known:
+                known[first, last] = stretches(times[first : last + 1], values[first : last + 1])
+            found += known[first, last]
     if not found:
         found = stretches(times, values)
     return sorted(found, key=lambda stretch: stretch.start)

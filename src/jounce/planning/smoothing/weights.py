@@ -9,17 +9,20 @@ parts of a motion support less smoothing than slow ones.
 from __future__ import annotations
 
 import dataclasses
+import functools
+from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 from jaxtyping import Float
 
-from jounce.planning.smoothing.bases import DEGREE, PENALIZED, banded, penalty_root, values_at, whole
+from jounce.planning.smoothing.bases import DEGREE, PENALIZED, penalty_root, values_at, whole
 
 CELLS = (8, 16, 32, 64)  # of a stretch: as few as resolve what is followed, or rounding counts
 MOST, LEAST = 3000, 64  # samples in a stretch
 RESOLVED = np.pi / 2  # largest cutoff frequency times the length of a cell
 RANGE = (-24.0, 20.0)  # of the natural logarithm of the weight, cells having the length 1
-STEPS = 24
+STEPS, FINE, REFINED = 24, 9, 2  # weights at once: at first, then about the best, so often
 FLOOR = 1e-7  # of the range of samples: less is no noise
 
 
@@ -77,47 +80,106 @@ def _resolved(times: np.ndarray, values: np.ndarray) -> tuple[Stretch, bool]:
 
 def _stretch(times: np.ndarray, values: np.ndarray, cells: int) -> Stretch:
     """Return the likely weight of one stretch, by splines of so many cells."""
-    from scipy.linalg import cho_solve_banded, cholesky_banded
-
     count, span = len(times), float(times[-1] - times[0])
-    knots = np.arange(cells + 1.0)
-    matrix = values_at(np.clip((times - times[0]) * (cells / span), 0.0, cells), knots)
-    since = (times - times.mean()) * (2 / span)
-    offset = values - np.polynomial.Polynomial.fit(since, values, PENALIZED - 1, domain=[-1, 1], window=[-1, 1])(since)
+    matrix = values_at(np.clip((times - times[0]) * (cells / span), 0.0, cells), np.arange(cells + 1.0))
+    offset = _without_cubic(times, values)
     floor = max(float(np.abs(values).max()) * np.finfo(float).eps, FLOOR * float(np.ptp(values)))
-    root = penalty_root(whole(knots), np.ones(cells))
-    gram, jounce, right = banded(matrix.T @ matrix), banded(root.T @ root), matrix.T @ offset
+    least_cost = _least_cost(matrix, offset, count * floor**2, cells)
     free = cells + DEGREE - PENALIZED
 
-    def unlikely(logarithm: float) -> tuple[float, float]:
-        factor = cholesky_banded(gram + np.exp(logarithm) * jounce)
-        solved = cho_solve_banded((factor, False), right)
-        apart, rough = offset - matrix @ solved, root @ solved
-        rest = float(apart @ apart) + np.exp(logarithm) * float(rough @ rough) + count * floor**2
-        determinant = 2 * float(np.log(factor[-1]).sum())
-        return (count - PENALIZED) * np.log(rest) + determinant - free * logarithm, rest
+    def unlikely(logarithms: Float[np.ndarray, " weight"]) -> Float[np.ndarray, " weight"]:
+        rest, determinant = least_cost(np.exp(logarithms))
+        return (count - PENALIZED) * np.log(rest) + determinant - free * logarithms
 
     grid = np.linspace(*RANGE, STEPS)
-    costs = np.array([_safe(unlikely, x)[0] for x in grid])
-    best = int(np.argmin(costs))
-    low, high = grid[max(best - 1, 0)], grid[min(best + 1, len(grid) - 1)]
-    for _ in range(12):  # golden section
-        third = 0.381966 * (high - low)
-        if _safe(unlikely, low + third)[0] < _safe(unlikely, high - third)[0]:
-            high -= third
-        else:
-            low += third
-    logarithm = (low + high) / 2
-    _, rest = _safe(unlikely, logarithm)
+    best = int(np.argmin(unlikely(grid)))
+    for _ in range(REFINED):
+        grid = np.linspace(grid[max(best - 1, 0)], grid[min(best + 1, len(grid) - 1)], FINE)
+        likely = unlikely(grid)
+        best = int(np.argmin(likely))
+    logarithm = float(grid[best])
+    if 0 < best < FINE - 1 and np.isfinite(likely[best - 1 : best + 2]).all():
+        before, at, after = likely[best - 1 : best + 2]
+        bend = before - 2 * at + after
+        logarithm += float((grid[1] - grid[0]) * (before - after) / (2 * bend)) if bend > 0 else 0.0
+    rest = float(least_cost(np.exp(np.array([logarithm])))[0][0])
     cell = span / cells
     weight = float(np.exp(logarithm)) * cell ** (2 * PENALIZED - 1)
     cutoff = float((count / span / weight) ** (1 / (2 * PENALIZED)))
     return Stretch(float(times[0]), float(times[-1]), weight, cutoff, float(np.sqrt(rest / (count - PENALIZED))))
 
 
-def _safe(function: object, argument: float) -> tuple[float, float]:
-    """Return what a function gives, and infinity where its system is not positive definite any more."""
+def _without_cubic(times: np.ndarray, values: np.ndarray) -> Float[np.ndarray, " sample"]:
+    """Return samples less the cubic nearest to them, which has no jounce."""
+    since = np.clip((times - times[0]) * (2 / (times[-1] - times[0])) - 1, -1.0, 1.0)
+    powers = np.polynomial.legendre.legvander(since, PENALIZED - 1)
+    return values - powers @ np.linalg.lstsq(powers.T @ powers, powers.T @ values)[0]
+
+
+def _least_cost(
+    matrix: Any, offset: Float[np.ndarray, " sample"], floor: float, cells: int
+) -> Callable[..., tuple[np.ndarray, np.ndarray]]:
+    """Return the least cost of splines near values, and the logarithm of the determinant, as functions of the weight.
+
+    The last pivot of the system, bordered by its right-hand side, is the least cost; the others give the determinant.
+    So one Cholesky factorization for each weight gives both. The cost is counted from splines that follow the samples,
+    or from zero, whichever costs less under that weight, so that hardly anything cancels. Where the system is not
+    positive definite, both are infinite.
+
+    Parameters
+    ----------
+    matrix : sparse matrix of shape (sample, spline)
+        Values of splines at the samples.
+    offset : array of shape (sample,)
+        The samples, rad or m.
+    floor : float
+        What is added to the cost, for rounding.
+    cells : int
+        Of length 1.
+    """
+    from scipy.linalg import cho_solve
+
+    root = _jounce_root(cells)
+    base, slope = np.zeros((2, len(root.T) + 1, len(root.T) + 1))
+    base[:-1, :-1] = (matrix.T @ matrix).toarray()
+    slope[:-1, :-1] = root.T @ root
+    near = np.zeros(len(root.T))
+    for weight in np.exp(np.linspace(*RANGE, STEPS)):  # the first one, unless samples are missing
+        try:
+            factor = np.linalg.cholesky(base[:-1, :-1] + weight * slope[:-1, :-1])
+        except np.linalg.LinAlgError:
+            continue
+        near = cho_solve((factor, True), matrix.T @ offset)
+        break
+    apart, bent = offset - matrix @ near, root @ near
+    far, far_slope = base.copy(), slope.copy()
+    for own, rest in ((base, apart), (far, offset)):
+        own[:-1, -1] = own[-1, :-1] = matrix.T @ rest
+        own[-1, -1] = rest @ rest + floor
+    slope[:-1, -1] = slope[-1, :-1] = -(root.T @ bent)
+    slope[-1, -1] = bent @ bent
+
+    def least(weights: Float[np.ndarray, " weight"]) -> tuple[np.ndarray, np.ndarray]:
+        stiff = base[-1, -1] + weights * slope[-1, -1] > far[-1, -1]
+        systems = np.where(stiff[:, None, None], far, base)
+        systems += weights[:, None, None] * np.where(stiff[:, None, None], far_slope, slope)
+        pivots = _pivots(systems)
+        return pivots[:, -1] ** 2, 2 * np.log(pivots[:, :-1]).sum(axis=1)
+
+    return least
+
+
+def _pivots(systems: Float[np.ndarray, "weight row row"]) -> Float[np.ndarray, "weight row"]:
+    """Return diagonals of Cholesky factors, infinite where a system is not positive definite."""
     try:
-        return function(argument)  # type: ignore[operator]
+        return np.diagonal(np.linalg.cholesky(systems), axis1=1, axis2=2)
     except np.linalg.LinAlgError:
-        return np.inf, np.inf
+        if len(systems) == 1:
+            return np.full(systems.shape[:2], np.inf)
+        return np.concatenate([_pivots(system[None]) for system in systems])
+
+
+@functools.cache
+def _jounce_root(cells: int) -> Float[np.ndarray, "row spline"]:
+    """Return a matrix whose square is that of the square of the jounce of splines on so many cells of length 1."""
+    return np.linalg.qr(penalty_root(whole(np.arange(cells + 1.0)), np.ones(cells)).toarray(), mode="r")
