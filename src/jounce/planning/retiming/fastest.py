@@ -8,7 +8,7 @@ from jounce.planning.retiming.rates.rate_law import Conditions, RateLaw, progres
 from jounce.planning.retiming.rates.rate_spline import Parametrization, RateBasis
 from jounce.planning.retiming.search import COARSE, Search
 
-COARSE_ROUNDS = 2
+COARSE_ROUNDS = 1
 
 
 def fastest(

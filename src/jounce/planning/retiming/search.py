@@ -21,7 +21,8 @@ ENDS = 1e-9  # of a cell: both sides of a knot are looked at
 OFFSETS = np.array([ENDS, 0.25, 0.5, 0.75, 1 - ENDS])  # in a cell, of the points that are looked at
 END_CELLS, END_POINTS = 2, 20
 FIRST = (1, 3)  # of them, where limits hold from the beginning
-NEAR, SETTLED_NEAR = 0.2, 0.6  # of a limit: where less is used, it is left out until it matters
+NEAR, SETTLED_NEAR, HELD_NEAR = 0.2, 0.6, 0.9  # of a limit: where less is used, it is left out until it matters
+COARSE_NEAR = 0.05
 SETTLED = 2e-4  # of the duration: an improvement that ends the iteration
 EXCEEDED = 1e-4  # of a limit: what is left to the last slowing
 ROUNDS = 20
@@ -29,7 +30,8 @@ EXCHANGES = 4
 EASE = 3.0  # times the limit of the fourth order: how much is taken back at a time
 TRUST = 4.0  # times a coefficient of z, where programs are but near the truth
 CLOSE = 2e-3  # to the largest ratio: peaks that are refined
-ZOOM, ZOOMS = 7, 4  # points about each, and how often
+ZOOMS = 3  # how often they are refined
+ASIDE = 0.1  # of the way to the points beside, of those about a vertex
 SPARE = 2e-8  # of a limit, left to rounding
 SLOWINGS = 12
 HOPELESS = 0.1  # of a limit: no slowing as a whole is meant to mend so much
@@ -80,6 +82,7 @@ class Search:
         self.duration: float | None = None  # that a law is to have, where the fastest is not wanted
         self.points, self.enforced = np.zeros(0), np.zeros(0, bool)
         self.prices = np.zeros((0, len(labels.every)))
+        self.held = np.zeros((0, len(labels.every)), bool)  # limits of the last program
         grid = ((np.arange(basis.cells)[:, None] + OFFSETS) / basis.cells).reshape(-1)
         ends = np.linspace(0.0, END_CELLS / basis.cells, END_POINTS)[1:]  # where it rests, limits change fast
         enforced = np.isin(np.arange(len(grid)) % len(OFFSETS), FIRST)
@@ -104,8 +107,9 @@ class Search:
         self.curves = Curves(quantities, self.shape)
         self.matrices = self.basis.matrices(self.points)
         self.compact = self.basis.compact(self.points, self.matrices)
-        known, self.prices = self.prices, np.zeros((len(self.points), len(self.labels.every)))
-        self.prices[np.searchsorted(self.points, before)] = known
+        at, shape = np.searchsorted(self.points, before), (len(self.points), len(self.labels.every))
+        (prices, held), self.prices, self.held = (self.prices, self.held), np.zeros(shape), np.zeros(shape, bool)
+        self.prices[at], self.held[at] = prices, held
 
     @property
     def largest_z(self) -> float:
@@ -146,9 +150,11 @@ class Search:
         x, cost = start, self._cost(start) if settled else np.inf
         ratios = self.curves.ratios(self.at(x))
         chosen = self.enforced[:, None] & (
-            ratios > (0 if len(self.nodes) == 2 * COARSE else SETTLED_NEAR if settled else NEAR)
+            ratios > (COARSE_NEAR if len(self.nodes) == 2 * COARSE else SETTLED_NEAR if settled else NEAR)
         )
         chosen |= _peaks(ratios) & (ratios > 1)
+        if settled:
+            chosen |= self.held & (ratios > HELD_NEAR)
         for self.rounds in range(1, rounds + 1):
             try:
                 x = self._improved(x, chosen, near=settled or self.rounds > 1)
@@ -163,6 +169,7 @@ class Search:
             if over < EXCEEDED and change < SETTLED:
                 break
             chosen |= _peaks(ratios) & (ratios > 1 + EXCEEDED / 10)
+        self.held = chosen
         return self.law_of(x)
 
     def _cost(self, x: _Points) -> float:
@@ -209,18 +216,18 @@ class Search:
         """Return where the highest peaks are between the points, and the ratios there, the largest among them."""
         ratios = self.curves.ratios(law.at(self.points))
         at, curve = np.nonzero(_peaks(ratios) & (ratios > min(float(ratios.max()), 1.0) - CLOSE))
-        best, positions = ratios[at, curve], self.points[at]
-        last = len(self.points) - 1
-        low, high = self.points[np.maximum(at - 1, 0)], self.points[np.minimum(at + 1, last)]
-        share, every = np.linspace(0.0, 1.0, ZOOM)[:, None], np.arange(len(at))
+        beside = np.clip(at + np.array([[-1], [0], [1]]), 0, len(self.points) - 1)
+        u, values, every = self.points[beside], ratios[beside, curve], np.arange(len(at))
         for _ in range(zooms):
-            u = low + share * (high - low)
-            refined = self.ratios_at(u.reshape(-1), law).reshape(*u.shape, -1)[:, every, curve]
-            top = np.argmax(refined, axis=0)
-            better = refined[top, every] > best
-            best, positions = np.where(better, refined[top, every], best), np.where(better, u[top, every], positions)
-            low, high = u[np.maximum(top - 1, 0), every], u[np.minimum(top + 1, ZOOM - 1), every]
-        return positions, best
+            more = _about_vertex(u, values)
+            u = np.concatenate([u, more])
+            found = self.ratios_at(more.reshape(-1), law).reshape(*more.shape, -1)[:, every, curve]
+            values = np.concatenate([values, found])
+            sequence = np.argsort(u, axis=0, kind="stable")
+            u, values = np.take_along_axis(u, sequence, axis=0), np.take_along_axis(values, sequence, axis=0)
+            beside = np.clip(np.argmax(values, axis=0) + np.array([[-1], [0], [1]]), 0, len(u) - 1)
+            u, values = np.take_along_axis(u, beside, axis=0), np.take_along_axis(values, beside, axis=0)
+        return u[1], values[1]
 
     def fastest_law(self, start: _Points) -> RateLaw:
         """Return the fastest law that keeps its limits between the points too.
@@ -233,9 +240,16 @@ class Search:
             over = ratios > 1 + EXCEEDED
             if not over.any():
                 break
-            self.extend(positions[over], np.ones(int(over.sum()), bool))
+            self.extend(*self._among_points(positions[over]))
             law = self.run(law.coefficients, settled=True)
         return self.slowed_to_limits(law)
+
+    def _among_points(self, positions: _Points) -> tuple[_Points, Bool[np.ndarray, " point"]]:
+        """Return positions between points, and those halfway to the points beside, all of which limits hold at."""
+        after = np.clip(np.searchsorted(self.points, positions), 1, len(self.points) - 1)
+        halfway = (positions + self.points[np.stack([after - 1, after])]) / 2
+        points = np.unique(np.append(halfway.reshape(-1), positions))
+        return points, np.ones(len(points), bool)
 
     def slowed_to_limits(self, law: RateLaw) -> RateLaw:
         """Return a law slowed as a whole by what it exceeds limits between the points.
@@ -364,6 +378,17 @@ class Search:
             rows += sums[: len(further)]
             values += [x / divisor / scale for x, divisor in zip(further, divisors, strict=False)]
         return sparse.vstack(rows, format="csr"), np.array(values)
+
+
+def _about_vertex(u: Float[np.ndarray, "3 peak"], values: Float[np.ndarray, "3 peak"]) -> Float[np.ndarray, "3 peak"]:
+    """Return the vertex of a parabola through three points, or the one in the middle, and instants on its two sides."""
+    before, after = u[1] - u[0], u[2] - u[1]
+    fall = (values[1] - values[0]) * after, (values[1] - values[2]) * before
+    with np.errstate(divide="ignore", invalid="ignore"):
+        step = (fall[0] * after - fall[1] * before) / (2 * (fall[0] + fall[1]))
+    step = np.clip(np.where(np.isfinite(step), step, 0.0), -before, after)
+    vertex = u[1] + np.where(np.abs(step) < 1e-3 * (before + after), 0.25 * ASIDE * (after - before), step)
+    return np.stack([vertex - ASIDE * (vertex - u[0]), vertex, vertex + ASIDE * (u[2] - vertex)])
 
 
 def _peaks(ratios: np.ndarray) -> np.ndarray:

@@ -92,14 +92,15 @@ def _stretch(times: np.ndarray, values: np.ndarray, cells: int) -> Stretch:
         return (count - PENALIZED) * np.log(rest) + determinant - free * logarithms
 
     grid = np.linspace(*RANGE, STEPS)
-    best = int(np.argmin(unlikely(grid)))
+    costs = unlikely(grid)
+    best = int(np.argmin(costs))
     for _ in range(REFINED):
         grid = np.linspace(grid[max(best - 1, 0)], grid[min(best + 1, len(grid) - 1)], FINE)
-        likely = unlikely(grid)
-        best = int(np.argmin(likely))
+        costs = unlikely(grid)
+        best = int(np.argmin(costs))
     logarithm = float(grid[best])
-    if 0 < best < FINE - 1 and np.isfinite(likely[best - 1 : best + 2]).all():
-        before, at, after = likely[best - 1 : best + 2]
+    if 0 < best < FINE - 1 and np.isfinite(costs[best - 1 : best + 2]).all():
+        before, at, after = costs[best - 1 : best + 2]
         bend = before - 2 * at + after
         logarithm += float((grid[1] - grid[0]) * (before - after) / (2 * bend)) if bend > 0 else 0.0
     rest = float(least_cost(np.exp(np.array([logarithm])))[0][0])
@@ -182,4 +183,5 @@ def _pivots(systems: Float[np.ndarray, "weight row row"]) -> Float[np.ndarray, "
 @functools.cache
 def _jounce_root(cells: int) -> Float[np.ndarray, "row spline"]:
     """Return a matrix whose square is that of the square of the jounce of splines on so many cells of length 1."""
-    return np.linalg.qr(penalty_root(whole(np.arange(cells + 1.0)), np.ones(cells)).toarray(), mode="r")
+    root = penalty_root(whole(np.arange(cells + 1.0)), np.ones(cells)).toarray()
+    return np.asarray(np.linalg.qr(root, mode="r"))

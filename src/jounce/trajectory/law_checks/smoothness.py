@@ -20,7 +20,8 @@ from jounce.trajectory.motion import AbstractMotion, ExpressionMotion, FunctionM
 HIGHEST = 10  # derivative that is looked at
 MOST_CROSSINGS = 10_000
 INTERVALS = 4000  # at a leader, for where it passes a knot of the law that follows it
-STEPS = 44  # of bisection between two of these: to rounding
+STEPS = 24  # at most, between two of these, to rounding
+AMONG, BESIDE = np.arange(1, 8) / 8, 10.0 ** -np.arange(2, 16, 2)  # shares of the time between, looked at together
 SLACK = 1e-6  # of the time between two looks, by which a crossing at an end may be beyond it
 BROKEN = {"abs": "kinks", "sign": "jumps"}  # what functions of expressions have where their argument is zero
 ROUNDING = 1e-9  # of the way of a profile by its duration to the power of the order: a smaller jump is none
@@ -155,8 +156,10 @@ class SeenLeaders:
         """Return the Taylor coefficients of a leader at instants."""
         key = id(leader), order, instants.tobytes()
         if key not in self._values:
-            jet = leader(Jet.variable(instants, order) if order else Jet([instants])).dense()
-            self._values[key] = leader, [np.asarray(c) for c in jet.coefficients]
+            filled = np.full(max(16, 1 << (len(instants) - 1).bit_length()), instants[-1] if len(instants) else 0.0)
+            filled[: len(instants)] = instants  # few lengths, so that few programs are compiled
+            jet = leader(Jet.variable(filled, order) if order else Jet([filled])).dense()
+            self._values[key] = leader, [np.asarray(c)[: len(instants)] for c in jet.coefficients]
         return self._values[key][1]
 
 
@@ -344,14 +347,29 @@ def _composed(
 def _crossings(
     leader: AbstractMotion, knots: np.ndarray, low: np.ndarray, high: np.ndarray, seen: SeenLeaders
 ) -> np.ndarray:
-    """Return when a leader passes values, each between an instant before and one after, by bisection."""
+    """Return when a leader passes values, each between an instant before and one after, to rounding.
+
+    Many instants are looked at together: about the one that a straight line gives, and evenly between both.
+    """
+    every, count = np.arange(len(knots)), len(AMONG) + 2 * len(BESIDE) + 1
 
     def away(instants: np.ndarray) -> np.ndarray:
-        return seen.coefficients(leader, instants)[0] - knots
+        return seen.coefficients(leader, instants.reshape(-1))[0].reshape(instants.shape) - knots
 
-    below = away(low) < 0
+    under, over = away(low), away(high)
+    below = under < 0
     for _ in range(STEPS):
-        middle = (low + high) / 2
-        before = (away(middle) < 0) == below
-        low, high = np.where(before, middle, low), np.where(before, high, middle)
+        width = high - low
+        if (width <= 4 * np.spacing(np.maximum(np.abs(low), np.abs(high)))).all():
+            break
+        with np.errstate(divide="ignore", invalid="ignore"):
+            share = np.nan_to_num(under / (under - over), nan=0.5, posinf=1.0, neginf=0.0)
+        near = np.clip(share + np.concatenate([-BESIDE, [0.0], BESIDE])[:, None], 0.0, 1.0)
+        shares = np.sort(np.concatenate([np.broadcast_to(AMONG[:, None], (len(AMONG), len(knots))), near]), axis=0)
+        instants = np.concatenate([low[None], low + shares * width, high[None]])
+        values = np.concatenate([under[None], away(instants[1:-1]), over[None]])
+        before = (values[1:-1] < 0) == below
+        first = np.where(before.all(axis=0), count, np.argmin(before, axis=0))  # of those after the passing
+        low, high = instants[first, every], instants[first + 1, every]
+        under, over = values[first, every], values[first + 1, every]
     return high
