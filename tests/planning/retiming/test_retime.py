@@ -361,22 +361,16 @@ def test_a_trajectory_gives_its_geometry():
     assert found.path.deviation < 1e-12
 
 
-@pytest.mark.slow
-def test_the_drivers_of_a_mechanism_keep_force_yank_and_the_speed_of_an_output():
-    # a wheel of 0.5 kg m^2 whose rim must not be faster than 1 m/s: torque 0.5 a, yank 0.5 j
-    wheel = jn.Mechanism(
-        space="planar",
-        bodies={"wheel": jn.Body([0, 0], mass=2.0, inertia=0.5)},
-        joints={"O": jn.planar.Revolute(("ground", "wheel"), [0, 0], [0, 0])},
-        drivers={"turn": jn.drivers.CoordinateDriver(("ground", "wheel"), "angle", motion="2*t + 0.1*t**2")},
-        outputs={"rim": jn.outputs.PointOutput("wheel", [0.5, 0])},
-        time=jn.TimeGrid(0.0, 2.0, 0.01),
+@pytest.mark.parametrize(("back", "slowest"), [(0.3, 0.3), (2.0, 0.5)])
+def test_a_limit_backward_holds_beside_that_of_a_joint_that_follows(back, slowest):
+    robot = led_cart(-2.0, velocity=1.0)  # so that its leader is no faster than half of that, either way
+    limits = jn.planning.MotionLimits(
+        {"slide": jn.Limits(velocity=3.0, acceleration=4.0)}, backward={"slide": jn.Limits(velocity=back)}
     )
-    limits = {"turn": jn.Limits(effort=1.0, effort_rate=5.0), "rim": jn.Limits(velocity=1.0)}
-    found = jn.retime(wheel, None, limits)
-    duration = 4.4 / 2 + 2 / 2 + 2 / 10  # d/v + v/a + a/j
-    assert duration * (1 - 1e-6) < found.stop < duration * 1.005
-    q, v, a, j = found.derivatives(np.linspace(0, found.stop, 5001), 3)[:, :, 0].T
-    assert q[-1] == pytest.approx(4.4, abs=1e-9)
-    for values, limit in ((v, 2.0), (a, 2.0), (j, 10.0)):
-        assert np.abs(values).max() <= limit * (1 + 1e-6)
+    for line, fastest in ((LINE, 0.5), (LINE[::-1], slowest)):
+        found = jn.retime(robot, line, limits)
+        speed = np.abs(found.derivatives(np.linspace(0.0, found.stop, 4001), 1)[:, 1, 0]).max()
+        assert fastest * 0.999 < speed <= fastest * (1 + 1e-6)
+        expected = LENGTH / fastest + fastest / 4
+        assert expected * (1 - 1e-9) < found.stop < expected * 1.003
+        assert found.report.kept

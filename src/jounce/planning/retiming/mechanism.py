@@ -48,10 +48,10 @@ def retime_mechanism(
     source.refer_to(None)
     law, search = fastest(source, source.labels, source.path.start, source.path.stop, conditions, cells)
     for _ in range(EXPANSIONS if source.loaded else 0):
-        duration = law.duration
+        before = law.duration
         source.refer_to(law)
         law, search = fastest(source, source.labels, source.path.start, source.path.stop, conditions, cells)
-        if abs(law.duration - duration) < STEADY * duration:
+        if abs(law.duration - before) < STEADY * before:
             break
     if duration is not None and duration >= law.duration:
         law = search.lasting(law, duration)
