@@ -361,7 +361,7 @@ def test_a_trajectory_gives_its_geometry():
     assert found.path.deviation < 1e-12
 
 
-@pytest.mark.parametrize(("back", "slowest"), [(0.3, 0.3), (2.0, 0.5)])
+@pytest.mark.parametrize("back, slowest", [(0.3, 0.3), (2.0, 0.5)])
 def test_a_limit_backward_holds_beside_that_of_a_joint_that_follows(back, slowest):
     robot = led_cart(-2.0, velocity=1.0)  # so that its leader is no faster than half of that, either way
     limits = jn.planning.MotionLimits(

@@ -8,7 +8,7 @@ from jounce.planning.retiming.rates.rate_law import Conditions, RateLaw, progres
 from jounce.planning.retiming.rates.rate_spline import Parametrization, RateBasis
 from jounce.planning.retiming.search import COARSE, Search
 
-COARSE_ROUNDS = 1
+COARSE_ROUNDS = {2: 1, 3: 2}  # by the level of limits: those to the second are linear in the program
 
 
 def fastest(
@@ -33,7 +33,7 @@ def fastest(
     for count in (COARSE, COARSE):
         parameter = Parametrization(share, s, conditions.rests)
         search = Search(source, labels, parameter, RateBasis(count, coarse), conditions, coarse)
-        law = search.run(np.full(count + coarse, search.level()), COARSE_ROUNDS)
+        law = search.run(np.full(count + coarse, search.level()), COARSE_ROUNDS[coarse])
         share, s = progress(law)
         duration = law.duration
     basis = RateBasis(cells, max(conditions.order + 1, 2))

@@ -22,7 +22,6 @@ OFFSETS = np.array([ENDS, 0.25, 0.5, 0.75, 1 - ENDS])  # in a cell, of the point
 END_CELLS, END_POINTS = 2, 20
 FIRST = (1, 3)  # of them, where limits hold from the beginning
 NEAR, SETTLED_NEAR, HELD_NEAR = 0.2, 0.6, 0.9  # of a limit: where less is used, it is left out until it matters
-COARSE_NEAR = 0.05
 SETTLED = 2e-4  # of the duration: an improvement that ends the iteration
 EXCEEDED = 1e-4  # of a limit: what is left to the last slowing
 ROUNDS = 20
@@ -150,7 +149,7 @@ class Search:
         x, cost = start, self._cost(start) if settled else np.inf
         ratios = self.curves.ratios(self.at(x))
         chosen = self.enforced[:, None] & (
-            ratios > (COARSE_NEAR if len(self.nodes) == 2 * COARSE else SETTLED_NEAR if settled else NEAR)
+            ratios > (0 if len(self.nodes) == 2 * COARSE else SETTLED_NEAR if settled else NEAR)
         )
         chosen |= _peaks(ratios) & (ratios > 1)
         if settled:
