@@ -50,3 +50,26 @@ def test_a_smoothed_log_is_told_as_json_and_drawn(tmp_path, capsys):
     assert last[1] == 3.0
     assert 0.8 < first[1] < 1.15
     assert figure.read_bytes()[:4] == b"\x89PNG"
+
+
+def test_joints_of_a_log_that_are_read_are_chosen_and_unknown_ones_named(tmp_path, capsys):
+    times = np.linspace(0, 2, 201)
+    log, out = tmp_path / "log.csv", tmp_path / "smooth.csv"
+    rows = [f"{t:.9g},{np.sin(t):.12g},{np.cos(t):.12g},{t:.12g}" for t in times]
+    log.write_text("\n".join(["time,elbow_joint,gripper,wrist_1_joint", *rows]) + "\n")
+    robot, chosen = "examples/robots/ur5.urdf", ["--joints", "wrist_1_joint,elbow_joint"]
+    assert main(["torques", robot, str(log)]) == 2
+    assert "gripper" in capsys.readouterr().err
+    for command in (
+        ["torques", "--rates", "1"],
+        ["check"],
+        ["smooth", "--deviation", "1e-6", "--out", str(out)],
+    ):
+        assert main([command[0], robot, str(log), *command[1:], *chosen]) in (0, 1)
+        assert "gripper" not in capsys.readouterr().out
+    read = jn.load_trajectory(out)
+    assert set(read.names) == {"elbow_joint", "wrist_1_joint"}
+    values = read.part(("elbow_joint", "wrist_1_joint")).derivatives(times, 0)[:, 0]
+    np.testing.assert_allclose(values, np.stack([np.sin(times), times], axis=1), atol=2e-6)
+    assert main(["check", robot, str(log), "--joints", "elbow_joint,wirst_1_joint"]) == 2
+    assert "did you mean 'wrist_1_joint'" in capsys.readouterr().err

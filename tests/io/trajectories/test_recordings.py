@@ -361,6 +361,36 @@ def test_bags_of_ros_2(tmp_path, version):
         jn.load_trajectory(folder, topic="/plan")
 
 
+@pytest.mark.parametrize("kept", ["feedback", "actual"])
+def test_controller_states_in_a_bag_are_what_was_measured(tmp_path, kept):
+    rosbags = pytest.importorskip("rosbags.rosbag2")
+    typesys = pytest.importorskip("rosbags.typesys")
+    store = typesys.get_typestore(typesys.Stores.ROS2_HUMBLE)
+    name, asked = "control_msgs/msg/JointTrajectoryControllerState", "reference" if kept == "feedback" else "desired"
+    point = "trajectory_msgs/JointTrajectoryPoint"
+    fields = f"std_msgs/Header header\nstring[] joint_names\n{point} {asked}\n{point} {kept}\n{point} error\n"
+    store.register(typesys.get_types_from_msg(fields, name))
+    kinds = store.types
+    head, stamp = kinds["std_msgs/msg/Header"], kinds["builtin_interfaces/msg/Time"]
+    row, duration = kinds["trajectory_msgs/msg/JointTrajectoryPoint"], kinds["builtin_interfaces/msg/Duration"]
+
+    def at(t, scale):
+        position, velocity = (scale * motion(np.array(t), k) for k in (0, 1))
+        return row(position, velocity, np.zeros(0), np.zeros(0), duration(0, 0))
+
+    folder = tmp_path / "bag"
+    with rosbags.Writer(folder, version=9) as writer:
+        connection = writer.add_connection("/arm_controller/controller_state", name, typestore=store)
+        for t in TIMES:
+            header = head(stamp(1732686000 + int(t), round((t % 1) * 1e9)), "")
+            states = {asked: at(t, 2.0), kept: at(t, 1.0), "error": at(t, 0.0)}
+            raw = store.serialize_cdr(kinds[name](header=header, joint_names=list(JOINTS), **states), name)
+            writer.write(connection, int((1732686000 + t) * 1e9), raw)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", jn.errors.RecordingWarning)
+        check(jn.load_trajectory(folder))
+
+
 def test_a_long_table_is_read_as_the_same_table_in_parts(tmp_path, monkeypatch):
     """Numbers without a text for each entry, stamps since an epoch exactly; a fault is told by its line."""
     epoch = table(tmp_path, "time,shoulder,elbow", [EPOCH, *Q])
