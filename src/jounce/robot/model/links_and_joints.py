@@ -357,7 +357,7 @@ class Closure:
             length = float(np.linalg.norm(axis))
             if length < 1e-9:
                 raise RobotError(
-                    f"a {self.type} needs the direction of its axis", name=f"{where}.axis", value=self.axis
+                    f"a {self.type} needs the direction of its axis", name=f"{where}.axis", value=np.asarray(self.axis).tolist()
                 )
             object.__setattr__(self, "axis", unchanging(axis / length))
         if self.rotation is not None:
