@@ -356,9 +356,8 @@ class Closure:
             axis = finite_numbers(f"{where}.axis", self.axis, (3,)) if self.axis is not None else np.zeros(3)
             length = float(np.linalg.norm(axis))
             if length < 1e-9:
-                raise RobotError(
-                    f"a {self.type} needs the direction of its axis", name=f"{where}.axis", value=np.asarray(self.axis).tolist()
-                )
+                given = None if self.axis is None else axis.tolist()
+                raise RobotError(f"a {self.type} needs the direction of its axis", name=f"{where}.axis", value=given)
             object.__setattr__(self, "axis", unchanging(axis / length))
         if self.rotation is not None:
             object.__setattr__(self, "rotation", rotation_matrix(f"{where}.rotation", self.rotation))
