@@ -10,7 +10,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
 # rooms whose names are still to be changed
-NOT_YET = ("dynamics", "planning")
+NOT_YET = ("dynamics",)
 
 
 def read_words(path: Path) -> dict[str, str]:

@@ -127,8 +127,8 @@ def _momentum(
     coordinates: Coordinates, masses: Masses, gravity: Gravity, pose_type: type[Pose], order: int
 ) -> Float[Numbers, "level coordinate time"]:
     pose = movable(pose_of(coordinates, pose_type, order).truncate(order))
-    found = jnp.concatenate([stacked(part) for part in inertia_forces(pose, masses, gravity)], axis=1)[:, :, 1:]
-    return jnp.swapaxes(found, 1, 2).reshape(found.shape[0], -1, found.shape[-1])
+    forces = jnp.concatenate([stacked(part) for part in inertia_forces(pose, masses, gravity)], axis=1)[:, :, 1:]
+    return jnp.swapaxes(forces, 1, 2).reshape(forces.shape[0], -1, forces.shape[-1])
 
 
 @compiled("pose_type", "form")

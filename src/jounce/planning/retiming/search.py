@@ -56,9 +56,9 @@ class Search:
     basis : RateBasis
         Splines of z.
     conditions : Conditions
-        What is asked of the law besides.
+        Further conditions of the law.
     level : int, default 4
-        Of the limits that are kept: 2 for those of acceleration and torque, 3 for those of their rates too, 4 for all.
+        Level of the limits to keep: 2 for those of acceleration and torque, 3 for those of their rates too, 4 for all.
     """
 
     def __init__(
@@ -78,7 +78,7 @@ class Search:
             conditions,
         )
         self.limit_level, self.margin = level, 0.0
-        self.duration: float | None = None  # that a law is to have, where the fastest is not wanted
+        self.duration: float | None = None  # prescribed duration of a law; None for the fastest
         self.points, self.enforced = np.zeros(0), np.zeros(0, bool)
         self.prices = np.zeros((0, len(labels.every)))
         self.held = np.zeros((0, len(labels.every)), bool)  # limits of the last program
@@ -160,7 +160,7 @@ class Search:
             except SolveError:
                 if not np.isfinite(cost):
                     raise
-                break  # the solver came to the end of its accuracy: the law that it has is kept
+                break  # the solver reached its accuracy, and its last law is the result
             ratios = self.curves.ratios(self.at(x))
             new = self._cost(x)
             over = float(ratios.max()) - 1
@@ -317,7 +317,7 @@ class Search:
         entries = np.append(data.reshape(-1), np.full(count, -1.0)), np.append(columns.reshape(-1), np.arange(count))
         rows = sparse.csr_matrix((*entries, begins), shape=(len(at) + count, count))
         squared = np.where(curve[row] < len(self.labels.first), 2.0, 1.0)
-        margin = self.margin * self._kept(at, curve[row])
+        margin = self.margin * self._margin_shares(at, curve[row])
         right = np.append(right[at, row] - margin * squared, np.full(self.basis.count, -FLOOR))
         if self.labels.fourth and self.limit_level == 4:  # their programs are near the truth only about the last law
             rows = sparse.vstack([rows, sparse.identity(self.basis.count), -sparse.identity(self.basis.count)])
@@ -349,7 +349,7 @@ class Search:
         )
         return program, curve[row], at
 
-    def _kept(self, at: np.ndarray, curve: np.ndarray) -> _Points:
+    def _margin_shares(self, at: np.ndarray, curve: np.ndarray) -> _Points:
         """Return which share of the margin rows keep: a state that is given may touch its limits."""
         if not self.conditions.further:
             return np.ones(len(at))
@@ -391,6 +391,6 @@ def _about_vertex(u: Float[np.ndarray, "3 peak"], values: Float[np.ndarray, "3 p
 
 
 def _peaks(ratios: np.ndarray) -> np.ndarray:
-    """Tell where curves have a local maximum."""
+    """Return where curves have a local maximum."""
     edge = np.full((1, ratios.shape[1]), -np.inf)
     return (ratios >= np.concatenate([edge, ratios[:-1]])) & (ratios >= np.concatenate([ratios[1:], edge]))

@@ -14,7 +14,7 @@ from jaxtyping import Bool, Float, Int
 from jounce.errors import SolveError
 from jounce.planning.smoothing.bases import DEGREE, banded, cost, parts_of, values_at, whole
 from jounce.planning.smoothing.dwells import Dwell
-from jounce.planning.smoothing.weights import Stretch
+from jounce.planning.smoothing.weights import IntervalEstimate
 
 CELL = np.pi / 4  # length of a cell times the cutoff frequency
 GRADED = 1.6  # ratio of the lengths of neighboring cells
@@ -58,7 +58,7 @@ def smoothed_curve(
     times: Float[np.ndarray, " sample"],
     values: Float[np.ndarray, " sample"],
     deviation: float,
-    estimates: Sequence[Stretch],
+    estimates: Sequence[IntervalEstimate],
     dwells: Sequence[Dwell],
 ) -> Curve:
     """Return the spline within a deviation of every sample that is as smooth as the estimated weights require.
@@ -81,7 +81,7 @@ def smoothed_curve(
 
 
 def laid_knots(
-    times: Float[np.ndarray, " sample"], estimates: Sequence[Stretch], dwells: Sequence[Dwell]
+    times: Float[np.ndarray, " sample"], estimates: Sequence[IntervalEstimate], dwells: Sequence[Dwell]
 ) -> Float[np.ndarray, " knot"]:
     """Return knots, among them the ends of dwells, with distances by the cutoff frequency."""
     ends = [times[0], *(t for d in dwells for t in (times[d.first], times[d.last])), times[-1]]
@@ -122,7 +122,7 @@ def _on_knots(
     values: np.ndarray,
     deviation: float,
     knots: np.ndarray,
-    estimates: Sequence[Stretch],
+    estimates: Sequence[IntervalEstimate],
     dwells: Sequence[Dwell],
 ) -> Curve:
     scale = float(np.median(np.diff(knots)))

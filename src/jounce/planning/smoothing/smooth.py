@@ -1,4 +1,4 @@
-"""Smooth motions within a deviation of samples, whose torque rates are those of the motion and not of its noise."""
+"""Smooth motions within a deviation of samples, with the torque rates of the motion, not those of its noise."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from jounce.planning.pieces import SmoothPieces
 from jounce.planning.smoothing.bases import DEGREE, whole
 from jounce.planning.smoothing.curves import smoothed_curve
 from jounce.planning.smoothing.dwells import Dwell, dwells, noise_of, without_margins
-from jounce.planning.smoothing.weights import Stretch, stretches
+from jounce.planning.smoothing.weights import IntervalEstimate, interval_estimates
 from jounce.trajectory import AbstractMotion, HermiteMotion, HermiteSplineMotion, JointTrajectory, SplineMotion
 from jounce.trajectory.checks import positive
 from jounce.trajectory.splines import local_powers
@@ -24,18 +24,18 @@ UNSEEN = 3.0  # over the cutoff frequency: for so long a motion may begin or end
 
 @dataclasses.dataclass(frozen=True)
 class SmoothedJoint:
-    """What smoothing made of the samples of a joint.
+    """The results of smoothing the samples of a joint.
 
     Parameters
     ----------
     noise : float
-        Standard deviation of the noise that the samples show, that of their rounding included, rad or m.
+        Standard deviation of the noise of the samples, including that of their rounding, rad or m.
     away : float
         Largest distance of the motion from a sample, rad or m.
     dwells : tuple of (float, float)
         Times at which it stands still, s.
     cutoff : tuple of (float, float)
-        Lowest and highest frequency from which on nothing of the samples is followed, Hz.
+        Lowest and highest frequency above which the motion does not follow the samples, Hz.
     """
 
     noise: float
@@ -52,9 +52,9 @@ class SmoothedTrajectory(JointTrajectory):
     laws, start, stop, times, measures
         As for `JointTrajectory`.
     deviation : float
-        Within which it is of every sample, rad or m.
+        Largest permitted distance from every sample, rad or m.
     joints : dict of str to SmoothedJoint
-        What was made of the samples of each joint.
+        The results for each joint.
     """
 
     def __init__(
@@ -79,7 +79,7 @@ def smooth(trajectory: JointTrajectory, deviation: float) -> SmoothedTrajectory:
     """Return a smooth motion within a deviation of the samples of a trajectory.
 
     Splines of degree 7 stay within the deviation of each sample. How much jounce counts against distance follows from
-    the samples themselves, stretch by stretch, as the weight under which they are most likely; where that leads too far
+    the samples themselves, in each interval, as the weight under which they are most likely; where that leads too far
     from a sample, the motion is the one of the least cost within the deviation. Where samples stand still, so does the
     motion. Derivatives to the sixth are continuous, so that torques and their rates are, too.
 
@@ -94,7 +94,7 @@ def smooth(trajectory: JointTrajectory, deviation: float) -> SmoothedTrajectory:
     Returns
     -------
     SmoothedTrajectory
-        With what was found of each joint: noise, distance, dwells.
+        With noise, distance and dwells of each joint.
 
     Raises
     ------
@@ -130,7 +130,7 @@ def smooth(trajectory: JointTrajectory, deviation: float) -> SmoothedTrajectory:
 
 
 def sampled(law: AbstractMotion) -> tuple[Float[np.ndarray, " sample"], Float[np.ndarray, " sample"]] | None:
-    """Return times and values that a law goes through; None where it does not come from samples."""
+    """Return the times and values of the samples of a law; None where it does not come from samples."""
     of_samples = type(law) in (SplineMotion, HermiteSplineMotion) and law.beyond == "refuse"
     if of_samples and law.samples.value is not None:
         return law.samples.value
@@ -144,12 +144,12 @@ def sampled(law: AbstractMotion) -> tuple[Float[np.ndarray, " sample"], Float[np
 def smoothed_samples(
     times: Float[np.ndarray, " sample"], values: Float[np.ndarray, " sample"], deviation: float
 ) -> tuple[AbstractMotion, SmoothedJoint]:
-    """Return the law of one joint within a deviation of its samples, and what was found.
+    """Return the law of one joint within a deviation of its samples, and its noise, distance and dwells.
 
     Raises
     ------
     TrajectoryError, SolveError
-        As `smooth` tells.
+        As `smooth`.
     """
     if len(times) < FEWEST:
         message = f"at least {FEWEST} samples are needed; a path through few points takes a deviation in retime"
@@ -157,11 +157,11 @@ def smoothed_samples(
     sigma = noise_of(times, values)
     if not np.ptp(values):
         still = [Dwell(0, len(times) - 1, float(values[0]))]
-        found = [Stretch(float(times[0]), float(times[-1]), 1.0, 1.0, 0.0)]
+        estimates = [IntervalEstimate(float(times[0]), float(times[-1]), 1.0, 1.0, 0.0)]
     else:
-        still, found = _dwells_and_stretches(times, values, sigma)
+        still, estimates = _dwells_and_estimates(times, values, sigma)
         still = [_fitting(times, values, dwell, deviation) for dwell in still]
-    curve = smoothed_curve(times, values, deviation, found, still)
+    curve = smoothed_curve(times, values, deviation, estimates, still)
     from scipy.interpolate import BSpline  # here, since importing SciPy takes half a second
 
     spline = BSpline(whole(curve.knots), curve.coefficients, DEGREE)
@@ -171,24 +171,26 @@ def smoothed_samples(
         powers[0, own], powers[1:, own] = dwell.position, 0.0
     law = SmoothPieces(curve.knots[:-1], powers, float(curve.knots[-1]))
     spans = tuple((float(times[d.first]), float(times[d.last])) for d in still)
-    rates = [stretch.cutoff / (2 * np.pi) for stretch in found]
-    noise = max(sigma, float(np.median([stretch.noise for stretch in found])))
+    rates = [estimate.cutoff / (2 * np.pi) for estimate in estimates]
+    noise = max(sigma, float(np.median([estimate.noise for estimate in estimates])))
     return law, SmoothedJoint(noise, curve.away, spans, (min(rates), max(rates)))
 
 
-def _dwells_and_stretches(times: np.ndarray, values: np.ndarray, sigma: float) -> tuple[list[Dwell], list[Stretch]]:
-    """Return dwells without their margins, and what the samples between them say.
+def _dwells_and_estimates(
+    times: np.ndarray, values: np.ndarray, sigma: float
+) -> tuple[list[Dwell], list[IntervalEstimate]]:
+    """Return dwells without their margins, and the estimates of the intervals between them.
 
-    A dwell of which nothing is left was a slow part of a motion: what is beside it is one motion then.
+    A dwell that is all margin was a slow part of a motion: the motions before and after it are then one.
     """
     whole_dwells = dwells(times, values, sigma)
-    known: dict[tuple[int, int], list[Stretch]] = {}
+    known: dict[tuple[int, int], list[IntervalEstimate]] = {}
     while True:
-        found = _moving(times, values, whole_dwells, known)
-        scales = [_scales(times, dwell, found) for dwell in whole_dwells]
+        estimates = _moving(times, values, whole_dwells, known)
+        scales = [_scales(times, dwell, estimates) for dwell in whole_dwells]
         inner = [without_margins([d], times, [scale]) for d, scale in zip(whole_dwells, scales, strict=True)]
         if all(inner):
-            return [dwell for (dwell,) in inner], found
+            return [dwell for (dwell,) in inner], estimates
         whole_dwells = [dwell for dwell, rest in zip(whole_dwells, inner, strict=True) if rest]
 
 
@@ -206,25 +208,25 @@ def _fitting(times: np.ndarray, values: np.ndarray, dwell: Dwell, deviation: flo
     return dataclasses.replace(dwell, position=float(np.clip(dwell.position, low, high)))
 
 
-def _scales(times: np.ndarray, dwell: Dwell, found: list[Stretch]) -> tuple[float, float]:
+def _scales(times: np.ndarray, dwell: Dwell, estimates: list[IntervalEstimate]) -> tuple[float, float]:
     """Return the times in which the motions before and after a dwell may change, s."""
-    before = [stretch for stretch in found if stretch.stop <= times[dwell.first]]
-    after = [stretch for stretch in found if stretch.start >= times[dwell.last]]
-    ends = before[-1] if before else found[0], after[0] if after else found[-1]
+    before = [estimate for estimate in estimates if estimate.stop <= times[dwell.first]]
+    after = [estimate for estimate in estimates if estimate.start >= times[dwell.last]]
+    ends = before[-1] if before else estimates[0], after[0] if after else estimates[-1]
     return UNSEEN / ends[0].cutoff, UNSEEN / ends[1].cutoff
 
 
 def _moving(
-    times: np.ndarray, values: np.ndarray, still: list[Dwell], known: dict[tuple[int, int], list[Stretch]]
-) -> list[Stretch]:
+    times: np.ndarray, values: np.ndarray, still: list[Dwell], known: dict[tuple[int, int], list[IntervalEstimate]]
+) -> list[IntervalEstimate]:
     """Return what samples between dwells say, and note it; of dwells, what those beside them do."""
     edges = [0, *(k for dwell in still for k in (dwell.first, dwell.last)), len(times) - 1]
-    found: list[Stretch] = []
+    estimates: list[IntervalEstimate] = []
     for first, last in zip(edges[::2], edges[1::2], strict=True):
         if last - first >= FEWEST:
             if (first, last) not in known:
-                known[first, last] = stretches(times[first : last + 1], values[first : last + 1])
-            found += known[first, last]
-    if not found:
-        found = stretches(times, values)
-    return sorted(found, key=lambda stretch: stretch.start)
+                known[first, last] = interval_estimates(times[first : last + 1], values[first : last + 1])
+            estimates += known[first, last]
+    if not estimates:
+        estimates = interval_estimates(times, values)
+    return sorted(estimates, key=lambda estimate: estimate.start)

@@ -1,9 +1,9 @@
-"""How much jounce counts against distance from the samples: the weight under which samples are most likely.
+"""The weight of jounce against distances from samples: the weight under which the samples are most likely.
 
 The likelihood of the samples, of a motion whose jounce is noise and of independent noise of their own, has one maximum
 over the weight (G. Wahba, A comparison of GCV and GML for choosing the smoothing parameter, Annals of Statistics 13
-(1985), 1378-1402): neither a noise level nor a bandwidth has to be given. It is found stretch by stretch, since fast
-parts of a motion support less smoothing than slow ones.
+(1985), 1378-1402): neither a noise level nor a bandwidth has to be given. It is estimated interval by interval, since
+fast parts of a motion support less smoothing than slow ones.
 """
 
 from __future__ import annotations
@@ -18,8 +18,8 @@ from jaxtyping import Float
 
 from jounce.planning.smoothing.bases import DEGREE, PENALIZED, penalty_root, values_at, whole
 
-CELLS = (8, 16, 32, 64)  # of a stretch: as few as resolve what is followed, or rounding counts
-MOST, LEAST = 3000, 64  # samples in a stretch
+CELLS = (8, 16, 32, 64)  # of an interval: the fewest that resolve the cutoff frequency, since rounding grows with them
+MOST, LEAST = 3000, 64  # samples in an interval
 RESOLVED = np.pi / 2  # largest cutoff frequency times the length of a cell
 RANGE = (-24.0, 20.0)  # of the natural logarithm of the weight, cells having the length 1
 STEPS, FINE, REFINED = 24, 9, 2  # weights at once: at first, then about the best, so often
@@ -27,8 +27,8 @@ FLOOR = 1e-7  # of the range of samples: less is no noise
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class Stretch:
-    """What samples of a stretch say.
+class IntervalEstimate:
+    """Weight, cutoff frequency and noise, estimated from the samples of an interval.
 
     Parameters
     ----------
@@ -37,7 +37,7 @@ class Stretch:
     weight : float
         Of the integral of the square of the jounce, s^7, against the sum of squares of distances.
     cutoff : float
-        Frequency from which on nothing is followed, rad/s.
+        Frequency above which the motion does not follow the samples, rad/s.
     noise : float
         Standard deviation, rad or m.
     """
@@ -49,13 +49,15 @@ class Stretch:
     noise: float
 
 
-def stretches(times: Float[np.ndarray, " sample"], values: Float[np.ndarray, " sample"]) -> list[Stretch]:
-    """Return the likely weight in stretches of samples, short where the motion is fast."""
+def interval_estimates(
+    times: Float[np.ndarray, " sample"], values: Float[np.ndarray, " sample"]
+) -> list[IntervalEstimate]:
+    """Return the estimates of intervals of samples, which are short where the motion is fast."""
     count = len(times)
     pending = [(k, min(k + MOST, count)) for k in range(0, count, MOST)]
     if len(pending) > 1 and pending[-1][1] - pending[-1][0] < MOST // 2:
         pending[-2:] = [(pending[-2][0], count)]
-    found = []
+    estimates = []
     while pending:
         first, last = pending.pop()
         own, resolved = _resolved(times[first:last], values[first:last])
@@ -63,23 +65,23 @@ def stretches(times: Float[np.ndarray, " sample"], values: Float[np.ndarray, " s
             middle = (first + last) // 2
             pending += [(first, middle), (middle, last)]
         else:
-            found.append(own)
-    return sorted(found, key=lambda stretch: stretch.start)
+            estimates.append(own)
+    return sorted(estimates, key=lambda estimate: estimate.start)
 
 
-def _resolved(times: np.ndarray, values: np.ndarray) -> tuple[Stretch, bool]:
+def _resolved(times: np.ndarray, values: np.ndarray) -> tuple[IntervalEstimate, bool]:
     """Return the likely weight by as few cells as resolve what is followed, and whether they do."""
     counts = [min(cells, len(times) - 1) for cells in CELLS]
-    own = _stretch(times, values, counts[0])
+    own = _estimate(times, values, counts[0])
     for k, cells in enumerate(counts):
-        own = _stretch(times, values, cells) if k else own
+        own = _estimate(times, values, cells) if k else own
         if own.cutoff * (own.stop - own.start) <= RESOLVED * cells:
             return own, True
     return own, False
 
 
-def _stretch(times: np.ndarray, values: np.ndarray, cells: int) -> Stretch:
-    """Return the likely weight of one stretch, by splines of so many cells."""
+def _estimate(times: np.ndarray, values: np.ndarray, cells: int) -> IntervalEstimate:
+    """Return the estimate of one interval, by splines with a number of cells."""
     count, span = len(times), float(times[-1] - times[0])
     matrix = values_at(np.clip((times - times[0]) * (cells / span), 0.0, cells), np.arange(cells + 1.0))
     offset = _without_cubic(times, values)
@@ -107,7 +109,9 @@ def _stretch(times: np.ndarray, values: np.ndarray, cells: int) -> Stretch:
     cell = span / cells
     weight = float(np.exp(logarithm)) * cell ** (2 * PENALIZED - 1)
     cutoff = float((count / span / weight) ** (1 / (2 * PENALIZED)))
-    return Stretch(float(times[0]), float(times[-1]), weight, cutoff, float(np.sqrt(rest / (count - PENALIZED))))
+    return IntervalEstimate(
+        float(times[0]), float(times[-1]), weight, cutoff, float(np.sqrt(rest / (count - PENALIZED)))
+    )
 
 
 def _without_cubic(times: np.ndarray, values: np.ndarray) -> Float[np.ndarray, " sample"]:
@@ -152,9 +156,9 @@ def _least_cost(
             continue
         near = cho_solve((factor, True), matrix.T @ offset)
         break
-    apart, bent = offset - matrix @ near, root @ near
+    residual, bent = offset - matrix @ near, root @ near
     far, far_slope = base.copy(), slope.copy()
-    for own, rest in ((base, apart), (far, offset)):
+    for own, rest in ((base, residual), (far, offset)):
         own[:-1, -1] = own[-1, :-1] = matrix.T @ rest
         own[-1, -1] = rest @ rest + floor
     slope[:-1, -1] = slope[-1, :-1] = -(root.T @ bent)
