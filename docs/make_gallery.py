@@ -189,6 +189,7 @@ PICTURES = {
         outline=("cam", flat_face_cam),
     ),
     "wolfrom_train": Picture(("tooth",), 0.4),
+    "worm_gearhead": Picture(("tip",), 1.5, view=(-75.0, 15.0)),
 }
 
 

@@ -12,7 +12,7 @@ from jounce.constraints import (
     rows as rows,
     spatial as spatial,
 )
-from jounce.constraints.friction import Friction as Friction
+from jounce.constraints.friction import Friction as Friction, GearFriction as GearFriction
 from jounce.trajectory import (
     ParametricCurve as ParametricCurve,
     SampledCurve as SampledCurve,

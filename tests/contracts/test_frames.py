@@ -37,6 +37,7 @@ DRAWINGS = {
     "half a turn": [0, 1, 0, 0],
 }
 LAW = "0.4 + 0.7*t + 0.4*sin(2*t)"
+LOSING = jn.joints.GearFriction(speed=0.7, efficiency=0.9, backward=0.6)
 
 
 def rates_of_law():
@@ -307,9 +308,9 @@ def shafts():
             "C": spatial.Revolute(("ground", "cage"), [0, 1, 0], ZERO, Z, Z),
             "S": spatial.Revolute(("cage", "sun"), [0, 0.5, 0.2], ZERO, Z, Z),
             "P": spatial.Revolute(("cage", "planet"), [0.5, 0.2, 0.1], ZERO, across, across),
-            "mesh": spatial.Gear(("sun", "planet", "cage"), Z, [0.6, 2.0, -0.4], -3 / 7),
+            "mesh": spatial.Gear(("sun", "planet", "cage"), Z, [0.6, 2.0, -0.4], -3 / 7, friction=LOSING),
             "guide": spatial.Prismatic(("cage", "rack"), line.tolist(), ZERO, along, along, x, x),
-            "teeth": spatial.Rolling(("rack", "sun"), [0.42, 0.16, 0.2], ZERO, along, Z, Z, 0.3, None, 0.35),
+            "teeth": spatial.Rolling(("rack", "sun"), [0.42, 0.16, 0.2], ZERO, along, Z, Z, 0.3, None, 0.35, LOSING),
         },
         drivers={
             "turn": drivers.RotationDriver(("ground", "cage"), Z, wave(0.3, 0.2, 0.4, 1.5), A, [1.0, 0.3, 0.5]),
@@ -332,10 +333,10 @@ def teeth():
             "A": planar.Revolute(("ground", "arm"), o, o),
             "P": planar.Revolute(("arm", "planet"), [0.5, 0], o),
             "R": planar.Revolute(("ring", "ground"), o, o),
-            "inner": planar.Gear(("sun", "planet"), None, None, o, o, 0.3, 0.2, angle),
-            "outer": planar.Gear(("ring", "planet"), None, None, o, o, -0.7, 0.2, angle),
+            "inner": planar.Gear(("sun", "planet"), None, None, o, o, 0.3, 0.2, angle, LOSING),
+            "outer": planar.Gear(("ring", "planet"), None, None, o, o, -0.7, 0.2, angle, LOSING),
             "guide": planar.Prismatic(("ground", "rack"), [0, 0.7], o, x, x),
-            "teeth": planar.Rolling(("rack", "ring"), o, o, x, 0.7, None, angle),
+            "teeth": planar.Rolling(("rack", "ring"), o, o, x, 0.7, None, angle, LOSING),
         },
         drivers={
             "turn": drivers.CoordinateDriver(("ground", "arm"), "angle", "0.5*t + 0.3*sin(2*t)"),
@@ -361,8 +362,8 @@ def lines():
             "guide": planar.Prismatic(("ground", "sled"), [0, 0.2], o, x, x),
             "P": planar.Revolute(("sled", "pulley"), o, o),
             "post": planar.Prismatic(("ground", "weight"), [2.0, 0], o, [0, 1], [0, 1]),
-            "open": planar.Belt(("motor", "tool"), o, o, 0.3, 0.2),
-            "wide": planar.Belt(("motor", "pulley"), o, o, 0.4, 0.1, crossed=True),
+            "open": planar.Belt(("motor", "tool"), o, o, 0.3, 0.2, friction=LOSING),
+            "wide": planar.Belt(("motor", "pulley"), o, o, 0.4, 0.1, crossed=True, friction=LOSING),
             "rope": jn.joints.Rope(("tool", "ground", "weight"), [[0.1, 0.05], [2.0, 1.5], [0.1, 0.2]], 4.5),
         },
         drivers={
@@ -480,7 +481,7 @@ def all_in_the_plane():
             "D": planar.Revolute(("ground", "rocker"), [2, 0], o),
             "BC": planar.DoubleRevolute(("crank", "rocker"), [0.6, 0], [1.2, 0], 1.9),
             "G": planar.Revolute(("crank", "gear"), [0.4, 0], o),
-            "mesh": planar.Gear(("rocker", "gear", "crank"), -1.5),
+            "mesh": planar.Gear(("rocker", "gear", "crank"), -1.5, friction=LOSING),
             "P": planar.Revolute(("ground", "planet"), [-2, 0], o),
             "pair": planar.Coordinate(("crank", "planet"), "angle", -2.0),
             "guide": planar.Prismatic(("ground", "block"), [0, -1], o, x, x),

@@ -6,7 +6,8 @@ import equinox as eqx
 import jax.numpy as jnp
 
 from jounce.constraints.angles import Vectors, coaxial, parallel_rows, relative_angle
-from jounce.constraints.base import AbstractConstraint, Scalar, Vector, rows
+from jounce.constraints.base import AbstractConstraint, Nested, Scalar, Vector, rows
+from jounce.constraints.friction import Velocities, check_friction, relative_turn
 from jounce.constraints.planar import length_of, slide
 from jounce.jet import Jet, cross, dot, wrap
 from jounce.rigid import SpatialPose
@@ -106,12 +107,16 @@ class Rolling(AbstractConstraint, type="rolling", space="spatial"):
     radius: Scalar  # m, of the pitch circle
     offset: Scalar = None  # m
     pressure_angle: Scalar = None  # rad
+    friction: Nested = None
     flank: Any = eqx.field(default=None, init=False)  # 1 or -1, the sign of the multiplier; zero for neither
 
     dimensions = {"offset": "length", "pressure_angle": "angle"}
     signs = {"pressure_angle": "pressure angle"}
     never_parallel = (("axis_i", "vector_i"),)
     symbol = "rolling"
+
+    def __check_init__(self):
+        check_friction(self)
 
     def residual(self, body_i: SpatialPose, body_j: SpatialPose, time: Jet) -> Jet:
         travel = slide(body_i, body_j, self.point_i, self.point_j, self.vector_i)
@@ -122,6 +127,14 @@ class Rolling(AbstractConstraint, type="rolling", space="spatial"):
         across = cross(self.vector_i, self.axis_i)
         clearance = slide(body_i, body_j, self.point_i, self.point_j, across) - self.radius
         return rolled - self.flank * jnp.tan(self.pressure_angle) * clearance
+
+    def slip(self, bodies: tuple[Any, ...], moving: Velocities) -> Jet:
+        """Return how fast the pinion turns about its axis relative to the rack, rad/s."""
+        return rows(bodies[0].direction(self.axis_i).dot(relative_turn(moving)) / length_of(self.axis_i))
+
+    def passed_on(self, multiplier: Jet) -> Jet:
+        """Return the torque that the pinion passes on to the rack, N m."""
+        return multiplier * -self.radius
 
 
 def _frame_of(axis: Vectors, normal: Vectors) -> tuple[Any, Any]:

@@ -1,7 +1,8 @@
 """Dry friction of joints: how surfaces in contact slide on each other, and how much they resist it.
 
 What a joint exerts presses its surfaces together, and friction is in proportion to that. A joint that can have it says
-in `slip` how its surfaces slide, linear in the velocities of its bodies; what presses them is its reaction force.
+in `slip` how its surfaces slide, linear in the velocities of its bodies; what presses them is its reaction force. The
+teeth of gears take a share of the power that they pass on: a gear says in `passed_on` by which torque.
 """
 
 import operator
@@ -15,7 +16,7 @@ from jaxtyping import Float
 from jounce.base.modules import Module
 from jounce.constraints.base import Scalar
 from jounce.errors import MechanismError
-from jounce.jet import Jet, exp, sqrt
+from jounce.jet import Jet, cross, exp, sqrt
 from jounce.rigid import PlanarPose
 from jounce.rigid.pose import Pose
 
@@ -73,6 +74,112 @@ class Friction(Module):
         return relative * (_tanh_of_root(relative.dot(relative)) * self.coefficient)
 
 
+class GearFriction(Module):
+    """Friction of the teeth of gears: a torque against the turning of gear i, in proportion to the torque passed on.
+
+    The power that leaves the gears is that which enters them times the efficiency: `efficiency` where gear i drives
+    gear j, and `backward` where gear j drives gear i. Both count in the frame that carries the gears. A worm has a
+    coefficient and its lead angle instead, from which both follow as of a screw: ``tan(lead) / tan(lead + rho)`` where
+    the worm, gear i, drives, and ``tan(lead - rho) / tan(lead)`` where its wheel does, with ``tan(rho) = coefficient /
+    cos(pressure_angle)``. What is zero or less backward locks itself: gear j moves gear i no way, and where gear i is
+    driven under a load that pushes it, it must be driven all the same. Within some multiples of the speed friction is
+    less, and at rest there is none: nothing sticks, but creeps. Niemann and Winter, Maschinenelemente 3.
+
+    Parameters
+    ----------
+    speed : float or expression
+        Of gear i relative to the frame, rad/s, at which friction is about 76 percent of what it is above; far below
+        those of the motion.
+    efficiency : float or expression, optional
+        Of power from gear i to gear j: above 0, at most 1.
+    backward : float or expression, optional
+        Of power from gear j to gear i, at most 1; as forward unless given.
+    coefficient, lead_angle : float or expression, optional
+        In the place of efficiencies: coefficient of friction of the flanks of worm i, and its lead angle at the pitch
+        radius, rad.
+    pressure_angle : float or expression, optional
+        Of the normal section of its thread, rad; none unless given.
+
+    Raises
+    ------
+    MechanismError
+        If there are neither efficiencies nor a coefficient with a lead angle, or both.
+
+    Examples
+    --------
+    >>> import jounce as jn
+    >>> worm = jn.joints.GearFriction(speed=0.1, coefficient=0.12, lead_angle=0.1)
+    >>> [round(float(x), 4) for x in worm.efficiencies]  # it locks itself
+    [0.4499, -0.1937]
+    """
+
+    speed: Scalar
+    efficiency: Scalar = None
+    backward: Scalar = None
+    coefficient: Scalar = None
+    lead_angle: Scalar = None
+    pressure_angle: Scalar = None
+
+    dimensions = {
+        "speed": "angular speed",
+        "efficiency": "ratio",
+        "backward": "ratio",
+        "coefficient": "ratio",
+        "lead_angle": "angle",
+        "pressure_angle": "angle",
+    }
+    signs = {
+        "speed": "positive",
+        "efficiency": "efficiency",
+        "backward": "at most 1",
+        "coefficient": "not negative",
+        "lead_angle": "lead angle",
+        "pressure_angle": "pressure angle",
+    }
+
+    def __check_init__(self):
+        given = [name for name in ("efficiency", "coefficient") if getattr(self, name) is not None]
+        if len(given) != 1:
+            message = "gears have either an efficiency, or a coefficient of friction and a lead angle, as worms do"
+            raise MechanismError(message, name="efficiency", value=self.efficiency)
+        if self.coefficient is not None and self.lead_angle is None:
+            message = "is missing: the efficiency of a worm follows from its coefficient and its lead angle"
+            raise MechanismError(message, name="lead_angle")
+        wrong = ("lead_angle", "pressure_angle") if self.coefficient is None else ("backward",)
+        for name in wrong:
+            if getattr(self, name) is not None:
+                message = f"does not go with {given[0]}: leave it out"
+                raise MechanismError(message, name=name, value=getattr(self, name))
+
+    @property
+    def efficiencies(self) -> tuple[Any, Any]:
+        """Efficiency where gear i drives gear j, and where gear j drives gear i."""
+        if self.coefficient is None:
+            return self.efficiency, self.efficiency if self.backward is None else self.backward
+        slope = self.coefficient if self.pressure_angle is None else self.coefficient / jnp.cos(self.pressure_angle)
+        rise = jnp.tan(self.lead_angle)
+        return rise * (1.0 - slope * rise) / (rise + slope), (rise - slope) / (rise * (1.0 + slope * rise))
+
+    def resisting(self, slip: Float[Jet, "direction *batch"]) -> Float[Jet, "direction *batch"]:
+        """Return the part of the torque lost that is against the turning of gear i."""
+        return _tanh(slip / self.speed)
+
+    def lost(self, passed: Float[Jet, "*batch"], resisting: Float[Jet, "*batch"]) -> Float[Jet, "*batch"]:
+        """Return the torque lost at a gear i that turns fast, N m, from what it passes on and what `resisting` says.
+
+        Where no torque is passed on, its rates are not determined, and those of zero are returned.
+        """
+        forward, backward = self.efficiencies
+        onward, back = 1.0 / forward - 1.0, 1.0 - backward
+        side = jnp.sign(passed.coefficients[0])
+        return passed * (resisting * (0.5 * (onward - back)) + 0.5 * (onward + back) * side)
+
+
+def friction_class(kind: type[Any]) -> type[Any]:
+    """Return the class of the friction that a class of joints can have."""
+    return GearFriction if hasattr(kind, "passed_on") else Friction
+
+
 def _tanh_of_root(square: Jet) -> Jet:
     """Return ``tanh(x) / x`` from the square of x, smooth at zero, where the root is not."""
     near = square.coefficients[0] < NEAR
@@ -114,9 +221,14 @@ def check_friction(joint: Any) -> None:
     friction = joint.friction
     if friction is None:
         return
-    if not isinstance(friction, Friction):
-        message = "must be a jn.joints.Friction, in a file {coefficient: 0.1, radius: 12 mm, speed: 1 mm/s}"
+    required = friction_class(type(joint))
+    if not isinstance(friction, required):
+        gears = "{efficiency: 0.95, speed: 1 rad/s}"
+        form = gears if required is GearFriction else "{coefficient: 0.1, radius: 12 mm, speed: 1 mm/s}"
+        message = f"must be a jn.joints.{required.__name__}, in a file {form}"
         raise MechanismError(message, name="friction", value=friction)
+    if required is GearFriction:
+        return
     if joint.has_friction_radius and friction.radius is None:
         raise MechanismError("is missing: the bodies turn, on a surface of some radius", name="friction.radius")
     if not joint.has_friction_radius and friction.radius is not None:
@@ -163,6 +275,14 @@ def relative_velocity(bodies: Sequence[Pose], moving: Velocities, point_j: Any) 
     """Return the velocity of a point of the second body relative to the first, global."""
     place = bodies[1].point(point_j)
     return _at(bodies[1], moving[1], place) - _at(bodies[0], moving[0], place)
+
+
+def line_turn(bodies: Sequence[Pose], moving: Velocities, point_i: Any, point_j: Any) -> Jet:
+    """Return the angular velocity of the line from a point of the first planar body to one of the second."""
+    points = [body.point(point) for body, point in zip(bodies, (point_i, point_j), strict=False)]
+    first, second = (_at(body, its, place) for body, its, place in zip(bodies, moving, points, strict=False))
+    line = points[1] - points[0]
+    return cross(line, second - first) / line.dot(line)
 
 
 def _at(body: Pose, moving: tuple[Jet, Jet], place: Jet) -> Jet:

@@ -13,7 +13,7 @@ from jaxtyping import Float
 
 from jounce.base.shapes import Numbers
 from jounce.constraints.base import AbstractConstraint, Curve, Flag, Nested, Scalar, Vector, rows
-from jounce.constraints.friction import Velocities, check_friction, relative_turn, relative_velocity
+from jounce.constraints.friction import Velocities, check_friction, line_turn, relative_turn, relative_velocity
 from jounce.errors import MechanismError
 from jounce.jet import Jet, atan2, cross, dot, sqrt, wrap
 from jounce.jet.turns import brought_near
@@ -219,6 +219,7 @@ class Gear(AbstractConstraint, type="gear", space="planar"):
     radius_i: Scalar = None  # m, of the pitch circle; of a ring below zero
     radius_j: Scalar = None
     pressure_angle: Scalar = None  # rad
+    friction: Nested = None
     arm: Any = eqx.field(default=None, init=False)  # rad, of the line of centers in the frame of a body that has both
     flank: Any = eqx.field(default=None, init=False)  # 1 or -1, the sign of the multiplier; zero for neither
 
@@ -246,6 +247,7 @@ class Gear(AbstractConstraint, type="gear", space="planar"):
         if self.pressure_angle is not None and not given:
             message = "gears by a ratio have no teeth: give points and radii in place of the ratio"
             raise MechanismError(message, name="pressure_angle", value=self.pressure_angle)
+        check_friction(self)
 
     def residual(self, body_i: PlanarPose, body_j: PlanarPose, *others: Any) -> Jet:
         """Return what body j lacks of turning as body i says.
@@ -265,6 +267,16 @@ class Gear(AbstractConstraint, type="gear", space="planar"):
         parted = sqrt(d.dot(d)) - jnp.abs(center_distance)
         side = -self.flank * jnp.sign(center_distance) / jnp.abs(self.radius_j)
         return excess + side * jnp.tan(self.pressure_angle) * parted
+
+    def slip(self, bodies: tuple[Any, ...], moving: Velocities) -> Jet:
+        """Return how fast gear i turns relative to what carries the gears, rad/s."""
+        toothed = self.ratio is None
+        carrier = line_turn(bodies, moving, self.point_i, self.point_j) if toothed else moving[2][1]
+        return rows(moving[0][1] - carrier)
+
+    def passed_on(self, multiplier: Jet) -> Jet:
+        """Return the torque that gear i passes on to gear j, as seen at gear i, N m."""
+        return multiplier * (-self.ratio if self.ratio is not None else self.radius_i / self.radius_j)
 
 
 def _turned_on_line(
@@ -306,10 +318,14 @@ class Belt(AbstractConstraint, type="belt", space="planar"):
     radius_j: Scalar
     crossed: Flag = eqx.field(static=True, default=False)
     offset: Scalar = None  # rad
+    friction: Nested = None
     arm: Any = eqx.field(default=None, init=False)  # rad, of the line of centers in the frame of a body that has both
 
     dimensions = {"offset": "angle"}
     symbol = "belt"
+
+    def __check_init__(self):
+        check_friction(self)
 
     @property
     def ratio(self) -> Any:
@@ -321,6 +337,14 @@ class Belt(AbstractConstraint, type="belt", space="planar"):
         d = body_j.point(self.point_j) - body_i.point(self.point_i)
         d = d + _aside(d, self.radius_i + self.radius_j)
         return _turned_on_line(self, body_i, body_j, others, d, self.ratio)
+
+    def slip(self, bodies: tuple[Any, ...], moving: Velocities) -> Jet:
+        """Return how fast pulley i turns relative to the line of centers, rad/s."""
+        return rows(moving[0][1] - line_turn(bodies, moving, self.point_i, self.point_j))
+
+    def passed_on(self, multiplier: Jet) -> Jet:
+        """Return the torque that pulley i passes on to pulley j, as seen at pulley i, N m."""
+        return multiplier * -self.ratio
 
     def line_force(self) -> Any:
         """Return the pull of the strand on the left of the line of centers less that of the other, N, for a multiplier.
@@ -343,11 +367,15 @@ class Rolling(AbstractConstraint, type="rolling", space="planar"):
     radius: Scalar  # m
     offset: Scalar = None  # m
     pressure_angle: Scalar = None  # rad
+    friction: Nested = None
     flank: Any = eqx.field(default=None, init=False)  # 1 or -1, the sign of the multiplier; zero for neither
 
     dimensions = {"offset": "length", "pressure_angle": "angle"}
     signs = {"pressure_angle": "pressure angle"}
     symbol = "rolling"
+
+    def __check_init__(self):
+        check_friction(self)
 
     def residual(self, body_i: PlanarPose, body_j: PlanarPose, time: Jet) -> Jet:
         travel = slide(body_i, body_j, self.point_i, self.point_j, self.vector_i)
@@ -357,3 +385,11 @@ class Rolling(AbstractConstraint, type="rolling", space="planar"):
         d = body_j.point(self.point_j) - body_i.point(self.point_i)
         aside = cross(body_i.direction(self.vector_i), d) / length_of(self.vector_i)
         return rolled + self.flank * jnp.tan(self.pressure_angle) * (aside + self.radius)
+
+    def slip(self, bodies: tuple[Any, ...], moving: Velocities) -> Jet:
+        """Return how fast the disc turns relative to the line, rad/s."""
+        return rows(relative_turn(moving))
+
+    def passed_on(self, multiplier: Jet) -> Jet:
+        """Return the torque that the disc passes on to the line, N m."""
+        return multiplier * -self.radius

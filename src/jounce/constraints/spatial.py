@@ -331,6 +331,7 @@ class Gear(AbstractConstraint, type="gear", space="spatial"):
     axis_j: Vector
     ratio: Scalar  # turns of j about its axis to those of i about its own
     offset: Scalar = None  # rad
+    friction: Nested = None
     held_i: Datum | None = eqx.field(default=None, init=False)  # that lays each axis on the one that it is in the frame
     held_j: Datum | None = eqx.field(default=None, init=False)
     whole: Any = eqx.field(default=None, init=False)  # the smallest whole number whose product with the ratio is whole
@@ -340,6 +341,9 @@ class Gear(AbstractConstraint, type="gear", space="spatial"):
     signs = {"ratio": "not zero"}
     symbol = "gear"
 
+    def __check_init__(self):
+        check_friction(self)
+
     def residual(self, body_i: SpatialPose, body_j: SpatialPose, body_m: SpatialPose, time: Jet) -> Jet:
         turn_i, turn_j = (
             -relative_angle(body, body_m, axis, datum=held)
@@ -347,6 +351,15 @@ class Gear(AbstractConstraint, type="gear", space="spatial"):
         )
         excess = turn_j - self.ratio * turn_i - self.offset
         return excess if self.whole is None else wrap(excess, 2 * jnp.pi / self.whole)
+
+    def slip(self, bodies: tuple[Any, ...], moving: Velocities) -> Jet:
+        """Return how fast shaft i turns about its axis relative to the frame, rad/s."""
+        turning = bodies[0].direction(self.axis_i).dot(moving[0][1] - moving[2][1])
+        return rows(turning / length_of(self.axis_i))
+
+    def passed_on(self, multiplier: Jet) -> Jet:
+        """Return the torque that shaft i passes on to shaft j, as seen at shaft i, N m."""
+        return multiplier * -self.ratio
 
 
 def _turning(bodies: tuple[Any, ...], moving: Velocities, axis_i: Vectors) -> Jet:

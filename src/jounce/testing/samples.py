@@ -8,7 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from jounce.constraints.facts import facts_of, field_kinds, value_fields
-from jounce.constraints.friction import Friction
+from jounce.constraints.friction import Friction, GearFriction, friction_class
 from jounce.errors import MechanismError
 from jounce.jet import Jet, sqrt, stack
 from jounce.mechanism.carriages import carriage_of
@@ -90,6 +90,8 @@ class Samples:
             return True
         if kind == "scalar":
             return float(random.uniform(0.5, 1.5))
+        if name == "friction" and friction_class(self.kind) is GearFriction:
+            return GearFriction(random.uniform(0.1, 0.2), random.uniform(0.6, 0.9), random.uniform(-0.2, 0.5))
         if name == "friction":
             radius = random.uniform(0.01, 0.02) if self.kind.has_friction_radius else None
             return Friction(random.uniform(0.1, 0.3), random.uniform(0.01, 0.02), radius)

@@ -59,6 +59,7 @@ KINDS: dict[str, tuple[str, tuple[Dimension, ...]]] = {
         (_TORSIONAL_DAMPING, times(_TORSIONAL_DAMPING, _PER_ANGLE)),
     ),
     "inertia": ("a moment of inertia, such as 0.1 kg*m^2", (dimension_of(mass=1, length=2),)),
+    "angular speed": ("an angular speed, such as 10 rpm", (dimension_of(angle=1, time=-1), dimension_of(time=-1))),
     "speed": ("a speed, such as 1 mm/s", (dimension_of(length=1, time=-1),)),
     "acceleration": ("an acceleration, such as 9.81 m/s^2", (dimension_of(length=1, time=-2),)),
     "any": ("a value", ()),

@@ -9,6 +9,7 @@ import pytest
 
 import jounce as jn
 from jounce.constraints import catalogue
+from jounce.constraints.friction import GearFriction, friction_class
 from jounce.integrate.mechanisms.batch_equations import ParametricMechanism
 from jounce.io import json_schema
 from jounce.io.mechanisms.overrides import override
@@ -61,7 +62,10 @@ def values_of(kind, size):
             one = WORDS.get(key.key)
         if key.kind == "curve":
             one = SURFACE if key.key == "surface" else {"expressions": CURVE[:size], "range": [-3.0, 3.0]}
-        if key.key == "friction":
+        if key.key == "friction" and friction_class(kind) is GearFriction:
+            thread = {"coefficient": 0.1, "lead_angle": 0.3, "pressure_angle": 0.4}
+            one = ({"efficiency": 0.8, "backward": 0.6} if size == 2 else thread) | {"speed": 0.2}
+        elif key.key == "friction":
             one = {"coefficient": 0.3, "speed": 0.2} | ({"radius": 0.1} if kind.has_friction_radius else {})
         found[key.key] = [copy.deepcopy(one) for _ in key.fields] if len(key.fields) > 1 else one
     return {key: value for key, value in found.items() if value is not None}

@@ -72,3 +72,77 @@ def test_a_guide_has_no_radius_and_a_rod_no_friction(tmp_path):
     rod = {"type: revolute": "type: double_revolute", "[[0, 0], [0, 0]]": "[[0, 0], [1, 0]]\n    length: 1"}
     with pytest.raises(jn.errors.MechanismFileError, match="friction"):
         jn.load(written(tmp_path, PIN, **rod))
+
+
+GEARS = """
+space: planar
+parameters: {eta: 0.9, slow: 10 rpm}
+bodies: {a: {}, b: {position: [0.3, 0]}}
+joints:
+  A: {type: revolute, bodies: [ground, a], points: [[0, 0], [0, 0]]}
+  B: {type: revolute, bodies: [ground, b], points: [[0.3, 0], [0, 0]]}
+  mesh:
+    type: gear
+    bodies: [a, b]
+    points: [[0, 0], [0, 0]]
+    radii: [0.1, 0.2]
+    friction: FRICTION
+forces: {load: {type: torque, bodies: [ground, b], law: 8*eta}}
+drivers: {turn: {type: coordinate, bodies: [ground, a], coordinate: angle, motion: 200*t}}
+outputs: {torque: {driver: turn, quantity: torque}}
+time: {stop: 1, step: 0.5}
+"""
+
+
+def gears(tmp_path, friction):
+    path = tmp_path / "gears.yaml"
+    path.write_text(GEARS.replace("FRICTION", friction))
+    return path
+
+
+@pytest.mark.parametrize("ending", ["yaml", "toml", "json"])
+@pytest.mark.parametrize(
+    "friction, torque",
+    [
+        ("{efficiency: eta, speed: slow}", 4.0),
+        ("{efficiency: eta, backward: 0.1, speed: slow}", 4.0),
+        ("{coefficient: eta - 0.8, lead_angle: 45 deg, speed: slow}", 3.6 * 1.1 / 0.9),
+    ],
+)
+def test_friction_of_gears_that_is_written_is_read_again(tmp_path, friction, torque, ending):
+    mechanism = jn.load(gears(tmp_path, friction))
+    found = jn.solve(mechanism, order=1).outputs["torque"][1, 0]
+    assert found == pytest.approx(torque, rel=1e-9)  # 4 N m of the load, which the gears pass on backward or forward
+    jn.write_mechanism(mechanism, tmp_path / f"again.{ending}")
+    assert jn.load(tmp_path / f"again.{ending}") == mechanism
+
+
+@pytest.mark.parametrize(
+    "friction, words",
+    [
+        ("{efficiency: 0, speed: slow}", r"friction\.efficiency: must be above 0 and at most 1"),
+        ("{efficiency: 0.9}", r"friction\.speed: is missing: give \{speed: ...\}"),
+        ("{speed: slow}", "gears have either an efficiency, or a coefficient"),
+        ("{efficiency: 0.9, speed: 1 mm/s}", "expected an angular speed, such as 10 rpm, but the unit of '1 mm/s' is"),
+        ("{coefficient: 0.1, radius: 5 mm, speed: slow}", "no key has this name"),
+    ],
+)
+def test_bad_friction_of_gears_is_refused_with_its_line(tmp_path, friction, words):
+    with pytest.raises(jn.errors.MechanismFileError, match=rf"gears\.yaml, line 13, .*{words}"):
+        jn.solve(jn.load(gears(tmp_path, friction)), order=1)
+
+
+def test_a_worm_that_cannot_drive_its_wheel_is_refused(tmp_path):
+    with pytest.raises(jn.errors.MechanismError, match=r"joints\.mesh\.friction: the worm cannot drive its wheel"):
+        jn.solve(jn.load(gears(tmp_path, "{coefficient: 0.3, lead_angle: 80 deg, speed: slow}")), order=1)
+
+
+def test_inspect_tells_efficiencies_and_what_locks_itself(tmp_path, capsys):
+    from jounce.cli import main
+
+    for friction, words in (
+        ("{efficiency: eta, backward: 0.8, speed: slow}", "mesh: efficiency 0.9 from a to b, 0.8 from b to a"),
+        ("{efficiency: 0.4, backward: -0.5, speed: slow}", "0.4 from a to b; locks itself: b does not drive a"),
+    ):
+        assert main(["inspect", str(gears(tmp_path, friction))]) == 0
+        assert words in " ".join(capsys.readouterr().out.split())

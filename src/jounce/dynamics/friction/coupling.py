@@ -5,9 +5,11 @@ normal force of one is known from the motion: bodies feel it as they feel a resi
 
     J^T lambda + V N = load,    N = |R(lambda)|,
 
-where R is the reaction force of the joint. What solves for multipliers without friction, lambda = S load, leaves for
-the normal forces a system of their number, ``N = |R(S load - S V N)|``: a few unknowns, solved by Newton's method from
-those without friction; and for their higher Taylor coefficients a linear one, with the same matrix at every order.
+where R is the reaction force of the joint; of gears N is the torque that they lose, of their multiplier alone. What
+solves for multipliers without friction, lambda = S load, leaves for the normal forces a system of their number,
+``N = |R(S load - S V N)|``: a few unknowns, solved by Newton's method from those without friction, or as friction grows
+from none where it goes astray; and for their higher Taylor coefficients a linear one, with the same matrix at every
+order.
 """
 
 from collections.abc import Callable, Sequence
@@ -19,7 +21,7 @@ from jaxtyping import Float
 
 from jounce.base.modules import Module
 from jounce.base.shapes import Numbers
-from jounce.constraints.friction import displacements, normal_force, slip_velocity
+from jounce.constraints.friction import GearFriction, displacements, normal_force, slip_velocity
 from jounce.errors import UnsupportedError
 from jounce.jet import Jet
 from jounce.jet.algebra import stacked
@@ -32,7 +34,9 @@ from jounce.rigid.pose import Pose
 
 SHARES = (0.25, 0.5, 0.75, 1.0)  # of friction, at which its matrix is looked at
 STEPS = 30  # of Newton's method, which takes four or five where friction is far from locking
+RAMP, EACH = 16, 6  # where it goes astray, friction grows in so many shares, with so many steps each
 CLOSE = 1e-15  # of the largest normal force: a smaller change is rounding
+ROUNDING = 1e-14  # of the largest multiplier, which normal forces of gears without loss are made of
 
 NormalForces = Float[Numbers, "joint batch"]
 
@@ -40,6 +44,11 @@ NormalForces = Float[Numbers, "joint batch"]
 def rubs(group: Group) -> bool:
     """Tell whether joints of a group have friction."""
     return getattr(group.element, "friction", None) is not None
+
+
+def loses_torque(element: Any) -> bool:
+    """Tell whether the friction of joints follows the torque that they pass on, as that of gears does."""
+    return isinstance(getattr(element, "friction", None), GearFriction)
 
 
 def joints_with_friction(model: Model, system: System) -> list[str]:
@@ -83,14 +92,14 @@ def friction_slope(element: Any, poses: Sequence[Pose], slot: int) -> Slope:
     array of shape (order, coordinates, 1, instances, batch)
         As `slopes` of a residual of one row, whose multiplier is the normal force.
     """
-    resisting = element.friction.resisting(slip_velocity(element, poses))
+    factor = resisting(element, poses)
     bodies = tuple(pose.truncate(pose.order - 1) for pose in poses)
     body = movable(bodies[slot])
 
     def resisted(change: Any) -> Any:
         changes = [None] * slot + [change] + [None] * (len(bodies) - slot - 1)
         slip = element.slip(bodies, displacements([*bodies[:slot], body, *bodies[slot + 1 :]], changes))
-        return stacked(slip.dot(resisting))[:, None]
+        return stacked(slip.dot(factor))[:, None]
 
     return along_displacements(body, resisted)
 
@@ -98,6 +107,18 @@ def friction_slope(element: Any, poses: Sequence[Pose], slot: int) -> Slope:
 def pressed(element: Any, poses: Sequence[Pose], force: Float[Jet, "component *batch"]) -> Jet:
     """Return the normal force of joints, (instances, batch), from what they exert on their second body, global."""
     return normal_force(element, tuple(pose.truncate(force.order) for pose in poses), force)
+
+
+def resisting(element: Any, poses: Sequence[Pose]) -> Float[Jet, "direction instance batch"]:
+    """Return which part of what presses resists slip, one order shorter than the poses."""
+    return element.friction.resisting(slip_velocity(element, poses))
+
+
+def torque_lost(
+    element: Any, own: Float[Jet, "row instance batch"], resisting: Float[Jet, "direction instance batch"]
+) -> Jet:
+    """Return the torque that gears lose where they turn fast, (instances, batch), of their multipliers."""
+    return element.friction.lost(element.passed_on(own[0]), resisting[0])
 
 
 class Coupling(Module):
@@ -155,25 +176,42 @@ class Coupling(Module):
         def normal_now(multipliers: Any) -> Any:
             return plain(multipliers, *held)
 
-        def improved(carry: Any) -> Any:
-            forces, _, step = carry
-            multipliers = with_friction(forces, *fixed)
-            gap = normal_now(multipliers) - forces
-            change = DenseFactor.of(matrix(normal_now, multipliers, fixed[1])).solve(gap, refined=False)
-            size = jnp.max(jnp.abs(forces), axis=0)
-            return forces + change, jnp.max(jnp.abs(change), axis=0) > CLOSE * size, step + 1
+        def gap_of(normal: Callable[[Any], Any], forces: Any, free: Any, response: Any) -> tuple[Any, Any]:
+            """Return what forces lack, and the matrix by which that changes with them."""
+            multipliers = with_friction(forces, free, response)
+            return normal(multipliers) - forces, matrix(normal, multipliers, response)
 
-        first = normal_now(fixed[0])
+        def is_found(gap: Any, forces: Any, whole: Any) -> Any:
+            first, last, held = (jnp.max(jnp.abs(x), axis=0) for x in (start, forces, fixed[0]))
+            near = jnp.max(jnp.abs(gap), axis=0) <= 1e-9 * (first + last) + ROUNDING * held
+            return near & _is_regular_from_none(whole)
+
+        def solved(moving: Any, forces: Any, shares: int) -> Any:
+            """Improve forces where they move, as friction grows in a number of shares."""
+
+            def improved(carry: Any) -> Any:
+                forces, moving, step = carry
+                share = jnp.minimum(jnp.ceil((step + 1).astype(float) / EACH) / shares, 1.0)
+                gap, whole = gap_of(normal_now, forces, fixed[0], share * fixed[1])
+                change = DenseFactor.of(whole).solve(gap, refined=False)
+                size = jnp.max(jnp.abs(forces), axis=0)
+                moved = (jnp.max(jnp.abs(change), axis=0) > CLOSE * size) | (share < 1.0)
+                return jnp.where(moving, forces + change, forces), moving & moved, step + 1
+
+            def unsolved(carry: Any) -> Any:
+                return jnp.any(carry[1]) & (carry[2] < STEPS + EACH * (shares - 1))
+
+            return jax.lax.while_loop(unsolved, improved, (forces, moving, jnp.zeros((), jnp.int32)))[0]
+
+        start = normal_now(fixed[0])
         # from none: the first step takes what presses on the side on which it does without friction
-        start = jnp.zeros_like(first), jnp.ones(first.shape[-1], bool), jnp.zeros((), jnp.int32)
-        forces, _, _ = jax.lax.while_loop(lambda carry: jnp.any(carry[1]) & (carry[2] < STEPS), improved, start)
-        forces = jax.lax.stop_gradient(forces)
-        multipliers = with_friction(forces, free, response)
-        whole = matrix(normal, multipliers, response)
+        forces = solved(jnp.ones(start.shape[-1], bool), jnp.zeros_like(start), 1)
+        gap, whole = gap_of(normal_now, forces, *fixed)
+        lost = ~is_found(gap, forces, whole)
+        forces = jax.lax.stop_gradient(solved(lost, jnp.where(lost, 0.0, forces), RAMP))
+        gap, whole = gap_of(normal, forces, free, response)
         factor = DenseFactor.of(whole)
-        gap = normal(multipliers) - forces
-        size = jnp.max(jnp.abs(first), axis=0) + jnp.max(jnp.abs(forces), axis=0)
-        found = (jnp.max(jnp.abs(gap), axis=0) <= 1e-9 * size) & _is_regular_from_none(jax.lax.stop_gradient(whole))
+        found = is_found(*map(jax.lax.stop_gradient, (gap, forces, whole)))
         forces = jnp.where(found, forces + factor.solve(gap), jnp.nan)  # the last step has the derivatives of all
         return cls(response, factor), with_friction(forces, free, response), forces
 

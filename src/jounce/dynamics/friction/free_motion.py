@@ -9,8 +9,8 @@ import jax.numpy as jnp
 from jaxtyping import Float
 
 from jounce.base.shapes import Numbers
-from jounce.constraints.friction import displacements, slip_velocity
-from jounce.dynamics.friction.coupling import Coupling, pressed, rubs
+from jounce.constraints.friction import displacements
+from jounce.dynamics.friction.coupling import Coupling, loses_torque, pressed, resisting, rubs, torque_lost
 from jounce.jet import Jet
 from jounce.mechanism.system import Group, System, movable, with_rows
 from jounce.rigid.pose import Pose
@@ -48,9 +48,17 @@ class FreeFriction:
             count = shape[0] * shape[1]
             if rubs(group):
                 own = unscaled[first : first + count].reshape(shape[0], shape[1], -1)
-                found.append(self._pressed(group, bodies, own))
+                found.append(
+                    self._lost(group, own) if loses_torque(group.element) else self._pressed(group, bodies, own)
+                )
             first += count
         return jnp.concatenate(found)
+
+    def _lost(self, group: Group, own: Any) -> Any:
+        return torque_lost(group.element, Jet([own]), self._resisting(group)).coefficients[0]
+
+    def _resisting(self, group: Group) -> Jet:
+        return resisting(group.element, [movable(self.pose.take(indices)) for indices in group.bodies])
 
     def _pressed(self, group: Group, bodies: tuple[Pose, ...], own: Any) -> Any:
         body = bodies[1]
@@ -75,8 +83,7 @@ class FreeFriction:
         """Return what resists the slip of each group, conjugate to `slips`, for normal forces of all joints."""
         found, first = [], 0
         for group in self.groups:
-            poses = [movable(self.pose.take(indices)) for indices in group.bodies]
-            factor = group.element.friction.resisting(slip_velocity(group.element, poses)).coefficients[0]
+            factor = self._resisting(group).coefficients[0]
             found.append(factor * normal[first : first + group.instances][None])
             first += group.instances
         return found

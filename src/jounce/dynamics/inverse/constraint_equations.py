@@ -87,8 +87,9 @@ def constraint_equations(
         ``multipliers`` (time, derivative, row)
             Where there are masses or applied forces: lambda, lambda', ..., with ``M q'' + Phi_q^T lambda = Q``; Q holds
             forces, global, and moments about the origins, along the axes of the bodies, with the terms of inertia that
-            have no q''. Two orders of the motion are used up. They are left out where accelerations are not known;
-            what redundant rows leave open is NaN, or as `Mechanism.redundant_reactions` chooses it.
+            have no q'', and what friction of joints exerts. Two orders of the motion are used up. They are left out
+            where accelerations are not known; what redundant rows leave open is NaN, or as
+            `Mechanism.redundant_reactions` chooses it.
 
     Raises
     ------

@@ -18,7 +18,8 @@ from jounce.base.shapes import Numbers
 from jounce.constraints.friction import pressing_force, slip_velocity
 from jounce.dynamics.forward.accelerations import Lanes
 from jounce.dynamics.forward.loads import loads, mass_matrices
-from jounce.dynamics.friction.coupling import friction_slope, rubs
+from jounce.dynamics.friction import coupling
+from jounce.dynamics.friction.coupling import friction_slope, loses_torque, rubs
 from jounce.dynamics.inverse import constraint_forces, redundant_forces
 from jounce.dynamics.inverse.constraint_forces import Multipliers, Slope, Slopes
 from jounce.dynamics.inverse.friction_of_motion import Rubbed, rubbing_of, with_friction
@@ -62,6 +63,12 @@ def slip_directions(element: Any, poses: Sequence[Coordinates], pose_type: type[
         return slip_velocity(element, [pose_of(pose, pose_type, 1) for pose in poses]).coefficients[0]
 
     return jax.eval_shape(slip, poses).shape[0]
+
+
+@compiled("pose_type", "levels", brief=True)
+def resisting(element: Any, poses: Sequence[Coordinates], pose_type: type[Pose], levels: int) -> Any:
+    """Return which part of what presses resists slip, Taylor coefficients, (levels, directions, joints, time)."""
+    return stacked(coupling.resisting(element, [pose_of(pose, pose_type, levels) for pose in poses]))
 
 
 @compiled("pose_type", "levels", brief=True)
@@ -167,7 +174,8 @@ def _balanced(shared: Any, lanes: Any, *, pose_type: type[Pose]) -> tuple[Any, A
     def rubbed(group: Group) -> Rubbed:
         moving, placed = ([part_of(bodies, its, n) for its in group.bodies] for n in (levels + 1, levels))
         slopes = [friction_slopes.function(group.element, moving, pose_type, s, levels) for s in group.moving_slots]
-        return slopes, placed
+        part = resisting.function(group.element, moving, pose_type, levels) if loses_torque(group.element) else None
+        return slopes, placed, part
 
     rubbing = [rubbed(group) for group in system.groups if rubs(group)]
     return multipliers.function(system, blocks, load, still, masses, pose_type, rubbing)[None], finite

@@ -11,7 +11,7 @@ from jaxtyping import Float
 
 from jounce.base.modules import Module
 from jounce.base.shapes import Numbers
-from jounce.dynamics.friction.coupling import Coupling, pressed, rubs
+from jounce.dynamics.friction.coupling import Coupling, pressed, rubs, torque_lost
 from jounce.dynamics.inverse.constraint_forces import BodyMatrices, Slopes, load_solver, onto_bodies
 from jounce.dynamics.motion_values import Coordinates, pose_of
 from jounce.jet import Jet
@@ -20,8 +20,10 @@ from jounce.kinematics.sensitivity.jacobian_series import Slope
 from jounce.mechanism.system import Group, System
 from jounce.rigid.pose import Pose
 
-Rubbed = tuple[Sequence[Float[Numbers, "order coordinate _ _ batch"]], Sequence[Coordinates]]
-"""Of a group of joints with friction: `friction_slope` for each moving slot, and where the bodies are."""
+Rubbed = tuple[Sequence[Float[Numbers, "order coordinate _ _ batch"]], Sequence[Coordinates], Any]
+"""Of a group of joints with friction: `friction_slope` for each moving slot, where the bodies are, and of gears which
+part of the torque lost resists, (levels, 1, instances, batch); None of others.
+"""
 
 
 class Rubbing(Module):
@@ -37,6 +39,8 @@ class Rubbing(Module):
         Of their residuals, for each moving slot.
     friction : sequence of array
         As `friction_slope` gives it, for each moving slot.
+    resisting : array of shape (levels, 1, instances, batch), or None
+        Of gears, which part of the torque lost is against their turning.
     first : int
         The first row of the group.
     """
@@ -45,6 +49,7 @@ class Rubbing(Module):
     poses: Sequence[Pose]
     slopes: Sequence[Any]  # as `Slope`; of other rows than those of friction
     friction: Sequence[Any]
+    resisting: Any
     first: int = eqx.field(static=True)
 
     def normal_forces(self, multipliers: Sequence[Any]) -> Float[Numbers, "order instance batch"]:
@@ -53,6 +58,8 @@ class Rubbing(Module):
         slope = self.slopes[-1][:, : self.poses[0].shifts]
         _, _, rows, instances, lanes = slope.shape
         own = [m[self.first : self.first + rows * instances].reshape(rows, instances, lanes) for m in multipliers]
+        if self.resisting is not None:
+            return stacked(torque_lost(self.group.element, Jet(tuple(own)), Jet(tuple(self.resisting[: len(own)]))))
         force = [
             sign * total(jnp.sum(slope[j] * own[k - j][None], axis=1) for j in range(k + 1)) for k in range(len(own))
         ]
@@ -64,9 +71,9 @@ def rubbing_of(system: System, blocks: Slopes, rubbed: Sequence[Rubbed], pose_ty
     found, first, left = [], 0, iter(rubbed)
     for group, slopes in zip(system.groups, blocks, strict=True):
         if rubs(group):
-            friction, bodies = next(left)
+            friction, bodies, resisting = next(left)
             poses = [pose_of(body, pose_type, len(slopes[0]) - 1) for body in bodies]
-            found.append(Rubbing(group, poses, slopes, friction, first))
+            found.append(Rubbing(group, poses, slopes, friction, resisting, first))
         first += slopes[0].shape[2] * group.instances
     return found
 

@@ -7,7 +7,7 @@ from jaxtyping import Float
 
 from jounce.base.shapes import Numbers
 from jounce.constraints.friction import UnitFriction
-from jounce.dynamics.friction.coupling import rubs
+from jounce.dynamics.friction.coupling import loses_torque, rubs
 from jounce.dynamics.inverse import force_programs as programs
 from jounce.mechanism.system import holding
 
@@ -41,7 +41,10 @@ class JointFriction:
         slopes = [
             programs.friction_slopes(group.element, moving, self.forces.pose_type, s, self.forces.levels) for s in slots
         ]
-        return slopes, self.forces._poses(index, lanes)
+        part = None
+        if loses_torque(group.element):
+            part = programs.resisting(group.element, moving, self.forces.pose_type, self.forces.levels)
+        return slopes, self.forces._poses(index, lanes), part
 
     @property
     def names(self) -> list[str]:
@@ -57,10 +60,14 @@ class JointFriction:
     def pressing_force(
         self, name: str, multipliers: Numbers, lanes: np.ndarray
     ) -> Float[Numbers, "order component time"]:
-        """Return what multipliers of all rows exert in a joint on one of its bodies, as Taylor coefficients."""
+        """Return what multipliers of all rows exert in a joint on one of its bodies, as Taylor coefficients; of gears,
+        their multiplier.
+        """
         place = self.forces.indices[name]
         group = self.forces._joined.groups[place.group]
         own = multipliers[:, place.rows].reshape(len(multipliers), -1, group.instances, len(lanes))
+        if loses_torque(group.element):
+            return np.asarray(own)[:, :, place.instance]
         works = programs.wrenches(self.forces._slopes(place.group, group.moving_slots[-1], lanes), own)
         return np.asarray(works)[:, : self.forces.pose_type.shifts, place.instance]
 
@@ -133,7 +140,9 @@ class JointFriction:
         return next(place.rows for place in self.forces.indices.values() if place.group == index)
 
     def normal_force(self, name: str) -> Float[Numbers, "order 1 time"]:
-        """Return what presses the surfaces of a joint with friction together, N, as Taylor coefficients."""
+        """Return what presses the surfaces of a joint with friction together, N, as Taylor coefficients; of gears, the
+        torque that they lose, N m.
+        """
         place = self.forces.indices[name]
         row = self.first_rows[place.group] + place.instance
         return self.forces._balancing[0][:, row : row + 1]

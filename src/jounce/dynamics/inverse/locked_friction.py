@@ -31,7 +31,7 @@ def check_not_locked(motion: Motion, system: System, multipliers: Float[Numbers,
         message = (
             f"friction locks at t = {motion.time[lane]:g} s: no force of the drivers moves the mechanism as they "
             "prescribe, as friction grows as fast as the normal forces in joints; give a smaller coefficient or "
-            "radius, or drivers with more mechanical advantage"
+            "radius, gears a larger efficiency, or drivers more mechanical advantage"
         )
         raise MechanismError(message, name=", ".join(f"{name}.friction" for name in names))
 

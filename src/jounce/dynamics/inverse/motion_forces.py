@@ -322,7 +322,7 @@ class MotionForces:
                 held = programs.wrenches(self._slopes(place.group, slot, lanes), self._of_group(place)[..., lanes])
                 if first is None:
                     return held
-                slopes, _ = self.friction.slopes(place.group, lanes)
+                slopes, *_ = self.friction.slopes(place.group, lanes)
                 pressing = self._balancing[0][:, None, first : first + group.instances, lanes]
                 return held + programs.wrenches(slopes[group.moving_slots.index(slot)], pressing)
 

@@ -7,6 +7,7 @@ import numpy as np
 
 from jounce.base.shapes import Numbers
 from jounce.constraints.spin_hold import SpinHold
+from jounce.dynamics.friction.coupling import loses_torque
 from jounce.dynamics.friction.extreme_friction import ExtremeFriction
 from jounce.dynamics.inverse.motion_forces import MotionForces
 from jounce.dynamics.inverse.tooth_flanks import listed
@@ -53,7 +54,8 @@ def holding_forces(motion: Motion) -> "xarray.Dataset":
     MechanismError
         If nothing has a mass and no force is applied, or there is no driver.
     UnsupportedError
-        If some motion is free, constraints are redundant, or teeth press on their flanks, where joints have friction.
+        If some motion is free, constraints are redundant, teeth press on their flanks, or gears lose torque, where
+        joints have friction.
 
     Examples
     --------
@@ -127,6 +129,8 @@ def _check_determined(forces: MotionForces, name: str) -> None:
         reasons.append("drivers do not hold all that can move: drive it, and look whether zero is within the range")
     if forces.flanks:
         reasons.append("teeth press on either flank: give gears without pressure_angle")
+    if any(loses_torque(group.element) for group in forces._joined.groups):
+        reasons.append("gears lose a share of what they pass on: move slowly one way and the other instead")
     if any(isinstance(group.element, SpinHold) for group in model.system.groups):
         reasons.append("a body may spin about an axis of itself: hold it by a joint")
     if reasons:

@@ -9,6 +9,7 @@ from jax.core import Tracer
 
 from jounce.constraints import planar, spatial
 from jounce.constraints.cams import Cam, turns_in_space
+from jounce.constraints.friction import GearFriction
 from jounce.errors import MechanismError, UnsupportedError
 from jounce.jet import Jet
 from jounce.jet.turns import WHOLE_TURN
@@ -42,6 +43,8 @@ def check_gears(groups: Sequence[Group], names: Sequence[Sequence[str]]) -> None
                 "one body, such as a carrier or the ground, so that the centers keep their distance"
             )
             raise MechanismError(message, name=f"{members[0]}.points")
+        if isinstance(getattr(group.element, "friction", None), GearFriction):
+            _check_driving(group.element.friction, members)
         if isinstance(group.element, planar.Belt) and group.element.arm is None:
             _check_belts(group.element, members)
         if isinstance(group.element, spatial.Gear) and None in (group.element.held_i, group.element.held_j):
@@ -60,6 +63,20 @@ def check_gears(groups: Sequence[Group], names: Sequence[Sequence[str]]) -> None
                 )
                 value = float(np.asarray(group.element.ratio).ravel()[odd[0]])
                 raise MechanismError(message, name=f"{members[odd[0]]}.ratio", value=value)
+
+
+def _check_driving(friction: GearFriction, names: Sequence[str]) -> None:
+    """Raise MechanismError where friction keeps gears from being driven by the first of them."""
+    forward = friction.efficiencies[0]
+    if isinstance(forward, Tracer):
+        return
+    odd = np.flatnonzero(~(np.asarray(forward).ravel() > 0))
+    if odd.size:
+        message = (
+            "the worm cannot drive its wheel, as lead and friction angle together are 90 deg or more: give a smaller "
+            "coefficient or lead angle, or the screw of the smaller lead angle as the first body"
+        )
+        raise MechanismError(message, name=f"{names[odd[0]]}.friction")
 
 
 def _check_belts(belts: planar.Belt, names: Sequence[str]) -> None:

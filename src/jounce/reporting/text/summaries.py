@@ -128,7 +128,8 @@ def _mechanism_start(facts: Facts) -> list[str]:
         lines += [f"  {time['remark']}"] if "remark" in time else []
     else:
         lines.append("  no time grid is given")
-    words = (*law_words(facts["laws"]), *_train_words(facts["trains"]), *line_words(facts["lines"]), *facts["remarks"])
+    words = (*law_words(facts["laws"]), *_train_words(facts["trains"]), *efficiency_words(facts["efficiencies"]))
+    words = (*words, *line_words(facts["lines"]), *facts["remarks"])
     lines += [f"  {line}" for line in words]
     if freedom["message"] and facts["ok"] and freedom["left"]:
         lines.append("  it has degrees of freedom left: jounce simulate moves it by its forces")
@@ -247,6 +248,23 @@ def _train_words(facts: list[dict[str, Any]]) -> list[str]:
         fraction = f" = {each['fraction']}" if "/" in (each["fraction"] or "") else ""
         by_driver.setdefault(each["driver"], []).append(f"{each['body']} {each['ratio']:.9g}{fraction}")
     return [f"turns for a turn of {driver}: {', '.join(fraction)}" for driver, fraction in by_driver.items()]
+
+
+def efficiency_words(facts: list[dict[str, Any]]) -> list[str]:
+    """Word what share of power gears with friction pass on, a line for each.
+
+    Examples
+    --------
+    >>> efficiency_words([{"joint": "mesh", "bodies": ["worm", "wheel"], "forward": 0.42, "backward": -0.35}])
+    ['mesh: efficiency 0.42 from worm to wheel; locks itself: wheel does not drive worm']
+    """
+    lines_shown = []
+    for each in facts:
+        first, second = each["bodies"]
+        back = f", {each['backward']:.4g} from {second} to {first}"
+        back = back if each["backward"] > 0 else f"; locks itself: {second} does not drive {first}"
+        lines_shown.append(f"{each['joint']}: efficiency {each['forward']:.4g} from {first} to {second}{back}")
+    return lines_shown
 
 
 def line_words(facts: list[dict[str, Any]]) -> list[str]:

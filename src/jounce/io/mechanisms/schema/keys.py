@@ -7,18 +7,14 @@ readable from files as soon as its class exists.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import MISSING, dataclass
 from typing import Any
 
 from jounce.base.modules import is_ours
 from jounce.constraints import catalogue
 from jounce.constraints.facts import facts_of, field_kind, value_fields
-from jounce.constraints.friction import Friction
 from jounce.io.files.located_data import Location
-
-NESTED: Mapping[str, type[Any]] = {"friction": Friction}
-"""What a field of this name has, in a file a mapping of the fields of its class."""
 
 _PLURALS = {"point": "points", "vector": "vectors", "axis": "axes", "normal": "normals", "radius": "radii"}
 

@@ -17,8 +17,9 @@ from jounce.base.modules import is_ours
 from jounce.constraints import catalogue
 from jounce.constraints.base import counted
 from jounce.constraints.facts import facts_of
+from jounce.constraints.friction import friction_class
 from jounce.errors import JounceError, MechanismFileError, no_such
-from jounce.io.mechanisms.schema.keys import NESTED, FileKey, cam_types, file_keys, is_cam
+from jounce.io.mechanisms.schema.keys import FileKey, cam_types, file_keys, is_cam
 from jounce.io.mechanisms.schema.output_types import HOLDERS, output_holder, output_tag, output_types
 from jounce.io.mechanisms.values.curve_values import curve
 from jounce.io.mechanisms.values.expressions import (
@@ -189,7 +190,7 @@ def _annotation(kind: type[Any], key: FileKey, size: int) -> Any:
         case "points":
             return points(size, key.quantity)
         case "flag" | "whole" | "wrenches" | "nested":
-            return nested(NESTED[key.key]) if key.kind == "nested" else _PLAIN[key.kind]
+            return nested(friction_class(kind)) if key.kind == "nested" else _PLAIN[key.kind]
     choices = facts_of(kind).choices.get(key.fields[0])
     words = {"enum": list(choices)} if choices else {"type": "string"}
     return Annotated[Any, Checked(_text, words)]

@@ -191,7 +191,11 @@ def nested(kind: type[Any]) -> Any:
             if raw.get(name) is None:
                 raise problem(f"is missing: give {words}", name, value=UNSET)
         given = {name: x for name, x in raw.items() if x is not None}
-        return kind(**{name: parse(x, quantities[name], info, name).value for name, x in given.items()})
+        parsed = {name: parse(x, quantities[name], info, name).value for name, x in given.items()}
+        try:
+            return kind(**parsed)
+        except MechanismError as error:
+            raise problem(error.message, error.name or "", value=UNSET) from None
 
     return Annotated[Any, Checked(check, object_schema({n: scalar_schema(quantities[n]) for n in fields}, needed))]
 

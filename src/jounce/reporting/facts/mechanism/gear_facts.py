@@ -1,4 +1,4 @@
-"""How fast the gears of a mechanism turn for a turn of each driver: ratios of trains, from the Jacobian."""
+"""How fast the gears of a mechanism turn for a turn of each driver, from the Jacobian, and what their teeth lose."""
 
 from collections.abc import Sequence
 from fractions import Fraction
@@ -7,8 +7,10 @@ from typing import Any
 import numpy as np
 from typing_extensions import TypedDict
 
-from jounce.constraints import spatial
+from jounce.constraints import planar, spatial
 from jounce.constraints.facts import facts_of
+from jounce.constraints.friction import GearFriction
+from jounce.mechanism.building.builder import group_rows
 from jounce.mechanism.laws.driver_outputs import is_turning
 from jounce.mechanism.resolve import resolve
 from jounce.mechanism.transmissions.axis_angles import turned
@@ -27,6 +29,50 @@ class TrainFacts(TypedDict):
     driver: str
     ratio: float
     fraction: str | None
+
+
+class EfficiencyFacts(TypedDict):
+    """Share of the power that gears with friction pass on, where the first of two bodies drives the second, and where
+    the second drives the first: zero or less where they lock themselves.
+    """
+
+    joint: str
+    bodies: list[str]
+    forward: float
+    backward: float
+
+
+def efficiency_facts(state: StartingState) -> list[dict[str, Any]]:
+    """Return the efficiencies of the gears with friction of a mechanism: EfficiencyFacts.
+
+    Parameters
+    ----------
+    state : StartingState
+        Of a mechanism.
+
+    Examples
+    --------
+    >>> import jounce as jn
+    >>> from jounce.mechanism import build
+    >>> gearhead = jn.load("examples/worm_gearhead.yaml")
+    >>> (worm,) = efficiency_facts(StartingState(gearhead, build(gearhead), 0.0))
+    >>> worm["joint"], round(worm["forward"], 3), worm["backward"] < 0
+    ('mesh', 0.422, True)
+    """
+    records: list[dict[str, Any]] = []
+    for group, rows in zip(state.model.system.groups, group_rows(state.model), strict=True):
+        if not isinstance(friction := getattr(group.element, "friction", None), GearFriction):
+            continue
+        shape = (group.instances, 1)
+        forward, backward = (np.broadcast_to(np.asarray(x), shape)[:, 0] for x in friction.efficiencies)
+        for k, row in enumerate(state.model.rows[rows][: group.instances]):
+            name = row.partition(".")[2]
+            bodies = list(state.mechanism.joints[name].bodies[:2])
+            if isinstance(group.element, planar.Rolling | spatial.Rolling):  # the disc is the second body
+                bodies = bodies[::-1]
+            shares = {"forward": float(forward[k]), "backward": float(backward[k])}
+            records.append({"joint": name, "bodies": bodies, **shares})
+    return records
 
 
 def train_facts(state: StartingState) -> list[dict[str, Any]]:

@@ -25,7 +25,7 @@ from jounce.mechanism.resolve import resolve
 from jounce.mechanism.system import POSITION_COMPONENTS
 from jounce.mechanism.time import last_step_words
 from jounce.reporting.facts.mechanism.freedom_facts import AssemblyFacts, FreedomFacts, MobilityFacts, StartingState
-from jounce.reporting.facts.mechanism.gear_facts import TrainFacts, train_facts
+from jounce.reporting.facts.mechanism.gear_facts import EfficiencyFacts, TrainFacts, efficiency_facts, train_facts
 from jounce.reporting.facts.mechanism.line_facts import LineFacts, line_facts
 from jounce.reporting.facts.mechanism.range_facts import RangeFacts
 from jounce.reporting.text.law_facts import LawFacts, law_facts
@@ -130,6 +130,7 @@ class InspectedMechanism(MechanismFacts):
     assembly: AssemblyFacts
     ok: bool
     trains: list[TrainFacts]
+    efficiencies: list[EfficiencyFacts]
     lines: list[LineFacts]
     remarks: list[str]
     range: NotRequired[RangeFacts | None]
@@ -193,6 +194,7 @@ def inspected(mechanism: Mechanism, path: str | PathLike[str] | None = None) -> 
         "assembly": state.assembly,
         "ok": state.ok,
         "trains": train_facts(state),
+        "efficiencies": efficiency_facts(state),
         "lines": line_facts(state),
         "remarks": _remarks(mechanism),
     }
