@@ -215,17 +215,17 @@ class Search:
         """Return where the highest peaks are between the points, and the ratios there, the largest among them."""
         ratios = self.curves.ratios(law.at(self.points))
         at, curve = np.nonzero(_peaks(ratios) & (ratios > min(float(ratios.max()), 1.0) - CLOSE))
-        beside = np.clip(at + np.array([[-1], [0], [1]]), 0, len(self.points) - 1)
-        u, values, every = self.points[beside], ratios[beside, curve], np.arange(len(at))
+        neighbors = np.clip(at + np.array([[-1], [0], [1]]), 0, len(self.points) - 1)
+        u, values, every = self.points[neighbors], ratios[neighbors, curve], np.arange(len(at))
         for _ in range(zooms):
             more = _about_vertex(u, values)
             u = np.concatenate([u, more])
-            found = self.ratios_at(more.reshape(-1), law).reshape(*more.shape, -1)[:, every, curve]
-            values = np.concatenate([values, found])
+            more_values = self.ratios_at(more.reshape(-1), law).reshape(*more.shape, -1)[:, every, curve]
+            values = np.concatenate([values, more_values])
             sequence = np.argsort(u, axis=0, kind="stable")
             u, values = np.take_along_axis(u, sequence, axis=0), np.take_along_axis(values, sequence, axis=0)
-            beside = np.clip(np.argmax(values, axis=0) + np.array([[-1], [0], [1]]), 0, len(u) - 1)
-            u, values = np.take_along_axis(u, beside, axis=0), np.take_along_axis(values, beside, axis=0)
+            neighbors = np.clip(np.argmax(values, axis=0) + np.array([[-1], [0], [1]]), 0, len(u) - 1)
+            u, values = np.take_along_axis(u, neighbors, axis=0), np.take_along_axis(values, neighbors, axis=0)
         return u[1], values[1]
 
     def fastest_law(self, start: _Points) -> RateLaw:

@@ -219,7 +219,7 @@ def _scales(times: np.ndarray, dwell: Dwell, estimates: list[IntervalEstimate]) 
 def _moving(
     times: np.ndarray, values: np.ndarray, still: list[Dwell], known: dict[tuple[int, int], list[IntervalEstimate]]
 ) -> list[IntervalEstimate]:
-    """Return what samples between dwells say, and note it; of dwells, what those beside them do."""
+    """Return the estimates of intervals between dwells, and store them in `known` by their first and last sample."""
     edges = [0, *(k for dwell in still for k in (dwell.first, dwell.last)), len(times) - 1]
     estimates: list[IntervalEstimate] = []
     for first, last in zip(edges[::2], edges[1::2], strict=True):

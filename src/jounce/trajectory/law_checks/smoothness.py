@@ -21,7 +21,7 @@ HIGHEST = 10  # derivative that is looked at
 MOST_CROSSINGS = 10_000
 INTERVALS = 4000  # at a leader, for where it passes a knot of the law that follows it
 STEPS = 24  # at most, between two of these, to rounding
-AMONG, BESIDE = np.arange(1, 8) / 8, 10.0 ** -np.arange(2, 16, 2)  # shares of the time between, looked at together
+AMONG, CLOSE = np.arange(1, 8) / 8, 10.0 ** -np.arange(2, 16, 2)  # shares of the time between, evaluated together
 SLACK = 1e-6  # of the time between two looks, by which a crossing at an end may be beyond it
 BROKEN = {"abs": "kinks", "sign": "jumps"}  # what functions of expressions have where their argument is zero
 ROUNDING = 1e-9  # of the way of a profile by its duration to the power of the order: a smaller jump is none
@@ -351,7 +351,7 @@ def _crossings(
 
     Many instants are looked at together: about the one that a straight line gives, and evenly between both.
     """
-    every, count = np.arange(len(knots)), len(AMONG) + 2 * len(BESIDE) + 1
+    every, count = np.arange(len(knots)), len(AMONG) + 2 * len(CLOSE) + 1
 
     def away(instants: np.ndarray) -> np.ndarray:
         return seen.coefficients(leader, instants.reshape(-1))[0].reshape(instants.shape) - knots
@@ -364,7 +364,7 @@ def _crossings(
             break
         with np.errstate(divide="ignore", invalid="ignore"):
             share = np.nan_to_num(under / (under - over), nan=0.5, posinf=1.0, neginf=0.0)
-        near = np.clip(share + np.concatenate([-BESIDE, [0.0], BESIDE])[:, None], 0.0, 1.0)
+        near = np.clip(share + np.concatenate([-CLOSE, [0.0], CLOSE])[:, None], 0.0, 1.0)
         shares = np.sort(np.concatenate([np.broadcast_to(AMONG[:, None], (len(AMONG), len(knots))), near]), axis=0)
         instants = np.concatenate([low[None], low + shares * width, high[None]])
         values = np.concatenate([under[None], away(instants[1:-1]), over[None]])
