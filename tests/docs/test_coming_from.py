@@ -553,11 +553,27 @@ def _(arm):
     near(jn.jacobian(arm.robot, arm.q[:1], arm.body)[0], np.concatenate(parts))
 
 
-@row(MUJOCO, "`mj_objectVelocity(..., flg_local=0)`: angular first")
+@row(MUJOCO, "`mj_objectVelocity(..., mjOBJ_XBODY, ..., flg_local=0)`: angular first")
 def _(arm):
-    found = np.zeros(6)
+    found, of_center = np.zeros((2, 6))
     mujoco.mj_objectVelocity(arm.model, arm.data, mujoco.mjtObj.mjOBJ_XBODY, arm.number, found, 0)
     near(np.concatenate([arm.frame.angular_velocity[0], arm.frame.position[1]]), found)
+    mujoco.mj_objectVelocity(arm.model, arm.data, mujoco.mjtObj.mjOBJ_BODY, arm.number, of_center, 0)
+    jacobian = np.zeros((3, 3))
+    mujoco.mj_jacBodyCom(arm.model, arm.data, jacobian, None, arm.number)
+    near(jacobian @ arm.q[1], of_center[3:])
+
+
+@row(
+    MUJOCO,
+    "`mj_objectAcceleration(..., mjOBJ_XBODY, ..., flg_local=0)`, sensor `framelinacc`: less that of free fall",
+)
+def _(arm):
+    found = np.zeros(6)
+    mujoco.mj_rnePostConstraint(arm.model, arm.data)
+    mujoco.mj_objectAcceleration(arm.model, arm.data, mujoco.mjtObj.mjOBJ_XBODY, arm.number, found, 0)
+    near(arm.frame.angular_velocity[1], found[:3])
+    near(arm.frame.position[2] - arm.robot.gravity, found[3:])
 
 
 @row(MUJOCO, "`mj_fullM`")
