@@ -391,6 +391,26 @@ def test_controller_states_in_a_bag_are_what_was_measured(tmp_path, kept):
         check(jn.load_trajectory(folder))
 
 
+@pytest.mark.parametrize("begin", [0, 12_345_678_901, 1732686000 * 10**9])
+def test_stamps_of_rostopic_are_in_ns_also_by_a_simulated_clock(tmp_path, begin):
+    log = tmp_path / "log.csv"
+    stamps = [begin + round(t * 1e9) for t in TIMES]
+    rows = [f"{s},shoulder,elbow,{a:.17g},{b:.17g}" for s, a, b in zip(stamps, *Q, strict=True)]
+    log.write_text("\n".join(["%time,field.name0,field.name1,field.position0,field.position1", *rows]) + "\n")
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", jn.errors.RecordingWarning)
+        read = jn.load_trajectory(log)
+    assert read.start == pytest.approx(begin * 1e-9 if begin < 1e17 else 0.0, abs=1e-9)
+    assert read.stop - read.start == pytest.approx(1.0, abs=1e-9)
+
+
+def test_spaces_between_entries_are_named(tmp_path):
+    log = tmp_path / "log.csv"
+    log.write_text("timestamp actual_q_0\n" + "".join(f"{t:.3f} {q:.9f}\n" for t, q in zip(TIMES, Q[0], strict=True)))
+    with pytest.raises(TrajectoryError, match=r"line 1: entries are separated by commas, here by spaces"):
+        jn.load_trajectory(log)
+
+
 def test_a_long_table_is_read_as_the_same_table_in_parts(tmp_path, monkeypatch):
     """Numbers without a text for each entry, stamps since an epoch exactly; a fault is told by its line."""
     epoch = table(tmp_path, "time,shoulder,elbow", [EPOCH, *Q])

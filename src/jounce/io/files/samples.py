@@ -17,7 +17,7 @@ from jounce.io.files.reading import LARGEST_NUMBER, fault_of_number, known_name,
 from jounce.units.dimensions import NUMBER, TIME, Dimension, describe_dimension, dimension_of
 from jounce.units.shown_units import unit_size
 
-SEPARATORS = {";": "semicolons", "\t": "tabs"}
+SEPARATORS = {";": "semicolons", "\t": "tabs", " ": "spaces"}
 """What other programs put between entries, and its name."""
 
 _RATE = re.compile(r"_d([0-9]{1,2})$")
@@ -252,9 +252,12 @@ class Table:
         return self.error_type(message, path=self.path, **location)  # type: ignore[arg-type]
 
     def _check_commas(self) -> None:
-        """Refuse a file in which semicolons or tabs are between the entries, as spreadsheets of many countries do."""
+        """Refuse a file in which other marks are between the entries, as of spreadsheets, or of robot controllers."""
         line, row = self.rows[0]
+        counts = [len(other[0].split()) if len(other) == 1 else 0 for _, other in self.rows[:2]]
         for mark, name in SEPARATORS.items():
+            if mark == " " and (len(counts) < 2 or counts[0] != counts[1]):
+                continue
             parts = [part for entry in row for part in entry.split(mark)]
             if len(parts) > len(row) and (len(row) == 1 or all(_number(part) is not None for part in parts)):
                 message = f"entries are separated by commas, here by {name}; write commas, and points in decimals"

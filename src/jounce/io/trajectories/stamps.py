@@ -12,6 +12,7 @@ from jaxtyping import Int
 from jounce.errors import TrajectoryError
 from jounce.io.trajectories.recordings import Recording
 
+NANO = 10**9  # ns in a second
 EPOCH = 1e8
 """s: no recording lasts so long; larger stamps are counted from an epoch, if need be in ms, us or ns."""
 SCALES = ((1e17, 9, "ns"), (1e14, 6, "us"), (1e11, 3, "ms"), (EPOCH, 0, "s"))
@@ -22,7 +23,9 @@ ROUGHER = 1.5  # by which rows in the order of their stamps may go further than 
 SAME = 1.5  # times the largest step beside: positions at one stamp differ by no more
 
 
-def relative(texts: Sequence[str], fail: Callable[[str, int], TrajectoryError]) -> tuple[np.ndarray, str]:
+def relative(
+    texts: Sequence[str], fail: Callable[[str, int], TrajectoryError], per_second: int = 1
+) -> tuple[np.ndarray, str]:
     """Return stamps counted from the first one where they are counted from an epoch, and words about that.
 
     They are subtracted before they are rounded: a stamp of this century in double precision has 0.2 us.
@@ -33,6 +36,8 @@ def relative(texts: Sequence[str], fail: Callable[[str, int], TrajectoryError]) 
         As the file has them.
     fail : callable
         Given a message and a row, returns the error.
+    per_second : int, default 1
+        As for `epoch`.
 
     Raises
     ------
@@ -50,7 +55,7 @@ def relative(texts: Sequence[str], fail: Callable[[str, int], TrajectoryError]) 
         raise fail("must be a finite number", int(bad[0]))
     try:
         exact = [Decimal(text.strip()) for text in texts[:1]]
-        known = epoch(exact[0]) if exact else None
+        known = epoch(exact[0], per_second) if exact else None
         if known is None:
             return values, ""
         exact = [Decimal(text.strip()) for text in texts]
@@ -60,13 +65,15 @@ def relative(texts: Sequence[str], fail: Callable[[str, int], TrajectoryError]) 
     return np.array([float((stamp - exact[0]).scaleb(-digits)) for stamp in exact]), words
 
 
-def epoch(first: Decimal) -> tuple[int, str] | None:
+def epoch(first: Decimal, per_second: int = 1) -> tuple[int, str] | None:
     """Return of which power of ten of a second stamps are that are counted from an epoch, and words about that.
 
     Parameters
     ----------
     first : Decimal
         The first stamp.
+    per_second : int, default 1
+        Units of the stamps in a second, if they are known to be ns: small ones are those of a simulated clock then.
 
     Examples
     --------
@@ -76,7 +83,8 @@ def epoch(first: Decimal) -> tuple[int, str] | None:
     >>> epoch(Decimal("12.5")) is None
     True
     """
-    known = next(((digits, unit) for least, digits, unit in SCALES if abs(first) >= least), None)
+    scales = SCALES[:1] if per_second == NANO else SCALES
+    known = next(((digits, unit) for least, digits, unit in scales if abs(first) >= least), None)
     if known is None:
         return None
     digits, unit = known

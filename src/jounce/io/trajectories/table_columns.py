@@ -7,6 +7,7 @@ import re
 from collections.abc import Mapping, Sequence
 
 from jounce.errors import TrajectoryError
+from jounce.io.trajectories.stamps import NANO
 
 TIMES = ("time", "__time", "%time", "timestamp", "Time", "stamp", "t")
 """Names of columns of times: of results, PlotJuggler, rostopic, controllers."""
@@ -89,7 +90,7 @@ def _of_rostopic(header: Sequence[str]) -> Columns | None:
                 names[joint] = column
             else:
                 joints.setdefault(joint, {})[WORDS[match[1]]] = column
-    return Columns(stamp, joints, unnamed=not names, names=names) if joints else None
+    return Columns(stamp, joints, unnamed=not names, names=names, per_second=NANO) if joints else None
 
 
 def _of_plotjuggler(header: Sequence[str]) -> Columns | None:

@@ -13,7 +13,7 @@ from jounce.io.files.samples import Table, check_named, rates
 from jounce.io.trajectories.agreement import check_agreement
 from jounce.io.trajectories.controller_formats import ControllerFormat, format_of, joint_count
 from jounce.io.trajectories.recordings import Recording
-from jounce.io.trajectories.stamps import epoch, in_sequence, relative
+from jounce.io.trajectories.stamps import NANO, epoch, in_sequence, relative
 from jounce.io.trajectories.table_columns import Columns, columns_of
 from jounce.units.dimensions import TIME, Dimension
 
@@ -156,18 +156,24 @@ def _times(table: Table, columns: Columns) -> tuple[Float[np.ndarray, " row"], s
     if table.units[columns.time] is not None:
         return np.array(table.column(columns.time, (TIME,))), ""
     if table.numbers is not None:
-        origin = table.numbers.offsets.get(columns.time)
-        known = None if origin is None else epoch(origin)
+        values, origin = np.array(table.column(columns.time)), table.numbers.offsets.get(columns.time)
+        per_second = _units(columns, values)
+        known = None if origin is None else epoch(origin, per_second)
         if known is None:
-            return np.array(table.column(columns.time)) / columns.per_second, ""
+            return values / per_second, ""
         digits, words = known
         return table.numbers.values[:, columns.time] / 10**digits, words
 
     def fail(message: str, row: int) -> TrajectoryError:
         return table.error(message, line=table.line(row), name=name, value=table.rows[row][1][columns.time])  # type: ignore[return-value]
 
-    values, words = relative([row[columns.time] for _, row in table.rows], fail)
-    return (values, words) if words else (values * size / columns.per_second, "")
+    values, words = relative([row[columns.time] for _, row in table.rows], fail, columns.per_second)
+    return (values, words) if words else (values * size / _units(columns, values), "")
+
+
+def _units(columns: Columns, stamps: Float[np.ndarray, " row"]) -> int:
+    """Return how many units of the stamps a second has: ns are whole, and others were converted to seconds."""
+    return 1 if columns.per_second == NANO and (stamps != np.rint(stamps)).any() else columns.per_second
 
 
 def _check_rate(
