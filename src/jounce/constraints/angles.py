@@ -168,3 +168,9 @@ def parallel_rows(body_i: SpatialPose, body_j: SpatialPose, axis_i: Vectors, axi
     """Return the two rows that keep an axis of each body parallel."""
     axis = body_j.direction(axis_j)
     return [body_i.direction(side).dot(axis) for side in perpendiculars(axis_i)]
+
+
+def upright(body: SpatialPose) -> list[Jet]:
+    """Return the three rows that keep the axes of a body along those of the ground."""
+    x, y = (body.direction(unit[:, None, None]) for unit in np.eye(3)[:2])
+    return [x[1], x[2], y[2]]

@@ -7,7 +7,8 @@ from typing import Any
 import equinox as eqx
 
 from jounce.base.modules import is_ours
-from jounce.constraints.base import AbstractConstraint, MotionLaw, Part
+from jounce.constraints.angles import upright
+from jounce.constraints.base import AbstractConstraint, MotionLaw, Part, rows
 from jounce.constraints.drivers import CoordinateDriver, RotationDriver, SlideDriver, SpatialSlideDriver
 from jounce.constraints.facts import facts_of
 from jounce.errors import MechanismError
@@ -21,8 +22,8 @@ class Cam(AbstractConstraint):
 
     The residual is the coordinate of the follower less the law of that of the leader. So the leader bears the force on
     the follower times the slope of the law, whatever moves it. An angle in space is that of a body about an axis by
-    which it is hinged; attitudes tell it up to whole turns, after which the law must come back, or an angle that
-    follows have gone whole turns.
+    which it is hinged. Attitudes tell it up to whole turns: an angle that leads is therefore a coordinate of its own,
+    that of a carriage without mass, which counts them, and an angle that follows may have gone whole turns.
 
     Parameters
     ----------
@@ -52,6 +53,7 @@ class Cam(AbstractConstraint):
     leader: Part
     of: str = eqx.field(static=True, default="")
     slots: tuple[tuple[int, ...], ...] = eqx.field(static=True, default=((), ()))
+    unit: Any = eqx.field(default=None, init=False)  # m, by which the carriage moves with a rad: the size of all
 
     body_counts = (2, 3, 4)
     symbol = "none"
@@ -80,14 +82,27 @@ class Cam(AbstractConstraint):
         )
         self.of = of
 
+    @property
+    def hidden(self) -> tuple[str, ...]:
+        """The angle of a leader that turns in space, with its whole turns."""
+        return ("turn",) if turns_in_space(self.leader) else ()
+
     def evaluate(self, *bodies: Any) -> Jet:
         """Return the coordinate of the follower."""
         return self.follower.evaluate(*(bodies[k] for k in self.slots[0]))
 
     def residual(self, *bodies_and_time: Any) -> Jet:
         *bodies, _ = bodies_and_time
-        excess = self.evaluate(*bodies) - self.motion(self.leader.evaluate(*(bodies[k] for k in self.slots[1])))
-        return wrap(excess) if turns_in_space(self.follower) else excess
+        leading, held = self.leader.evaluate(*(bodies[k] for k in self.slots[1])), []
+        if self.hidden:
+            along, aside, unit = bodies[-1].position
+            size = 1.0 if self.unit is None else self.unit
+            turn = along / size
+            held = [wrap(leading - turn), aside, unit - size, *upright(bodies[-1])]
+            leading = turn
+        excess = self.evaluate(*bodies) - self.motion(leading)
+        excess = wrap(excess) if turns_in_space(self.follower) else excess
+        return rows(excess, *held) if held else excess
 
 
 def turns_in_space(part: Any) -> bool:

@@ -7,9 +7,16 @@ from typing import Any
 
 import equinox as eqx
 import jax.numpy as jnp
-import numpy as np
 
-from jounce.constraints.angles import Datum, Vectors, coaxial, parallel_rows, perpendiculars, relative_angle
+from jounce.constraints.angles import (
+    Datum,
+    Vectors,
+    coaxial,
+    parallel_rows,
+    perpendiculars,
+    relative_angle,
+    upright,
+)
 from jounce.constraints.base import AbstractConstraint, Curve, Nested, Scalar, Vector, rows
 from jounce.constraints.couplings import (
     ConstantVelocity as ConstantVelocity,
@@ -243,7 +250,7 @@ class SpatialCurve(AbstractConstraint, type="curve", space="spatial"):
     def residual(self, body_i: SpatialPose, body_j: SpatialPose, carriage: SpatialPose, time: Jet) -> Jet:
         along, aside, unit = carriage.position
         d = body_j.point(self.point_j) - body_i.point(self.curve(along / self.curve.unit))
-        return rows(d, aside, unit - self.curve.unit, *_upright(carriage))
+        return rows(d, aside, unit - self.curve.unit, *upright(carriage))
 
 
 class Surface(AbstractConstraint, type="surface", space="spatial"):
@@ -266,7 +273,7 @@ class Surface(AbstractConstraint, type="surface", space="spatial"):
         along, aside, unit = carriage.position
         point = self.surface(along / self.surface.unit, aside / self.surface.unit)
         d = body_j.point(self.point_j) - body_i.point(point)
-        return rows(d, unit - self.surface.unit, *_upright(carriage))
+        return rows(d, unit - self.surface.unit, *upright(carriage))
 
 
 class Screw(AbstractConstraint, type="screw", space="spatial"):
@@ -371,12 +378,6 @@ def _sliding(bodies: tuple[Any, ...], moving: Velocities, joint: Any) -> Jet:
     """Return how fast the point of a joint on body j slides along the axis of body i, m/s."""
     velocity = relative_velocity(bodies, moving, joint.point_j)
     return bodies[0].direction(joint.axis_i).dot(velocity) / length_of(joint.axis_i)
-
-
-def _upright(body: SpatialPose) -> list[Jet]:
-    """Return the three rows that keep the axes of a body along those of the ground."""
-    x, y = (body.direction(unit[:, None, None]) for unit in np.eye(3)[:2])
-    return [x[1], x[2], y[2]]
 
 
 def _collinear(joint: Any, body_i: SpatialPose, body_j: SpatialPose) -> list[Jet]:

@@ -151,12 +151,18 @@ def _corrected(
 def _repeated(states: list[Coordinates], turns: int) -> Coordinates | None:
     """Return the coordinates after further turns, each like the last; None if the last turn did not close."""
     before, after = states[-1 - STEPS_A_TURN], states[-1]
+    advance = np.zeros_like(after["position"])
+    if len(states) > 2 * STEPS_A_TURN:  # by as much a turn, as a nut on a screw does, or what counts the turns of a cam
+        advance = before["position"] - states[-1 - 2 * STEPS_A_TURN]["position"]
     for name, value in after.items():
         away = value - before[name]
+        if name == "position":
+            away = away - advance
         if name == "quaternion":
             away = np.minimum(np.abs(away).max(axis=0), np.abs(value + before[name]).max(axis=0))
         if np.max(np.abs(principal(away) if name == "angle" else away), initial=0.0) > 1e-6:
             return None
+    after = {**after, "position": after["position"] + turns * advance}
     if "angle" not in after:
         return after
     return {**after, "angle": after["angle"] + turns * whole_periods(after["angle"] - before["angle"])}

@@ -41,6 +41,7 @@ from jounce.mechanism import (
 from jounce.mechanism.building.belts import check_room
 from jounce.mechanism.building.builder import group_rows
 from jounce.mechanism.building.preconditions import check_holonomic, concrete, concrete_or
+from jounce.mechanism.laws.cam_laws import check_turns
 from jounce.mechanism.laws.law_checks import check_laws
 from jounce.mechanism.laws.output_drivers import output_laws
 from jounce.mechanism.time import Instants, TimeLike, instants_of
@@ -252,6 +253,7 @@ def _followed(
     if beyond := beyond_end(model, coordinates):
         message = f"t = {first:g} s, {beyond}: end of curve: {Status.END_OF_CURVE.advice}"
         raise SolveError(message, status=Status.END_OF_CURVE)
+    check_turns(mechanism, model, coordinates, first)
     prepare_outputs(mechanism, model, solver.order)
     solver = dataclasses.replace(solver, model=model)
     start = solver.beginning(solver.still(coordinates), first)

@@ -12,6 +12,7 @@ from jaxtyping import Float
 
 from jounce.base.modules import unchecked, with_fields
 from jounce.base.shapes import Numbers
+from jounce.constraints.cams import Cam
 from jounce.constraints.facts import facts_of, field_kinds, value_fields
 from jounce.jet import Jet
 from jounce.linear_algebra.fronts import Fronts, elimination
@@ -128,6 +129,7 @@ def build(mechanism: Mechanism, like: Model | None = None, *, initial: bool = Fa
     groups = tuple(with_sense(with_offsets(group, pose_type, guess), pose_type, guess) for group in groups)
     groups, forces, outputs = (with_datums(part, guess) for part in (groups, forces, outputs))
     length = _size(groups, guess["position"][:, : 1 + len(mechanism.rigid_bodies)])
+    groups = tuple(_with_unit(group, guess, length) for group in groups)
     history = AttitudeHistory(guess["quaternion"], np.zeros(1)) if components == 3 else None
     parts = ((groups, names), (forces, force_names), (outputs, output_names))
     return model_of(tuple(mechanism.bodies), parts, guess, length, history)
@@ -333,12 +335,22 @@ def with_sense(group: Group, pose_type: type[Pose], guess: dict[str, Any]) -> Gr
     return holding(group, "sense", sense if sense is None or isinstance(sense, Tracer) else np.asarray(sense))
 
 
+def _with_unit(group: Group, guess: dict[str, Any], length: float) -> Group:
+    """Return a group of which carriages that count the turns of cams move by the size of the mechanism with a rad."""
+    if not (isinstance(group.element, Cam) and group.element.hidden):
+        return group
+    guess["position"][2, list(group.bodies[-1])] = length
+    return holding(group, "unit", np.full((group.instances, 1), length))
+
+
 def _with_derived_of(group: Group, known: Group) -> Group:
     """Return a group with offsets and signs that another one has derived from a position."""
     if measures_angle(group):
         return with_datum_of(group, known)
     if hasattr(group.element, "sense"):
         return holding(group, "sense", known.element.sense)
+    if isinstance(group.element, Cam):
+        return holding(group, "unit", known.element.unit)
     if "offset" not in value_fields(type(group.element)) or group.element.offset is not None:
         return group
     return holding(group, "offset", known.element.offset)

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from jounce.constraints.cams import Cam
 from jounce.errors import JounceError, MechanismError
 from jounce.jet import Jet
 from jounce.mechanism.carriages import carriage_guess, curve_in, joint_of
@@ -43,6 +44,8 @@ def _carriage_guess(
         return np.asarray(body.position, float)
     joint = joint_of(name)
     element = mechanism.joints[joint]
+    if isinstance(element, Cam):  # no turn of its leader: whole turns are counted on the way to the laws
+        return np.array([0.0, 0.0, 1.0])
     values = resolve_element(element, parameters, components, f"joints.{joint}")
     start = [x for key, x in values.items() if key.startswith("start")]
     pose_type, key = (PlanarPose, "angle") if components == 2 else (SpatialPose, "quaternion")

@@ -1,11 +1,18 @@
 """The laws of cams as laws of time, where what leads a cam has a law of time itself."""
 
-from collections.abc import Iterator
+import math
+from collections.abc import Iterator, Mapping
 from typing import Any
+
+import numpy as np
 
 from jounce.constraints.base import value_fields
 from jounce.constraints.cams import Cam, coordinate_of_element
-from jounce.errors import JounceError
+from jounce.errors import JounceError, MechanismError
+from jounce.jet import Jet
+from jounce.jet.turns import WHOLE_TURN
+from jounce.mechanism.building.builder import Model, group_rows
+from jounce.mechanism.carriages import carriage_of
 from jounce.mechanism.laws.output_drivers import driver_of_output
 from jounce.mechanism.mechanism import Mechanism
 from jounce.mechanism.resolve import resolve_motion
@@ -62,6 +69,43 @@ def leader_name(mechanism: Mechanism, cam: Cam) -> str | None:
         except JounceError:
             continue
     return None
+
+
+def check_turns(mechanism: Mechanism, model: Model, coordinates: Mapping[str, Any], instant: float) -> None:
+    """Raise MechanismError where a cam does not count the turns with which the law of its leader starts, in space.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+        Put together.
+    model : Model
+        Of it.
+    coordinates : mapping of str to array
+        Of all bodies, the ground first, put together at the instant, (..., bodies, 1).
+    instant : float
+        s.
+    """
+    for name, cam in mechanism.joints.items():
+        if not (isinstance(cam, Cam) and cam.hidden) or (leader := driver_of_leader(mechanism, cam)) is None:
+            continue
+        given = _law_value(model, f"drivers.{leader}", instant)
+        place = np.asarray(coordinates["position"])[:, 1 + model.bodies.index(carriage_of(name)), 0]
+        if abs(counted := place[0] / place[-1] - given) > 1.0:
+            message = (
+                f"its leader starts at {given:g} rad by the law of {leader}, and {abs(counted) / WHOLE_TURN:.3g} turns "
+                "of it were not counted on the way from the starting guess: start the law less than 100 turns from it"
+            )
+            raise MechanismError(message, name=f"joints.{name}.motion.of")
+
+
+def _law_value(model: Model, driver: str, instant: float) -> float:
+    """Return the value of the law of a driver by its dotted name at an instant, s."""
+    for group, rows in zip(model.system.groups, group_rows(model), strict=True):
+        names = model.rows[rows][: group.instances]
+        if driver in names:
+            values = np.asarray(group.element.motion(Jet([np.full((1, 1), instant)])).coefficients[0])
+            return float(np.broadcast_to(values, (group.instances, 1))[names.index(driver), 0])
+    return math.nan
 
 
 def cams_in_time(mechanism: Mechanism) -> Iterator[tuple[str, FollowingMotion]]:

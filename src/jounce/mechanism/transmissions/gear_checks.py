@@ -3,7 +3,6 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-import jax
 import numpy as np
 from jax.core import Tracer
 
@@ -11,16 +10,13 @@ from jounce.constraints import planar, spatial
 from jounce.constraints.cams import Cam, turns_in_space
 from jounce.constraints.friction import GearFriction
 from jounce.errors import MechanismError, UnsupportedError
-from jounce.jet import Jet
-from jounce.jet.turns import WHOLE_TURN
 from jounce.mechanism.system import Group
 from jounce.mechanism.transmissions.axis_angles import turned
-from jounce.mechanism.transmissions.gear_frames import LARGEST_WHOLE, WHOLE, is_toothed
+from jounce.mechanism.transmissions.gear_frames import LARGEST_WHOLE, is_toothed
 from jounce.mechanism.transmissions.rope_lengths import check_ropes
 
 LEAST_DIFFERENCE = 0.05  # of the radii of a belt's pulleys where no body carries both: less is a tiny part of a turn
 FLAT = 1e-6  # sine of the angle between the axis of a wheel and the normal of its plane: less, and it lies on it
-TURN = np.linspace(-np.pi, np.pi, 128, endpoint=False)[None] + 0.0123  # rad, where laws of angles are looked at
 
 
 def check_gears(groups: Sequence[Group], names: Sequence[Sequence[str]]) -> None:
@@ -95,7 +91,7 @@ def _check_belts(belts: planar.Belt, names: Sequence[str]) -> None:
 
 
 def _check_cams(cams: Cam, names: Sequence[str]) -> None:
-    """Raise MechanismError where an angle in space is that of no hinge, or a law of one depends on its whole turns."""
+    """Raise MechanismError where an angle in space that leads or follows is that of no hinge."""
     for field, part in (("bodies", cams.follower), ("motion.of", cams.leader)):
         if turns_in_space(part) and part.datum is None:
             message = (
@@ -103,22 +99,6 @@ def _check_cams(cams: Cam, names: Sequence[str]) -> None:
                 "are hinged about the axis, by joints that have it"
             )
             raise MechanismError(message, name=f"{names[0]}.{field}")
-    if not turns_in_space(cams.leader) or any(isinstance(x, Tracer) for x in jax.tree.leaves(cams.motion)):
-        return
-    once, again = (np.asarray(cams.motion(Jet([TURN + k * WHOLE_TURN])).coefficients[0]) for k in (0, 1))
-    rise = np.broadcast_to(again - once, (len(names), TURN.shape[-1]))
-    if turns_in_space(cams.follower):
-        rise = rise - WHOLE_TURN * np.round(rise / WHOLE_TURN)
-    size = np.abs(np.broadcast_to(once, rise.shape)).max(axis=-1) + 1e-300
-    odd = np.flatnonzero(~(np.abs(rise).max(axis=-1) <= WHOLE * size))
-    if odd.size:
-        message = (
-            "must come back after a whole turn of its leader, as beyond: repeat does, since attitudes tell angles in "
-            "space up to whole turns only"
-        )
-        if turns_in_space(cams.follower):
-            message += "; an angle that follows may have gone whole turns"
-        raise MechanismError(message, name=f"{names[int(odd[0])]}.motion")
 
 
 def check_wheels(groups: Sequence[Group], names: Sequence[Sequence[str]], guess: Mapping[str, Any]) -> None:

@@ -37,7 +37,9 @@ def curve_lines(mechanism: Mechanism, name: str) -> CurveLines:
         return NONE
     size = POSITION_COMPONENTS[mechanism.space]
     values = resolve_element(element, mechanism.parameter_values, size, f"joints.{name}")
-    curve = next(value for value in values.values() if isinstance(value, CurveLaw))
+    curve = next((value for value in values.values() if isinstance(value, CurveLaw)), None)
+    if curve is None:  # a cam, which counts turns
+        return NONE
     if len(element.hidden) > 1:
         return CurveLines(() if curve.ends is None else _net(curve, [float(x) for x in curve.ends]), True)
     start = float(values["start"] or 0.0)
