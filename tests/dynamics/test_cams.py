@@ -3,6 +3,7 @@
 import dataclasses
 import shutil
 
+import jax
 import mpmath
 import numpy as np
 import pytest
@@ -145,15 +146,88 @@ def test_cams_in_space_know_angles_about_hinges(tmp_path, leader):
 @pytest.mark.parametrize(
     "motion, leader, words",
     [
-        ("expression: 0.01*t", "shaft", r"joints.cam.motion: must come back after a whole turn"),
-        ("piecewise: [{until: 90 deg, expression: 0.01}]", "shaft", "must come back after a whole turn"),
+        ("piecewise: [{until: 9000 deg, expression: 0.01}]", "shaft", r"joints.cam.motion: its leader goes from 2000"),
         ("expression: sin(t)", "slanted", r"joints.cam.motion.of: the body does not turn about this axis"),
     ],
 )
 def test_laws_and_axes_that_tell_no_angle_in_space_are_named_before_any_computing(tmp_path, motion, leader, words):
+    text = IN_SPACE.replace("motion: 20*t", "motion: 2000 + 20*t")
     slanted = "\n  slanted: {type: rotation, bodies: [ground, shaft], axis: [0.3, 0, 1], motion: t}"
     with pytest.raises(jn.errors.MechanismError, match=words):
-        jn.solve(load(tmp_path, motion, leader, IN_SPACE.replace("drivers:", f"drivers:{slanted}")), [0.0])
+        jn.solve(load(tmp_path, motion, leader, text.replace("drivers:", f"drivers:{slanted}")), [0.0])
+
+
+STEPS = "profile: [{profile: polynomial_4_5_6_7, duration: 360 deg, to: 2 mm}], beyond: "
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "motion, turn",
+    [
+        ("expression: 0.015*(1 - cos(0.3*t))/2 + 0.0001*t", lambda x: 0.015 * (1 - mpmath.cos(0.3 * x)) / 2 + 1e-4 * x),
+        (STEPS + "advance", lambda x: 0.002 * (mpmath.floor(x / mpmath.pi / 2) + rise(x))),
+        (STEPS + "hold", lambda x: 0.002 * (0 if x < 0 else rise(x) if x < 2 * mpmath.pi else 1)),
+    ],
+    ids=["expression", "advance", "hold"],
+)
+def test_laws_in_space_go_on_from_turn_to_turn(tmp_path, motion, turn):
+    """Contact and shaft torque with rates where the law does not come back: it starts 8 turns on, and goes on for 3."""
+    text = IN_SPACE.replace("motion: 20*t", "motion: 50 - 20*t").replace(
+        "expression: t + 0.1*sin(2*t)", "expression: t"
+    )
+    instants = [0.1, 1.37, 2.2, 2.65]
+    motion = jn.solve(load(tmp_path, motion, "shaft", text), instants, order=4)
+
+    def angle(t):
+        return 50 - 20 * t + mpmath.mpf("0.3") * mpmath.sin(5 * t)
+
+    def place(t):
+        return mpmath.mpf("0.046") + turn(angle(t))
+
+    def force(t):
+        spring = 5000 * (place(t) - mpmath.mpf("0.03"))
+        return mpmath.mpf("1.3") * (mpmath.diff(place, t, 2) + mpmath.mpf("9.81")) + spring
+
+    def torque(t):  # the rocker turns with the shaft
+        return mpmath.mpf("0.024") * mpmath.diff(angle, t, 2) + force(t) * mpmath.diff(turn, angle(t))
+
+    with mpmath.workdps(60):
+        for name, function in (("contact", force), ("torque", torque)):
+            exact = np.array([[mpmath.diff(function, x, k) for k in range(3)] for x in instants], float)
+            sizes = np.abs(exact).max(axis=0) + 1e-9
+            np.testing.assert_allclose(motion.outputs[name][:, :3] / sizes, exact / sizes, atol=1e-10, err_msg=name)
+
+
+def rise(angle):
+    """A rise of one within a turn by the polynomial of degree 7."""
+    x = angle / mpmath.pi / 2
+    x -= mpmath.floor(x)
+    return 35 * x**4 - 84 * x**5 + 70 * x**6 - 20 * x**7
+
+
+@pytest.mark.slow
+def test_gradients_of_cams_in_space_know_all_turns(tmp_path):
+    text = IN_SPACE.replace("gravity:", "parameters: {rate: 0.5}\ngravity:", 1)
+    cam = load(tmp_path, "expression: 0.01*sin(rate*t)", "shaft", text)
+    place = {"place": jn.outputs.PointOutput("follower", [0, 0, 0])}
+    angle = 20 * 1.5 + 0.3 * np.sin(7.5)
+
+    def height(rate):
+        moved = dataclasses.replace(cam, outputs=place, parameters={**cam.parameters, "rate": rate})
+        return jn.solve(moved, [0.0, 1.5], 1).outputs["place"][1, 0, 1]
+
+    assert float(jax.grad(height)(0.5)) == pytest.approx(0.01 * angle * np.cos(0.5 * angle), rel=1e-10)
+
+
+@pytest.mark.slow
+def test_a_shaft_that_is_driven_too_far_from_the_guess_is_refused(tmp_path):
+    """Two shafts that turn unlike each other: turns are followed one by one, and no more than 100."""
+    other = "\n  other: {type: rotation, bodies: [ground, rocker], axis: [0, 0, 1], motion: 2828 + t}"
+    text = IN_SPACE.replace("motion: 20*t", "motion: 2000 + 20*t").replace("drivers:", f"drivers:{other}")
+    swing = next(line for line in text.splitlines() if line.lstrip().startswith("swing:")) + "\n"
+    text = text.replace(swing, "").replace("  turning: {joint: swing, quantity: contact_torque}\n", "")
+    with pytest.raises(jn.errors.MechanismError, match=r"joints\.cam\.motion\.of: its leader starts at 2000 rad"):
+        jn.solve(load(tmp_path, "expression: 0.00001*t", "shaft", text), [0.0, 0.1], 1)
 
 
 ROLLER = """

@@ -129,7 +129,9 @@ def build(mechanism: Mechanism, like: Model | None = None, *, initial: bool = Fa
     groups = tuple(with_sense(with_offsets(group, pose_type, guess), pose_type, guess) for group in groups)
     groups, forces, outputs = (with_datums(part, guess) for part in (groups, forces, outputs))
     length = _size(groups, guess["position"][:, : 1 + len(mechanism.rigid_bodies)])
-    groups = tuple(_with_unit(group, guess, length) for group in groups)
+    groups = tuple(with_turn_unit(group, length) for group in groups)
+    for group in filter(counts_turns, groups):
+        guess["position"][2, list(group.bodies[-1])] = length
     history = AttitudeHistory(guess["quaternion"], np.zeros(1)) if components == 3 else None
     parts = ((groups, names), (forces, force_names), (outputs, output_names))
     return model_of(tuple(mechanism.bodies), parts, guess, length, history)
@@ -335,12 +337,16 @@ def with_sense(group: Group, pose_type: type[Pose], guess: dict[str, Any]) -> Gr
     return holding(group, "sense", sense if sense is None or isinstance(sense, Tracer) else np.asarray(sense))
 
 
-def _with_unit(group: Group, guess: dict[str, Any], length: float) -> Group:
-    """Return a group of which carriages that count the turns of cams move by the size of the mechanism with a rad."""
-    if not (isinstance(group.element, Cam) and group.element.hidden):
+def counts_turns(group: Group) -> bool:
+    """Return whether carriages count the turns of the leaders of a group of cams."""
+    return isinstance(group.element, Cam) and bool(group.element.hidden)
+
+
+def with_turn_unit(group: Group, length: Any) -> Group:
+    """Return a group whose carriages move by the size of the mechanism, m, with a rad of the leaders of cams."""
+    if not counts_turns(group):
         return group
-    guess["position"][2, list(group.bodies[-1])] = length
-    return holding(group, "unit", np.full((group.instances, 1), length))
+    return holding(group, "unit", length * np.ones((group.instances, 1)))
 
 
 def _with_derived_of(group: Group, known: Group) -> Group:
@@ -349,7 +355,7 @@ def _with_derived_of(group: Group, known: Group) -> Group:
         return with_datum_of(group, known)
     if hasattr(group.element, "sense"):
         return holding(group, "sense", known.element.sense)
-    if isinstance(group.element, Cam):
+    if counts_turns(group):
         return holding(group, "unit", known.element.unit)
     if "offset" not in value_fields(type(group.element)) or group.element.offset is not None:
         return group

@@ -19,7 +19,14 @@ from jounce.constraints.base import value_fields
 from jounce.constraints.planar import length_of
 from jounce.errors import UnsupportedError
 from jounce.jet.turns import brought_near
-from jounce.mechanism.building.builder import Model, grouped_elements, model_of, with_offsets, with_sense
+from jounce.mechanism.building.builder import (
+    Model,
+    grouped_elements,
+    model_of,
+    with_offsets,
+    with_sense,
+    with_turn_unit,
+)
 from jounce.mechanism.building.preconditions import PLAIN
 from jounce.mechanism.building.starting_guess import pose_at, starting_guess
 from jounce.mechanism.mechanism import Mechanism
@@ -149,6 +156,7 @@ def traced_model(
     (groups, names), *others = grouped_elements(mechanism)
     check_ratios(groups, names)
     groups = tuple(with_sense(with_offsets(group, pose_type, guess), pose_type, guess) for group in groups)
+    groups = tuple(with_turn_unit(group, length) for group in groups)
     parts = [groups, *(part for part, _ in others)]
     if angles is not None and any(measures_angle(group) for part in parts for group in part):
         assert first is not None

@@ -305,7 +305,7 @@ def _across(vector: Any, axis: Any) -> Any:
 
 def _coaxial(axis: Any, there: Any) -> Datum:
     datum = coaxial(axis, there)
-    if any(isinstance(x, Tracer) for x in (axis, there)):
+    if isinstance(datum.attitude, Tracer):  # all is within what JAX compiles
         return datum
     return Datum(*(np.asarray(x) for x in (datum.attitude, datum.angle, datum.near)))
 
