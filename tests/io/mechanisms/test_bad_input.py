@@ -153,3 +153,22 @@ def test_a_line_that_is_indented_otherwise_is_told_with_its_column(tmp_path, spa
         load(path)
     assert "line 4: the YAML cannot be read: the line is indented further than the entries" in str(error.value)
     assert f"({spaces} spaces, not {beside})" in str(error.value)
+
+
+@pytest.mark.parametrize(
+    "joint, words",
+    [
+        ("{type: double_revolute, bodies: [a, b], points: [[0, 0], [0, 0]], length: 4,5 mm}", "such as 4.5 mm"),
+        ("{type: gear, bodies: [a, b], points: [[0, 0], [0, 0]], radii: [100, 200]}", "is in m: write mm"),
+    ],
+)
+def test_a_decimal_comma_between_braces_and_radii_in_millimeters_are_recognized(tmp_path, joint, words):
+    path = tmp_path / "pair.yaml"
+    path.write_text(
+        "space: planar\nbodies: {a: {}, b: {position: [0.3, 0]}}\njoints:\n"
+        "  A: {type: revolute, bodies: [ground, a], points: [[0, 0], [0, 0]]}\n"
+        "  B: {type: revolute, bodies: [ground, b], points: [[0.3, 0], [0, 0]]}\n"
+        f"  C: {joint}\n"
+    )
+    with pytest.raises(MechanismFileError, match=words):
+        load(path)

@@ -159,6 +159,8 @@ def _check_gap(name: str, body: str, distance: float, radii: Sequence[float]) ->
             f"{center_distance:.9g} m, a gap of {distance - center_distance:.3g} m: move a center, or change a radius "
             "(a ring has one below zero)"
         )
+        if abs(center_distance - 1000 * distance) <= LARGEST_GAP * center_distance:
+            message += "; a number without a unit is in m: write mm"
         raise MechanismError(message, name=f"{name}.radii", value=radii)
 
 

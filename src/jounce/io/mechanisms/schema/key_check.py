@@ -58,6 +58,8 @@ def check_keys(path: str | PathLike[str]) -> None:
 def unknown_key(source: Source, space: str, at: Location, valid: Iterable[str]) -> JounceError:
     """Return the error for a key that an entry does not have, with those that it may have."""
     hint = _HINTS.get((space, str(at[-1]))) if at[0] == "bodies" else None
+    if str(at[-1])[:1].isdigit():
+        hint = "a comma ends a value here; for a decimal comma write a point, such as 4.5 mm"
     return source.error(f"unknown key {show_value(at[-1])}; {hint or did_you_mean(at[-1], valid)}", at)
 
 
