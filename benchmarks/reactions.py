@@ -14,6 +14,7 @@ from mpmath import mp, mpf
 import jounce as jn
 from benchmarks.cases import EXAMPLES, Case, Cases, Contestant, ready
 from benchmarks.references import largest_error
+from tests.oracles import friction_circles
 from tests.oracles.mp_series import Series, cos, sin, sqrt
 
 R, L, E = 0.05, 0.15, 0.01  # m: crank, rod, offset of the slider
@@ -101,8 +102,34 @@ def exact(time: np.ndarray) -> np.ndarray:
         return np.array([[float(x) for x in torque(t)] for t in time])
 
 
+def four_bar(rubbing: bool) -> jn.Mechanism:
+    """Return the four-bar of the friction circles, whose rocker bears 3 N m, with friction in its four pins or not."""
+    pins = {
+        name: jn.joints.Friction(0.2, 1e-8, size / 0.2) if rubbing else None
+        for name, size in friction_circles.CIRCLES.items()
+    }
+    crank, coupler, rocker, ground = (getattr(friction_circles, x) for x in ("CRANK", "COUPLER", "ROCKER", "GROUND"))
+    revolute, origin = jn.planar.Revolute, [0.0, 0.0]
+    return jn.Mechanism(
+        space="planar",
+        bodies={
+            "crank": jn.Body(origin, angle=0.4),
+            "coupler": jn.Body([crank * np.cos(0.4), crank * np.sin(0.4)], angle=0.6),
+            "rocker": jn.Body([ground, 0], angle=1.5),
+        },
+        joints={
+            "A": revolute(("ground", "crank"), origin, origin, friction=pins["A"]),
+            "B": revolute(("crank", "coupler"), [crank, 0], origin, friction=pins["B"]),
+            "C": revolute(("rocker", "coupler"), [rocker, 0], [coupler, 0], friction=pins["C"]),
+            "D": revolute(("ground", "rocker"), [ground, 0], origin, friction=pins["D"]),
+        },
+        drivers={"theta": jn.drivers.CoordinateDriver(("ground", "crank"), "angle", motion="0.4 + 0.2*t")},
+        forces={"load": jn.forces.Torque(("ground", "rocker"), 3.0)},
+    )
+
+
 def cases(quick: bool) -> Cases:
-    """Yield the torque with two rates of a solved motion, and with its solution."""
+    """Yield the torque with two rates of a solved motion, and with its solution; and with friction in the pins."""
     model = mechanism()
     time = np.linspace(0.0, 2.0, 2001 if quick else 10_001)
     motion = jn.solve(model, time, order=4)
@@ -128,3 +155,16 @@ def cases(quick: bool) -> Cases:
             unit="instant",
             reference="the power balance in fifty digits, by the peak of each derivative",
         )
+    motions = [jn.solve(four_bar(rubbing), time, order=4) for rubbing in (True, False)]
+    circles = np.array([friction_circles.torques(0.4 + 0.2 * t, 3.0).max() for t in time[lanes]])
+    rubbing, smooth = (ready(lambda motion=motion: torque(motion)) for motion in motions)
+    yield Case(
+        f"driver torque and two rates of a four-bar with friction in its pins, {len(time):,} instants",
+        [
+            Contestant("jounce", rubbing, lambda found: largest_error(found[lanes, :1], circles[:, None])),
+            Contestant("jounce, without friction", smooth, aim=1.5),
+        ],
+        count=len(time),
+        unit="instant",
+        reference="friction circles in closed form",
+    )

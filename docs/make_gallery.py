@@ -169,6 +169,7 @@ PICTURES = {
     "sarrus": Picture(("lift", "knee"), 0.3, points={"knee": ("upper_x", (0, 0, 0))}, view=(-50.0, 20.0)),
     "scara": robot("SCARA", "scara.urdf", "scara_pick.yaml", "spindle", (0, 0, 0.06), view=(-50.0, 25.0)),
     "scotch_yoke": Picture(("pin",), 0.2, points={"pin": ("crank", (0.04, 0))}),
+    "screw_jack": Picture(("rim",), 0.3, points={"rim": ("screw", (0.03, 0, 0))}, view=(-60.0, 20.0)),
     "screw_press": Picture(("tip",), 0.2),
     "sprung_four_bar": Picture(("C",), 0.0, stop=2.0),
     "servo_press": Picture(("ram", "pin"), 0.3, points={"pin": ("crank", (0.08, 0))}),

@@ -406,3 +406,34 @@ def test_programs_that_are_not_known_are_refused(run, arguments, says):
     status, _, err = run("inspect", *arguments)
     assert status == 2
     assert says in err
+
+
+def test_inspect_reports_how_well_a_screw_turns_and_whether_it_locks(run, facts):
+    rise = 8 / (2 * np.pi * 22)
+    lead, phi = np.arctan(rise), np.arctan(0.12)
+    (thread,) = facts("inspect", EXAMPLES / "screw_jack.yaml")[1]["screws"]
+    assert (thread["joint"], thread["self_locking"], thread["back_efficiency"]) == ("thread", True, 0.0)
+    assert thread["lead_angle"] == pytest.approx(lead, rel=1e-14)
+    assert thread["efficiency"] == pytest.approx(np.tan(lead) / np.tan(lead + phi), rel=1e-14)
+    status, out, _ = run("inspect", EXAMPLES / "screw_jack.yaml", "--set", "mu=0.04", "--set", "lead=-8 mm")
+    assert status == 0
+    forth = 100 * np.tan(lead) / np.tan(lead + np.arctan(0.04))
+    back = 100 * np.tan(lead - np.arctan(0.04)) / np.tan(lead)
+    words = f"efficiency {forth:.3g} % from turning to advance, {back:.3g} % from advance to turning"
+    assert f"thread: lead angle {np.degrees(lead):.4g} deg, {words}" in " ".join(out.split())
+
+
+@pytest.mark.slow
+def test_run_reports_what_holds_a_jack_at_rest(run, facts):
+    jack = EXAMPLES / "screw_jack.yaml"
+    lead, phi = np.arctan(8 / (2 * np.pi * 22)), np.arctan(0.12)
+    collar = 0.12 * 0.03 * 2012 * 9.81
+    up, down = (2000 * 9.81 * 0.022 * np.tan(angle) + collar for angle in (lead + phi, phi - lead))
+    (crank,) = facts("run", jack, "--holding", "--order", "0")[1]["holding"]
+    assert crank["least"] == pytest.approx(-up, rel=1e-12)
+    assert crank["greatest"] == pytest.approx(down, rel=1e-12)
+    assert (crank["driver"], crank["unit"], crank["self_locking"], crank["locks"]) == ("crank", "N*m", True, False)
+    status, out, _ = run("run", jack, "--holding", "--order", "0", "--units", "torque=N*mm")
+    assert status == 0
+    assert re.search(rf"crank +N\*mm +{-1000 * up:.6g} .* {1000 * down:.6g} .* everywhere", out)
+    assert "holding" not in facts("run", jack, "--order", "0")[1]

@@ -327,6 +327,81 @@ def test_batches_and_gradients_of_forces(monkeypatch):
         assert float(jax.grad(rate)(1.0)) == pytest.approx(-5 * part * np.exp(-5 * part), abs=1e-12)
 
 
+# -- friction of joints -----------------------------------------------------------------------------------------------
+
+
+class Worn(jn.joints.Friction):
+    """Friction of which a share is left that the class knows."""
+
+    share = 1.0
+
+    def resisting(self, slip):
+        return jn.joints.Friction.resisting(self, slip) * self.share
+
+
+class Loose(jn.planar.Prismatic):
+    """A guide that a part of its reaction presses, which the class knows."""
+
+    part = 1.0
+
+    def pressing(self, bodies, force):
+        return force * self.part
+
+
+def braked(friction: Any, joint: Any = jn.planar.Prismatic, **parts: Any) -> jn.Mechanism:
+    """Return a sled of 2 kg, pressed with 20 N on its guide, that a driver pushes."""
+    guide = joint(GROUND, [0, 0], [0, 0], [1, 0], [1, 0], friction=friction)
+    whole: dict[str, Any] = {
+        "space": "planar",
+        "gravity": [0, -10.0],
+        "bodies": {"rod": jn.Body([0, 0], mass=2.0, inertia=1.0)},
+        "joints": {"guide": guide},
+        "drivers": {"push": jn.drivers.CoordinateDriver(GROUND, "x", motion="t")},
+        "outputs": {"force": jn.outputs.DriverForceOutput("push"), "place": jn.outputs.PointOutput("rod", [0, 0])},
+    }
+    return jn.Mechanism(**whole | parts)
+
+
+def pushing(mechanism: jn.Mechanism) -> float:
+    """Return the force of the driver, and assert that the power of friction is that."""
+    motion = jn.solve(mechanism, [0.0, 0.5], order=3)
+    force = float(motion.outputs["force"][1, 0])
+    taken = jn.energy.power_balance(motion)["friction"].sel(derivative=0).values[1]
+    assert float(taken) == pytest.approx(-force, abs=1e-12)
+    return force
+
+
+def rate_of_sled(mechanism: jn.Mechanism) -> float:
+    """Return the velocity of the free sled after 0.1 s, from 2 m/s."""
+    start = {"go": jn.drivers.CoordinateDriver(GROUND, "x", "2*t")}
+    outputs = {"place": mechanism.outputs["place"]}
+    free = dataclasses.replace(mechanism, drivers={}, initial=start, outputs=outputs)
+    return float(jn.simulate(free, [0.0, 0.1], order=1).outputs["place"][1, 1, 0])
+
+
+def test_friction_of_ones_own_is_refused_by_name():
+    with pytest.raises(jn.errors.UnsupportedError, match="a law of friction of your own is not supported"):
+        jn.solve(braked(Worn(0.3, 1e-3)), [0.0], order=1)
+    with pytest.raises(jn.errors.UnsupportedError, match="cannot have friction, as its `pressing` is yours"):
+        jn.solve(braked(jn.joints.Friction(0.3, 1e-3), Loose), [0.0], order=1)
+
+
+@pytest.mark.slow  # `.ci/run` runs it each time
+@pytest.mark.parametrize("kind", [float, np.float64, np.float32, np.array, jnp.asarray])
+def test_coefficients_of_any_kind_of_number_are_followed(kind):
+    for mu in (0.25, 0.5):
+        assert pushing(braked(jn.joints.Friction(kind(mu), kind(1e-3)))) == pytest.approx(20 * mu, abs=1e-9)
+    named = braked(jn.joints.Friction("2*mu", "slow"), parameters={"mu": kind(0.125), "slow": 1e-3})
+    for mu in (0.125, 0.25):  # changed after a first solution
+        assert pushing(named.with_parameters(mu=kind(mu))) == pytest.approx(40 * mu, abs=1e-12)
+        assert rate_of_sled(named.with_parameters(mu=kind(mu))) == pytest.approx(2 - 2 * mu, abs=1e-9)
+
+    def force(mu: Any) -> Any:
+        return jn.solve(named.with_parameters(mu=mu), [0.0, 0.5], order=1).outputs["force"][1, 0]
+
+    assert float(jax.grad(force)(0.25)) == pytest.approx(40, abs=1e-12)
+
+
 # -- joints, drivers and outputs --------------------------------------------------------------------------------------
 
 

@@ -82,3 +82,40 @@ def test_a_wedge_that_jams_stops_though_it_is_pushed_and_creeps_as_the_law_says(
     # 400 N across the slope, per unit of x, lift 30 N and overcome the guide, which bears the half of them
     creep = 1e-3 * np.arctanh((400 - 30) / (2.5 * 200))
     assert found.outputs["lift"][-1, 1, 1] == pytest.approx(creep, rel=1e-8)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("mu, locks", [(3.4, False), (3.6, True)])
+def test_a_simulation_that_friction_locks_says_so(mu, locks):
+    # the lift, of 3 kg, has the acceleration (...) / (3 + (1 - mu / 2) 1 kg / 0.5^2): none as mu comes to 3.5
+    free = wedge(mu)
+    parts = vars_of(free) | {"drivers": {}, "outputs": {"lift": jn.outputs.PointOutput("lift", [0, 0])}}
+    start = {"go": jn.drivers.CoordinateDriver(("ground", "wedge"), "x", "-0.3*t")}
+    push = {"push": jn.forces.PointForce("wedge", [0, 0], ["-200", "0"])}
+    mechanism = jn.Mechanism(**parts, joints=free.joints, initial=start, forces=push)
+    if not locks:
+        assert (jn.simulate(mechanism, [0.0, 0.01]).status == 0).all()
+        return
+    words = r"friction locks at t = 0 s: joints\.guide: locked: no acceleration"
+    with pytest.raises(jn.errors.SolveError, match=words) as caught:
+        jn.simulate(mechanism, [0.0, 0.01])
+    assert caught.value.status == jn.Status.LOCKED
+    assert (jn.simulate(mechanism, [0.0, 0.01], strict=False).status != 0).all()
+
+
+@pytest.mark.slow
+def test_the_solvers_of_diffrax_have_friction():
+    import diffrax
+    import jax
+    import jax.numpy as jnp
+
+    equation = jn.integrate.ode_term(sled())
+    with jax.enable_x64(True):
+        solution = diffrax.diffeqsolve(
+            equation.term, diffrax.Dopri8(), 0.0, 1.0, 0.01, equation.state, args=equation.equations,
+            saveat=diffrax.SaveAt(ts=jnp.asarray(TIME)),
+            stepsize_controller=diffrax.PIDController(rtol=1e-11, atol=1e-11),
+        )  # fmt: skip
+    found = equation.motion(solution.ts, solution.ys, order=3).outputs["place"]
+    np.testing.assert_allclose(found[:, 1, 0], velocity(), rtol=0, atol=1e-9)
+    np.testing.assert_allclose(found[:, 2, 0], -3 * np.tanh(velocity() / 0.05), rtol=0, atol=1e-7)

@@ -13,9 +13,9 @@ import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Float
 
-from jounce.base.modules import Module
+from jounce.base.modules import Module, is_ours
 from jounce.constraints.base import Scalar
-from jounce.errors import MechanismError
+from jounce.errors import MechanismError, UnsupportedError
 from jounce.jet import Jet, cross, exp, sqrt
 from jounce.rigid import PlanarPose
 from jounce.rigid.pose import Pose
@@ -234,6 +234,23 @@ def check_friction(joint: Any) -> None:
     if not joint.has_friction_radius and friction.radius is not None:
         message = "is none of a guide, whose surfaces slide and do not turn: leave it out"
         raise MechanismError(message, name="friction.radius", value=friction.radius)
+
+
+def check_no_own_code(joint: Any) -> None:
+    """Raise UnsupportedError where a user wrote how surfaces slip, what presses them, or the law of their friction.
+
+    What such methods compute is not read off when a model is built, so that numbers that they capture would be kept.
+    """
+    friction = getattr(joint, "friction", None)
+    if friction is None or not (hasattr(joint, "slip") or hasattr(joint, "passed_on")):
+        return
+    if not is_ours(type(friction)):
+        message = "a law of friction of your own is not supported: give a jn.joints.Friction, or apply a force"
+        raise UnsupportedError(message, name="friction", value=type(friction).__name__)
+    for name in ("slip", "pressing", "passed_on"):
+        if not is_ours(getattr(type(joint), name, check_no_own_code)):
+            message = f"a joint of your own cannot have friction, as its `{name}` is yours: apply a force instead"
+            raise UnsupportedError(message, name="friction")
 
 
 def velocities(bodies: Sequence[Pose]) -> Velocities:

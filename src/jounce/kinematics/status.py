@@ -18,6 +18,7 @@ class Status(enum.IntEnum):
     INCONSISTENT = 9
     UNBALANCED = 10
     END_OF_CURVE = 11
+    LOCKED = 12
 
     @property
     def advice(self) -> str:
@@ -49,5 +50,7 @@ _ADVICE = {
     "residual smooth, or ask for a `longest_step` as short as the feature",
     Status.END_OF_CURVE: "a point has come to an end of the curve that it is held on, and there is no curve beyond; "
     "ask for a shorter motion, or give a longer curve, or a closed one",
+    Status.LOCKED: "no acceleration fulfills the law of friction, which grows as fast as what presses the joint; give "
+    "a smaller coefficient or radius, or a start that is slower, as friction is less below its speed",
     Status.NOT_REACHED: "not computed, because the motion could not be followed up to here",
 }

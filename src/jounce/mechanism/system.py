@@ -11,6 +11,7 @@ from jaxtyping import Bool, Float
 
 from jounce.base.modules import Module, unchecked, with_fields
 from jounce.base.shapes import Numbers
+from jounce.constraints.friction import check_no_own_code
 from jounce.errors import UnsupportedError
 from jounce.jet import Jet, concatenate
 from jounce.jet.algebra import stacked
@@ -184,6 +185,7 @@ def group_elements(
     for name, element in elements.items():
         values = resolve_element(element, parameters, components, name)
         try:
+            check_no_own_code(element)
             readings = readings_of(element, values, components)
         except UnsupportedError as error:
             raise error.located(name=name) from None

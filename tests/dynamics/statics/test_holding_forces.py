@@ -8,6 +8,8 @@ from scipy.optimize import minimize
 
 import jounce as jn
 from tests.dynamics.inverse.test_friction import ORIGIN, UP, screw_jack, slider_crank, vars_of, wedge
+from tests.oracles import friction_circles
+from tests.oracles.friction_circles import CIRCLES, COUPLER, CRANK, GROUND, ROCKER
 
 
 def held(mechanism, name, time=0.0):
@@ -97,10 +99,6 @@ def test_a_screw_jack_holds_its_load_by_itself_where_friction_exceeds_the_lead(m
     assert (found[0] < 0 < found[2]) == (mu > np.tan(rise))
 
 
-CRANK, COUPLER, ROCKER, GROUND = 0.1, 0.32, 0.25, 0.3
-CIRCLES = {"A": 0.004, "B": 0.003, "C": 0.005, "D": 0.002}  # m, radii of the friction circles
-
-
 def four_bar(angle, moment):
     """A four-bar of bodies without weight, a moment on its rocker, held by its crank; mu is 0.2."""
     pins = {name: jn.joints.Friction(0.2, 1e-3, size / 0.2) for name, size in CIRCLES.items()}
@@ -122,34 +120,11 @@ def four_bar(angle, moment):
     )
 
 
-def by_friction_circles(angle, moment):
-    """Return the torques of the crank for the force of the coupler along each tangent of two friction circles."""
-    b = CRANK * np.array([np.cos(angle), np.sin(angle)])
-    away = np.array([GROUND, 0.0]) - b
-    distance = np.hypot(*away)
-    inner = np.arccos((distance**2 + ROCKER**2 - COUPLER**2) / (2 * distance * ROCKER))
-    direction = np.arctan2(-away[1], -away[0]) - inner  # of the rocker
-    c = np.array([GROUND, 0.0]) + ROCKER * np.array([np.cos(direction), np.sin(direction)])
-    span, torques = np.hypot(*(c - b)), []
-    for at_a, at_b, at_c, at_d in itertools.product((1, -1), repeat=4):
-        # the line passes B at the distance p and C at q, on the sides that the signs tell
-        p, q = at_b * CIRCLES["B"], at_c * CIRCLES["C"]
-        line = np.arctan2(*(c - b)[::-1]) - np.arcsin((q - p) / span)
-        along, normal = np.array([np.cos(line), np.sin(line)]), np.array([-np.sin(line), np.cos(line)])
-        on_line = b - p * normal
-        arm_a = on_line[0] * along[1] - on_line[1] * along[0]
-        arm_d = (on_line[0] - GROUND) * along[1] - on_line[1] * along[0]
-        force = moment / (arm_d + at_d * CIRCLES["D"])  # of the rocker on the coupler, along the line
-        torques.append(force * (arm_a + at_a * CIRCLES["A"]))
-    return np.array(torques)
-
-
 @pytest.mark.parametrize("angle", [0.4, 1.9, 4.0])
 @pytest.mark.parametrize("moment", [3.0, -2.0])
 def test_a_four_bar_by_friction_circles(angle, moment):
-    mechanism = four_bar(angle, moment)
-    found, torques = held(mechanism, "turn"), by_friction_circles(angle, moment)
-    np.testing.assert_allclose(found[[0, 2]], -np.array([torques.max(), torques.min()]), rtol=1e-11)
+    found, torques = held(four_bar(angle, moment), "turn"), friction_circles.torques(angle, moment)
+    np.testing.assert_allclose(found[[0, 2]], [torques.min(), torques.max()], rtol=1e-11)
 
 
 def torque_at_rest(crank):

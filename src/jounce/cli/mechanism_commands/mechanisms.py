@@ -21,7 +21,7 @@ from jounce.cli.options import (
 from jounce.cli.robot_motion import RobotRun, simulate_robot_file
 from jounce.errors import JounceError
 from jounce.io.files import ROBOT_FILES
-from jounce.reporting.terminal import say, show_peaks
+from jounce.reporting.terminal import say, show_peaks, show_table
 
 if TYPE_CHECKING:
     from jounce.integrate import AbstractMethod
@@ -38,6 +38,7 @@ def run(
     order: int = 4,
     tolerance: float = 1e-12,
     no_refine: bool = False,
+    holding: bool = False,
     reading: MechanismReading = PLAIN_MECHANISM,
     heading: Heading = PLAIN,
     output: TableOutput = NO_TABLE,
@@ -54,6 +55,8 @@ def run(
         Tolerance of positions, rad or sizes of the mechanism.
     no_refine
         Search peaks at the instants only, not between them.
+    holding
+        Print the range of drive forces that hold it at rest.
 
     Examples
     --------
@@ -61,6 +64,7 @@ def run(
       jounce run examples/rsur.yaml --order 8 --out motion.nc
       jounce run examples/four_bar.yaml --set "BC=15 cm" --set tau=3
       jounce run examples/four_bar.yaml --units angle=deg,length=mm
+      jounce run examples/screw_jack.yaml --holding
     """
     output.check()
     units = heading.units
@@ -68,10 +72,12 @@ def run(
     spare_inputs(output.out, overwrite=output.overwrite)
     refine = not no_refine
     if _is_long(mechanism, file):
+        if holding:
+            raise JounceError("is for motions of fewer instants: give a coarser time grid", name="--holding", path=file)
         motion = _streamed(mechanism, file, order, tolerance, output, refine=refine, heading=units)
         return _write_result("run", motion, file, output, refine=refine)
     motion = solved(mechanism, file, order, tolerance)
-    return _finished("run", motion, file, output, refine=refine, heading=units)
+    return _finished("run", motion, file, output, refine=refine, heading=units, holding=holding)
 
 
 def simulate(
@@ -180,6 +186,7 @@ def _finished(
     *,
     refine: bool,
     heading: bool | None,
+    holding: bool = False,
 ) -> int:
     """Print and write the results of a motion, and return the exit status."""
 
@@ -188,7 +195,13 @@ def _finished(
 
         output.write(lambda: in_units(motion.dataset, motion.mechanism.shown_units), header_units=heading)
 
-    return _write_result(command, motion, file, output, refine=refine, write=write)
+    held = None
+    if holding:
+        from jounce.reporting.facts.holding_facts import holding_facts
+
+        with errors_about(file):
+            held = holding_facts(motion)
+    return _write_result(command, motion, file, output, refine=refine, write=write, held=held)
 
 
 def _write_result(
@@ -199,6 +212,7 @@ def _write_result(
     *,
     refine: bool,
     write: Callable[[], None] = lambda: None,
+    held: list[dict[str, Any]] | None = None,
 ) -> int:
     """Print what there is to tell of a motion, write it, and return the exit status."""
     from jounce.reporting.facts.motion_facts import motion_facts
@@ -209,8 +223,13 @@ def _write_result(
     if not output.json:
         say(motion_summary(motion_facts(motion), file.name))
         show_peaks(shown_peaks(peaks(motion, refine=refine), motion.mechanism.shown_units))
+        if held is not None:
+            from jounce.reporting.facts.holding_facts import holding_table
+
+            show_table(holding_table(held, motion.mechanism.shown_units))
     write()
-    output.tell(command, lambda: motion_result(motion, file, output.out, refine))
+    more = {} if held is None else {"holding": held}
+    output.tell(command, lambda: motion_result(motion, file, output.out, refine) | more)
     return outcome(motion, file)
 
 

@@ -397,7 +397,7 @@ class _Run:
         acceleration = np.abs(np.asarray(current.expansion.acceleration[0])[..., 0])
         rubbing = joints_with_friction(self.start.model, self.start.model.system)
         if rubbing and not np.isfinite(acceleration).all():
-            return Status.COLLAPSED, f"friction locks at t = {time:g} s: {', '.join(rubbing)}"
+            return Status.LOCKED, f"friction locks at t = {time:g} s: {', '.join(rubbing)}"
         if (blocked := current.blocked.item()) >= 0:
             return Status.COLLAPSED, f"{watched_names(self.start.model)[blocked]} at t = {time:g} s"
         scale = np.asarray(self.start.equations.system.column_scale)[:, None]

@@ -106,7 +106,8 @@ class Simulation(Motion):
             status[undefined] = int(Status.UNDEFINED)
             faults |= {int(lane): f"output {names[int(np.argmax(bad[:, lane]))]}" for lane in undefined}
         if lost.any():  # the state is known there, but not its derivatives
-            status[lost], faults[int(np.argmax(lost))] = int(Status.INADMISSIBLE), ending[1]
+            reason = ending[0] if ending[0] == Status.LOCKED else Status.INADMISSIBLE
+            status[lost], faults[int(np.argmax(lost))] = int(reason), ending[1]
         beyond = np.flatnonzero(~reached & (np.abs(instants - dense.start[0]) > abs(dense.end - dense.start[0])))
         if ending[0] != Status.OK and beyond.size:
             status[beyond[0]], faults[int(beyond[0])] = int(ending[0]), ending[1]

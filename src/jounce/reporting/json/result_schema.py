@@ -11,6 +11,7 @@ from typing_extensions import TypedDict
 from jounce.reporting.facts.cam_facts import CamFacts
 from jounce.reporting.facts.curve_facts import CurveFacts
 from jounce.reporting.facts.design_facts import DesignFacts
+from jounce.reporting.facts.holding_facts import HoldingFacts
 from jounce.reporting.facts.mechanism.mechanism_facts import Grid, InspectedMechanism
 from jounce.reporting.facts.modes_facts import ModesFacts
 from jounce.reporting.facts.motion_facts import MotionFacts, SimulationFacts
@@ -31,6 +32,7 @@ class RunResult(Result, MotionFacts, Written):
     """jounce run --json."""
 
     command: Literal["run"]
+    holding: NotRequired[list[HoldingFacts]]
 
 
 class SimulateResult(Result, SimulationFacts, Written):

@@ -129,7 +129,7 @@ def _mechanism_start(facts: Facts) -> list[str]:
     else:
         lines.append("  no time grid is given")
     words = (*law_words(facts["laws"]), *_train_words(facts["trains"]), *efficiency_words(facts["efficiencies"]))
-    words = (*words, *line_words(facts["lines"]), *facts["remarks"])
+    words = (*words, *screw_words(facts["screws"]), *line_words(facts["lines"]), *facts["remarks"])
     lines += [f"  {line}" for line in words]
     if freedom["message"] and facts["ok"] and freedom["left"]:
         lines.append("  it has degrees of freedom left: jounce simulate moves it by its forces")
@@ -265,6 +265,24 @@ def efficiency_words(facts: list[dict[str, Any]]) -> list[str]:
         back = back if each["backward"] > 0 else f"; locks itself: {second} does not drive {first}"
         lines_shown.append(f"{each['joint']}: efficiency {each['forward']:.4g} from {first} to {second}{back}")
     return lines_shown
+
+
+def screw_words(facts: list[dict[str, Any]]) -> list[str]:
+    """Word screws with friction, a line for each.
+
+    Examples
+    --------
+    >>> thread = {"joint": "thread", "lead_angle": 0.05, "efficiency": 0.4, "back_efficiency": 0.0}
+    >>> screw_words([thread | {"self_locking": True}])
+    ['thread: lead angle 2.865 deg, efficiency 40 % from turning to advance, locks by itself']
+    """
+    lines = []
+    for each in facts:
+        forth, back = (f"{100 * each[key]:.3g} %" for key in ("efficiency", "back_efficiency"))
+        backward = "locks by itself" if each["self_locking"] else f"{back} from advance to turning"
+        words = f"{each['joint']}: lead angle {math.degrees(each['lead_angle']):.4g} deg"
+        lines.append(f"{words}, efficiency {forth} from turning to advance, {backward}")
+    return lines
 
 
 def line_words(facts: list[dict[str, Any]]) -> list[str]:

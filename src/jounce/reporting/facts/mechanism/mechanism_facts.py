@@ -28,6 +28,7 @@ from jounce.reporting.facts.mechanism.freedom_facts import AssemblyFacts, Freedo
 from jounce.reporting.facts.mechanism.gear_facts import EfficiencyFacts, TrainFacts, efficiency_facts, train_facts
 from jounce.reporting.facts.mechanism.line_facts import LineFacts, line_facts
 from jounce.reporting.facts.mechanism.range_facts import RangeFacts
+from jounce.reporting.facts.mechanism.screw_facts import ScrewFacts, screw_facts
 from jounce.reporting.text.law_facts import LawFacts, law_facts
 from jounce.trajectory import OutputMotion, SegmentedMotion
 from jounce.units.dimensions import Dimension
@@ -132,6 +133,7 @@ class InspectedMechanism(MechanismFacts):
     trains: list[TrainFacts]
     efficiencies: list[EfficiencyFacts]
     lines: list[LineFacts]
+    screws: list[ScrewFacts]
     remarks: list[str]
     range: NotRequired[RangeFacts | None]
 
@@ -196,6 +198,7 @@ def inspected(mechanism: Mechanism, path: str | PathLike[str] | None = None) -> 
         "trains": train_facts(state),
         "efficiencies": efficiency_facts(state),
         "lines": line_facts(state),
+        "screws": screw_facts(state),
         "remarks": _remarks(mechanism),
     }
 

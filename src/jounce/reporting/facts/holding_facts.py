@@ -1,0 +1,87 @@
+"""The forces of drivers that hold a mechanism at rest, over all positions of a motion: facts and a table."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from typing_extensions import TypedDict
+
+from jounce.dynamics import holding_forces
+from jounce.kinematics import Motion
+from jounce.reporting.text.tables import Table, table
+from jounce.units.shown_units import ShownUnits
+
+STAYS = {True: "everywhere", False: "nowhere", None: "in places"}
+
+
+class HoldingFacts(TypedDict):
+    """The least and the greatest force or torque of a driver that hold the mechanism at rest in the positions of a
+    motion, None where it is infinite or not known; the instants of these positions, s; whether friction locks one way;
+    whether the mechanism stays without the driver, None where it does in some of the positions only.
+    """
+
+    driver: str
+    unit: str
+    least: float | None
+    least_at: float | None
+    greatest: float | None
+    greatest_at: float | None
+    locks: bool
+    self_locking: bool | None
+    remark: str
+
+
+def holding_facts(motion: Motion) -> list[dict[str, Any]]:
+    """Return between which forces each driver holds a mechanism at rest, over a motion: HoldingFacts.
+
+    Parameters
+    ----------
+    motion : Motion
+        As `jounce.holding_forces` takes it.
+
+    Examples
+    --------
+    >>> import jounce as jn
+    >>> jack = jn.load("examples/screw_jack.yaml")
+    >>> (crank,) = holding_facts(jn.solve(jack, [0.0], order=0))
+    >>> crank["driver"], crank["unit"], round(crank["least"], 2), round(crank["greatest"], 2), crank["self_locking"]
+    ('crank', 'N*m', -148.37, 97.69, True)
+    """
+    dataset = holding_forces(motion)
+    return [_of_driver(str(name), dataset[name], motion.time) for name in dataset.data_vars]
+
+
+def _of_driver(name: str, array: Any, time: np.ndarray) -> dict[str, Any]:
+    least, greatest = array.sel(bound="least").values, array.sel(bound="greatest").values
+    known = ~np.isnan(least) & ~np.isnan(greatest)
+    stays = (least <= 0) & (greatest >= 0)
+    facts: dict[str, Any] = {"driver": name, "unit": array.attrs["units"]}
+    for key, values, extreme in (("least", least, np.nanargmin), ("greatest", greatest, np.nanargmax)):
+        lane = int(extreme(values)) if known.any() else None
+        facts[key] = None if lane is None or not np.isfinite(values[lane]) else float(values[lane])
+        facts[f"{key}_at"] = None if lane is None else float(time[lane])
+    facts["locks"] = bool(np.isinf(least[known]).any() or np.isinf(greatest[known]).any())
+    every, some = bool(known.any() and stays[known].all()), bool(stays[known].any())
+    facts["self_locking"] = every if every == some else None
+    return facts | {"remark": array.attrs.get("comment", "")}
+
+
+def holding_table(facts: list[dict[str, Any]], units: ShownUnits) -> Table:
+    """Return the forces that hold a mechanism at rest, a row for each driver, in the units that are shown."""
+    rows = []
+    for each in facts:
+        unit, factor = units.of(each["unit"], each["driver"])
+        bounds = [
+            [_number(each, key, factor), "" if each[f"{key}_at"] is None else f"{each[f'{key}_at']:.5g}"]
+            for key in ("least", "greatest")
+        ]
+        rows.append([each["driver"], unit, *bounds[0], *bounds[1], STAYS[each["self_locking"]], each["remark"]])
+    headings = ("driver", "unit", "least", "at t/s", "greatest", "at t/s", "stays by itself", "remark")
+    return table("Held at rest by", headings, rows, (2, 3, 4, 5))
+
+
+def _number(facts: dict[str, Any], key: str, factor: float) -> str:
+    if facts[key] is not None:
+        return f"{facts[key] * factor:.6g}"
+    return "infinite" if facts["locks"] and facts[f"{key}_at"] is not None else "-"
