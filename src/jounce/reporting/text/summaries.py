@@ -55,9 +55,9 @@ def motion_summary(facts: Facts, file: str) -> str:
 
 
 def _with_carriages(words: str, facts: Facts, coordinates: int) -> str:
-    """Word how many bodies there are, and how many carriages, which have the parameters of curves."""
+    """Word how many bodies there are, and how many carriages, which have the hidden coordinates of joints."""
     carriages = coordinates // (3 if facts["space"] == "planar" else 6) - len(facts["bodies"])
-    return f"{words} and {count(carriages, 'carriage on a curve', 'carriages on curves')}" if carriages else words
+    return f"{words} and {count(carriages, 'carriage of a joint', 'carriages of joints')}" if carriages else words
 
 
 def _conservation_lines(facts: Facts) -> list[str]:
