@@ -15,6 +15,8 @@ from jounce.errors import (
     MechanismFileError,
     RobotWarning,
     SolveError,
+    check_choice,
+    check_name,
     did_you_mean,
     flag,
     show_value,
@@ -77,7 +79,7 @@ def test_long_values_are_cut():
 def test_suggestions_come_before_the_list():
     assert did_you_mean("lenght", ["length", "points"]) == "did you mean 'length'? valid: length, points"
     assert did_you_mean("A", ["a"]) == "did you mean 'a'? valid: a"
-    assert did_you_mean("q", [str(k) for k in range(100)]) == ""
+    assert did_you_mean("q", [str(k) for k in range(100)]) == "there are 100, such as 0, 1, 10"
     assert did_you_mean("q", []) == "none is defined"
 
 
@@ -106,5 +108,12 @@ def test_messages_are_bounded_whatever_a_file_says():
 
 def test_of_very_many_names_none_is_likened():
     names = [f"joint_{k:06d}" for k in range(100_000)]
-    assert did_you_mean("joint_00000x", names) == ""
+    assert did_you_mean("joint_00000x", names) == "there are 100,000, such as joint_000000, joint_000001, joint_000002"
     assert did_you_mean("joint_000001", names[:1000]) == "did you mean 'joint_000001'?"
+
+
+def test_a_value_that_cannot_be_a_name_is_no_name():
+    with pytest.raises(JounceError, match=r"no link has this name, got \[0, 0\]; valid: base, rod"):
+        check_name("link", [0, 0], {"base": 0, "rod": 1}, JounceError)
+    with pytest.raises(JounceError, match=r"frame: unknown frame, got \[0, 0\]; valid: body, global"):
+        check_choice("frame", [0, 0], {"body", "global"}, JounceError)

@@ -12,7 +12,7 @@ import numbers
 import operator
 import sys
 import warnings
-from collections.abc import Collection, Iterable
+from collections.abc import Collection, Hashable, Iterable
 from typing import Any
 
 __all__ = [
@@ -153,13 +153,13 @@ def check_name(
     kind: str, given: object, known: Collection[str], error: type[JounceError], what: str = "name", **location: Any
 ) -> None:
     """Raise an error unless something of a kind has the name given; `location` says where it was given."""
-    if given not in known:
+    if not isinstance(given, Hashable) or given not in known:
         raise error(no_such(kind, given, known, what), value=given, **location)
 
 
 def check_choice(field: str, value: object, valid: Collection[str], error: type[JounceError], **location: Any) -> None:
     """Raise an error unless a word, such as the name of a frame, is valid; `location` is the field's name."""
-    if value not in valid:
+    if not isinstance(value, Hashable) or value not in valid:
         raise error(unknown(field, value, valid), value=value, **{"name": field, **location})
 
 
@@ -202,6 +202,8 @@ def did_you_mean(name: object, valid: Iterable[str], limit: int = 20) -> str:
         parts.append(f"valid: {', '.join(words)}")
     elif not names:
         parts.append("none is defined")
+    elif limit and not near:
+        parts.append(f"there are {len(names):,}, such as {', '.join(words[:3])}")
     return " ".join(parts)
 
 

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import jounce as jn
-from jounce.cli import main
+from jounce.cli import COMMANDS, main
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 FOUR_BAR = str(ROOT / "examples" / "four_bar.yaml")
@@ -356,6 +356,16 @@ def test_version_and_help(run):
         assert (status, err) == (0, "")
         assert "Usage: jounce" in out
         assert "Examples:" in out
+
+
+def test_help_of_every_command_names_what_an_option_is(run):
+    for command in COMMANDS:
+        status, out, err = run(command.__name__, "--help")
+        assert (status, err) == (0, "")
+        explained = re.findall(r"^  -[^:]*: (.+)", out, re.MULTILINE)
+        assert len(explained) >= (command.__name__ != "schema")
+        assert [words for words in explained if re.match(r"(Of|From|Those|Whose|Which|What|Where)\b", words)] == []
+        assert not re.search(r"\S {3,}--", out)  # a command that goes on in the next line
 
 
 @pytest.mark.slow

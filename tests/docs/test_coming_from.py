@@ -304,7 +304,7 @@ def _(panda, planar_arm):
         near(state.robot.mass - (0.0 if base is None else base.mass), pin.computeTotalMass(state.model))
 
 
-@row(PINOCCHIO, "`model.gravity`: 9.81 m/s^2 along -z, whatever `<option gravity>` of an MJCF file says")
+@row(PINOCCHIO, "`model.gravity`: 9.81 m/s^2 along -z; `<option gravity>` of an MJCF file is ignored")
 def _(panda):
     near(panda.robot.gravity, panda.model.gravity.linear)
     path = ROBOTS / "planar_arm.xml"
@@ -321,7 +321,7 @@ def _(panda):
     assert np.abs(whole - found).max() > 1e-4  # the damping of the file
 
 
-@row(PINOCCHIO, "`rnea`, a model of MJCF: it holds the armature, and neither damping nor friction")
+@row(PINOCCHIO, "`rnea`, a model of MJCF: includes the armature, but neither damping nor friction")
 def _(planar_arm):
     robot, q = planar_arm.robot, planar_arm.q
     near(jn.mass_matrix(robot, q[0]) @ q[2] + jn.bias_forces(robot, q[:2], drives=False), planar_arm.rnea)

@@ -53,6 +53,8 @@ def test_paths_run_through_the_point_and_are_colored_by_a_derivative(recording):
     sizes = np.linalg.norm(expected[:, 2], axis=1)
     np.testing.assert_allclose(drawn.extremes, (0.0, sizes.max()), rtol=1e-12)
     assert drawn.colors[0, 0].tolist() == [68, 1, 84]  # viridis begins so
+    steady = Overlay.of(recording, DisplayOptions((TracedPoint(rim(recording), ()),), path_order=1))
+    assert steady.extremes[0] == 0.0  # colors start at zero
     assert not drawn.arrows
 
 

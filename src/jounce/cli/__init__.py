@@ -89,11 +89,11 @@ FIRST = """\
   jounce view four-bar.yaml                    # moving, in the browser
   jounce convert robot.urdf robot.yaml         # a robot as a mechanism
 
-jounce COMMAND --help explains a command, with examples; --verbose tells more of what is wrong."""
+jounce COMMAND --help explains a command, with examples; --verbose adds details to errors."""
 STATUS = """\
 Exit status:
   0  success
-  1  a failed instant, a broken limit, no possible start, nothing written
+  1  a failed instant, a violated limit, no possible start, nothing written
   2  bad input
   130  interrupted by Ctrl-C; 143 ended by SIGTERM"""
 
@@ -166,7 +166,7 @@ def _status(given: list[str], as_json: bool, verbose: bool) -> int:
     except SolveError as error:
         complain(error, json=as_json)
         if details := getattr(error, "details", ""):
-            detail(details if verbose else "--verbose tells more", json=as_json)
+            detail(details if verbose else "--verbose adds details", json=as_json)
         return 2 if error.motion is None else 1
     except JounceError as error:
         complain(error, json=as_json)

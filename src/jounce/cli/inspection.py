@@ -48,12 +48,12 @@ def inspect(
     range_
         Print the range of a driver, and the transmission at its ends.
     driver
-        Whose range, where there are several.
+        Driver of the range, if there are several.
     as_
-        Tell how another program numbers the coordinates of a robot file:
+        Show how another program numbers the coordinates of a robot file:
         pinocchio, mujoco, drake, pybullet or yourdfpy.
     model
-        Which model of an SDF file that holds several.
+        Model to read from an SDF file with several.
 
     Examples
     --------

@@ -118,9 +118,9 @@ class RobotReading:
     as_controller
         Interpolate as joint_trajectory_controller of ros2_control.
     topic
-        Of a bag, as /joint_states.
+        Topic to read from a bag, such as /joint_states.
     joints
-        Those of the trajectory that are read (export: in this order), as a,b.
+        Joints to read, such as a,b; export writes them in this order.
     model
         Model to read from an SDF file with several.
     closures

@@ -2,6 +2,7 @@
 
 import json
 import pathlib
+import re
 
 import pytest
 
@@ -34,7 +35,16 @@ def test_robots_are_copied_with_their_ending_in_the_name(run, tmp_path):
     assert (tmp_path / "arm.urdf").read_bytes() == (EXAMPLES / "robots" / "panda.urdf").read_bytes()
 
 
+def test_only_models_are_to_be_inspected(run, tmp_path):
+    assert "jounce inspect" in run("example", "four_bar", tmp_path / "four_bar.yaml")[1]
+    status, out, _ = run("example", "limits/franka_panda", tmp_path / "limits.yaml")
+    assert (status, out) == (0, f"Written to {tmp_path / 'limits.yaml'}\n")
+
+
 def test_an_unknown_one_is_named_with_its_neighbor(run):
     status, _, err = run("example", "fourbar")
     assert status == 2
     assert "no example has this name, got 'fourbar'; did you mean 'four_bar'?" in err
+    status, _, err = run("example", "nosuch")
+    assert status == 2
+    assert re.search(r"got 'nosuch'; there are \d+, such as andrews, barrel_cam, belt_drive$", err.strip())

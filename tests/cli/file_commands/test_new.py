@@ -65,6 +65,7 @@ def test_a_file_that_is_there_is_kept_unless_forced(run):
     "arguments, part",
     [
         (("fourbar",), "did you mean 'four-bar'?"),
+        (("press",), "no starter has this name, got 'press'; `jounce example press` copies the example"),
         (("cam", "cam.txt"), "valid: .yaml, .yml, .toml, .json"),
         (("cam", "no/where/cam.yaml"), "does not exist"),
         (("cam", "--forse"), "--force"),

@@ -17,6 +17,12 @@ def test_each_kind_writes_a_figure(run, tmp_path, kind):
         assert min(picture.size) > 400
 
 
+def test_outputs_alone_are_named_on_request(run, tmp_path):
+    path = tmp_path / "sketch.png"
+    status, _, err = run("plot", FOUR_BAR, "--kind", "sketch", "--names", "outputs", "--out", path)
+    assert (status, err) == (0, "")
+
+
 def test_an_ending_of_a_film_draws_one(run, tmp_path):
     path = tmp_path / "film.gif"
     assert run("plot", FOUR_BAR, "--fps", "4", "--speed", "0.5", "--out", path)[0] == 0

@@ -136,6 +136,20 @@ NOTHING = jn.Robot("frame", [jn.Link("base")], [])
             "q: must hold q along its last axis but one: the shape (..., order + 1, n), not (0, 1)",
         ),
         (lambda: jn.inverse_dynamics(PIN, [[0.0], [1.0, 2.0]]), "q: must be an array of real numbers, got 'list'"),
+        (
+            lambda: jn.forward_kinematics(PIN, "rod", "rod"),
+            "q: must be an array of real numbers, got 'rod'; the arguments are the robot, q, then the name of a link",
+        ),
+        (
+            lambda: jn.mass_matrix(PIN, None, [0.0]),
+            "mass_matrix: takes 2 arguments without names, not 3; write jn.mass_matrix(robot, q) for "
+            "pin.crba(model, data, q)",
+        ),
+        (
+            lambda: jn.jacobian(PIN, None, [0.0], "rod", None),
+            "jacobian: takes 4 arguments without names, not 5; write jn.jacobian(robot, q[None], link)[0] for "
+            "pin.computeFrameJacobian(model, data, q, frame, LOCAL_WORLD_ALIGNED)",
+        ),
         (lambda: jn.inverse_dynamics(PIN, "q.csv"), "q: must be an array of real numbers, got 'str'"),
         (
             lambda: jn.inverse_dynamics(PIN, np.zeros((3, 1), complex)),

@@ -56,7 +56,7 @@ def sweep(
         Motion of a robot: .csv, .yaml, .toml or .json.
     vary
         NAME=LOW:HIGH:COUNT, with units; with --sample NAME=LOW:HIGH,
-        NAME=normal:SIGMA or NAME=uniform:HALFWIDTH; repeatable. Of robots
+        NAME=normal:SIGMA or NAME=uniform:HALFWIDTH; repeatable. For robots
         payload.LINK, armature.JOINT, damping.JOINT, friction.JOINT, speed.
     out
         Folder of the results, its name ending in .zarr.

@@ -8,11 +8,13 @@ from pathlib import Path
 from jounce.cli.options import Overwrite
 from jounce.reporting.terminal import say, say_json, show_columns
 
+NO_MODELS = ("cams/", "drives/", "limits/", "trajectories/")  # examples that `jounce inspect` does not read
+
 
 def example(
     name: str | None = None, file: Path | None = None, /, *, overwrite: Overwrite = False, json: bool = False
 ) -> int:
-    """Copy an example of the package, with the files that it names; without a name, list them.
+    """Copy an example with the files that it names, or list the examples.
 
     Parameters
     ----------
@@ -47,6 +49,6 @@ def example(
         return 0
     for path in written:
         say(f"Written to {path}")
-    if written[0].endswith((".yaml", ".urdf", ".xml", ".sdf")):
+    if not name.startswith(NO_MODELS) and written[0].endswith((".yaml", ".urdf", ".xml", ".sdf")):
         say(f"\nTry now:\n  jounce inspect {shlex.quote(written[0])}")
     return 0

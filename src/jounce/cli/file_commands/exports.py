@@ -42,7 +42,7 @@ def export(
     out
         File to write.
     rate
-        Rows a second, as 1kHz; else 1 kHz, 500 Hz or 100 Hz.
+        Rate of the rows [default: franka 1kHz, ur 500Hz, ros 100Hz].
     torques
         Write torques too.
     header_units

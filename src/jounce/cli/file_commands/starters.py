@@ -12,7 +12,7 @@ from jounce.reporting.terminal import say, say_json, show_columns
 def new(
     name: str | None = None, file: Path | None = None, /, *, overwrite: Overwrite = False, json: bool = False
 ) -> int:
-    """Write a commented starter file; without a name, list them.
+    """Write a commented starter file, or list the starters.
 
     Parameters
     ----------
@@ -39,7 +39,7 @@ def new(
             say_json("new", {"starters": listed})
             return 0
         show_columns([(starter.name, starter.about) for starter in STARTERS.values()])
-        say("\nWrite one with: jounce new NAME [FILE]")
+        say("\nWrite one with: jounce new NAME [FILE]; complete machines: jounce example")
         return 0
     target = Path(f"{name}.yaml") if file is None else file
     starter = write_starter(name, target, overwrite=overwrite)

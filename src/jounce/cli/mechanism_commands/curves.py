@@ -40,16 +40,16 @@ def trace(
 ) -> int:
     """Follow a mechanism through dead points: limits, branches, curves.
 
-    One driver is released, and the whole curve of configurations is
-    followed by arc length (numerical continuation) until it closes or
-    ends. The command lists limit positions, branches and change points.
+    The value of one driver becomes an unknown, and the command follows
+    the curve of configurations by arc-length continuation until it
+    closes or ends. The command lists limit positions, branches and change points.
 
     Parameters
     ----------
     file
         Mechanism file: .yaml, .yml, .toml or .json.
     driver
-        The driver that is released, or "time" [default: the only one].
+        Driver to release, or "time" [default: the only one].
     time
         Instant of the start, s; other drivers stop there [file's first].
     order

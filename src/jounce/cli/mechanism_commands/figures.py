@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from jounce.mechanism import Mechanism
 
 Kind = Literal["outputs", "sketch", "hodograph", "phase", "energy", "power", "reactions", "animation"]
-Names = Literal["all", "bodies", "joints", "none"]
+Names = Literal["all", "bodies", "joints", "outputs", "none"]
 ANIMATIONS = (".gif", ".mp4")
 ORDERS = {"outputs": 4, "reactions": 4, "power": 4, "energy": 1, "phase": 1, "hodograph": 1}  # unless another is given
 PORTRAITS = ("hodograph", "phase")

@@ -45,7 +45,7 @@ def modes(
     overwrite: Overwrite = False,
     json: bool = False,
 ) -> int:
-    """Find an equilibrium of a mechanism, and its modes there.
+    r"""Find an equilibrium of a mechanism, and its modes there.
 
     The command prints the equilibrium and its stability, natural
     frequencies, damping ratios, and what moves most in each mode. With

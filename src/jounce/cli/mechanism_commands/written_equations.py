@@ -52,11 +52,11 @@ def equations(
     joint
         Joint or driver whose equations are written [all].
     quantity
-        What code computes; repeatable. Mechanisms: constraints [default],
+        Quantity of the code; repeatable. Mechanisms: constraints [default],
         forces with the mass matrix, outputs with derivatives. Robots: torque
         [default], mass_matrix, regressor, energies.
     order
-        Highest derivative [4].
+        Highest derivative.
     no_drives
         Omit armature, damping, friction and springs of a robot.
     out

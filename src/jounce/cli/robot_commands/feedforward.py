@@ -43,7 +43,7 @@ def feedforward(
     r"""Compute the motor motion and torque for links behind springs.
 
     The links follow the given motion exactly. The exit status is 0 if
-    all limits of the drives are kept, and 1 if one is broken.
+    all limits of the drives are satisfied, and 1 if one is violated.
 
     Parameters
     ----------

@@ -76,15 +76,15 @@ def retime(
     cells
         Pieces of the spline of the rate, 20 or more [160].
     deviation
-        Of the path from straight lines between samples, as 0.1deg, 1mm; a
-        plain number is in rad or m [0.001, or 0.001 of its size if less];
-        between waypoints go splines unless it is given.
+        Largest distance of the path from straight lines between samples,
+        such as 0.1deg; a plain number is in rad or m [0.001, or 0.001 of
+        its size if less]. Without it, splines connect waypoints.
     duration
-        Of the motion, in place of the least, as 2.5s; a plain number is in s.
+        Duration instead of the shortest one, such as 2.5s.
     running
-        Trajectory on which the robot is already: begin as it is at --at.
+        Trajectory that the robot follows now; start from its state at --at.
     at
-        Instant of it, as 0.8s; a plain number is in s.
+        Instant of --running, such as 0.8s.
     figure
         Draw which limits are active when: .png, .svg or .pdf.
 

@@ -38,8 +38,8 @@ def check(
 ) -> int:
     r"""Compare a trajectory with the limits of a robot, to torque rate.
 
-    The exit status is 0 if all limits are kept, and 1 if one is broken,
-    also by a jump from rest at the start or to rest at the stop.
+    The exit status is 0 if all limits are satisfied, and 1 if one is
+    violated, also by a jump from rest at the start or to rest at the stop.
 
     Parameters
     ----------

@@ -31,7 +31,7 @@ def smooth(
 
     Its derivatives to the sixth are continuous, it stands still where the
     samples do, and its jerk is that of the motion, not of the noise. With
-    --out, positions to jerk are written. Needs Clarabel: pip install
+    --out, positions to jerk are written. It needs Clarabel: pip install
     'jounce[planning]'.
 
     Parameters
@@ -41,9 +41,9 @@ def smooth(
     trajectory
         A log: samples (.csv), joint states (.yaml), a bag.
     deviation
-        From each sample, as 0.01deg, 1mm; a plain number is in rad or m.
+        Largest distance from a sample, such as 0.01deg; else in rad or m.
     rate
-        Of the rows, as 1kHz, 500Hz; a plain number is in Hz.
+        Rate of the rows, such as 1kHz; a plain number is in Hz.
     figure
         Draw distances from the samples, and jerk: .png, .svg or .pdf.
 

@@ -79,9 +79,13 @@ def write_starter(name: str, path: str | PathLike[str], *, overwrite: bool = Fal
     """
     from jounce.io.files import DATA_FILES
     from jounce.io.files.dumping import dumped
+    from jounce.io.files.examples import example_names
     from jounce.io.files.parsers import read_yaml
     from jounce.io.files.writing import check_target, replacing
 
+    if name not in STARTERS and name in example_names():
+        message = f"no starter has this name; `jounce example {name}` copies the example"
+        raise JounceError(message, value=name)
     check_name("starter", name, STARTERS, JounceError)
     starter, suffix = STARTERS[name], Path(path).suffix.lower()
     check_target(path, DATA_FILES, "mechanism file", overwrite=overwrite)

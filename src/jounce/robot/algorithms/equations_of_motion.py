@@ -174,6 +174,7 @@ def _bias(tree: Tree, arrays: tuple[Series], _: Any, parts: frozenset[str], driv
     return forces + stacked(inertial_forces(tree, coordinates, rate, still))
 
 
+@stacked_arguments(2, "jn.mass_matrix(robot, q) for pin.crba(model, data, q)")
 def mass_matrix(
     robot: Robot, q: ArrayLike, *, rates: bool = False, drives: bool = True
 ) -> Float[Numbers, "*batch joint joint"]:

@@ -10,7 +10,7 @@ from jounce.base.shapes import ArrayLike, Numbers
 from jounce.errors import RobotError, whole_number
 from jounce.jet import Jet, concatenate, cross
 from jounce.jet.algebra import stacked
-from jounce.robot.model.arguments import checked_coordinates
+from jounce.robot.model.arguments import checked_coordinates, stacked_arguments
 from jounce.robot.model.tree import Frame, Tree
 from jounce.robot.recursions.batches import Batched
 from jounce.robot.recursions.kinematics import body_frames, frame_at, link_frame
@@ -39,6 +39,10 @@ def _jacobian(tree: Tree, arrays: tuple[Series], frame: Frame) -> Any:
     return stacked(jacobian_jet(tree, arrays[0], frame))
 
 
+@stacked_arguments(
+    4,
+    "jn.jacobian(robot, q[None], link)[0] for pin.computeFrameJacobian(model, data, q, frame, LOCAL_WORLD_ALIGNED)",
+)
 def jacobian(
     robot: Robot, q: ArrayLike, link: str, point: ArrayLike = (0.0, 0.0, 0.0)
 ) -> Float[Numbers, "*batch derivative 6 joint"]:

@@ -75,6 +75,15 @@ def joints_of(robot: object) -> tuple[str, ...]:
     return robot.joint_names
 
 
+def _numbered(robot: AbstractRobot, name: str, q: object) -> tuple[int, Float[Numbers, "..."]]:
+    """Return the number of joints, and coordinates as an array."""
+    count = len(joints_of(robot))
+    if isinstance(q, str) and q in robot.frames:
+        message = "must be an array of real numbers; the arguments are the robot, q, then the name of a link"
+        raise RobotError(message, name=name, value=q)
+    return count, floats(name, q)
+
+
 def checked_position(robot: AbstractRobot, q: object, name: str = "q") -> Float[Numbers, "*batch 1 joint"]:
     """Return coordinates without derivatives as those of order zero.
 
@@ -83,7 +92,7 @@ def checked_position(robot: AbstractRobot, q: object, name: str = "q") -> Float[
     RobotError
         If there is no robot, or their shape, (..., n), does not fit it.
     """
-    n, q = len(joints_of(robot)), floats(name, q)
+    n, q = _numbered(robot, name, q)
     if q.ndim < 1 or q.shape[-1] != n:
         raise RobotError(f"must have the shape (..., n) with n = {n}, not {q.shape}", name=name)
     return q[..., None, :]
@@ -114,7 +123,7 @@ def checked_coordinates(
     RobotError
         If there is no robot, their shape does not fit it, or the derivatives are too few or too many.
     """
-    n, q = len(joints_of(robot)), floats("q", q)
+    n, q = _numbered(robot, "q", q)
     if q.ndim < 2 or q.shape[-1] != n:
         joints = f"{robot.name} has {n} {'joint' if n == 1 else 'joints'}"
         stack = "; stack positions and derivatives: np.stack([q, v, a])" if q.shape == (n,) else ""

@@ -53,7 +53,7 @@ def legend(shown: Overlay, frame: int) -> str:
         parts.append(_color_bar(shown))
     parts += _loads(shown, frame)
     body = "".join(parts) or "nothing is marked"
-    return f'<div style="font-size:0.8em;line-height:1.45;padding:2px 8px 4px 8px">{body}</div>'
+    return f'<div style="font-size:0.8em;line-height:1.45;padding:2px 16px 4px 8px">{body}</div>'
 
 
 def _loads(shown: Overlay, frame: int) -> list[str]:

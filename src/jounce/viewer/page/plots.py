@@ -112,9 +112,9 @@ class Chart:
             title=title,
             scales=scales,
             axes=(below, {"size": 58, "ticks": TICKS}),
-            legend={"show": count > 1},
+            legend={"show": count > 1, "live": False},
             height=180,
-            padding=(6, 14, 0, 0),
+            padding=(6, 14, 4 if count > 1 else 0, 0),
         )
 
     def _read(self, recording: Recording) -> tuple[str, dict[str, Any]]:

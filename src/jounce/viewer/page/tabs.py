@@ -16,6 +16,7 @@ __all__ = ["ArrowsTab", "ForcesTab"]
 
 OWN = "a point of my own"
 SHOWN = 4  # derivatives with a check box; higher ones are plotted
+SCALE_HINT = "Factor by which arrows are longer than the automatic length"
 
 
 class ArrowsTab(Observer):
@@ -57,8 +58,7 @@ class ArrowsTab(Observer):
         self.path = self.gui.add_dropdown("path color", names, initial_value=names[0])
         self.path.on_update(lambda _: self._set(path_order=1 + names.index(self.path.value)))
         for order, name in enumerate(names[: min(max_order, SHOWN)], 1):
-            hint = "Longer or shorter than the automatic length"
-            slider = self.gui.add_slider(f"{name} x", 0.1, 5.0, 0.1, 1.0, hint=hint)
+            slider = self.gui.add_slider(f"{name} scale", 0.1, 5.0, 0.1, 1.0, hint=SCALE_HINT)
             slider.on_update(lambda event, order=order: self._set_length(order, float(event.target.value)))
 
     def _set_length(self, order: int, factor: float) -> None:
@@ -143,7 +143,7 @@ class ForcesTab:
             )
             return
         self.boxes = {kind: gui.add_checkbox(words, False) for kind, words in LOAD_WORDS.items()}
-        self.length = gui.add_slider("length x", 0.1, 5.0, 0.1, 1.0)
+        self.length = gui.add_slider("arrow scale", 0.1, 5.0, 0.1, 1.0, hint=SCALE_HINT)
         for control in (*self.boxes.values(), self.length):
             control.on_update(lambda _: self._set())
         gui.add_markdown(

@@ -110,19 +110,17 @@ def colored_paths(
     colors : numpy.ndarray of uint8, shape (lines, 2, 3)
         From dark to light.
     extremes : tuple of float
-        Sizes that the darkest and the lightest color stand for.
+        Sizes that the darkest and the lightest color stand for, of which the first is zero.
     """
     motions = [recording.motion(each.point) for each in traced if each.path and len(recording.time) > 1]
     if not motions:
         return np.zeros((0, 2, 3)), np.zeros((0, 2, 3), np.uint8), (0.0, 0.0)
     points = np.stack([motion[:, 0] for motion in motions]) + in_front(recording)
     sizes = np.linalg.norm([motion[:, order] for motion in motions], axis=-1)
-    low, high = float(sizes.min()), float(sizes.max())
-    low = 0.0 if low <= 1e-9 * high else low
-    range_ = high - low if high - low > 1e-9 * high else 1.0
-    colors = path_colors((sizes - low) / range_)
+    most = float(sizes.max())
+    colors = path_colors(sizes / (most or 1.0))
     lines, ends = (np.stack([x[:, :-1], x[:, 1:]], axis=2).reshape(-1, 2, 3) for x in (points, colors))
-    return lines, ends, (low, high)
+    return lines, ends, (0.0, most)
 
 
 def path_colors(share: Float[np.ndarray, "*batch"]) -> UInt8[np.ndarray, "*batch 3"]:
