@@ -1,7 +1,7 @@
 """Friction of joints in the equations of motion: forces in proportion to reactions, which they change.
 
-The normal force N of each joint with friction counts among the unknowns beside the multipliers, and the friction of a
-normal force of one is known from the motion: bodies feel it as they feel a residual held by a multiplier. So
+The normal forces N of joints with friction are unknowns in addition to the multipliers, and the friction of a normal
+force of one is known from the motion: bodies feel it as they feel a residual held by a multiplier. So
 
     J^T lambda + V N = load,    N = |R(lambda)|,
 
@@ -42,7 +42,7 @@ NormalForces = Float[Numbers, "joint batch"]
 
 
 def rubs(group: Group) -> bool:
-    """Tell whether joints of a group have friction."""
+    """Return whether joints of a group have friction."""
     return getattr(group.element, "friction", None) is not None
 
 
@@ -211,8 +211,8 @@ class Coupling(Module):
         forces = jax.lax.stop_gradient(solved(lost, jnp.where(lost, 0.0, forces), RAMP))
         gap, whole = gap_of(normal, forces, free, response)
         factor = DenseFactor.of(whole)
-        found = is_found(*map(jax.lax.stop_gradient, (gap, forces, whole)))
-        forces = jnp.where(found, forces + factor.solve(gap), jnp.nan)  # the last step has the derivatives of all
+        converged = is_found(*map(jax.lax.stop_gradient, (gap, forces, whole)))
+        forces = jnp.where(converged, forces + factor.solve(gap), jnp.nan)  # the last step has the derivatives of all
         return cls(response, factor), with_friction(forces, free, response), forces
 
     def solved(self, free: Float[Numbers, "row batch"], lower: NormalForces) -> tuple[Any, NormalForces]:
@@ -230,7 +230,7 @@ class Coupling(Module):
 
 
 def _is_regular_from_none(matrix: Float[Numbers, "joint joint batch"]) -> Any:
-    """Tell where the matrix of normal forces keeps its sign as friction grows from none, (batch,)."""
+    """Return where the matrix of normal forces keeps its sign as friction grows from none, (batch,)."""
     size, _, lanes = matrix.shape
     unit = jnp.eye(size)[..., None]
     shares = jnp.concatenate([unit + share * (matrix - unit) for share in SHARES], axis=-1)

@@ -41,18 +41,18 @@ class FreeFriction:
 
     def normal_forces(self, multipliers: Rows) -> Float[Numbers, "joint batch"]:
         """Return what presses the surfaces of all joints with friction together, from multipliers of scaled rows."""
-        unscaled, found, first = multipliers * self.system.row_scale, [], 0
+        unscaled, normals, first = multipliers * self.system.row_scale, [], 0
         for group in self.system.groups:
             bodies = tuple(self._at_rest.take(indices) for indices in group.bodies)
             shape = jax.eval_shape(lambda g=group: g.residual(self.pose.truncate(0), self.time).coefficients[0]).shape
             count = shape[0] * shape[1]
             if rubs(group):
                 own = unscaled[first : first + count].reshape(shape[0], shape[1], -1)
-                found.append(
+                normals.append(
                     self._lost(group, own) if loses_torque(group.element) else self._pressed(group, bodies, own)
                 )
             first += count
-        return jnp.concatenate(found)
+        return jnp.concatenate(normals)
 
     def _lost(self, group: Group, own: Any) -> Any:
         return torque_lost(group.element, Jet([own]), self._resisting(group)).coefficients[0]
@@ -73,20 +73,20 @@ class FreeFriction:
 
     def slips(self, change: Pose) -> list[Any]:
         """Return by how much the surfaces of each group slip on each other as all bodies are displaced by a change."""
-        found = []
+        slips = []
         for group in self.groups:
             bodies, changes = ([p.take(its) for its in group.bodies] for p in (self._at_rest, change))
-            found.append(group.element.slip(tuple(bodies), displacements(bodies, changes)).coefficients[0])
-        return found
+            slips.append(group.element.slip(tuple(bodies), displacements(bodies, changes)).coefficients[0])
+        return slips
 
     def resisting(self, normal: Float[Numbers, "joint batch"]) -> list[Any]:
         """Return what resists the slip of each group, conjugate to `slips`, for normal forces of all joints."""
-        found, first = [], 0
+        forces, first = [], 0
         for group in self.groups:
             factor = self._resisting(group).coefficients[0]
-            found.append(factor * normal[first : first + group.instances][None])
+            forces.append(factor * normal[first : first + group.instances][None])
             first += group.instances
-        return found
+        return forces
 
 
 def with_friction(

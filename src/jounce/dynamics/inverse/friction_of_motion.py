@@ -67,15 +67,15 @@ class Rubbing(Module):
 
 
 def rubbing_of(system: System, blocks: Slopes, rubbed: Sequence[Rubbed], pose_type: type[Pose]) -> list[Rubbing]:
-    """Return the groups of joints with friction; what is told of each is in the order of the groups."""
-    found, first, left = [], 0, iter(rubbed)
+    """Return the groups of joints with friction; `rubbed` is in the order of the groups."""
+    rubbing, first, left = [], 0, iter(rubbed)
     for group, slopes in zip(system.groups, blocks, strict=True):
         if rubs(group):
             friction, bodies, resisting = next(left)
             poses = [pose_of(body, pose_type, len(slopes[0]) - 1) for body in bodies]
-            found.append(Rubbing(group, poses, slopes, friction, resisting, first))
+            rubbing.append(Rubbing(group, poses, slopes, friction, resisting, first))
         first += slopes[0].shape[2] * group.instances
-    return found
+    return rubbing
 
 
 def with_friction(

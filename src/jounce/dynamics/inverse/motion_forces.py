@@ -31,7 +31,7 @@ NOTHING = 1e-9  # of the largest multiplier: what is less is rounding
 
 
 class MotionForces:
-    """The forces in a motion, computed when they are asked for and kept. Sommer 2024, section 7.
+    """The forces in a motion, computed on request and stored. Sommer 2024, section 7.
 
     Parameters
     ----------
@@ -239,7 +239,7 @@ class MotionForces:
         return [[self._slopes(index, slot, lanes) for slot in group.moving_slots] for index, group in groups]
 
     def is_loaded(self, name: str) -> bool:
-        """Tell whether a joint or driver exerts anything anywhere in the motion."""
+        """Return whether a joint or driver exerts a force anywhere in the motion."""
         sizes = np.abs(np.nan_to_num(np.asarray(self.multipliers[0])))
         return bool(sizes[list(self.indices[name].own_rows)].max(initial=0.0) > NOTHING * sizes.max(initial=0.0))
 
