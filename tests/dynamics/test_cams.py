@@ -170,6 +170,7 @@ STEPS = "profile: [{profile: polynomial_4_5_6_7, duration: 360 deg, to: 2 mm}], 
     ],
     ids=["expression", "advance", "hold"],
 )
+@pytest.mark.filterwarnings("ignore::jounce.errors.UnitWarning")
 def test_laws_in_space_go_on_from_turn_to_turn(tmp_path, motion, turn):
     """Contact and shaft torque with rates where the law does not come back: it starts 8 turns on, and goes on for 3."""
     text = IN_SPACE.replace("motion: 20*t", "motion: 50 - 20*t").replace(
@@ -220,6 +221,7 @@ def test_gradients_of_cams_in_space_know_all_turns(tmp_path):
 
 
 @pytest.mark.slow
+@pytest.mark.filterwarnings("ignore::jounce.errors.UnitWarning")
 def test_a_shaft_that_is_driven_too_far_from_the_guess_is_refused(tmp_path):
     """Two shafts that turn unlike each other: turns are followed one by one, and no more than 100."""
     other = "\n  other: {type: rotation, bodies: [ground, rocker], axis: [0, 0, 1], motion: 2828 + t}"
