@@ -83,7 +83,7 @@ class Cam(AbstractConstraint):
         self.of = of
 
     @property
-    def hidden(self) -> tuple[str, ...]:
+    def hidden(self) -> tuple[str, ...]:  # pyright: ignore[reportIncompatibleVariableOverride]
         """The angle of a leader that turns in space, with its whole turns."""
         return ("turn",) if turns_in_space(self.leader) else ()
 
