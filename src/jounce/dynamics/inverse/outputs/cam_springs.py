@@ -18,6 +18,7 @@ from jounce.trajectory.law_checks.breaks import with_sides
 
 SHARE = 0.1  # of a size, by which the spring is changed to see what it does
 EXACT = 1e-7  # of the largest contact: what may be left of it at its least
+PEAKS, POINTS, ROUNDS = 3, 15, 5  # highest maxima, instants on both sides of each, and how often these close in
 
 
 @dataclasses.dataclass(frozen=True)
@@ -42,9 +43,9 @@ class ContactSpring:
 def contact_spring(mechanism: Mechanism, cam: str, spring: str, time: TimeLike | None = None) -> ContactSpring:
     """Return the spring with the least preload that keeps a follower on its cam in a driven motion.
 
-    The contact force is linear in where the spring is free, so that two motions tell it. It presses in the sense that
-    it has in the mean with the spring as it is. Besides the instants of the grid those just before and
-    after the knots of laws count.
+    The contact force is linear in where the spring is free, so two motions determine it. It presses in the sense that
+    it has in the mean with the spring as it is. Besides the instants of the grid, those just before and after the knots
+    of laws count, and around the highest maxima of the preload further instants, which close in on them.
 
     Parameters
     ----------
@@ -89,19 +90,37 @@ def contact_spring(mechanism: Mechanism, cam: str, spring: str, time: TimeLike |
     given = float(resolve(getattr(force, field), mechanism.parameter_values))
     now = contact(given)
     step = SHARE * max(abs(given), float(np.ptp(now)) / _stiffness(mechanism, force), 1e-6)
-    slope = (contact(given + step) - now) / step
     sense = 1.0 if np.mean(now) >= 0 else -1.0
-    if (sense * slope).max() * (sense * slope).min() <= 0:
-        message = "does nothing to the contact force, or presses at some instants and pulls at others"
-        raise MechanismError(message, name="spring", value=spring)
-    needed = given - now / slope
-    where = int(np.argmin(needed) if sense * slope[0] < 0 else np.argmax(needed))
+    for remaining in reversed(range(ROUNDS + 1)):
+        slope = (contact(given + step) - now) / step
+        if (sense * slope).max() * (sense * slope).min() <= 0:
+            message = "does nothing to the contact force, or presses at some instants and pulls at others"
+            raise MechanismError(message, name="spring", value=spring)
+        needed = given - now / slope
+        preload = -needed if sense * slope[0] < 0 else needed
+        if remaining and len(instants) > 1:
+            instants = _closer(instants, preload)
+            now = contact(given)
+    where = int(np.argmax(preload))
     left = contact(float(needed[where]))
     if abs((sense * left).min()) > EXACT * np.abs(left).max():
         raise MechanismError(
             "does not act on the contact in proportion to where it is free", name="spring", value=spring
         )
     return ContactSpring(float(needed[where]), float(instants[where]), float((sense * now).min()))
+
+
+def _closer(instants: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """Return instants with further ones on both sides of the highest local maxima of values."""
+    edge = [-np.inf]
+    before, after = np.concatenate([edge, values[:-1]]), np.concatenate([values[1:], edge])
+    maxima = np.flatnonzero((values > before) & (values >= after))
+    last = len(instants) - 1
+    further = [
+        np.linspace(instants[max(k - 1, 0)], instants[min(k + 1, last)], 2 * POINTS + 1)
+        for k in maxima[np.argsort(-values[maxima])][:PEAKS]
+    ]
+    return np.unique(np.concatenate([instants, *further]))
 
 
 def _with(mechanism: Mechanism, forces: Any, output: Any) -> Mechanism:
