@@ -365,7 +365,7 @@ class UnitWarning(_BoundedWarning):
 
 
 class AssemblyWarning(_BoundedWarning):
-    """Bodies were put together with a part turned over in its joint, unlike in the starting guess."""
+    """Bodies were assembled with a part turned over in its joint, unlike in the starting guess."""
 
 
 class IdleMotionWarning(_BoundedWarning):
@@ -402,7 +402,7 @@ class SolveError(JounceError):
 
 
 class AssemblyError(SolveError):
-    """The bodies cannot be put together from the starting guess.
+    """The bodies cannot be assembled from the starting guess.
 
     ``details`` is all that is known of it, where the message is a short one; the command tells it with ``--verbose``.
     """

@@ -473,7 +473,7 @@ def _():
 
 @row(PINOCCHIO, "`RigidConstraintModel`")
 def _():
-    """A five-bar is put together where the points that Pinocchio ties are in one place."""
+    """A five-bar is assembled where the points that Pinocchio ties are in one place."""
     robot = jn.load_robot(FIVE_BAR)
     mechanism = robot.mechanism(
         {"left_motor": 0.2, "right_motor": 0.1}, drivers={"left_motor": 0.2, "right_motor": 0.1}

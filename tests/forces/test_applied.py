@@ -178,7 +178,7 @@ def angle_between(i, j, t, vectors, turn_i=None, turn_j=None):
     axis = mp.matrix(AXIS) / mp.norm(mp.matrix(AXIS))
     relative = a_i.T * a_j
     if vectors:
-        # the vector on j counts by its part across the axis, as in the position put together: no turn of one frame
+        # the vector on j counts by its part across the axis, as in the position assembled: no turn of one frame
         lies = mp.matrix(V_J) - axis * dot(axis, V_J)
         b, a = list(relative * lies), V_I
         return mp.atan2(dot(axis, cross(a, b)), dot(a, b) - dot(axis, a) * dot(axis, b))

@@ -68,7 +68,7 @@ def test_half_a_turn_is_pi_whatever_its_last_digit_says():
 
 
 def assembled_angles(mechanism, instant=0.0):
-    """Return the angles of the moving bodies of a planar mechanism where it is put together."""
+    """Return the angles of the moving bodies of a planar mechanism where it is assembled."""
     return assemble(build(mechanism), instant, 1e-12)[1]["angle"][1:, 0]
 
 

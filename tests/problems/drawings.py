@@ -254,7 +254,7 @@ def _body(body, drawing, world, values):
 
 
 def at(mechanism, coordinates):
-    """Return a mechanism of which the guess is a position put together."""
+    """Return a mechanism of which the guess is a position assembled."""
     values = {name: x.reshape(-1, *x.shape[-3:])[0] if name != "angle" else x for name, x in coordinates.items()}
     bodies = {}
     for k, (name, body) in enumerate(mechanism.bodies.items(), start=1):
@@ -289,7 +289,7 @@ def counted(mechanism):
 
 
 def shifts(mechanism, coordinates, drawings):
-    """Return by how much the frames alone change the angle of each such element, at a position put together.
+    """Return by how much the frames alone change the angle of each such element, at a position assembled.
 
     In space it is the angle of ``A_i^T A_j`` about the axis; in the plane that of the bodies.
     """

@@ -64,7 +64,7 @@ def judged(linkage):
 
 
 def _starts(linkage, expected):
-    """Return the linkage put together in both ways in the middle of every range."""
+    """Return the linkage assembled in both ways in the middle of every range."""
     family, random = linkage.family, np.random.default_rng(0)
     ends = [*expected, expected[0] + 2 * np.pi] if len(expected) else [linkage.law.start, linkage.law.start]
     for value in 0.5 * (np.array(ends[1:]) + ends[:-1]):

@@ -97,5 +97,5 @@ class Slow:
         assert self.gate.wait(20.0)
         self.solved.append(values["value"])
         if values["value"] < 0:
-            raise jn.errors.AssemblyError("the bodies cannot be put together", name="value", value=values["value"])
+            raise jn.errors.AssemblyError("the bodies cannot be assembled", name="value", value=values["value"])
         return plain_recording(values["value"], "some instants are missing" if values["value"] > 100 else "")

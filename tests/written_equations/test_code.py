@@ -179,7 +179,7 @@ def test_mechanisms_along_their_motions(name, tmp_path):
 
 @pytest.mark.slow
 def test_a_worm_on_crossed_axes():
-    """Angles about axes are counted as along a motion, or from where the bodies are put together."""
+    """Angles about axes are counted as along a motion, or from where the bodies are assembled."""
     bodies = {"worm": jn.Body([0, 0, 0]), "wheel": jn.Body([0, 0, 0.1])}
     joints = {
         "a": jn.spatial.Revolute(("ground", "worm"), [0, 0, 0], [0, 0, 0], [1, 0, 0], [1, 0, 0]),

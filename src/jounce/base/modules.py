@@ -1,6 +1,6 @@
 """Objects whose values JAX sees, and copies of them with other values, made without the checks of a construction.
 
-A model is put together of modules that were checked already, and of each several copies are made for every solution:
+A model is built of modules that were checked already, and of each several copies are made for every solution:
 `dataclasses.replace` and `equinox.tree_at` take longer for one than Newton's method for a step.
 """
 

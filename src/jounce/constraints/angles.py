@@ -4,7 +4,7 @@ Between bodies that turn about a common axis, fixed in both, there is one angle,
 Euler parameters of their frames give it as ``2 atan2(u.e, e0)``; but unless the axis has the same components in both
 frames, that function also changes as the axes tilt against each other, and a torque that works on it tilts the bearing.
 Here body j is therefore given a frame that differs from that of body i by a turn about the axis only, at a position
-where the mechanism is put together, its `Datum`.
+where the mechanism is assembled, its `Datum`.
 """
 
 from typing import Any

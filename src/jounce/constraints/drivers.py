@@ -95,7 +95,7 @@ class SpatialDistanceDriver(DistanceDriver, type="distance", space="spatial", ro
 class RotationDriver(AbstractConstraint, type="rotation", space="spatial", role="driver"):
     """Prescribed angle of body j about an axis of body i. Sommer 2024, equations 101-103, continuous over turns.
 
-    Without vectors the angle is that of ``A_i^T A_j`` where the mechanism is put together, and the turn from there;
+    Without vectors the angle is that of ``A_i^T A_j`` where the mechanism is assembled, and the turn from there;
     with them, the signed angle from `vector_i` to `vector_j`.
     What is left of angle minus motion after whole turns must vanish, so that the motion may go on for many turns.
     """
@@ -104,7 +104,7 @@ class RotationDriver(AbstractConstraint, type="rotation", space="spatial", role=
     motion: MotionLaw  # rad
     vector_i: Vector = None
     vector_j: Vector = None
-    datum: Datum | None = eqx.field(default=None, init=False)  # found when the mechanism is put together
+    datum: Datum | None = eqx.field(default=None, init=False)  # found when the mechanism is assembled
 
     periodic = True
     law_apart = True

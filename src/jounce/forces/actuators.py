@@ -79,7 +79,7 @@ class SpatialTorque(AbstractForce, type="torque", space="spatial"):
     law: Law  # N m
     vector_i: Vector = None
     vector_j: Vector = None
-    datum: Datum | None = eqx.field(default=None, init=False)  # found when the mechanism is put together
+    datum: Datum | None = eqx.field(default=None, init=False)  # found when the mechanism is assembled
 
     unit = "N*m"
     dimensions = {"law": "torque"}

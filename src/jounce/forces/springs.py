@@ -99,7 +99,7 @@ class SpatialTorsionalSpring(AbstractForce, type="torsional_spring", space="spat
     damping: Scalar = 0.0  # N m s/rad
     vector_i: Vector = None
     vector_j: Vector = None
-    datum: Datum | None = eqx.field(default=None, init=False)  # found when the mechanism is put together
+    datum: Datum | None = eqx.field(default=None, init=False)  # found when the mechanism is assembled
 
     unit = "N*m"
     dimensions = {"stiffness": "torsional stiffness", "damping": "torsional damping", "angle": "angle"}

@@ -28,7 +28,7 @@ class Status(enum.IntEnum):
 
 _ADVICE = {
     Status.OK: "solved",
-    Status.NOT_ASSEMBLED: "the bodies cannot be put together; check lengths and the driver's range",
+    Status.NOT_ASSEMBLED: "the bodies cannot be assembled; check lengths and the driver's range",
     Status.SINGULAR: "the mechanism is at a singular position (a dead point), where its motion is not determined; "
     "drive another body, or keep the driver's range away from it",
     Status.BRANCH_JUMP: "the solution left its predicted path for another assembly branch, or a motion law jumps; "

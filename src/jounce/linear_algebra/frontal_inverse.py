@@ -1,7 +1,7 @@
 """Inverses of large sparse matrices, as one product with a small matrix for each front and each way through them.
 
 `FrontalFactor.solve` goes through reflections one after the other; where right sides come one by one, such as those of
-the orders of a Taylor series, what a front makes of them is put together once. Time and memory grow with the number of
+the orders of a Taylor series, what a front makes of them is assembled once. Time and memory grow with the number of
 fronts, where a dense inverse takes its square.
 """
 

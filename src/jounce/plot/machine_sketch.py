@@ -225,7 +225,7 @@ def sketch(
     Parameters
     ----------
     moving : Motion or Mechanism
-        A mechanism is put together near its starting guess; a motion is drawn at one instant.
+        A mechanism is assembled near its starting guess; a motion is drawn at one instant.
     instant : float, optional
         Time, s; the nearest instant of the motion that was solved is taken, the first unless given.
     names : str, default "all"
@@ -247,7 +247,7 @@ def sketch(
     MechanismError
         A name or an order is not valid, or no instant was solved.
     AssemblyError
-        The mechanism cannot be put together.
+        The mechanism cannot be assembled.
 
     Examples
     --------

@@ -270,7 +270,7 @@ def outputs_of(mechanism: Mechanism, instants: Float[np.ndarray, " time"], order
             assert motion is not None
             values = motion.outputs[name]
             count = values.shape[2] if values.ndim == 3 else 1
-        elif getattr(output, "turning", False):  # counted from where the mechanism is put together
+        elif getattr(output, "turning", False):  # counted from where the mechanism is assembled
             count = 1
         else:
             assert isinstance(output, AbstractOutput)

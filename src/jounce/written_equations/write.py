@@ -73,7 +73,7 @@ def equations(
     Parameters
     ----------
     model : Mechanism, Motion or Robot
-        A mechanism: angles about axes in space are counted from where its bodies are put together, at the start of its
+        A mechanism: angles about axes in space are counted from where its bodies are assembled, at the start of its
         grid of time. Or a motion: they are counted as along it. Or a robot.
     joint : str, optional
         Name of the joint or driver whose equations alone are written.

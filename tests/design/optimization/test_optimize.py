@@ -208,14 +208,14 @@ def test_designs_that_lock_are_kept_away_from(four_bar):
     found = jn.optimize(four_bar, "peak(psi, 4)", {"BC": (0.12, 0.6)}, starts=3, samples=16)
     assert found.success
     assert found.smallest_singular_value > 0.01
-    assert "cannot be put together, or lock" in found.notes[0]
+    assert "cannot be assembled, or lock" in found.notes[0]
     alone = jn.solve(four_bar.with_parameters(**found.parameters), np.linspace(0.0, 2.0, 4001))
     sampled = np.abs(alone.outputs["psi"][:, 4]).max()  # the peak lies between two of the instants
     assert found.objective * (1 - 1e-5) < sampled < found.objective * (1 + 1e-9)
     for change in (-1e-4, 1e-4):
         other = jn.solve(four_bar.with_parameters(BC=found.parameters["BC"] + change), np.linspace(0.0, 2.0, 4001))
         assert np.abs(other.outputs["psi"][:, 4]).max() > sampled
-    with pytest.raises(jn.errors.DesignError, match=r"none of 16 designs .*put together"):
+    with pytest.raises(jn.errors.DesignError, match=r"none of 16 designs .*assembled"):
         jn.optimize(four_bar, "peak(psi, 4)", {"BC": (0.5, 0.6)}, starts=2, samples=16)
 
 

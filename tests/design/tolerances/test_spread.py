@@ -95,7 +95,7 @@ def test_designs_that_cannot_be_are_counted_and_left_out(crank):
     assert "tip" not in found
     reached = np.linspace(0.7, 1.0, 20001)
     assert float(found["angle_mean"][0, 0]) == pytest.approx(np.arccos(reached).mean(), rel=5e-3)
-    with pytest.raises(JounceError, match="designs lock or cannot be put together"):
+    with pytest.raises(JounceError, match="designs lock or cannot be assembled"):
         jn.tolerance(mechanism, vary, TIME, 2, of=["angle"], samples=64, linear=False, indices=True)
 
 

@@ -1,4 +1,4 @@
-"""Laws: from a rough guess no part is put together turned over in its joint, and what can be put together is."""
+"""Laws: from a rough guess no part is assembled turned over in its joint, and what can be assembled is."""
 
 import dataclasses
 
@@ -55,7 +55,7 @@ def assembled(name):
     return mechanism, model, attempt.coordinates
 
 
-# from some of these guesses a hinge was put together turned over before, and from others nothing was
+# from some of these guesses a hinge was assembled turned over before, and from others nothing was
 @pytest.mark.slow
 @pytest.mark.parametrize(
     "name",

@@ -17,7 +17,7 @@ FOUR_BAR = FourBar()
 
 
 def four_bar(a, b, c, d, value=1.0, seed=0):
-    """Return a four-bar put together at an angle of its crank, in one of the two ways."""
+    """Return a four-bar assembled at an angle of its crank, in one of the two ways."""
     values = {"a": a, "b": b, "c": c, "d": d}
     start = FOUR_BAR.assembly(values, value, np.random.default_rng(seed))
     guess = map(float, FOUR_BAR.guess(values, value, start))

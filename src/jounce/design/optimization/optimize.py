@@ -96,7 +96,7 @@ def optimize(
         If a name does not exist, bounds are not two increasing numbers, a parameter cannot have one of them, an
         expression cannot be read, or instants would differ from design to design.
     DesignError
-        If no design can be put together and moved, or conditions cannot be met: the message names them with their
+        If no design can be assembled and moved, or conditions cannot be met: the message names them with their
         violations, and the error has the design that is nearest to meeting them.
 
     References

@@ -24,7 +24,7 @@ LOCKS = (AssemblyError, MobilityError, SolveError)
 
 
 class Locked(Exception):  # noqa: N818 - not an error of the user
-    """A design cannot be put together, or locks."""
+    """A design cannot be assembled, or locks."""
 
     def __init__(self, point: Float[np.ndarray, " parameter"], error: Exception):
         super().__init__(str(error))
@@ -120,7 +120,7 @@ class Problem:
         Raises
         ------
         Locked
-            The design cannot be put together, or locks.
+            The design cannot be assembled, or locks.
         """
         key = point.tobytes()
         if key not in self._cached:

@@ -72,7 +72,7 @@ class OptimizedDesign(Displayed):
     evaluations : int
         Number of designs solved with their slopes.
     notes : tuple of str
-        Remarks for the designer, such as bounds at which no design can be put together.
+        Remarks for the designer, such as bounds at which no design can be assembled.
     """
 
     mechanism: Mechanism

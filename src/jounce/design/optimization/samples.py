@@ -53,11 +53,11 @@ class Samples:
         return selected
 
     def notes(self, bounds: Mapping[str, tuple[float, float]]) -> list[str]:
-        """Return words for designs that cannot be put together or lock, and the ranges of those that move."""
+        """Return words for designs that cannot be assembled or lock, and the ranges of those that move."""
         stuck = self.count - int(self.moving.sum())
         if not stuck or not self.moving.any():
             return []
-        words = [f"{stuck} of {self.count} designs within the bounds cannot be put together, or lock"]
+        words = [f"{stuck} of {self.count} designs within the bounds cannot be assembled, or lock"]
         step = 2.0 / self.count if self.points.shape[1] == 1 else 0.1
         for k, name in enumerate(self.names):
             low, high = bounds[name]

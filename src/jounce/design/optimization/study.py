@@ -83,7 +83,7 @@ class Study:
         Raises
         ------
         DesignError
-            If none can be put together and moved, or conditions cannot be met.
+            If none can be assembled and moved, or conditions cannot be met.
         """
         self._note_bounds()
         points, lock = [self.here], None
@@ -187,7 +187,7 @@ class Study:
         Raises
         ------
         AssemblyError, MobilityError, SolveError
-            The design cannot be put together, or locks.
+            The design cannot be assembled, or locks.
         """
         goals, previous = self.goals, self.goals.instants
         try:
@@ -261,7 +261,7 @@ class Study:
         """Return objective, conditions and parameters, of the mechanism as it was given and of the design."""
         known = original.parameter_values  # also outside of the bounds
         given = {name: float(known[name]) for name in self.problem.names}
-        as_given = with_outputs(original, self.goals.mechanism.outputs)  # put together as it is, not as this study does
+        as_given = with_outputs(original, self.goals.mechanism.outputs)  # assembled as it is, not as this study does
         try:
             before = self._on(_split(self.goals.instants, FINER), as_given, given)
         except LOCKS:
@@ -299,10 +299,10 @@ class Study:
 
 
 def _nothing_moves(lock: Locked | None, taken: Samples) -> DesignError:
-    """Return the error where no design can be put together and moved."""
+    """Return the error where no design can be assembled and moved."""
     why = "" if lock is None else f"; the mechanism as it is: {lock}"
     bounds = "give bounds within which it can be, or a starting guess nearer to them"
-    return DesignError(f"none of {taken.count} designs within the bounds can be put together and moved; {bounds}{why}")
+    return DesignError(f"none of {taken.count} designs within the bounds can be assembled and moved; {bounds}{why}")
 
 
 def _configuration(motion: Motion) -> Float[np.ndarray, " entry"]:

@@ -84,7 +84,7 @@ def tolerance(
         has its derivatives by the parameters, NAME_share (parameter, ...) the part of the variance that each causes to
         first order. NAME_peak, NAME_peak_mean, and so on are for the largest magnitude at the instants; with indices
         NAME_peak_first_order and NAME_peak_total_order (Saltelli 2010). ``solved`` (time) is the number of samples
-        solved: means leave out the others, which lock or cannot be put together.
+        solved: means leave out the others, which lock or cannot be assembled.
 
     Raises
     ------
@@ -259,7 +259,7 @@ class _Spread:
             solved, sides = self._solved_designs({name: x[start:stop] for name, x in values.items()})
             bad = (solved["status"].values != Status.OK).any(axis=1)
             if bad.any():
-                share = f"{int(bad.sum())} of {stop - start} designs lock or cannot be put together"
+                share = f"{int(bad.sum())} of {stop - start} designs lock or cannot be assembled"
                 message = f"{share}, and indices need all of them; narrow the spread"
                 raise MechanismError(message, name="indices")
             for name in self._outputs:

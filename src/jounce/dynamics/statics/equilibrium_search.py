@@ -177,7 +177,7 @@ def _shortened(
 
 
 def _moved(point: OperatingPoint, step: Float[np.ndarray, " column"]) -> OperatingPoint | None:
-    """Return the mechanism after a step of the scaled coordinates, put together; None where that does not go.
+    """Return the mechanism after a step of the scaled coordinates, assembled; None where that does not go.
 
     Angles about axes go on from those before the step, and so count their turns.
     """

@@ -36,7 +36,7 @@ def equilibria(
 ) -> tuple[Equilibrium, ...]:
     """Return all equilibria that Newton's method finds from many starts, of every assembly of the mechanism.
 
-    Each start is a random position of all bodies, put together, or random coordinates of the joints of a robot, within
+    Each start is a random position of all bodies, assembled, or random coordinates of the joints of a robot, within
     their limits; equilibria within 1e-6 rad and sizes of the mechanism count as one, and those that are indifferent are
     one of a family. A body that lies turned over in a hinge or a guide is no assembly.
 
@@ -122,7 +122,7 @@ def _random_poses(start: OperatingPoint, random: np.random.Generator) -> Coordin
 
 
 def _closed(start: OperatingPoint, coordinates: Coordinates) -> OperatingPoint | None:
-    """Return the mechanism put together from a position; None where that does not go, or turns a part over."""
+    """Return the mechanism assembled from a position; None where that does not go, or turns a part over."""
     model, instant = start.model, float(start.clock[0, 0, 0])
     if model.rows:
         trial = assemble_from_guess(model, instant, TOLERANCE, coordinates)

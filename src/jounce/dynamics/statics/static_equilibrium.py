@@ -210,7 +210,7 @@ def equilibrium(
     Parameters
     ----------
     mechanism : Mechanism or Robot
-        With masses or applied forces. The search begins where its bodies can be put together nearest to their starting
+        With masses or applied forces. The search begins where its bodies can be assembled nearest to their starting
         guess. A robot, with loops or without, is taken as the mechanism that it is (`Robot.mechanism`), whose outputs
         are the coordinates of its joints.
     time : float, optional
@@ -240,7 +240,7 @@ def equilibrium(
     MechanismError
         If a name or an option is not valid, or nothing has a mass and no force is applied.
     AssemblyError
-        If the bodies cannot be put together.
+        If the bodies cannot be assembled.
     SolveError
         If no equilibrium is found: the message says what force stays on which body. Or if a force has no finite value
         at rest.
@@ -292,7 +292,7 @@ def as_mechanism(
 def at_rest_from(
     mechanism: Mechanism, time: Real | Refused | None, without: Sequence[str], method: str
 ) -> OperatingPoint:
-    """Return the mechanism at rest where its bodies can be put together, or raise where something is not valid."""
+    """Return the mechanism at rest where its bodies can be assembled, or raise where something is not valid."""
     check_mechanism(mechanism)
     check_holonomic(mechanism, "an equilibrium")
     check_choice("method", method, METHODS, MechanismError)

@@ -123,7 +123,7 @@ class ParametricMechanism:
 class BatchStart:
     """Consistent states of runs at the start: positions followed from those of the first run, least velocities.
 
-    Where the starting guess of bodies that are free to move differs, each run is put together from its own guess.
+    Where the starting guess of bodies that are free to move differs, each run is assembled from its own guess.
 
     Parameters
     ----------

@@ -210,7 +210,7 @@ def robot_mechanism(
     robot : Robot
         Its names can stand in a file.
     start : dict of str to float
-        Coordinates near which it is put together, rad or m; zero where none are given.
+        Coordinates near which it is assembled, rad or m; zero where none are given.
     laws : dict of str to law
         Coordinates that are driven.
     hold : bool

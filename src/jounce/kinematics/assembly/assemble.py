@@ -1,4 +1,4 @@
-"""The first assembly: bodies put together from the starting guess, and degrees of freedom counted and explained."""
+"""The first assembly, from the starting guess, and degrees of freedom counted and explained."""
 
 import dataclasses
 import warnings
@@ -38,7 +38,7 @@ from jounce.mechanism.transmissions.gear_checks import check_gears, check_wheels
 from jounce.trajectory import AbstractMotion
 
 MAX_DATUMS = 100
-TIGHT = 1e-12  # rad or sizes of the mechanism: the tolerance of bodies put together to rounding
+TIGHT = 1e-12  # rad or sizes of the mechanism: the tolerance of bodies assembled to rounding
 SETTLED = 1e-12  # rad, by which the angles of drivers may be counted otherwise
 
 
@@ -92,7 +92,7 @@ def assemble(model: Model, instant: float, tolerance: float, *, free: bool = Fal
 
 
 def _exact(model: Model, attempt: AssemblyAttempt, instant: float, tolerance: float) -> AssemblyAttempt:
-    """Return bodies that were put together loosely, next to a singular position, put together to rounding."""
+    """Return bodies that were assembled loosely, next to a singular position, assembled to rounding."""
     if tolerance <= TIGHT or not attempt.jacobian.smallest[1].size:
         return attempt
     exact = assemble_from_guess(model, instant, TIGHT, attempt.coordinates)
@@ -165,7 +165,7 @@ def warn_of_parts_turned_over(model: Model, attempt: AssemblyAttempt) -> None:
         return
     names = [name for name, is_odd in zip(pair_names(model), odd, strict=True) if is_odd]
     message = (
-        f"{', '.join(dict.fromkeys(names))}: put together only with parts turned over: directions that are held "
+        f"{', '.join(dict.fromkeys(names))}: assembled only with parts turned over: directions that are held "
         "parallel point opposite ways, unlike in the starting guess; guess the pose of the bodies more closely, or "
         "give one of the two directions the other sign"
     )
@@ -200,7 +200,7 @@ def _start_after_turns(
 
 
 def nearest_to_guess(model: Model, attempt: AssemblyAttempt, instant: float) -> AssemblyAttempt:
-    """Return planar bodies put together, with every angle shifted by whole turns to be nearest to the guess."""
+    """Return planar bodies assembled, with every angle shifted by whole turns to be nearest to the guess."""
     displace = Displacements(model, instant)
 
     def residual_at(angle: np.ndarray) -> np.ndarray:
@@ -301,7 +301,7 @@ def _squared_lengths(model: Model, instant: float) -> dict[str, float]:
 
 
 def redundancy_of(model: Model, attempt: AssemblyAttempt, instant: float) -> tuple[Model, Redundancy]:
-    """Return a model that was put together with its rows scaled, and which of them follow from others."""
+    """Return a model that was assembled with its rows scaled, and which of them follow from others."""
     system = resident(with_fields(model.system, row_scale=attempt.scale[:, None], rank=None))
     model = dataclasses.replace(model, system=system)
     redundant = redundancy(model, attempt.coordinates, attempt.jacobian, Displacements(model, instant))

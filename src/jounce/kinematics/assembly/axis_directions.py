@@ -76,7 +76,7 @@ def pair_names(model: Model) -> list[str]:
 def axis_signs_to_try(model: Model, attempt: AssemblyAttempt) -> list[AxisSigns]:
     """Return the signs with which to assemble again, the most likely first; none where the assembly is as drawn.
 
-    That is where parts lie turned over, and where they were not put together at all from a guess in which directions
+    That is where parts lie turned over, and where they were not assembled at all from a guess in which directions
     are far from parallel. What the guess draws may not exist: then all pairs are meant to point the same way.
     """
     there = axis_signs(model.system, attempt.coordinates) if attempt.closed else None

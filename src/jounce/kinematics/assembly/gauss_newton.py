@@ -1,4 +1,4 @@
-"""Bodies put together at one instant, from a starting guess, by damped Gauss-Newton on the host."""
+"""Bodies assembled at one instant, from a starting guess, by damped Gauss-Newton on the host."""
 
 from functools import cached_property
 from typing import Any, NamedTuple
@@ -132,7 +132,7 @@ class Displacements:
     def closed(
         self, start: Coordinates, tolerance: float
     ) -> tuple[Float[np.ndarray, " row"], AssemblyAttempt | None, Displaced | None]:
-        """Return the residual at some coordinates, and the bodies put together from there if no step needs a check.
+        """Return the residual at some coordinates, and the bodies assembled from there if no step needs a check.
 
         The position with those coordinates comes last, where none of its steps was tried: the one to go on from.
         """

@@ -29,7 +29,7 @@ def idle_motions(model: Model, redundant: Redundancy, coordinates: Coordinates, 
     Parameters
     ----------
     model : Model
-        That was put together.
+        One that was assembled.
     redundant : Redundancy
         Of its equations.
     coordinates : dict of str to array

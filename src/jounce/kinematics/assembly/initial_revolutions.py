@@ -94,7 +94,7 @@ def turned_to_laws(
     lag : DriverLag
         At the guess.
     start : dict of str to array
-        Coordinates, put together with the drivers as in the guess.
+        Coordinates, assembled with the drivers as in the guess.
     displace : callable
         Takes coordinates and an increment to coordinates, residual and Jacobian.
 

@@ -136,7 +136,7 @@ def mobility(mechanism: Mechanism, time: float | None = None, order: int = 10) -
     Parameters
     ----------
     mechanism : Mechanism
-        That can be put together.
+        That can be assembled.
     time : float, optional
         The instant of the drivers, s; that at which the mechanism's own grid begins, or 0, unless given.
     order : int, default 10
@@ -147,7 +147,7 @@ def mobility(mechanism: Mechanism, time: float | None = None, order: int = 10) -
     MechanismError
         If a value is not valid.
     AssemblyError
-        If the bodies cannot be put together.
+        If the bodies cannot be assembled.
 
     Examples
     --------

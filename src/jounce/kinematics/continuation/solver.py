@@ -127,7 +127,7 @@ class Solver:
         return _run_from(known, expansion_point, largest=largest, crawled=crawled)
 
     def beginning(self, guess: SolvedState, instant: float) -> StepState:
-        """Return the run that begins with solving an instant, from a position put together there."""
+        """Return the run that begins with solving an instant, from a position assembled there."""
         known = jax.tree.map(lambda x: _filled(x, SMALL_BATCH), self.needed(guess))
         return _run_from(known, (instant, 0.0, 0.0, 0.0), instant=np.full(SMALL_BATCH, instant))
 

@@ -41,7 +41,7 @@ TOLERANCE = 1e-12
 
 @dataclasses.dataclass(frozen=True)
 class Assembly:
-    """One of the ways in which a mechanism can be put together.
+    """One of the ways in which a mechanism can be assembled.
 
     Attributes
     ----------

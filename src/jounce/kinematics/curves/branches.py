@@ -54,7 +54,7 @@ def trace(
     MechanismError
         If the mechanism or an option is not valid, or it is not said which of several drivers is free.
     AssemblyError
-        If the bodies cannot be put together at the start.
+        If the bodies cannot be assembled at the start.
     MobilityError
         If there is more than one degree of freedom with the driver free, or none.
     SingularityError

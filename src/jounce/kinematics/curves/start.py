@@ -1,4 +1,4 @@
-"""Where a curve of configurations starts: a mechanism with the value of one driver free, put together."""
+"""Where a curve of configurations starts: a mechanism with the value of one driver free, assembled."""
 
 import dataclasses
 from typing import Any
@@ -118,7 +118,7 @@ def start_of_curve(free: Freed, tolerance: float = 1e-12) -> tuple[PathTracker, 
     Raises
     ------
     AssemblyError
-        If the bodies cannot be put together.
+        If the bodies cannot be assembled.
     MobilityError
         If there is more than one degree of freedom, or none.
     SingularityError

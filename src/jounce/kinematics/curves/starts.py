@@ -1,4 +1,4 @@
-"""One compiled function: bodies put together from many starts side by side, at one instant."""
+"""One compiled function: bodies assembled from many starts side by side, at one instant."""
 
 from typing import Any
 

@@ -89,7 +89,7 @@ class Group(NamedTuple):
 
 
 class DesignPaths:
-    """The motions of many designs, followed from where each is put together to the last instant.
+    """The motions of many designs, followed from where each is assembled to the last instant.
 
     Parameters
     ----------
@@ -118,7 +118,7 @@ class DesignPaths:
         self._groups: list[Group] = []
 
     def follow(self, coordinates: Coordinates, plain: Bool[np.ndarray, " design"], threads: int) -> None:
-        """Follow the designs from where they are put together, those that are plain."""
+        """Follow the designs from where they are assembled, those that are plain."""
         self.individual |= ~plain
         lanes = np.flatnonzero(plain)
         groups = [lanes[k : k + TOGETHER] for k in range(0, len(lanes), TOGETHER)]

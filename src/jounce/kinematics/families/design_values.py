@@ -1,4 +1,4 @@
-"""Many designs of one mechanism as one system whose values have a lane for each, and where each is put together."""
+"""Many designs of one mechanism as one system whose values have a lane for each, and where each is assembled."""
 
 import dataclasses
 from collections.abc import Sequence
@@ -28,7 +28,7 @@ class Designs:
     mechanism : Mechanism
         Any of them.
     model : Model
-        Of one that was put together: sizes are measured by it.
+        Of one that was assembled: sizes are measured by it.
     names : tuple of str
         Parameters in which they differ.
     rows : array of shape (designs, parameters)
@@ -62,7 +62,7 @@ class Designs:
     def of_models(
         cls, mechanism: Mechanism, models: Sequence[Model], names: tuple[str, ...], rows: np.ndarray
     ) -> "Designs":
-        """Return designs that were put together one by one, with the angles about axes that each counts."""
+        """Return designs that were assembled one by one, with the angles about axes that each counts."""
         self = object.__new__(cls)
         self.mechanism, self.model, self.names, self.rows = mechanism, without_forces(models[0]), names, rows
         whole = [jax.tree.leaves((model.system.groups, model.system.outputs)) for model in models]

@@ -299,7 +299,7 @@ class _Family:
         return self._followed(levels, designs, attempts.coordinates, plain, np.arange(count), threads)
 
     def _first_assembled(self, instant: float) -> tuple[Model | None, int]:
-        """Return the model of the first design that can be put together, and which it is."""
+        """Return the model of the first design that can be assembled, and which it is."""
         for k in range(len(self.rows)):
             try:
                 return assemble(build(self.held_design(k)), instant, self.tolerance)[0], k

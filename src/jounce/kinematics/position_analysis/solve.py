@@ -133,7 +133,7 @@ def solve(
     MechanismError
         If the mechanism, the time grid or the order is not valid.
     AssemblyError
-        If the bodies cannot be put together at the first instant.
+        If the bodies cannot be assembled at the first instant.
     MobilityError
         If degrees of freedom are left, or the start is a singular position.
     SolveError

@@ -65,7 +65,7 @@ def output_group(
 ) -> Group:
     """Return an output of poses, or a driver for its coordinate, as a group of one, on the pose of all bodies.
 
-    With a model, angles about axes are counted as those of the outputs that it was put together with.
+    With a model, angles about axes are counted as those of the outputs that it was assembled with.
     """
     index = {body: k for k, body in enumerate((GROUND, *mechanism.bodies))}
     components = POSITION_COMPONENTS[mechanism.space]
@@ -107,7 +107,7 @@ class Motion(Tabulated):
         Which arithmetic gave the numbers: "llvm", machine code, or "xla", with the device unless that is the processor;
         both where each computed a part.
 
-    It is put together from the Taylor coefficients of the coordinates of all bodies, or what computes them, and the
+    It is assembled from the Taylor coefficients of the coordinates of all bodies, or what computes them, and the
     derivatives of the outputs, (order + 1, components, instances, time) for each group.
     """
 

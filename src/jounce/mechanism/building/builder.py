@@ -64,7 +64,7 @@ class Model:
     length : float
         Size of the mechanism, by which positions are scaled, m.
     reference : dict of str to array
-        Coordinates from which angles about axes are counted: those of the starting guess, until put together.
+        Coordinates from which angles about axes are counted: those of the starting guess, until assembled.
     prescribed : tuple of PrescribedAngle
         Angles that drivers prescribe there, with their whole turns.
     history : AttitudeHistory, optional
@@ -229,7 +229,7 @@ def with_reference(
     model : Model
         Of a mechanism.
     coordinates : dict of str to array
-        Of all bodies, the ground first, put together.
+        Of all bodies, the ground first, assembled.
     instant : float
         At which they are there, s.
     prescribed : tuple of PrescribedAngle
@@ -249,7 +249,7 @@ def with_reference(
 
 
 def counted_as_in(groups: tuple[Group, ...], model: Model) -> tuple[Group, ...]:
-    """Return groups with angles about axes counted as if they had been in the model when it was put together."""
+    """Return groups with angles about axes counted as if they had been in the model when it was assembled."""
     if model.history is None or not any(map(measures_angle, groups)):
         return groups
     first, last = ({"quaternion": model.history.quaternion[..., instant]} for instant in (slice(1), slice(-1, None)))

@@ -88,7 +88,7 @@ def check_holonomic(mechanism: Any, what: str) -> None:
 
 def _traced(given: Mapping[str, Any]) -> str | None:
     """Return the dotted name of the first value that JAX traces, None if there is none."""
-    if not holds_tracer(given):  # nearly always, and before names are put together
+    if not holds_tracer(given):  # nearly always, and before names are assembled
         return None
     pending: list[tuple[tuple[str | int, ...], Any]] = [((), given)]
     while pending:

@@ -1,7 +1,7 @@
 """Mechanisms of which JAX traces some values: the values out and in again, and the model that depends on them.
 
 What a solution decides by values, it decides outside of what is traced: whole turns, signs, the size of the mechanism.
-The rest of a model is a function of the traced values, and is put together here as one: also the offsets that follow
+The rest of a model is a function of the traced values, and is assembled here as one: also the offsets that follow
 from the starting guess, and the position in which angles about axes are counted from.
 """
 
@@ -47,7 +47,7 @@ class Angles(NamedTuple):
     Attributes
     ----------
     angle : tuple of tuple of array of shape (instances, 1)
-        Of joints and drivers, of forces and of outputs, where the mechanism is put together.
+        Of joints and drivers, of forces and of outputs, where the mechanism is assembled.
     near : tuple of tuple of array of shape (instances, time)
         Of forces and of outputs at all instants.
     """
@@ -140,7 +140,7 @@ def traced_model(
         Its size, m.
     angles : Angles, optional
         As a solution counted them. Without, angles about axes are those of the attitude matrices: they tell the same
-        at the position in which the mechanism is put together, and need to know of none.
+        at the position in which the mechanism is assembled, and need to know of none.
     first : dict of str to array, optional
         Coordinates of all bodies in that position, the ground first, (..., bodies, 1).
 

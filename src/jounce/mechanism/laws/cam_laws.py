@@ -81,7 +81,7 @@ def check_turns(mechanism: Mechanism, model: Model, coordinates: Mapping[str, An
     model : Model
         Of it.
     coordinates : mapping of str to array
-        Of all bodies, the ground first, put together at the instant, (..., bodies, 1).
+        Of all bodies, the ground first, assembled at the instant, (..., bodies, 1).
     instant : float
         s.
     """

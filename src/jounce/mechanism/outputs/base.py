@@ -167,14 +167,14 @@ class AngleOutput(AbstractOutput):
 class RelativeAngleOutput(AbstractOutput):
     """Signed angle about an axis of body i, from a vector of body i to one of body j, rad, continuous over turns.
 
-    Without vectors it is the angle of ``A_i^T A_j`` where the mechanism is put together, and the turn from there.
+    Without vectors it is the angle of ``A_i^T A_j`` where the mechanism is assembled, and the turn from there.
     Vectors are seen along the axis: where one has no part across it there is no angle.
     """
 
     axis: Vector
     vector_i: Vector = None
     vector_j: Vector = None
-    datum: Any = eqx.field(default=None, init=False)  # found when the mechanism is put together
+    datum: Any = eqx.field(default=None, init=False)  # found when the mechanism is assembled
 
     unit = "rad"
     space = "spatial"

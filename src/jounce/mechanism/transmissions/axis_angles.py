@@ -1,4 +1,4 @@
-"""Where angles about axes are counted from: the position in which a mechanism was put together, and its turns."""
+"""Where angles about axes are counted from: the position in which a mechanism was assembled, and its turns."""
 
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple

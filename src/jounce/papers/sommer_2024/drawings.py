@@ -96,7 +96,7 @@ def draw(drawn: Mapping[str, Drawn], _: Any, *, title: str, note: str, size: tup
 
 
 def _panel(axes: Any, drawn: Drawn, view: View) -> SketchFigure:
-    """Return a mechanism, put together at the start of its cycle, in a panel; its names are not yet written."""
+    """Return a mechanism, assembled at the start of its cycle, in a panel; its names are not yet written."""
     mechanism = VALIDATION_CASES[drawn.simulation].load()
     values, drawing = mechanism.parameter_values, drawing_of(mechanism, view=view)
     drawing.labels.clear()

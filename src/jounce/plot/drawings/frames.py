@@ -1,4 +1,4 @@
-"""Where bodies and their points are: in a motion, put together at the start, at the starting guess.
+"""Where bodies and their points are: in a motion, assembled at the start, at the starting guess.
 
 A frame holds the origin of a body, m, and its axes, in columns, at some instants: (time, components, 1 + components).
 """
@@ -34,14 +34,14 @@ Frame = Float[np.ndarray, "time components columns"]
 
 
 def assembled(mechanism: Mechanism) -> dict[str, Frame]:
-    """Return the frames of all bodies, the ground first, put together near the starting guess at the first instant.
+    """Return the frames of all bodies, the ground first, assembled near the starting guess at the first instant.
 
     Degrees of freedom may be left; initial conditions count as drivers.
 
     Raises
     ------
     AssemblyError
-        The bodies cannot be put together.
+        The bodies cannot be assembled.
 
     Examples
     --------

@@ -84,7 +84,7 @@ def scene_of(moving: Motion | Mechanism, *, view: View = VIEW, instants: Instant
 
 
 def drawing_of(moving: Motion | Mechanism, *, view: View = VIEW, instants: Instants | None = None) -> Drawing:
-    """Return a mechanism as it is drawn, at the instants of a motion or as it is put together at the start.
+    """Return a mechanism as it is drawn, at the instants of a motion or as it is assembled at the start.
 
     Parameters
     ----------

@@ -122,7 +122,7 @@ def _mechanism_start(facts: Facts) -> list[str]:
         )
         lines.append(f"  idle: {spinning} may spin about an axis of itself; held by the least motion")
     assembled = assembly["status"] == "assembled"
-    lines += ["", "Start", f"  put together at t = {assembly['at']:g} s" if assembled else f"  {assembly['message']}"]
+    lines += ["", "Start", f"  assembled at t = {assembly['at']:g} s" if assembled else f"  {assembly['message']}"]
     if time is not None:
         lines.append(f"  time: {count(time['count'], 'instant')} from {time['start']:g} s to {time['stop']:g} s")
         lines += [f"  {time['remark']}"] if "remark" in time else []

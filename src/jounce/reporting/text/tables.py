@@ -77,7 +77,7 @@ def bodies_table(facts: Facts) -> Table:
         if moved is not None:
             by = f"{_rounded(moved['distance']):.3g} m, {_rounded(math.degrees(moved['angle'])):.3g} deg"
         rows.append([body["name"], number(body["mass"]), vector(pose["position"]), vector(turned), by])
-    state_words = "put together" if facts["assembly"]["status"] == "assembled" else "as guessed"
+    state_words = "assembled" if facts["assembly"]["status"] == "assembled" else "as guessed"
     title = f"Bodies, {state_words}, at t = {facts['assembly']['at']:g} s"
     return table(title, ("body", "mass/kg", "position/m", "angle/rad" if angle == "angle" else angle, "moved by"), rows)
 

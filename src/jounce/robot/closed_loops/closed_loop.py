@@ -49,7 +49,7 @@ def mechanism(
     robot : Robot
         With closures or without.
     q : array_like of shape (n,) or dict of str to float, optional
-        Coordinates near which the mechanism is put together, zero unless given. Driven joints start where their laws
+        Coordinates near which the mechanism is assembled, zero unless given. Driven joints start where their laws
         do, the others are moved until the loops are closed.
     drivers : dict of str to law, or JointTrajectory, optional
         Laws of coordinates, by name of the joint: expressions of t, functions of time, motions or numbers; rad or m.

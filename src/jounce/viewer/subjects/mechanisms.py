@@ -55,7 +55,7 @@ class MechanismSubject:
         Raises
         ------
         JounceError
-            If the bodies cannot be put together, or the motion ends at once.
+            If the bodies cannot be assembled, or the motion ends at once.
         """
         mechanism = self.mechanism.with_parameters(**values)
         moved = simulate if mechanism.initial else solve

@@ -47,7 +47,7 @@ def mechanism_code(given: Mechanism | Motion, joint: str | None, order: int, qua
     Parameters
     ----------
     given : Mechanism or Motion
-        A mechanism, whose angles about axes are counted from where it is put together, or as along a motion.
+        A mechanism, whose angles about axes are counted from where it is assembled, or as along a motion.
     joint : str, optional
         Name of a joint or a driver.
     order : int
@@ -111,7 +111,7 @@ def _constraints(mechanism: Mechanism, model: Model, inputs: Inputs, own: tuple[
 
 
 def put_together(mechanism: Mechanism) -> Model:
-    """Return the model of a mechanism, with angles about axes counted from where it is put together."""
+    """Return the model of a mechanism, with angles about axes counted from where it is assembled."""
     instant = 0.0
     if mechanism.time is not None:
         instant = float(time_grid(mechanism.time, mechanism.parameter_values)[0])

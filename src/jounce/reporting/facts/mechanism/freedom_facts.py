@@ -1,4 +1,4 @@
-"""How a mechanism starts: put together at its first instant, and its degrees of freedom there, as plain data."""
+"""How a mechanism starts: assembled at its first instant, and its degrees of freedom there, as plain data."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ class FreedomFacts(TypedDict):
 
 
 class AssemblyFacts(TypedDict):
-    """Whether the bodies can be put together, at which instant, and how far joints are open."""
+    """Whether the bodies can be assembled, at which instant, and how far joints are open."""
 
     status: Literal["assembled", "open"]
     message: str | None
@@ -87,7 +87,7 @@ class MobilityFacts(TypedDict):
 
 
 class StartingState:
-    """The mechanism put together at its first instant, and its degrees of freedom there."""
+    """The mechanism assembled at its first instant, and its degrees of freedom there."""
 
     def __init__(self, mechanism: Mechanism, model: Model, instant: float):
         self.mechanism, self.model, self.instant = mechanism, model, instant
@@ -100,7 +100,7 @@ class StartingState:
         self.ok = self.assembly["status"] == "assembled" and possible
 
     def mobility(self) -> dict[str, Any] | None:
-        """Return how it can move with its drivers released; None where it cannot be put together."""
+        """Return how it can move with its drivers released; None where it cannot be assembled."""
         rolling = any(joint.nonholonomic for joint in self.mechanism.joints.values())  # where it is tells no motions
         if self.coordinates is None or self.here is None or rolling:
             return None

@@ -76,7 +76,7 @@ def efficiency_facts(state: StartingState) -> list[dict[str, Any]]:
 
 
 def train_facts(state: StartingState) -> list[dict[str, Any]]:
-    """Return the speed ratios of all bodies that mesh, have a belt or carry gears, where put together: TrainFacts.
+    """Return the speed ratios of all bodies that mesh, have a belt or carry gears, where it is assembled: TrainFacts.
 
     In space a speed is the angular velocity along the axis of a gear, or along that of a gear that the body carries.
 

@@ -1,4 +1,4 @@
-"""How long belts and ropes are and where they run, at the position put together."""
+"""How long belts and ropes are and where they run, in the assembled position."""
 
 from itertools import pairwise
 from typing import Any
@@ -29,7 +29,7 @@ class LineFacts(TypedDict):
 
 
 def line_facts(state: StartingState) -> list[dict[str, Any]]:
-    """Return the belts and ropes of a mechanism, as it is put together: LineFacts; none where it is not.
+    """Return the belts and ropes of a mechanism, as it is assembled: LineFacts; none where it is not.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What a mechanism file holds, counted and put together: what ``jounce inspect`` and a notebook show."""
+"""What a mechanism file holds, counted and assembled: what ``jounce inspect`` and a notebook show."""
 
 from __future__ import annotations
 
@@ -139,7 +139,7 @@ class InspectedMechanism(MechanismFacts):
 
 
 def mechanism_facts(mechanism: Mechanism, path: str | PathLike[str] | None = None) -> dict[str, Any]:
-    """Return what stands in a mechanism, before anything is put together: MechanismFacts.
+    """Return what stands in a mechanism, before anything is assembled: MechanismFacts.
 
     Parameters
     ----------
