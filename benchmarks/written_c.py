@@ -1,7 +1,8 @@
-"""Residual, Jacobian and right sides of the RSUR mechanism as C: what `jn.equations` writes, beside CasADi's C.
+"""Residual, Jacobian and right sides of the RSUR mechanism: C written by `jn.equations`, `jn` itself, CasADi's C.
 
-CasADi differentiates the same residual, the one of the Python module that `jn.equations` writes, on its own symbols;
-both files are compiled alike and called in a loop over the states of a motion.
+`jn.constraint_equations` is called as users call it, labels included. CasADi differentiates the same residual, the one
+of the Python module that `jn.equations` writes, on its own symbols. Both files of C are compiled alike and called in a
+loop over the states of a motion.
 """
 
 import ctypes
@@ -44,12 +45,17 @@ void casadi_all(int n, const double *t, const double *q, const double *v, double
 class _Symbols:
     """What a written module asks of NumPy, on symbols of CasADi."""
 
-    names = {"arctan2": "atan2", "abs": "fabs", "where": "if_else", "rint": "round"}
+    names = {"arctan2": "atan2", "abs": "fabs", "where": "if_else"}
 
     def __getattr__(self, name: str) -> Any:
         import casadi
 
         return getattr(casadi, self.names.get(name, name))
+
+    def rint(self, x: Any) -> Any:
+        import casadi
+
+        return casadi.floor(x + 0.5)  # it has no rounding of its own
 
     def shape(self, _: Any) -> tuple[()]:
         return ()
@@ -109,6 +115,17 @@ def written(states: _States) -> Callable[[], Any]:
     return states.caller(text + LOOP.format(name="rsur", **states.sizes), "rsur_all")
 
 
+def by_library(states: _States) -> Callable[[], Any]:
+    """Return the call of `jn.constraint_equations`."""
+
+    def run() -> Any:
+        equations = jn.constraint_equations(states.motion)
+        sides = equations.right_side.sel(derivative=slice(1, None))
+        return equations.residual.values, equations.jacobian.values, sides.values
+
+    return run
+
+
 def by_casadi(states: _States) -> Callable[[], Any]:
     """Return the loop over what CasADi writes, from the residual alone."""
     import casadi
@@ -154,6 +171,7 @@ def cases(quick: bool) -> Cases:
         f"RSUR, equations to order {ORDER} as C, {count:,} states",
         [
             Contestant("jounce, C code", lambda: written(states), states.error),
+            Contestant("jounce, constraint_equations", lambda: by_library(states), states.error),
             Contestant("CasADi, C code, by the same residual", lambda: by_casadi(states), states.error, "casadi"),
         ],
         count=count,
