@@ -287,7 +287,7 @@ class MotionForces:
             poses = [self.coordinates_at((its,), lanes, self.levels) for its in moving.values()]
             return programs.passed_on([w[..., lanes] for w in works], poses, point[:, None, None], self.pose_type)
 
-        return self._expressed(self.in_chunks(chunk), 0, frame, np.zeros_like(point))
+        return self._expressed(self.in_chunks(chunk), 0, frame, np.zeros(np.shape(point)))
 
     def point_of(self, name: str, body: int) -> Float[Numbers, " component"]:
         """Return the point of a joint, driver or force on a body, or the origin of the body where it has none there."""

@@ -3,6 +3,7 @@
 import dataclasses
 import math
 
+import jax
 import numpy as np
 import pytest
 
@@ -241,3 +242,25 @@ def test_forces_at_a_change_point_are_not_told():
     inertia = jn.dynamics.gibbs_appell(motion).values[:, 0, 0]
     np.testing.assert_allclose(inertia[[0, 1, 4, 5]], 0, rtol=0, atol=1e-9)  # at a steady speed
     assert np.isnan(inertia[3])
+
+
+def test_gradient_of_what_a_bearing_does_to_the_ground():
+    """A bar of mass m turns at w about its end: what it does to the ground is -m (a - g), a = -w^2 L/2 along it."""
+    bar = jn.Body([0, 0], 0.3, mass=2.0, inertia=0.1, center_of_mass=["L/2", 0])
+    mechanism = jn.Mechanism(
+        space="planar",
+        bodies={"bar": bar},
+        joints={"O": jn.planar.Revolute(("ground", "bar"), [0, 0], [0, 0])},
+        drivers={"turn": jn.drivers.CoordinateDriver(("ground", "bar"), "angle", motion="0.3 + 5*t")},
+        outputs={"O": jn.outputs.JointForceOutput("O", body="ground")},
+        parameters={"L": 0.4},
+        gravity=[0, -9.81],
+    )
+
+    def felt(length):
+        return jn.solve(mechanism.with_parameters(L=length), TIME, order=1).outputs["O"][:, 0]
+
+    angle = 0.3 + 5 * TIME
+    along = np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    np.testing.assert_allclose(felt(0.4), 2.0 * 25 * 0.2 * along + [0, -2.0 * 9.81], rtol=1e-12)
+    np.testing.assert_allclose(jax.jacfwd(felt)(0.4), 2.0 * 25 / 2 * along, rtol=1e-11, atol=1e-12)
