@@ -25,7 +25,6 @@ from jounce.dynamics import (
     constraint_equations as constraint_equations,
     driver_force as driver_force,
     equilibrium as equilibrium,
-    holding_forces as holding_forces,
     joint_reaction as joint_reaction,
     linearize as linearize,
 )

@@ -627,7 +627,8 @@ def test_no_quantity_depends_on_how_frames_are_drawn(name):
 def optional_fields(kind):
     """Return the names of the vectors, words and the like of a joint, driver, force or output that may be left out."""
     fields = value_fields(kind).items()
-    return [name for name, field in fields if field.default is None and field_kind(field) != "scalar"]
+    scalars = {name for name, field in fields if field_kind(field) == "scalar"} | {"friction"}  # whose numbers are, too
+    return [name for name, field in fields if field.default is None and name not in scalars]
 
 
 def forms(kind):

@@ -150,6 +150,7 @@ def test_cams_in_space_know_angles_about_hinges(tmp_path, leader):
         ("expression: sin(t)", "slanted", r"joints.cam.motion.of: the body does not turn about this axis"),
     ],
 )
+@pytest.mark.filterwarnings("ignore::jounce.errors.UnitWarning")  # 2000 rad are meant
 def test_laws_and_axes_that_tell_no_angle_in_space_are_named_before_any_computing(tmp_path, motion, leader, words):
     text = IN_SPACE.replace("motion: 20*t", "motion: 2000 + 20*t")
     slanted = "\n  slanted: {type: rotation, bodies: [ground, shaft], axis: [0.3, 0, 1], motion: t}"

@@ -14,7 +14,7 @@ from tests.oracles.friction_circles import CIRCLES, COUPLER, CRANK, GROUND, ROCK
 
 def held(mechanism, name, time=0.0):
     """Return least, frictionless and greatest force of a driver at an instant."""
-    return jn.holding_forces(jn.solve(mechanism, [time], order=0))[name].values[0]
+    return jn.dynamics.holding_forces(jn.solve(mechanism, [time], order=0))[name].values[0]
 
 
 def sled(mu=0.3, angle=0.4, turned=0.0, load="0*t"):
@@ -46,7 +46,7 @@ def test_a_sled_on_a_slope_stays_by_itself_where_its_slope_is_less_than_friction
 
 
 def test_the_range_is_that_of_each_position_and_of_the_loads_there():
-    found = jn.holding_forces(jn.solve(sled(load="5*t*t"), [0.0, 2.0], order=0))["push"]
+    found = jn.dynamics.holding_forces(jn.solve(sled(load="5*t*t"), [0.0, 2.0], order=0))["push"]
     size = [20 * np.cos(0.4), 20 * np.cos(0.4) + 20 * np.sin(0.4)]
     plain = [20 * np.sin(0.4), 20 * np.sin(0.4) - 20 * np.cos(0.4)]
     np.testing.assert_allclose(found, np.array([plain]).T + 0.3 * np.outer(size, [-1, 0, 1]), rtol=1e-12)
@@ -58,7 +58,7 @@ def test_the_range_is_that_of_each_position_and_of_the_loads_there():
 def test_values_of_parameters_are_followed_and_an_equilibrium_has_a_range_too():
     changing = sled()
     for mu in (0.3, np.float64(0.5), np.array(0.2)):
-        found = jn.holding_forces(jn.equilibrium(changing.with_parameters(mu=mu)).motion)["push"].values[0]
+        found = jn.dynamics.holding_forces(jn.equilibrium(changing.with_parameters(mu=mu)).motion)["push"].values[0]
         np.testing.assert_allclose(found, 20 * (np.sin(0.4) + mu * np.cos(0.4) * np.array([-1, 0, 1])), rtol=1e-12)
 
 
@@ -72,7 +72,7 @@ def test_a_wedge_locks_where_friction_grows_as_fast_as_what_presses(mu):
 
 
 def test_where_friction_locks_the_comment_says_so_also_without_a_load():
-    found = jn.holding_forces(jn.solve(wedge(2.5), [0.0, 1.0], order=0))["push"]
+    found = jn.dynamics.holding_forces(jn.solve(wedge(2.5), [0.0, 1.0], order=0))["push"]
     assert found.attrs["comment"] == "friction locks, no force moves it one way, at t = 0 s, 1 s"
     parts = {**vars_of(wedge(2.5)), "gravity": None}
     idle = jn.Mechanism(**parts, joints=wedge(2.5).joints)
@@ -194,7 +194,7 @@ def test_a_slider_crank_by_a_search_of_all_friction_also_where_a_joint_does_not_
 def test_a_press_is_held_between_what_slow_strokes_take_both_ways():
     press = jn.load("examples/press_with_friction.yaml").with_parameters(slow=1e-12)
     instants = [0.2, 0.7, 1.1]
-    held_by = jn.holding_forces(jn.solve(press, instants, order=0))["motor"].values
+    held_by = jn.dynamics.holding_forces(jn.solve(press, instants, order=0))["motor"].values
     angles = jn.solve(press, instants, order=0).driver("motor").values[:, 0]
     blank = dict(press.forces)
     blank["blank"] = jn.forces.SlideForce(("ground", "ram"), [0, 0.162], [0, 0], [0, -1], press.forces["blank"].law)
@@ -242,7 +242,7 @@ def ball_and_sleeve():
 
 
 def test_friction_of_two_directions_does_all_it_can_in_one_of_them():
-    found = jn.holding_forces(jn.solve(ball_and_sleeve(), [0.0, 0.3], order=0))
+    found = jn.dynamics.holding_forces(jn.solve(ball_and_sleeve(), [0.0, 0.3], order=0))
     expected = {"turn": 0.05 * 0.2 * 30, "roll": 0.05 * 0.2 * 20, "push": 0.2 * 20, "aside": 0.3 * 40, "spin": 0.0}
     for name, most in (expected | {"along": 12.0}).items():
         np.testing.assert_allclose(found[name], [[-most, 0, most]] * 2, rtol=1e-10, atol=1e-12, err_msg=name)
@@ -280,16 +280,16 @@ def test_what_has_no_range_is_refused_by_name():
     parts = {"space": "planar", "gravity": [0, -10], "parameters": {"mu": 0.3}, "bodies": sled().bodies}
     alone = jn.Mechanism(**parts, joints=sled().joints)
     with pytest.raises(jn.errors.MechanismError, match="holding forces are those of drivers, and there are none"):
-        jn.holding_forces(jn.simulate(alone, [0.0, 0.1]))
+        jn.dynamics.holding_forces(jn.simulate(alone, [0.0, 0.1]))
     parts["bodies"] = {**parts["bodies"], "other": jn.Body([5, 0], mass=1.0)}
     swing = {**alone.joints, "pin": jn.planar.Revolute(("ground", "other"), [5, 0], [0.5, 0])}
     loose = jn.Mechanism(**parts, joints=swing, drivers=sled().drivers)
     with pytest.raises(jn.errors.UnsupportedError, match=r"joints\.guide\.friction: .* drivers do not hold all"):
-        jn.holding_forces(jn.simulate(loose, [0.0, 0.1]))
+        jn.dynamics.holding_forces(jn.simulate(loose, [0.0, 0.1]))
     twice = {**alone.joints, "again": jn.planar.Parallel1(("ground", "sled"), [1, 0], [np.cos(0.4), -np.sin(0.4)])}
     held_twice = jn.Mechanism(**{**parts, "bodies": sled().bodies}, joints=twice, drivers=sled().drivers)
     with pytest.raises(jn.errors.UnsupportedError, match="friction follows reactions, and redundant constraints"):
-        jn.holding_forces(jn.solve(held_twice, [0.0], order=0))
+        jn.dynamics.holding_forces(jn.solve(held_twice, [0.0], order=0))
 
 
 @pytest.mark.slow
@@ -308,14 +308,14 @@ def test_teeth_that_press_on_either_flank_have_no_range_with_friction():
         drivers={"turn": jn.drivers.CoordinateDriver(("ground", "a"), "angle", motion="t")},
     )
     with pytest.raises(jn.errors.UnsupportedError, match=r"joints\.A\.friction: .* teeth press on either flank"):
-        jn.holding_forces(jn.solve(gears, [0.0], order=0))
+        jn.dynamics.holding_forces(jn.solve(gears, [0.0], order=0))
 
 
 def test_a_gradient_is_refused():
     import jax
 
     def least(mu):
-        return jn.holding_forces(jn.solve(sled().with_parameters(mu=mu), [0.0], order=0))["push"].values[0, 0]
+        return jn.dynamics.holding_forces(jn.solve(sled().with_parameters(mu=mu), [0.0], order=0))["push"].values[0, 0]
 
     with pytest.raises(jn.errors.UnsupportedError, match="they are not differentiated by JAX"):
         jax.grad(least)(0.3)

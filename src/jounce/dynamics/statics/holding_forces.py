@@ -68,7 +68,7 @@ def holding_forces(motion: Motion) -> "xarray.Dataset":
     ...     joints={"G": jn.planar.Prismatic(("ground", "sled"), [0, 0], [0, 0], [4, 3], [1, 0], friction=guide)},
     ...     drivers={"push": jn.drivers.SlideDriver(("ground", "sled"), [0, 0], [0, 0], [4, 3], "0*t")},
     ... )
-    >>> found = jn.holding_forces(jn.solve(sled, [0.0], order=0))  # on a slope of 3 in 4: 30 N and 0.5 * 40 N
+    >>> found = jn.dynamics.holding_forces(jn.solve(sled, [0.0], order=0))  # on a slope of 3 in 4: 30 N and 0.5 * 40 N
     >>> found["push"].values.round(9).tolist()
     [[10.0, 30.0, 50.0]]
     """

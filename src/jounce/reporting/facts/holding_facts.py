@@ -38,7 +38,7 @@ def holding_facts(motion: Motion) -> list[dict[str, Any]]:
     Parameters
     ----------
     motion : Motion
-        As `jounce.holding_forces` takes it.
+        As `jounce.dynamics.holding_forces` takes it.
 
     Examples
     --------
