@@ -52,7 +52,7 @@ def rates(function, t, count):
         return np.array([float(mpmath.diff(function, mpmath.mpf(t), k)) for k in range(count)])
 
 
-@pytest.mark.parametrize("sign", [1, -1])
+@pytest.mark.parametrize("sign", [1, pytest.param(-1, marks=pytest.mark.slow)])
 def test_a_tooth_loads_bearing_and_guide_along_the_rack_and_apart(sign):
     """Over ten turns, with rates to the fourth: the rack takes its inertia and the load from the pitch point."""
     time = [0.0, 0.7, 3.3]
@@ -80,6 +80,7 @@ def test_a_tooth_loads_bearing_and_guide_along_the_rack_and_apart(sign):
         np.testing.assert_allclose(jn.driver_force(motion, "motor").values[k], torque, rtol=1e-10, atol=1e-12 * size)
 
 
+@pytest.mark.slow
 def test_a_rack_that_is_pushed_accelerates_its_pinion():
     """From rest, by a force that is constant: both reach ``F s = m v^2 / 2``."""
     pushed = dataclasses.replace(rack(load="40"), drivers={})
@@ -128,6 +129,7 @@ def test_what_does_not_mesh_is_refused():
             jn.driver_force(jn.solve(rack(height), [0.0], 3), "motor")
 
 
+@pytest.mark.slow
 def test_a_pinion_climbs_a_rack_that_is_fixed():
     """The rack on the ground, the pinion on a lift: the lift hangs on the tooth."""
     along, above, axis = TILT.T.tolist()

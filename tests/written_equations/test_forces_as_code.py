@@ -26,9 +26,8 @@ FRICTION = tuple(
 )
 
 
-@pytest.mark.parametrize(
-    "name", [x if x == "arm" else pytest.param(x, marks=pytest.mark.slow) for x in MECHANISMS if x not in FRICTION]
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("name", [x for x in MECHANISMS if x not in FRICTION])
 def test_every_joint_and_force_balances_what_moves(name, tmp_path):
     motion = bank(name)
     equations = jn.constraint_equations(motion)
@@ -46,7 +45,7 @@ def test_every_joint_and_force_balances_what_moves(name, tmp_path):
         np.testing.assert_allclose(call("mass_matrix", mass.shape, motion.time[0], q), mass, rtol=0, atol=1e-14)
 
 
-@pytest.mark.parametrize("name", FRICTION)
+@pytest.mark.parametrize("name", [x if x == "lines" else pytest.param(x, marks=pytest.mark.slow) for x in FRICTION])
 def test_friction_is_refused_by_name(name):
     """It follows from the multipliers of the same instant; the constraints do not depend on it."""
     mechanism = MECHANISMS[name]()

@@ -141,6 +141,7 @@ def test_a_pinion_drives_its_rack_and_is_driven_by_it_with_their_efficiencies():
         np.testing.assert_allclose(whole[:, 0], [[load, 0.0]] * 2, atol=1e-11)
 
 
+@pytest.mark.slow
 def test_a_pinion_in_space_drives_its_rack_and_is_driven_by_it_with_their_efficiencies():
     friction = jn.joints.GearFriction(speed=1e-3, efficiency=0.95, backward=0.85)
     light = {"mass": 0.1, "inertia": [1e-3] * 3}
@@ -258,6 +259,7 @@ def friction_of_worm(coefficient, speed=1e-3, **values):
     return jn.joints.GearFriction(speed=speed, coefficient=coefficient, lead_angle=float(LEAD), **values)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("coefficient, pressure", [(0.05, None), (0.12, None), (0.05, 0.35), (0.099, 0.2)])
 def test_a_worm_drives_and_is_held_by_the_formulas_of_its_thread(coefficient, pressure):
     angle = np.arctan(coefficient / np.cos(pressure or 0.0))
@@ -283,6 +285,7 @@ def test_a_wheel_drives_its_worm_or_locks(coefficient):
     np.testing.assert_allclose(abs(found), 0.5 * 30.0 / efficiency, rtol=1e-9)
 
 
+@pytest.mark.slow
 def test_a_worm_that_pushes_its_driven_wheel_is_no_lock():
     found = jn.solve(worm("2*t", "0.5", friction_of_worm(0.12), drives="wheel"), [0.0, 0.7], order=1)
     forward = np.tan(LEAD) / np.tan(LEAD + np.arctan(0.12))

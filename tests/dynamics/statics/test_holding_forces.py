@@ -241,6 +241,7 @@ def ball_and_sleeve():
     )
 
 
+@pytest.mark.slow
 def test_friction_of_two_directions_does_all_it_can_in_one_of_them():
     found = jn.dynamics.holding_forces(jn.solve(ball_and_sleeve(), [0.0, 0.3], order=0))
     expected = {"turn": 0.05 * 0.2 * 30, "roll": 0.05 * 0.2 * 20, "push": 0.2 * 20, "aside": 0.3 * 40, "spin": 0.0}
@@ -250,6 +251,7 @@ def test_friction_of_two_directions_does_all_it_can_in_one_of_them():
         assert found[name].attrs["units"] == ("N*m" if name in ("turn", "roll", "spin") else "N")
 
 
+@pytest.mark.slow
 def test_friction_of_two_directions_that_a_motion_joins():
     """A puck on a slope, held along a line across the slope: friction helps along the line alone, and all of it."""
     slope, mu, line = 0.5, 0.4, 0.7
