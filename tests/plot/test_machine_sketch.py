@@ -47,13 +47,14 @@ def test_every_example_has_all_its_bodies_and_joints(path):
     scene = scene_of(mechanism)
     assert all(np.isfinite(shape.points).all() for shape in scene.shapes)
     drawn = {shape.owner for shape in scene.shapes}
-    unseen = ("dot1", "parallel1", "coordinate", "gear")  # they keep directions, or their gears stand for them
+    # they keep directions, or their gears and wheels stand for them, which are drawn as bodies
+    unseen = ("dot1", "parallel1", "coordinate", "gear", "wheel")
     for name, joint in mechanism.joints.items():
         assert f"joints.{name}" in drawn or joint.type_name in unseen or joint.type_name == "revolute"
     for kind in ("drivers", "forces"):
         for name in mechanism.elements[kind]:
             assert f"{kind}.{name}" in drawn
-    assert {label.text for label in scene.labels} >= set(mechanism.bodies)
+    assert {label.text for label in scene.labels} >= set(mechanism.rigid_bodies)
     left, right, lower, upper = scene.limits
     assert right > left
     assert upper > lower

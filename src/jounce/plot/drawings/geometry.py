@@ -23,6 +23,7 @@ from jounce.mechanism import Mechanism
 from jounce.mechanism.mechanism import GROUND, check_mechanism
 from jounce.mechanism.resolve import check_value, resolve
 from jounce.mechanism.system import POSITION_COMPONENTS
+from jounce.plot.drawings.cams import cam_disc
 from jounce.plot.drawings.curve_lines import NONE, CurveLines, curve_lines
 from jounce.plot.drawings.frames import guessed, points_at
 from jounce.plot.drawings.gears import pitch_radii, shaft_wheels
@@ -69,7 +70,7 @@ class Symbol:
     ----------
     name, kind : str
         Its name, and the symbol that its class states; ``gear`` also for a fixed ratio of two angles, ``rack`` for a
-        wheel that rolls along x or y.
+        wheel that rolls along x or y, ``cam`` for a plate cam.
     bodies : tuple of str
         Those it acts on, in the order i, j, m.
     points : tuple of numpy.ndarray
@@ -369,6 +370,8 @@ def _symbol(
     coordinate = element.coordinate if facts.symbol == "coordinate" else "angle"
     if coordinate != "angle":
         axes[0] = np.array([1.0, 0.0]) if coordinate == "x" else np.array([0.0, 1.0])
+    if disc := cam_disc(mechanism, element):
+        return Symbol(name, "cam", *disc, (None, None), (None, None))
     symbol = Symbol(name, facts.symbol, bodies, tuple(points), tuple(axes), tuple(radii))
     if curve is not None:
         symbol = replace(symbol, curve=curve)

@@ -12,6 +12,7 @@ from jounce.mechanism import Mechanism
 from jounce.mechanism.building.belts import belt_course, belt_outline
 from jounce.mechanism.mechanism import GROUND
 from jounce.plot.drawings import symbol_parts as parts
+from jounce.plot.drawings.cams import pitch_curve
 from jounce.plot.drawings.curve_lines import shown
 from jounce.plot.drawings.drawing import BARS, GUIDES, INK, MARKS, SYMBOLS, WHEELS, Drawing, Flat, Label, tinted
 from jounce.plot.drawings.driver_symbols import DRIVERS_AND_FORCES
@@ -121,6 +122,17 @@ def _curve(drawing: Drawing, symbol: Symbol) -> None:
         else:
             drawing.curve(flat, stroke=tinted(color, 0.6), width=0.6, layer=GUIDES - 1)
     (parts.pin if drawing.planar else parts.ball)(drawing, drawing.flat(held))
+
+
+def _cam(drawing: Drawing, symbol: Symbol) -> None:
+    """Draw the pitch curve of a plate cam, which a point of its follower describes on it, and the point as a roller."""
+    disc, _ = symbol.bodies
+    held, color = drawing.global_point(symbol, 1), drawing.colors.get(disc, INK)
+    pitch, whole = pitch_curve(drawing.within(disc, held))
+    if len(pitch) > 1:
+        flat = drawing.flat(drawing.at(disc, pitch))
+        drawing.curve(flat, closed=whole, stroke=color, width=1.6, layer=WHEELS, owner=f"bodies.{disc}")
+    drawing.disc(drawing.flat(held), 0.9 * drawing.unit, stroke=INK, fill=parts.PAPER, width=1.2, layer=SYMBOLS)
 
 
 def _coordinate(drawing: Drawing, symbol: Symbol) -> None:
@@ -277,6 +289,7 @@ _PLANAR: dict[str, Callable[[Drawing, Symbol], None]] = {
     "rack": _rack,
     "rolling": _rolling,
     "curve": _curve,
+    "cam": _cam,
     "belt": _belt,
     "rope": _rope,
     "none": _nothing,

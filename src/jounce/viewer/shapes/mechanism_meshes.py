@@ -11,6 +11,7 @@ from trimesh import Trimesh
 
 from jounce.kinematics import Motion
 from jounce.mechanism.mechanism import GROUND
+from jounce.plot.drawings.cams import pitch_curve
 from jounce.plot.drawings.curve_lines import shown
 from jounce.plot.drawings.frames import frames, points_at, within
 from jounce.plot.drawings.geometry import Point, Skeleton, Symbol, Wheel
@@ -52,6 +53,8 @@ def planar_meshes(motion: Motion, skeleton: Skeleton, colors: Mapping[str, Color
         if symbol.kind == "curve":
             yield from _pins(symbol, layer, size)
             yield from _groove(motion, symbol, size, layer[symbol.bodies[0]])
+        if symbol.kind == "cam":
+            yield from _disc_cam(motion, symbol, layer, size, colors[symbol.bodies[0]])
     for symbol in skeleton.drivers:
         if symbol.kind == "slide":
             yield from _planar_slide(motion, symbol, layer, size)
@@ -133,6 +136,20 @@ def _groove(motion: Motion, symbol: Symbol, size: float, level: float = 0.0) -> 
     for line in shown(symbol.curve, visited, 0.1 * size):
         high = np.full((len(line), 1), level + 0.4 * THICKNESS * size)
         yield body, tube(np.concatenate([line, high], axis=1)[:, :3] if line.shape[1] == 2 else line, radius), GRAY
+
+
+def _disc_cam(motion: Motion, symbol: Symbol, layer: Mapping[str, float], size: float, color: Color) -> Pieces:
+    """Give a roller at the point of a follower, and the plate cam that it rolls on in a motion of a whole turn."""
+    (disc, moved), radius = symbol.bodies, 2.0 * PIN * size
+    low, high = layer[disc], layer[disc] + 0.8 * THICKNESS * size
+    center = [*symbol.points[1], 0.5 * (low + high)]
+    yield moved, cylinder(radius, high - low, center=center), DARK
+    whole = frames(motion)
+    pitch, is_whole = pitch_curve(within(whole[disc], points_at(whole[moved], symbol.points[1])))
+    if is_whole:
+        profile = Polygon(pitch).buffer(-radius)
+        if isinstance(profile, Polygon) and not profile.is_empty:
+            yield disc, extruded(profile, low, high), color
 
 
 def _turned_to(axis: Point) -> Float[np.ndarray, "3 3"]:

@@ -1,0 +1,79 @@
+"""Which bodies of a cam are its disc and its follower, as they are drawn."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float
+
+from jounce.constraints import Cam
+from jounce.mechanism import Mechanism
+from jounce.mechanism.mechanism import GROUND
+from jounce.mechanism.resolve import resolve
+
+__all__ = ["cam_disc", "pitch_curve"]
+
+Point = Float[np.ndarray, " component"]
+
+
+def cam_disc(mechanism: Mechanism, joint: Any) -> tuple[tuple[str, str], tuple[Point, Point]] | None:
+    """Return the body of a plate cam and that of its follower, and in the frame of each its point, m.
+
+    The point of the disc is its origin, that of the follower describes the pitch curve on the disc.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+    joint : Joint
+
+    Returns
+    -------
+    tuple of two tuples, or None
+        None for other joints, and where no point is known: of followers that turn, in space, and of leaders that do
+        not turn.
+
+    Examples
+    --------
+    >>> import jounce as jn
+    >>> from jounce.plot.drawings.cams import cam_disc
+    >>> engine = jn.load("examples/camshaft.yaml")
+    >>> bodies, points = cam_disc(engine, engine.joints["cam"])
+    >>> bodies
+    ('shaft', 'follower')
+    """
+    if mechanism.space != "planar" or not isinstance(joint, Cam):
+        return None
+    follower, leader = joint.follower, joint.leader
+    turns, rocks = (getattr(part, "coordinate", None) == "angle" for part in (leader, follower))
+    disc, moved = leader.bodies[-1], follower.bodies[-1]
+    if not turns or rocks or GROUND in (disc, moved) or disc == moved:
+        return None
+    point = getattr(follower, "point_j", None)
+    place = np.zeros(2) if point is None else np.asarray(resolve(point, mechanism.parameter_values), float)
+    return (disc, moved), (np.zeros(2), place)
+
+
+def pitch_curve(
+    visited: Float[np.ndarray, "time components"],
+) -> tuple[Float[np.ndarray, "point components"], bool]:
+    """Return the points on a disc that a follower visits in a motion, and whether they go all the way around.
+
+    Parameters
+    ----------
+    visited : array of shape (time, 2)
+        The point of the follower in the frame of the disc, m; NaN where the motion failed.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from jounce.plot.drawings.cams import pitch_curve
+    >>> angle = np.linspace(0, 2 * np.pi, 73)
+    >>> pitch_curve(np.stack([np.cos(angle), np.sin(angle)], axis=1))[1]
+    True
+    """
+    points = visited[np.isfinite(visited).all(axis=1)]
+    if len(points) < 3:
+        return points, False
+    steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
+    return points, bool(np.linalg.norm(points[-1] - points[0]) <= 2 * steps.max())
