@@ -91,16 +91,21 @@ def contact_spring(mechanism: Mechanism, cam: str, spring: str, time: TimeLike |
     now = contact(given)
     step = SHARE * max(abs(given), float(np.ptp(now)) / _stiffness(mechanism, force), 1e-6)
     sense = 1.0 if np.mean(now) >= 0 else -1.0
-    for remaining in reversed(range(ROUNDS + 1)):
+
+    def required(now: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return where the spring must be free at each instant, and its preload, up to a constant."""
         slope = (contact(given + step) - now) / step
         if (sense * slope).max() * (sense * slope).min() <= 0:
             message = "does nothing to the contact force, or presses at some instants and pulls at others"
             raise MechanismError(message, name="spring", value=spring)
         needed = given - now / slope
-        preload = -needed if sense * slope[0] < 0 else needed
-        if remaining and len(instants) > 1:
-            instants = _closer(instants, preload)
-            now = contact(given)
+        return needed, -needed if sense * slope[0] < 0 else needed
+
+    needed, preload = required(now)
+    for _ in range(ROUNDS if len(instants) > 1 else 0):
+        instants = _closer(instants, preload)
+        now = contact(given)
+        needed, preload = required(now)
     where = int(np.argmax(preload))
     left = contact(float(needed[where]))
     if abs((sense * left).min()) > EXACT * np.abs(left).max():
