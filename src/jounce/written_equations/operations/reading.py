@@ -162,7 +162,8 @@ class GraphReader(ProgramReader):
         return leaf if isinstance(leaf, Entries) else np.asarray(leaf)
 
     def _each(self, dtype: Any, function: Callable[..., int], *given: Entries) -> Entries:
-        numbers = np.frompyfunc(function, len(given), 1)(*(x.numbers for x in given))
+        with np.errstate(all="ignore"):  # of folded constants, such as comparisons with NaN
+            numbers = np.frompyfunc(function, len(given), 1)(*(x.numbers for x in given))
         return Entries(np.asarray(numbers, np.int64), dtype)
 
     def _converted(self, given: Entries, dtype: Any) -> Entries:
