@@ -38,15 +38,15 @@ def coordinates(equations):
     return np.concatenate([equations.position.values, attitude], axis=-1).reshape(len(equations.time), -1)
 
 
-def differences(module, equations):
+def differences(module, equations, *, by_terms=False):
     """Return by how much code differs from numbers: residual, Jacobian, right sides, each over the size of its row.
 
-    The size of right sides is that of the terms of ``Phi_q q^(k)``, which may cancel.
+    With `by_terms` the size of right sides is at least that of the terms of ``Phi_q q^(k)``, where these cancel.
     """
     q, found = coordinates(equations), []
     moving, sides = (from_one(x) for x in (equations.velocities, equations.right_side))
     for k, t in enumerate(equations.time.values.tolist()):
-        terms = np.nan_to_num(np.abs(moving[k])) @ np.abs(equations.jacobian.values[k]).T
+        terms = by_terms * (np.nan_to_num(np.abs(moving[k])) @ np.abs(equations.jacobian.values[k]).T)
         pairs = (
             (module["residual"](t, q[k]), equations.residual.values[k], (), 1.0),
             (module["jacobian"](t, q[k]), equations.jacobian.values[k], (1,), 1.0),
