@@ -397,7 +397,7 @@ def test_coordinates_as_another_program_numbers_them(run, facts):
     "arguments, says",
     [
         ((EXAMPLES / "robots" / "panda.urdf", "--as", "kdl"), "--as: unknown reader, got 'kdl'"),
-        ((EXAMPLES / "robots" / "five_bar.xml", "--as", "drake"), "has not been looked at"),
+        ((EXAMPLES / "robots" / "five_bar.xml", "--as", "drake"), "has not been examined"),
         ((FOUR_BAR, "--as", "drake"), "--as: is for robot files"),
         ((FOUR_BAR, "--model", "a"), "--model: is for robot files"),
     ],

@@ -177,7 +177,7 @@ def test_a_missing_duration_is_told():
 
 
 def test_a_quantity_that_is_no_time_is_refused():
-    with pytest.raises(jn.errors.MechanismError, match="have the unit meter, which is none of time"):
+    with pytest.raises(jn.errors.MechanismError, match="have the unit meter, which is not a unit of time"):
         jn.solve(MECHANISM, UNITS.Quantity([0.0, 1.0], "m"), order=0)
 
 

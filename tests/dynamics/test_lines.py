@@ -349,7 +349,7 @@ def crank(length, points=((1, 0), (0.2, 0)), bodies=("ground", "crank"), **joint
         (crank(1.3), r"rope.length: the rope is too long: along its points it is 1.2 m at most"),
         (crank(1.55, ((1, 0), (0.3, 0)), ("ground", "rod")), "1.5 m at most"),
         (crank(0.45, ((1, 0), (0.3, 0)), ("ground", "rod")), "0.5 m at least"),
-        (crank(1.0, ((0, 0), (0, 0), (1, 0)), ("ground", "crank", "ground")), "in one place with the point before it"),
+        (crank(1.0, ((0, 0), (0, 0), (1, 0)), ("ground", "crank", "ground")), "coincides with the point before it"),
         (crank(1.0, ((0, 0), (0, 0, 0))), "2 points of 2 numbers"),
         (crank(1.0, ((0, 0),)), "2 points of 2 numbers"),
         (crank(-1.0), "must be greater than zero"),
@@ -372,7 +372,7 @@ def test_a_rope_within_its_bounds_is_taken():
 
 @pytest.mark.parametrize("bodies", [("a", "a"), ("a",)])
 def test_a_rope_joins_bodies(bodies):
-    with pytest.raises(jn.errors.MechanismError, match="joins two bodies or more, and all its points are on one"):
+    with pytest.raises(jn.errors.MechanismError, match="joins two or more bodies, but all its points are on one"):
         jn.joints.Rope(bodies, [ZERO] * len(bodies), 1.0)
 
 

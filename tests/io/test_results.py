@@ -262,8 +262,8 @@ def test_names_that_netcdf_cannot_hold(tmp_path):
         ("a.csv", b"a,b\n1,2\n", "is not a table of results"),
         ("a.csv", b"time,a\n1,2\n3\n", "line 3: must have 2 entries, got 1"),
         ("a.csv", b"time,a\n1,x\n", "line 2, a: must be a number, got 'x'"),
-        ("a.csv", b"\xff\xfe\x00", "line 1: is no text in UTF-8"),
-        ("a.nc", b"\xff\xfe\x00" * 99, "is damaged, or no file of results"),
+        ("a.csv", b"\xff\xfe\x00", "line 1: is not text in UTF-8"),
+        ("a.nc", b"\xff\xfe\x00" * 99, "is damaged, or is not a file of results"),
     ],
 )
 def test_what_is_no_file_of_results(tmp_path, name, content, words):

@@ -145,7 +145,7 @@ def assert_refused(folder, match=None):
 @pytest.mark.parametrize("change", CHANGES)
 def test_without_its_description_a_folder_is_no_sweep(copy, change):
     change(copy / ROOT)
-    assert_refused(copy, r"no sweep of jounce, or one that was damaged \(zarr.json: ")
+    assert_refused(copy, r"not a sweep of jounce, or is a damaged one \(zarr.json: ")
 
 
 @pytest.mark.parametrize("name", FILES)
@@ -153,7 +153,7 @@ def test_without_its_description_a_folder_is_no_sweep(copy, change):
 def test_every_alteration_of_a_file_is_mended_or_refused(copy, whole, name, change):
     change(copy / name)
     if change in (make_folder, fill_folder):
-        assert_refused(copy, f"{name}: something else has the place of a file of the sweep; remove it")
+        assert_refused(copy, f"{name}: something else takes the place of a file of the sweep; remove it")
         shutil.rmtree(copy / name)
         with ignored():
             assert swept(copy) == whole[1]
@@ -190,7 +190,7 @@ def test_every_alteration_of_a_folder_is_mended_or_refused(copy, whole, name):
         path.unlink(missing_ok=True)
         before = contents(kept)
         planted()
-        assert_refused(copy, f"{name}: has the place of a folder of the sweep; remove it")
+        assert_refused(copy, f"{name}: takes the place of a folder of the sweep; remove it")
         assert contents(kept) == before
 
 

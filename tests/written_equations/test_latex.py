@@ -286,13 +286,13 @@ def test_an_angle_of_a_line_is_refused_by_name():
     mechanism = between_free_bodies(Tilted(BODIES), "planar")
     with pytest.raises(MechanismError, match=r"^it: cannot be written out: it takes a function of \d+ long terms"):
         jn.equations(mechanism, "it", format="latex")
-    assert "Left out, as nobody would read it" in jn.equations(mechanism, format="latex")
+    assert "Omitted, because it is too long to read" in jn.equations(mechanism, format="latex")
 
 
 def test_what_nobody_would_read_is_left_out_within_seconds():
     text = jn.equations(jn.load(example("belt_drive")), format="latex")
     assert_well_formed(text)
-    assert "Left out, as nobody would read it: it takes a function of" in text
+    assert "Omitted, because it is too long to read: it takes a function of" in text
     with pytest.raises(MechanismError, match=r"^belt\w*: cannot be written out: it takes a function of"):
         jn.equations(jn.load(example("belt_drive")), "belt", format="latex")
 

@@ -113,7 +113,7 @@ class PrivateFolder:
 
     def _check(self, status: os.stat_result) -> None:
         if fault := _fault(status):
-            message = f"{fault}: what is in it may be another's; use a folder of your own that only you may write"
+            message = f"{fault}: somebody else may have written its contents; use a folder that only you can write to"
             raise OutputError(message, path=self.path)
 
     def _check_above(self) -> None:

@@ -148,7 +148,7 @@ def _unit_free(values: Any, timed: bool) -> Any:
     try:
         in_seconds: Any = bare.to("s")
     except Exception:  # noqa: BLE001 - the errors of libraries of units have no common base
-        raise _NoNumbersError(f"these have the unit {own or 1}, which is none of time") from None
+        raise _NoNumbersError(f"these have the unit {own or 1}, which is not a unit of time") from None
     return in_seconds.magnitude if hasattr(in_seconds, "magnitude") else in_seconds.value
 
 

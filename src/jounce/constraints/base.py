@@ -56,7 +56,9 @@ def register(kind: type[Any], type: str, space: str, role: str) -> None:  # noqa
         check_choice("space", space, SPACES, MechanismError)
     for field in vars(kind).get("__annotations__", {}):
         if field in RESERVED_KEYS:
-            message = f"no field of {kind.__qualname__} may have this name, which files use otherwise; rename it"
+            message = (
+                f"no field of {kind.__qualname__} may have this name, which files use for something else; rename it"
+            )
             raise MechanismError(message, name="field", value=field)
     catalogues = [_REGISTRY.setdefault((each, role), {}) for each in ((space,) if space else SPACES)]
     for taken in catalogues:

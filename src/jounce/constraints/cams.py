@@ -137,7 +137,7 @@ def coordinate_of_element(element: Any, name: str = "leader") -> Any:
     kind, bodies = type(element), getattr(element, "bodies", ())
     if not isinstance(element, AbstractConstraint) or not is_ours(kind.residual):
         message = "must be a driver, or a joint that turns or slides, of this package"
-        raise MechanismError(f"{message}; a law of something else is a joint of your own", name=name, value=element)
+        raise MechanismError(f"{message}; for any other law, write a joint of your own", name=name, value=element)
     if element.role == "driver" and hasattr(element, "evaluate"):
         return dataclasses.replace(element, motion=AT_REST)
     pair = facts_of(kind).pair

@@ -61,7 +61,7 @@ SIGNS: Mapping[str, str] = MappingProxyType(
         "not zero": "must not be zero",
         "pressure angle": "must be from 0 to 45 deg; a number without a unit is in rad",
         "efficiency": "must be above 0 and at most 1",
-        "at most 1": "must be at most 1; zero or less is of what locks itself",
+        "at most 1": "must be at most 1; zero or less means self-locking",
         "lead angle": "must be above 0 and below 90 deg; a number without a unit is in rad",
         "any": "",
     }

@@ -232,7 +232,7 @@ def check_friction(joint: Any) -> None:
     if joint.has_friction_radius and friction.radius is None:
         raise MechanismError("is missing: the bodies turn, on a surface of some radius", name="friction.radius")
     if not joint.has_friction_radius and friction.radius is not None:
-        message = "is none of a guide, whose surfaces slide and do not turn: leave it out"
+        message = "does not apply to a guide, whose surfaces slide and do not turn: leave it out"
         raise MechanismError(message, name="friction.radius", value=friction.radius)
 
 

@@ -53,7 +53,7 @@ class Rope(AbstractConstraint, type="rope"):
 
     def __check_init__(self):
         if len(set(self.bodies)) < 2:
-            message = "a rope joins two bodies or more, and all its points are on one"
+            message = "a rope joins two or more bodies, but all its points are on one"
             raise MechanismError(message, name="bodies", value=list(self.bodies))
 
     def residual(self, *bodies_and_time: Any) -> Jet:

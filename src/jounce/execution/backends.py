@@ -57,7 +57,7 @@ def tell_missing(operation: str) -> None:
         return
     _warned.add(operation)
     message = (
-        f"there is no machine code for the operation {operation!r} of JAX: XLA computes what has it, with the same "
-        "results in two to six times the time; another form of that operation may be faster"
+        f"there is no machine code for the operation {operation!r} of JAX: XLA computes the programs that contain it, "
+        "with the same results in two to six times the time; another form of that operation may be faster"
     )
     warnings.warn(message, MachineCodeWarning, stacklevel=2)

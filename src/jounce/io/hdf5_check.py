@@ -61,14 +61,14 @@ def check_readable(content: bytes, path: str) -> None:
     try:
         status, message = _read_by_another(content, seconds)
     except subprocess.TimeoutExpired:
-        raise OutputError(f"is damaged: HDF5 does not come to an end with it in {seconds:.0f} s", path=path) from None
+        raise OutputError(f"is damaged: HDF5 did not finish reading it in {seconds:.0f} s", path=path) from None
     except OSError as error:
         raise OutputError(f"cannot be read: no process can be started to look at it: {error}", path=path) from None
     if status == 3:
         words = " ".join(message.decode(errors="replace").split())
-        raise OutputError(f"is damaged, or no file of results: {words}", path=path)
+        raise OutputError(f"is damaged, or is not a file of results: {words}", path=path)
     if status != 0:
-        raise OutputError("is damaged: HDF5 ends the process that reads it", path=path)
+        raise OutputError("is damaged: the process in which HDF5 reads it crashes", path=path)
 
 
 def _read_by_another(content: bytes, seconds: float) -> tuple[int, bytes]:

@@ -72,7 +72,7 @@ def _dataset(content: bytes, path: str) -> xarray.Dataset:
             return xarray.load_dataset(io.BytesIO(content), engine="h5netcdf", decode_times=False)
     except Exception as error:  # noqa: BLE001 - what the libraries below raise for a file that they do not understand
         message = ascii(f"{type(error).__name__}: {error}"[:LONGEST])[1:-1]
-        raise OutputError(f"is damaged, or no file of results: {message}", path=path) from None
+        raise OutputError(f"is damaged, or is not a file of results: {message}", path=path) from None
 
 
 def _table(content: bytes, path: str) -> xarray.Dataset:
@@ -80,7 +80,7 @@ def _table(content: bytes, path: str) -> xarray.Dataset:
     try:
         text = content.decode("utf-8-sig")
     except UnicodeDecodeError:
-        raise OutputError("is no text in UTF-8", path=path, line=bad_line(content)) from None
+        raise OutputError("is not text in UTF-8", path=path, line=bad_line(content)) from None
     lines = csv.reader(io.StringIO(text, newline=""), strict=True)
     try:
         header, units = _named_columns(next(lines, []))

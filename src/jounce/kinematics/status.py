@@ -41,16 +41,16 @@ _ADVICE = {
     "or a force grows beyond all bounds or jumps, or the motion takes more than a million steps; check the mechanism, "
     "its laws and its forces here, or ask for a shorter motion",
     Status.UNDEFINED: "a quantity or a derivative of it is not a finite number here: a distance that is zero has no "
-    "rate, a motion law such as t**2.5 no third derivative at t = 0, and Euler angles are none where their first and "
-    "last axes are parallel; ask for a lower order, for another sequence, or leave it out",
+    "rate, a motion law such as t**2.5 no third derivative at t = 0, and Euler angles are undefined where their first "
+    "and last axes are parallel; ask for a lower order, for another sequence, or leave it out",
     Status.INCONSISTENT: "redundant constraints contradict each other here: they agree at the start, and not all along "
     "the motion; correct lengths, axes and laws of those named, or free a direction there",
-    Status.UNBALANCED: "the energy of the motion would change here, though nothing takes or gives any: a joint has a "
+    Status.UNBALANCED: "the energy of the motion would change here, though nothing adds or removes any: a joint has a "
     "kink or a jump, at which velocities would have to jump, too, or a feature too narrow for the steps; make its "
     "residual smooth, or ask for a `longest_step` as short as the feature",
     Status.END_OF_CURVE: "a point has come to an end of the curve that it is held on, and there is no curve beyond; "
     "ask for a shorter motion, or give a longer curve, or a closed one",
-    Status.LOCKED: "no acceleration fulfills the law of friction, which grows as fast as what presses the joint; give "
-    "a smaller coefficient or radius, or a start that is slower, as friction is less below its speed",
+    Status.LOCKED: "no acceleration fulfills the law of friction, which grows as fast as the normal force on the "
+    "joint; give a smaller coefficient or radius, or a start that is slower, as friction is less below its speed",
     Status.NOT_REACHED: "not computed, because the motion could not be followed up to here",
 }

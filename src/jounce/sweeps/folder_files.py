@@ -69,7 +69,7 @@ def worded(path: Path) -> Iterator[None]:
     try:
         yield
     except (IsADirectoryError, NotADirectoryError) as error:
-        message = f"something else has the place of a file of the sweep; {REMOVE}"
+        message = f"something else takes the place of a file of the sweep; {REMOVE}"
         raise OutputError(message, path=os.fsdecode(error.filename2 or error.filename or path)) from error
     except OSError as error:
         named = error.filename2 or error.filename or path

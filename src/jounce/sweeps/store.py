@@ -130,7 +130,7 @@ class Store:
         with worded(self.folder):
             for folder in sorted({*self._folders(files)}):
                 if folder.is_symlink() or (os.path.lexists(folder) and not folder.is_dir()):
-                    raise OutputError(f"has the place of a folder of the sweep; {REMOVE}", path=str(folder))
+                    raise OutputError(f"takes the place of a folder of the sweep; {REMOVE}", path=str(folder))
             for name, content in files.items():
                 path = self.folder / name
                 if (expected := self._expected_content(path, content)) is not None:
@@ -335,9 +335,7 @@ def find(folder: Path) -> Store | None:
     except OutputError as error:
         present, reason = False, f"{ROOT}: {error.message}"
     if not present:
-        message = (
-            f"something is there that is no sweep of jounce, or one that was damaged ({reason}); give another name"
-        )
+        message = f"what is there is not a sweep of jounce, or is a damaged one ({reason}); give another name"
         raise OutputError(message, path=str(folder))
     store = Store(folder)
     store.manifest  # noqa: B018 - it is compared with its digest

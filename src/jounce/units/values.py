@@ -181,7 +181,7 @@ def _parse_text(
         raise ExpressionError(f"a value has at most {MAX_CHARACTERS} characters")
     if comma := _DECIMAL_COMMA.fullmatch(text.strip()):
         point = f"{comma[1]}.{comma[2]} {comma[3] or ''}".strip()
-        raise UnitError(f"a decimal point is a point, and thousands have no sign: write {point}")
+        raise UnitError(f"a number has a decimal point and no thousands separator: write {point}")
     with_unit = _WITH_UNIT.fullmatch(text.strip())
     if with_unit and not _divided_by_a_name(with_unit[2], known):
         return _parse_with_unit(*with_unit.groups(), kind=kind, known=known, variables=variables)
@@ -215,8 +215,8 @@ def _with_units_named(error: ExpressionError, text: str, known: Collection[str])
         except UnitError:
             continue
         message = (
-            f"a number with a unit stands alone: '{number} {unit}' cannot be a part of an expression; give it as a "
-            "parameter of its own, and write the name of that here"
+            f"a number with a unit must stand alone: '{number} {unit}' cannot be a part of an expression; define a "
+            "parameter with this value, and write its name here"
         )
         return UnitError(message)
     return error
@@ -236,8 +236,8 @@ def _parse_with_unit(
         first = re.match(_ATOM, unit)
         given = f"{number} {first.group() if first else ''}".strip()
         message = (
-            f"a number with a unit stands alone, and '{named[0]}' would be a unit, too; give '{given}' as a parameter, "
-            f"such as c: {given}, and write c*{named[0]}"
+            f"a number with a unit must stand alone, and '{named[0]}' would be a unit, too; give '{given}' as a "
+            f"parameter, such as c: {given}, and write c*{named[0]}"
         )
         raise UnitError(message)
     try:

@@ -239,7 +239,7 @@ def test_bad_trajectories_end_with_2_and_one_line(suffix, text, message, run, fi
 BAD_ROBOTS = {
     "malformed": (PENDULUM.replace("</robot>", ""), "pendulum.urdf, line "),
     "negative mass": (PENDULUM.replace('value="2"', 'value="-2"'), "must be greater than zero"),
-    "no robot": ("<world/>", "is no robot file"),
+    "no robot": ("<world/>", "is not a robot file"),
 }
 
 

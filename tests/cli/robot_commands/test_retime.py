@@ -111,7 +111,7 @@ def test_from_a_running_trajectory(run, cart, tmp_path):
     assert rows[:, 1].min() >= -0.5 * (1 + 1e-6)  # backward it is slower
     assert abs(rows[-1, 0] + 1) < 1e-8
     for more, message in (
-        (("--running", running), "--running: says nothing without --at"),
+        (("--running", running), "--running: has no effect without --at"),
         (("--running", running, "--at", "9s"), "goes from 0 s to 2 s"),
         (("--running", running, "--at", "1s", "--out", tmp_path / "none.csv"), "--duration: the rows of a motion"),
     ):

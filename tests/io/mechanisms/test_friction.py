@@ -67,7 +67,7 @@ def test_bad_friction_is_refused_with_its_line(tmp_path, friction, words):
 
 def test_a_guide_has_no_radius_and_a_rod_no_friction(tmp_path):
     guide = {"type: revolute": "type: prismatic", "[[0, 0], [0, 0]]": "[[0, 0], [0, 0]]\n    vectors: [[1, 0], [1, 0]]"}
-    with pytest.raises(jn.errors.MechanismFileError, match="radius: is none of a guide"):
+    with pytest.raises(jn.errors.MechanismFileError, match="radius: does not apply to a guide"):
         jn.load(written(tmp_path, PIN, **guide))
     rod = {"type: revolute": "type: double_revolute", "[[0, 0], [0, 0]]": "[[0, 0], [1, 0]]\n    length: 1"}
     with pytest.raises(jn.errors.MechanismFileError, match="friction"):

@@ -125,7 +125,7 @@ def test_what_is_written_reads_the_same(tmp_path, motion):
         ("{piecewise: [{until: 1 s, expression: t}], of: crank}", "until: .*angle"),
         ("{piecewise: [{until: 1, expression: t}], beyond: never}", "no such way|unknown way"),
         ("{expression: 3 mm, derivative: 1}", "must be angle per s"),
-        ("{expression: t, initial: [1]}", "goes with a derivative that is given"),
+        ("{expression: t, initial: [1]}", "is only for a law that is given by a derivative"),
         ("{expression: t, derivative: 7}", "must be a whole number from 0 to 4"),
         ("{expression: t, derivative: 1, initial: [1, 2]}", "must be a list of at most 1 values"),
     ],

@@ -119,7 +119,7 @@ def test_the_files_without_mistakes_are_read(tmp_path, kind):
         (b"<?xml version='1.0' encoding='klingon'?><robot/>", ": is in no encoding that can be read: unknown encoding"),
         (
             b"<world/>",
-            ", line 1: is no robot file, got '<world>'; the root element of a URDF is <robot>, of an MJCF file",
+            ", line 1: is not a robot file, got '<world>'; the root element of a URDF is <robot>, of an MJCF file",
         ),
         (b"<robot/>", ", line 1: a robot needs at least one <link>"),
         (b"<a>" * 3000, ", line 1: nested more than 2000 deep"),
@@ -146,7 +146,7 @@ def test_content_that_is_no_robot(tmp_path, content, says):
         ("folder.urdf", "is a directory, a file is needed"),
         (
             "robot.urdf.xacro",
-            "is a xacro file, from which a URDF has yet to be made; run: xacro FILE.urdf.xacro > FILE",
+            "is a xacro file, which must first be expanded to a URDF; run: xacro FILE.urdf.xacro > FILE",
         ),
         ("robot.yaml", "the kind of a robot file is given by its extension; valid: .urdf, .xml"),
         ("robot", "the kind of a robot file is given by its extension; valid: .urdf, .xml"),

@@ -127,7 +127,10 @@ def test_toml_and_json_are_read_too(read):
         ("joints: {pin: 3}", "line 1, joints.pin: must be a mapping with at least one entry, got 3"),
         ("joints:", "line 1, joints: must be a mapping with at least one entry, got nothing"),
         ("- 1", "line 1: must be a mapping with at least one entry, got [1]"),
-        ("joints: {pin: {jerk: -5}}", "line 1, joints.pin.jerk: must be greater than zero, got -5; null is no limit"),
+        (
+            "joints: {pin: {jerk: -5}}",
+            "line 1, joints.pin.jerk: must be greater than zero, got -5; null means no limit",
+        ),
         ("joints: {pin: {jerk: 0}}", "line 1, joints.pin.jerk: must be greater than zero, got 0"),
         ("default: {jerk: -5 m/s^3}", "line 1, default.jerk: must be greater than zero, got '-5 m/s^3'"),
         ("joints: {pin: {jerk: .inf}}", "line 1, joints.pin.jerk: must be a finite number, got inf"),

@@ -143,7 +143,7 @@ def test_files_of_mujoco_have_its_order(tmp_path):
     assert [model.jnt_qposadr[k] for k in range(5)] == np.cumsum([0, 7, 1, 4, 1]).tolist()
     assert [name for joint in joints for name in joint.coordinates] == list(robot.joint_names)
     assert joints[3].note.startswith("an equality holds it")
-    with pytest.raises(RobotFileError, match="has not been looked at, got 'drake'; known of it: mujoco"):
+    with pytest.raises(RobotFileError, match="has not been examined, got 'drake'; known readers of it: mujoco"):
         as_read_by("drake", path, robot)
 
 

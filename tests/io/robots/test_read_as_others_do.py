@@ -32,8 +32,8 @@ TOLD = {
     "zero bytes": (arm() + "\n\0\0", "zero bytes at the end (line 2)"),
     "closed twice": (arm() + "\n</robot>\n", "text after the end of its root element (line 2)"),
     "unknown": (arm(inside="\n<controller_gains k_p='3'/>"), "<controller_gains> of j (line 2)"),
-    "reversed": (arm(limit='<limit lower="1" upper="-1" velocity="2"/>'), "taken for no range: j (line 1)"),
-    "no velocity": (arm(limit='<limit lower="-1" upper="1" velocity="-1"/>'), "taken for none: j (line 1)"),
+    "reversed": (arm(limit='<limit lower="1" upper="-1" velocity="2"/>'), "read as no range: j (line 1)"),
+    "no velocity": (arm(limit='<limit lower="-1" upper="1" velocity="-1"/>'), "read as none: j (line 1)"),
 }
 
 

@@ -307,7 +307,7 @@ def test_as_the_controller_goes_through_samples(tmp_path):
     assert all(law.degree == 3 for law in jn.load_trajectory(path, as_controller=True).laws.values())
     law = tmp_path / "law.yaml"
     law.write_text("joints: {a: t}\ntime: {stop: 1, step: 0.1}\n")
-    with pytest.raises(TrajectoryError, match="as_controller: holds laws"):
+    with pytest.raises(TrajectoryError, match="as_controller: contains laws"):
         jn.load_trajectory(law, as_controller=True)
     twice = tmp_path / "twice.json"
     twice.write_text(json.dumps(message([POINTS[0], *POINTS])))
@@ -424,7 +424,7 @@ def test_a_long_table_is_read_as_the_same_table_in_parts(tmp_path, monkeypatch):
     with pytest.raises(TrajectoryError, match="line 27, time: must be a finite number, got 'x'"):
         jn.load_trajectory(bad)
     monkeypatch.setattr("jounce.io.files.long_tables.MAX_SAMPLES", 10)
-    with pytest.raises(TrajectoryError, match="line 27: from so long a file numbers alone are read"):
+    with pytest.raises(TrajectoryError, match="line 27: a file of this length may contain numbers only"):
         jn.load_trajectory(bad)
 
 
@@ -455,7 +455,7 @@ def controller_states(part, count=51, rate=True):
 def test_states_of_a_controller_are_what_was_measured(tmp_path, part):
     path = tmp_path / "state.yaml"
     path.write_text(yaml.safe_dump_all(controller_states(part), explicit_start=True))
-    with pytest.warns(jn.errors.RecordingWarning, match=rf"what was measured is read \({part}\)"):
+    with pytest.warns(jn.errors.RecordingWarning, match=rf"only measured values are read \({part}\)"):
         found = jn.load_trajectory(path)
     check(found)
     short = tmp_path / "short.yaml"

@@ -112,10 +112,10 @@ def retime(
         warnings.simplefilter("ignore", SampleWarning)
         if (running is None) != (at is None):
             name, other = ("--at", "--running") if running is None else ("--running", "--at")
-            raise JounceError(f"says nothing without {other}; give both", name=name)
+            raise JounceError(f"has no effect without {other}; give both", name=name)
         if running is not None and output.out is not None and duration is None:
             message = (
-                "the rows of a motion that begins in motion are not slowed to whole periods; say how many s it takes"
+                "the rows of a motion that starts in motion cannot be slowed to whole periods; give its duration in s"
             )
             raise JounceError(message, name="--duration")
         if file.suffix.lower() in DATA_FILES:

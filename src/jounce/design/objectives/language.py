@@ -191,7 +191,8 @@ def refuse_name(name: str, known: Mapping[str, str], text: str) -> ExpressionErr
 def varying_message(text: str) -> MechanismError:
     """Return the error for a quantity that is compared or minimized though it changes in time."""
     return MechanismError(
-        f"changes in time; make one number of it, as by peak({text}), rms({text}), mean({text}), span({text}), "
+        f"changes in time; reduce it to one number, for example by peak({text}), rms({text}), mean({text}), "
+        f"span({text}), "
         f"maximum({text}), minimum({text}) or at({text}, 0.5)",
         value=text,
     )

@@ -168,7 +168,7 @@ def _exerted_by(mechanism: Mechanism, name: str, kind: str, component: str) -> A
         return JointForceOutput(name) if kind == "force" else JointTorqueOutput(name)
     if is_turning(driver) != (kind == "torque"):
         right, wrong = ("torque", "force") if is_turning(driver) else ("force", "torque")
-        raise MechanismError(f"the driver '{name}' exerts a {right}, no {wrong}; write {right}({name})")
+        raise MechanismError(f"the driver '{name}' exerts a {right}, not a {wrong}; write {right}({name})")
     return DriverTorqueOutput(name) if kind == "torque" else DriverForceOutput(name)
 
 

@@ -206,7 +206,7 @@ def check_pitch(motion: Motion, groups: Sequence[Group], poses: Callable[[int], 
             size = radius[instance, 0]
             message = (
                 f"at t = {motion.time[lane]:g} s the center is {away[instance, lane] - size:.6g} m to the left of the "
-                f"line, and must be {-size:.6g} m, the radius to its right: move the line or the center, turn the line "
-                "round, or guide the rack so that it keeps its distance"
+                f"line, and must be {-size:.6g} m, the radius to its right: move the line or the center, reverse the "
+                "line, or guide the rack so that it keeps its distance"
             )
             raise MechanismError(message, name=f"{motion.model.rows[rows][instance]}.points")

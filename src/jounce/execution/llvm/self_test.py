@@ -30,7 +30,7 @@ def is_usable() -> bool:
 def passes() -> bool:
     """Tell whether machine code gives what XLA does on this system; if not, one warning says why."""
     if not Path(sys.executable or "").name.startswith("python"):  # it may be an application that has Python within
-        reason = f"{sys.executable!r} is no Python that could be asked to try it"
+        reason = f"{sys.executable!r} cannot be run as a Python interpreter"
     else:
         try:
             subprocess.run([sys.executable, "-P", "-c", CALL], capture_output=True, check=True, timeout=LONGEST)
@@ -43,8 +43,8 @@ def passes() -> bool:
             return True
     message = (
         f"machine code was not tried on {sys.platform}, and a small program does not run here as it does in XLA "
-        f"({reason}); XLA computes in its place, with the same results in two to six times the time; "
-        "JOUNCE_NATIVE=0 in the environment asks for that without this message"
+        f"({reason}); XLA computes instead, with the same results in two to six times the time; JOUNCE_NATIVE=0 in "
+        "the environment selects it without this message"
     )
     warnings.warn(message, MachineCodeWarning, stacklevel=2)
     return False

@@ -169,7 +169,9 @@ def divided_steps(
         needed = np.where(np.isin(which, lacking), _needed(sizes, pieces, duration, allowed / FINER), 1)
         np.maximum.at(parts, which, count[which] * needed)
         if parts.sum() > MOST_STEPS:
-            message = f"changes of this motion are so fast that more than {MOST_STEPS} steps are needed; simulate less"
+            message = (
+                f"this motion changes so fast that more than {MOST_STEPS} steps are needed; simulate a shorter time"
+            )
             raise UnsupportedError(message, name="time")
         count = parts
 

@@ -49,7 +49,7 @@ class Outcome(enum.IntEnum):
     COLLAPSED = 2  # steps became too small to move on
     LOST = 3  # the motion is not finite from the start
     UNEXPANDED = 4  # the motion is to be expanded at the start, by the first of the steps tried
-    UNBALANCED = 5  # the energy would change, though nothing takes or gives any
+    UNBALANCED = 5  # the energy would change, though nothing adds or removes any
 
 
 MOVING = np.array([Outcome.RUNNING, Outcome.UNEXPANDED])

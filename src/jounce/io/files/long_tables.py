@@ -81,7 +81,7 @@ def numbers_of(path: str, error_type: type[JounceError]) -> Numbers | None:
             return None
         row = _ROW.search(str(reason))
         words = str(reason).split(";")[0].encode("ascii", "backslashreplace").decode("ascii")
-        message = f"from so long a file numbers alone are read: {words}"
+        message = f"a file of this length may contain numbers only: {words}"
         raise error_type(message, path=path, line=None if row is None else 2 + int(row[1])) from None
     return Numbers(1, names, values, offsets) if values.shape[1] == len(names) else None
 

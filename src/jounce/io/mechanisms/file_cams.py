@@ -99,7 +99,7 @@ def with_leaders(source: Source, space: str, elements: dict[str, dict[str, Any]]
         if isinstance(entry, CamEntry):
             at = ("joints", name, "motion", "of")
             if entry.of == name and name not in elements["drivers"]:
-                raise source.error("a cam does not lead itself", at, value=name)
+                raise source.error("a cam cannot follow itself", at, value=name)
             try:
                 entry = Cam(entry.follower, coordinate_of_element(leader(entry.of)), entry.of)
             except JounceError as error:

@@ -81,8 +81,8 @@ class FileLaws:
             profile = load_cam(file)
             if profile.follower.is_flat:
                 message = (
-                    "a flat face touches the cam at another of its points all the time, which is no point on a curve: "
-                    "give its law with of: under joints"
+                    "the contact point moves along a flat face, and is not a fixed point on a curve: give the law of "
+                    "the follower with of: under joints"
                 )
                 raise self.source.error(message, (*location, "cam"), value=given.cam)
             return SampledCurve(profile.table.pitch.T[:-1], closed=True)

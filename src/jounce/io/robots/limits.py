@@ -268,9 +268,9 @@ class _LimitsFile:
 
     def _check_size(self, number: float, raw: Any, key: str, at: Location) -> None:
         if not math.isfinite(number):
-            raise self.source.error("must be a finite number; null is no limit", at, value=raw)
+            raise self.source.error("must be a finite number; null means no limit", at, value=raw)
         if key not in RANGE and number <= 0:
-            raise self.source.error("must be greater than zero; null is no limit", at, value=raw)
+            raise self.source.error("must be greater than zero; null means no limit", at, value=raw)
 
     def _check_default(self, key: str) -> None:
         """Check an entry of the defaults by itself: it may be one that fits no joint of this robot."""

@@ -21,7 +21,7 @@ from jounce.settings import under_own_settings
 
 SHAPES = ("visual", "collision")
 XACRO_SOURCE = ("xacro:include", "xacro:macro", "xacro:property", "xacro:arg", "xacro:if", "xacro:unless")
-XACRO = "is a xacro file, from which a URDF has yet to be made; run: xacro FILE.urdf.xacro > FILE.urdf"
+XACRO = "is a xacro file, which must first be expanded to a URDF; run: xacro FILE.urdf.xacro > FILE.urdf"
 
 
 @under_own_settings
@@ -112,7 +112,9 @@ def load_robot(
     elif root.tag == "sdf":
         robot = read_sdf(root, faults, model, check_allowed(allow))
     else:
-        message = "is no robot file; the root element of a URDF is <robot>, of an MJCF file <mujoco>, of an SDF <sdf>"
+        message = (
+            "is not a robot file; the root element of a URDF is <robot>, of an MJCF file <mujoco>, of an SDF <sdf>"
+        )
         raise root.error(message, value=f"<{root.tag}>")
     if (warning := faults.warning()) is not None:
         warnings.warn(warning, stacklevel=2)

@@ -96,8 +96,8 @@ def as_read_by(reader: str, path: str | PathLike[str], robot: Robot) -> list[The
     root = read_markup(fspath(path))
     valid = OF_FORMAT.get(root.tag, ())
     if reader not in valid:
-        known = f"known of it: {', '.join(valid)}" if valid else "of it none is known"
-        raise root.error(f"how {reader} reads this format has not been looked at; {known}", "reader", value=reader)
+        known = f"known readers of it: {', '.join(valid)}" if valid else "no reader of this format is known"
+        raise root.error(f"how {reader} reads this format has not been examined; {known}", "reader", value=reader)
     return list(_of_mjcf(path, robot) if root.tag == "mujoco" else _of_urdf(reader, root, robot))
 
 
@@ -172,7 +172,7 @@ def _of_several(reader: str, name: str, kind: str, element: Element, *, first: b
     """Return a joint of several coordinates."""
     known = {"planar": ("pinocchio", "mujoco", "drake"), "floating": tuple(FREE), "spherical": ("mujoco",)}[kind]
     if reader not in known or (kind == "floating" and reader == "drake" and not first):
-        message = f"how {reader} numbers this {kind} joint has not been looked at"
+        message = f"how {reader} numbers this {kind} joint has not been examined"
         raise element.error(message, "joints", name, value=kind)
     if kind == "planar":
         return _planar(reader, name, element)
@@ -193,7 +193,7 @@ def _planar(reader: str, name: str, element: Element) -> TheirJoint:
     direction = np.array((None if axis is None else axis.numbers("xyz", 3, "joints", name)) or [1.0, 0.0, 0.0])
     direction /= np.linalg.norm(direction)
     if direction[2] < 0:
-        message = f"how {reader} chooses the directions of a planar joint with this axis has not been looked at"
+        message = f"how {reader} chooses the directions of a planar joint with this axis has not been examined"
         raise element.error(message, "joints", name, value=direction.tolist())
     from scipy.spatial.transform import Rotation
 

@@ -110,7 +110,7 @@ def load_trajectory(
     chosen = None if only is None else tuple(only)
     if isinstance(recording, LawFile):
         if as_controller:
-            message = "holds laws, between whose instants no controller has to say anything; give points or samples"
+            message = "contains laws, which no controller interpolates; give points or samples"
             raise TrajectoryError(message, path=str(fspath(path)), name="as_controller")
         return _selected_laws(recording.trajectory(), chosen, str(fspath(path)))
     if robot is not None and recording.unnamed:
@@ -146,7 +146,7 @@ def load_recording(
     if is_bag(name):
         return read_bag(name, given, topic)
     if topic is not None:
-        raise TrajectoryError("bags have topics, other files have none", path=name, name="topic", value=topic)
+        raise TrajectoryError("only bags have topics", path=name, name="topic", value=topic)
     suffix = Path(name).suffix.lower()
     if suffix not in (".csv", *DATA_FILES):
         message = "the kind of a trajectory file is given by its extension"

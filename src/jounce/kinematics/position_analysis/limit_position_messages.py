@@ -50,7 +50,7 @@ def dead_end_words(motion: Motion, index: int) -> str:
     led = output_laws(motion.mechanism)
     if name in led:
         return (
-            f"{led[name].output} can go no further than {_words(value, curve.unit)}: there it says nothing of the "
+            f"{led[name].output} can go no further than {_words(value, curve.unit)}: there it does not determine the "
             f"driver {name}, which goes on past this dead point while it turns back"
         )
     return f"{name} can go no further than {_words(value, curve.unit)}: past this dead point it turns back{far}"

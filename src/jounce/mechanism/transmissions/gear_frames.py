@@ -148,9 +148,11 @@ def _check_gap(name: str, body: str, distance: float, radii: Sequence[float]) ->
     """Raise MechanismError unless the distance of two centers on a body is that of the pitch radii."""
     center_distance = abs(sum(radii))
     if radii[0] < 0 and radii[1] < 0:
-        raise MechanismError("one gear at most is a ring, of a radius below zero", name=f"{name}.radii", value=radii)
+        raise MechanismError(
+            "at most one of two gears is a ring, which has a negative radius", name=f"{name}.radii", value=radii
+        )
     if center_distance <= LARGEST_GAP * max(map(abs, radii)) or min(radii) < 0 < sum(radii):
-        message = "a ring is larger than the gear in it, or they do not turn against each other"
+        message = "a ring must be larger than the gear inside it"
         raise MechanismError(message, name=f"{name}.radii", value=radii)
     if not abs(distance - center_distance) <= LARGEST_GAP * center_distance:
         kind = "of a ring less that of the gear in it" if min(radii) < 0 else "together"

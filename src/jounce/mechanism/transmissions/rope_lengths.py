@@ -104,7 +104,7 @@ def _check(group: Any, instance: int, name: str, points: _Points) -> None:
     least, largest = points.bounds(bodies, positions)
     for k in range(len(positions) - 1):
         if largest[k, k + 1] <= ROUNDING * length:
-            message = "lies in one place with the point before it, where the rope has no direction; leave out one"
+            message = "coincides with the point before it, where the rope has no direction; leave one of them out"
             raise MechanismError(message, name=f"{name}.points", value=positions[k + 1].tolist())
     low, high = (float(sum(bound[i, j] for i, j in pairwise(range(len(positions))))) for bound in (least, largest))
     if length < low * (1 - ROUNDING):

@@ -301,7 +301,7 @@ def line_words(facts: list[dict[str, Any]]) -> list[str]:
             continue
         lies = zip(each["wraps"], each["bodies"], strict=True)
         words += f", on {' and '.join(f'{math.degrees(wrap):.4g} deg of {body}' for wrap, body in lies)}"
-        parts = "what the belt needs changes where the centers part: a tensioner takes it up"
+        parts = "the length of the belt changes as the centers move apart: a tensioner takes it up"
         lines_shown.append(
             f"{words}; {parts}" if each["carrier"] is None else f"{words}, both carried by {each['carrier']}"
         )

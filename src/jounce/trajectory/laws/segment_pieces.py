@@ -138,7 +138,9 @@ def _within_limits(segment: Segment, name: str, value: Value, target: Value) -> 
         else {"duration": number_of_value(f"{name}.duration", segment.duration, positive)}
     )
     if value == target and not given:
-        raise TrajectoryError("goes nowhere, so that its limits give it no duration; give one", name=f"{name}.duration")
+        raise TrajectoryError(
+            "has no displacement, so that its limits determine no duration; give one", name=f"{name}.duration"
+        )
     try:
         law = TrapezoidalMotion(value, target, **dict(zip(LIMITS, bounds, strict=True)), **given)
     except TrajectoryError as error:

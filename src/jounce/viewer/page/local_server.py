@@ -26,7 +26,7 @@ __all__ = ["AccessControl", "check_installed", "check_port", "quiet_server", "qu
 
 HOSTS = ("127.0.0.1", "localhost", "[::1]")  # of any port, as a tunnel may have another one at its other end
 LONGEST_PATH = 1000  # characters; those of the page are far shorter
-REFUSED = "This page is opened by the whole address that jounce view prints, with its token.\n"
+REFUSED = "Open this page with the complete address that jounce view prints, including its token.\n"
 HEADERS = {"Cache-Control": "no-store", "Referrer-Policy": "no-referrer", "X-Content-Type-Options": "nosniff"}
 # The page of viser connects to its own address without the query string, unless it is given another one.
 CONNECT = b"""<script>{

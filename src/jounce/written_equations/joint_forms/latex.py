@@ -109,7 +109,11 @@ def _section(
             message = f"cannot be written out: {reason}; lower the order, or take python or c"
             raise MechanismError(message, name=names[0]) from None
         lines += [rf"\item {escaped(name)}: {_instance(elements[name])}" for name in names]
-        return [*lines, r"\end{itemize}", escaped(f"Left out, as nobody would read it: {reason}. Code has it.")]
+        return [
+            *lines,
+            r"\end{itemize}",
+            escaped(f"Omitted, because it is too long to read: {reason}. The formats of code contain it."),
+        ]
     used = {atom for level in joint.rows for row in level for m in row.terms for atom in m if atom[0] == "c"}
     for name in names:
         constants = enumerate(joint.constants[members.index(name)], 1)

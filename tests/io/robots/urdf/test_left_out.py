@@ -41,7 +41,7 @@ CASES = {  # what follows the links and joints of a file; what is said of it, if
         ROTOR.format('<joint name="j"/><joint name="rigid"/>', '<drake:rotor_inertia value="2"/>'),
         r"inertia of the rotors of drives: t \(line 4\)",
     ),
-    "gravity of MuJoCo": ('<mujoco><option gravity="0 0 0"/></mujoco>', r"<mujoco> says .*: gravity 0 0 0 \(line 4\)"),
+    "gravity of MuJoCo": ('<mujoco><option gravity="0 0 0"/></mujoco>', r"settings of gravity .*: gravity 0 0 0 \(line 4\)"),
     "shapes of MuJoCo": ('<mujoco><compiler inertiafromgeom="true"/></mujoco>', r"masses that follow from shapes"),
     "meshes of MuJoCo": ('<mujoco><compiler meshdir="a" balanceinertia="true"/></mujoco>', None),
 }
@@ -141,7 +141,7 @@ def test_quaternions_count_from_version_1_1_on_as_in_the_reference_parser(tmp_pa
     version = f' version="{version}"' if version else ""
     path = write(tmp_path, version=version, turn=f'quat_xyzw="{" ".join(map(str, TURN))}"')
     old = "1.1" not in version and "1.2" not in version
-    robot = told(path, r"quat_xyzw, of which the version .*: l \(line 2\), j \(line 5\)") if old else load_robot(path)
+    robot = told(path, r"quat_xyzw, which the version .*: l \(line 2\), j \(line 5\)") if old else load_robot(path)
     found = float(jn.inverse_dynamics(robot, [[0.2], [0.0], [0.0]])[0, 0])
     assert found == pytest.approx(pinocchio_torque(path), rel=1e-13)
 

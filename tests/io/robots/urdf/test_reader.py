@@ -408,7 +408,7 @@ def test_no_floating_base_where_a_link_is_named_world_already(tmp_path):
     "limit, expected, told",
     [
         ('lower="-1" upper="1" effort="9" velocity="inf"', (-1.0, 1.0, None), None),
-        ('lower="-1" upper="1" effort="9" velocity="-1"', (-1.0, 1.0, None), "below zero, .* taken for none: j"),
+        ('lower="-1" upper="1" effort="9" velocity="-1"', (-1.0, 1.0, None), "below zero, .* read as none: j"),
         ('upper="-0.3" effort="9" velocity="2"', (None, -0.3, 2.0), "one end of a range, .* taken for none: j"),
         ('lower="0.3" effort="9" velocity="2"', (0.3, None, 2.0), "one end of a range"),
         ('upper="0.3" effort="9" velocity="2"', (0.0, 0.3, 2.0), None),
@@ -425,5 +425,5 @@ def test_a_range_with_both_ends_the_wrong_way_round_is_none_and_told(tmp_path):
     path = small(tmp_path, 'type="revolute"><limit lower="0.3" upper="0" effort="9" velocity="2"/>')
     with pytest.raises(jn.errors.RobotFileError, match="lower limit must not exceed"):
         load_robot(path, strict=True)
-    with pytest.warns(jn.errors.RobotWarning, match="lower limits exceed upper ones, and are taken for no range: j"):
+    with pytest.warns(jn.errors.RobotWarning, match="lower limits exceed upper ones, and are read as no range: j"):
         assert load_robot(path).limits["j"].lower is None

@@ -22,7 +22,7 @@ class _CamOutput(AbstractForceOutput):
 
     def _check_named(self, element: Any) -> None:
         if not isinstance(element, Cam):
-            message = "is no cam, and only cams have a contact force; take its reaction"
+            message = "is not a cam, and only cams have a contact force; take its reaction"
             raise MechanismError(message, name="joint", value=self.joint)
         if is_turning(element.follower) != (self.unit == "N*m"):
             kind, word = ("turns", "contact_torque") if self.unit == "N" else ("slides", "contact")

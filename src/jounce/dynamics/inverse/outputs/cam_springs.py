@@ -110,7 +110,7 @@ def contact_spring(mechanism: Mechanism, cam: str, spring: str, time: TimeLike |
     left = contact(float(needed[where]))
     if abs((sense * left).min()) > EXACT * np.abs(left).max():
         raise MechanismError(
-            "does not act on the contact in proportion to where it is free", name="spring", value=spring
+            "does not change the contact force in proportion to its free length or angle", name="spring", value=spring
         )
     return ContactSpring(float(needed[where]), float(instants[where]), float((sense * now).min()))
 

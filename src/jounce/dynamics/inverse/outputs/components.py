@@ -326,7 +326,7 @@ class _AppliedOutput(AbstractForceOutput):
     def _check_named(self, element):
         if element.unit != self.unit:
             kind, other = ("force", "torque") if element.unit == "N" else ("torque", "force")
-            raise MechanismError(f"this is a {kind}, no {other}", name="quantity")
+            raise MechanismError(f"this is a {kind}, not a {other}", name="quantity")
 
 
 class AppliedForceOutput(_AppliedOutput):

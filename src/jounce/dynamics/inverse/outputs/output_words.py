@@ -38,20 +38,17 @@ def following(mechanism: Mechanism, leader: str) -> list[str]:
 
 
 def signal_words(names: Sequence[str]) -> str:
-    """Say of drivers that follow another one what it does not feel; nothing where there are none.
+    """Say of drivers that follow another one that it does not bear their load; nothing where there are none.
 
     Examples
     --------
     >>> signal_words(["cam"])
-    'cam follows it as a signal does, and it feels nothing of that: a cam that presses stands under joints'
+    'cam follows it without loading it: define a cam that transmits its force under joints'
     """
     if not names:
         return ""
-    verb, plural = ("follows", "does") if len(names) == 1 else ("follow", "do")
-    return (
-        f"{', '.join(names)} {verb} it as a signal {plural}, and it feels nothing of that: a cam that presses stands "
-        "under joints"
-    )
+    verb = "follows" if len(names) == 1 else "follow"
+    return f"{', '.join(names)} {verb} it without loading it: define a cam that transmits its force under joints"
 
 
 def slack_words(time: np.ndarray, tensions: np.ndarray) -> str:

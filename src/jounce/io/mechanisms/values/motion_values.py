@@ -98,10 +98,10 @@ def cam_motion(quantity: str) -> Any:
     def check(raw: object, info: Any) -> Any:
         if not isinstance(raw, dict) or raw.get("of") is None:
             raise problem(
-                "a law under joints is a cam: it is of a coordinate; give of, the name of what leads it", "of"
+                "a law under joints is a cam, a function of another coordinate; give of, the name of its leader", "of"
             )
         if "output" in raw:
-            raise problem("a cam has its law itself; a driver may follow from an output", "output", value=UNSET)
+            raise problem("a cam states its own law; only a driver may follow from an output", "output", value=UNSET)
         context = info.context or {}
         return plain.function(raw, SimpleNamespace(context={**context, "drivers": context["leaders"]}, data=info.data))
 
@@ -167,7 +167,7 @@ def motion(quantity: str, variables: dict[str, Dimension | None] | None = None, 
 def _output_law(raw: dict[str, Any], info: Any, variables: dict[str, Dimension | None]) -> OutputLaw:
     """Return the law of an output from which that of a driver follows."""
     if set(variables) != {"t"}:
-        raise problem("a force has no law of an output; a driver has", "output", value=UNSET)
+        raise problem("a force cannot have the law of an output; a driver can", "output", value=UNSET)
     for key in ("output", "law"):
         if key not in raw:
             raise problem("is missing", key, value=UNSET)

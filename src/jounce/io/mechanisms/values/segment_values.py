@@ -67,7 +67,9 @@ def leader(raw: dict[str, Any], info: Any) -> str | Expression | None:
         words = no_such("leader", given, known, "coordinate")
         raise problem(f"must be the name of a driver, a joint, or an output; {words}", "of", value=given)
     if given in context.get("leaders", ()) and given not in context.get("names", ()):
-        words = "is no driver: what moves by itself leads a cam, which is a joint; write this law under joints"
+        words = (
+            "is not a driver, and only a cam, which is a joint, follows what is not driven; write this law under joints"
+        )
         raise problem(words, "of", value=given)
     value = parse(given, "any", info, "of", variables={"t": None}).value
     if not isinstance(value, Expression):
@@ -130,7 +132,7 @@ def _integrated(law: Any, raw: dict[str, Any], quantity: str, lapse: str, info: 
     if not level:
         for key in ("initial", *(("start",) if start is None else ())):
             if key in raw:
-                raise problem("goes with a derivative that is given", key, value=UNSET)
+                raise problem("is only for a law that is given by a derivative", key, value=UNSET)
         return law
     values = initial_values(raw, level, quantity, lapse, info)
     if start is None:
@@ -149,7 +151,7 @@ def expressed(raw: dict[str, Any], quantity: str, info: Any, variables: dict[str
             words = "an expression has no end; write it as a piece: piecewise: [{until: ..., expression: ...}]"
             raise problem(words, key, value=UNSET)
     if set(variables) != {"t"} and len(raw) > 1:
-        raise problem("goes with laws of t alone", next(key for key in raw if key != "expression"), value=UNSET)
+        raise problem("is for laws of t only", next(key for key in raw if key != "expression"), value=UNSET)
     by = leader(raw, info)
     lapse = _lapse(by, info)
     if by is not None:
@@ -245,7 +247,7 @@ def piecewise(raw: dict[str, Any], quantity: str, info: Any, variables: dict[str
     if len(ends) < len(laws):
         for key in ("beyond", "start"):
             if key in raw and not (key == "start" and level):
-                words = "the last piece has no end, so that nothing is beyond it; say until when it goes"
+                words = "the last piece has no end, so that nothing lies beyond it; give until when it is valid"
                 raise problem(words, key, value=UNSET)
     try:
         law = PiecewiseMotion(laws, ends, start if len(ends) == len(laws) else None, beyond)

@@ -10,13 +10,13 @@ from jounce.rigid.inertia import ADVICE, NEGATIVE, TRIANGLE, WITHOUT_MASS, Inert
 MASSLESS = "these links move but have no mass"
 IDLE = "these links move and neither have nor carry mass, so that a simulation has no answer unless they are driven"
 FOLLOWS_NONE = "these joints follow one that the file does not have, and are taken as free"
-BELOW_ZERO = "limits of velocity or effort are below zero, as SDF writes that there is none, and are taken for none"
-REVERSED = "lower limits exceed upper ones, and are taken for no range"
+BELOW_ZERO = "limits of velocity or effort are below zero, which in SDF means none, and are read as none"
+REVERSED = "lower limits exceed upper ones, and are read as no range"
 ONE_END = "these joints have one end of a range, beyond the zero that stands for the other, which is taken for none"
 WITHOUT_INERTIAL = "these links have no inertia of their own, which SDF takes for 1 kg with moments of 1 kg m^2"
 PARTLY_INERTIAL = "these links lack their mass or moments of inertia, which SDF takes for 1 kg and 1 kg m^2"
 DEFAULT_DENSITY = "shapes give these links their mass without a density, for which SDF takes 1000 kg/m^3"
-OVERWRITTEN = "poses or moments of inertia stand beside those that shapes give, which are taken"
+OVERWRITTEN = "poses or moments of inertia are given besides those of shapes, which are used"
 HEADINGS = {
     NEGATIVE: "a principal moment of inertia is negative",
     TRIANGLE: "a principal moment of inertia exceeds the sum of the others",

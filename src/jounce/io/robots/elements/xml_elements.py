@@ -265,5 +265,5 @@ class _Reader:
         self.open[-1].pieces.append(text)
 
     def entity(self, name: str, *_rest: object) -> None:
-        message = "declares an entity, which robot files have no use for; write its text where it is used"
+        message = "declares an XML entity, which is not read; write its text where it is used"
         raise RobotFileError(message, path=self.path, line=self.parser.CurrentLineNumber, value=name)

@@ -103,7 +103,7 @@ def pitch_of(element: Element, *where: str) -> float:
     if (old := only(element, "thread_pitch", *where)) and not only(element, "screw_thread_pitch", *where):
         radians = number_of(element, "thread_pitch", *where, default=1.0)
         if radians == 0:
-            raise old.error("must not be zero: it counts radians for a meter", *where, "thread_pitch", value=radians)
+            raise old.error("must not be zero: it is in radians per meter", *where, "thread_pitch", value=radians)
         return -1.0 / radians
     return number_of(element, "screw_thread_pitch", *where, default=1.0) / (2 * math.pi)
 

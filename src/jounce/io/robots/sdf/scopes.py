@@ -28,9 +28,9 @@ def named(model: Element) -> dict[str, Element]:
                 raise element.error(message, f"{tag}s", value=name)
             if name == WORLD or (name.startswith("__") and name.endswith("__")):
                 if name == WORLD and tag == "link" and element.first("inertial") is None:
-                    element.leave_out_unknown("SDF keeps this name for itself: leave the link out", "links", name)
+                    element.leave_out_unknown("SDF reserves this name: leave the link out", "links", name)
                     continue
-                raise element.error("SDF keeps this name for itself", f"{tag}s", value=name)
+                raise element.error("SDF reserves this name", f"{tag}s", value=name)
             elements[name] = element
     if not any(element.tag == "link" for element in elements.values()):
         raise model.error("a robot needs at least one <link>")

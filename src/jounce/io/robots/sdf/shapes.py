@@ -52,7 +52,7 @@ def inertia_of_shapes(name: str, link: Element, inertial: Element, frames: Frame
         message = 'auto="true" takes the inertia from <collision> shapes, and the link has none; write mass and inertia'
         raise inertial.error(message, *where)
     for part in (part for tag in ("pose", "inertia") for part in inertial.every(tag)):
-        message = 'auto="true" computes the inertia from shapes, and takes this for nothing; leave one of them out'
+        message = 'auto="true" computes the inertia from shapes, and ignores this; leave one of them out'
         faults.add(OVERWRITTEN, name, part.error(message, *where, part.tag))
     total = Inertia.total([_of_collision(name, x, inertial, frames, faults) for x in collisions])
     if only(inertial, "mass", *where) is None:

@@ -29,8 +29,8 @@ from jounce.robot.robot import Robot
 IN_GAZEBO = "links and joints that <gazebo> adds"
 WEIGHT = "the weight of links that <gazebo> takes out of gravity, which other readers of URDF count"
 FORCE_ELEMENTS = "<force_element>, which is a force"
-QUATERNIONS = "quat_xyzw, of which the version of this file knows nothing"
-OF_MUJOCO = "what <mujoco> says of gravity and fluids"
+QUATERNIONS = "quat_xyzw, which the version of this file does not have"
+OF_MUJOCO = "settings of gravity and fluids in <mujoco>"
 OF_FILE = {
     "force_element": FORCE_ELEMENTS,
     "drake:linear_bushing_rpy": BUSHINGS,

@@ -208,7 +208,7 @@ def _controller_states(source: Source) -> Recording:
         states.append(State(stamp, names, levels, source.line((k,)) or 0))
         keys.add(key)
     recording = recorded_states(source.path, states)
-    note = f"of the states of a controller what was measured is read ({', '.join(sorted(keys))})"
+    note = f"of the states of a controller, only measured values are read ({', '.join(sorted(keys))})"
     return dataclasses.replace(recording, notes=(*recording.notes, note))
 
 
