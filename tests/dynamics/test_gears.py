@@ -179,7 +179,7 @@ def test_centers_that_are_not_at_the_sum_of_radii_are_told_with_the_gap():
     for change, words in (
         ({"sp": wide}, r"0.042 m apart on 'carrier'.*0.043 m.*-0.001 m"),
         ({"pr": dataclasses.replace(gears.joints["pr"], radius_j=0.06)}, "0.042 m apart.*together are 0.078"),
-        ({"sp": dataclasses.replace(gears.joints["sp"], radius_i=-0.1, radius_j=-0.1)}, "at most one of two gears is a ring"),
+        ({"sp": dataclasses.replace(gears.joints["sp"], radius_i=-0.1, radius_j=-0.1)}, "at most one of two gears"),
         ({"sp": dataclasses.replace(gears.joints["sp"], radius_i=-0.018)}, "a ring must be larger"),
         ({"P": planar.Revolute(("carrier", "planet"), [0.042, 0], [1e-3, 0])}, "no body carries both gears"),
         ({"sp": dataclasses.replace(gears.joints["sp"], pressure_angle=20.0)}, "from 0 to 45 deg"),

@@ -123,7 +123,7 @@ def test_every_form_is_in_the_schema_and_other_formats():
         ("point: [r, 0]", "point: [r, 0, 0]", 17, "outputs.M.point", "must be a list of 2 values"),
         ("point: [r, 0]", "pont: [r, 0]", 17, "outputs.M.pont", "unknown key 'pont'; did you mean 'point'?"),
         ("force: spring", "force: sprng", 18, "outputs.S.force", "no force has this name, got 'sprng'; did you mean"),
-        ("spring, quantity: torque", "spring, quantity: force", 18, "outputs.S.quantity", "this is a torque, not a force"),
+        ("spring, quantity: torque", "spring, quantity: force", 18, "outputs.S.quantity", "is a torque, not a force"),
         ("  S:", "  F_x:", 18, "outputs.F_x", "this name is taken by a component of the output 'F'"),
     ],
 )

@@ -41,7 +41,7 @@ CASES = {  # what follows the links and joints of a file; what is said of it, if
         ROTOR.format('<joint name="j"/><joint name="rigid"/>', '<drake:rotor_inertia value="2"/>'),
         r"inertia of the rotors of drives: t \(line 4\)",
     ),
-    "gravity of MuJoCo": ('<mujoco><option gravity="0 0 0"/></mujoco>', r"settings of gravity .*: gravity 0 0 0 \(line 4\)"),
+    "gravity of MuJoCo": ('<mujoco><option gravity="0 0 0"/></mujoco>', r"settings .*: gravity 0 0 0 \(line 4\)"),
     "shapes of MuJoCo": ('<mujoco><compiler inertiafromgeom="true"/></mujoco>', r"masses that follow from shapes"),
     "meshes of MuJoCo": ('<mujoco><compiler meshdir="a" balanceinertia="true"/></mujoco>', None),
 }
