@@ -342,9 +342,7 @@ def test_a_joint_without_a_leader_and_a_driver_of_what_moves_freely_are_named(tm
     with pytest.raises(jn.errors.MechanismFileError, match=r"joints.cam.motion.of: a law under joints is a cam"):
         load(tmp_path, text=FILE.replace(", of: LEADER", ""))
     text = FILE.replace("motion: w*t + 0.3*sin(5*t)", "motion: {expression: t, of: theta}")
-    with pytest.raises(
-        jn.errors.MechanismFileError, match=r"drivers.shaft.motion.of: is not a driver"
-    ):
+    with pytest.raises(jn.errors.MechanismFileError, match=r"drivers.shaft.motion.of: is not a driver"):
         load(tmp_path, text=text)
 
 
