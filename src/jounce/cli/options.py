@@ -16,7 +16,7 @@ from jounce.reporting.terminal import say, say_json
 
 if TYPE_CHECKING:
     from jounce.mechanism import Mechanism
-    from jounce.robot import Robot
+    from jounce.robot import CarriedLoad, Robot
     from jounce.trajectory import JointTrajectory
     from jounce.units.dimensions import Dimension
     from jounce.units.shown_units import ShownUnits
@@ -109,6 +109,7 @@ class RobotReading:
     ----------
     payload
         LINK=MASS with a unit, at the origin of the link; repeatable.
+        LINK=MASS@FROM:TO for a part of a motion, as @0.8s:2s.
     degree
         Degree of the splines through samples, odd, 3 to 11.
     strict
@@ -137,8 +138,11 @@ class RobotReading:
     model: str | None = None
     closures: Path | None = None
 
-    def robot(self, file: Path) -> Robot:
-        """Return the robot of a file, with what it holds."""
+    def robot(self, file: Path, *, carries: bool = False) -> Robot:
+        """Return the robot of a file, with what it holds all the time.
+
+        With `carries`, what it holds for a part of a motion is left to `loads`; otherwise that is refused.
+        """
         from jounce.io import load_robot
         from jounce.io.robots.payloads import with_payloads
 
@@ -146,7 +150,13 @@ class RobotReading:
             robot = load_robot(
                 file, strict=self.strict, model=self.model, closures=self.closures, allow=allowed(self.allow)
             )
-        return with_payloads(robot, self.payload or ())
+        return with_payloads(robot, [text for text in self.payload or () if not (carries and "@" in text)])
+
+    def loads(self, robot: Robot, *, moving: bool = False) -> list[CarriedLoad]:
+        """Return what a robot carries for parts of a motion."""
+        from jounce.io.robots.payloads import carried_loads
+
+        return carried_loads(robot, [text for text in self.payload or () if "@" in text], moving=moving)
 
     def trajectory(self, file: Path, robot: Robot, *, samples: bool = False) -> JointTrajectory:
         """Return the trajectory of a file, whose joints are those of a robot where it names none.

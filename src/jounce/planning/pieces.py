@@ -1,5 +1,7 @@
 """Laws of polynomials that follow one another."""
 
+from typing import Literal
+
 import numpy as np
 
 from jounce.trajectory import SplineMotion
@@ -16,10 +18,14 @@ class JoinedPieces(SplineMotion):
         Coefficients, lowest power first, of the argument less the begin of its piece.
     stop : float
         End of the last piece.
+    beyond : {"refuse", "continue"}, default "refuse"
+        Whether the polynomials at the ends go on beyond them.
     """
 
-    def __init__(self, begins: np.ndarray, powers: np.ndarray, stop: float):
-        self._set(begins, powers, stop, "refuse")
+    def __init__(
+        self, begins: np.ndarray, powers: np.ndarray, stop: float, beyond: Literal["refuse", "continue"] = "refuse"
+    ):
+        self._set(begins, powers, stop, beyond)
 
 
 class SmoothPieces(JoinedPieces):

@@ -12,6 +12,7 @@ from jounce.dynamics.limits.trajectories import drives_note
 from jounce.planning import RetimedTrajectory
 from jounce.planning.paths.path import Path as JointPath
 from jounce.reporting.json.results import limits_result
+from jounce.reporting.load_changes import load_words
 from jounce.reporting.motion_ends import ends_words
 from jounce.reporting.text.summaries import count
 from jounce.reporting.text.tables import Table, number
@@ -70,6 +71,7 @@ def retimed_words(
     if what == "joint" and any(row.unit.startswith("N") for row in retimed.report.limited):
         lines.append(f"torques: {drives_note(retimed.report.drives)}")
     lines += [*path_words(retimed.path), *ends_words(retimed.report.ends)]
+    lines += load_words(retimed.report)
     worst = retimed.report.worst
     if worst is not None and worst.ratio is not None:
         verdict = f"all {len(retimed.report.limited)} limits kept, between rows too; nearest"

@@ -2,6 +2,11 @@
 
 from jounce.rigid.inertia import Inertia as Inertia
 from jounce.robot.algorithms.base_motion import BaseMotion as BaseMotion
+from jounce.robot.algorithms.carried_loads import (
+    CarriedLoad as CarriedLoad,
+    LoadChange as LoadChange,
+    LoadedRobot as LoadedRobot,
+)
 from jounce.robot.algorithms.equations_of_motion import bias_forces as bias_forces, mass_matrix as mass_matrix
 from jounce.robot.algorithms.forward_dynamics import forward_dynamics as forward_dynamics
 from jounce.robot.algorithms.inverse_dynamics import (

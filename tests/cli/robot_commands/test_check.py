@@ -274,6 +274,10 @@ BAD_OPTIONS = {
     "no file of limits": (["--limits", "none.yaml"], "none.yaml: file not found"),
     "figure of another kind": (["--out", "limits.gif"], "limits.gif: the kind of a figure is given by its extension"),
     "no such link": (["--payload", "hand=3 kg"], "--payload: no link has this name, got 'hand'"),
+    "no such place": (["--payload", "tip=3 kg@2 m:"], "--payload: "),
+    "an end that is not in the motion": (["--payload", "tip=3 kg@0.1 s:90 s"], "outside of the motion"),
+    "a waypoint of a trajectory": (["--payload", "tip=3 kg@waypoint 2:"], "instants, not by waypoint"),
+    "two kinds of places": (["--payload", "tip=3 kg@10 %:2 s"], "both ends are of one kind"),
     "even degree": (["--degree", "4"], "degree: the degree of the splines is odd"),
 }
 

@@ -61,6 +61,18 @@ def test_a_payload_adds_its_weight(run, files, tmp_path):
     np.testing.assert_allclose(found["pin"].values[:, 0], expected, rtol=0, atol=1e-12)
 
 
+def test_a_payload_is_carried_for_a_part_of_the_motion(run, files, tmp_path):
+    out = tmp_path / "tau.csv"
+    status, told, _ = run(*files, "--rates", 0, "--out", out, "--payload", "tip=3 kg@0.35 s:750 ms")
+    assert status == 0
+    assert "tip carries 3 kg from 0.35 s to 0.75 s" in told
+    found = io.read(out)
+    t = found["time"].values
+    q, a, carried = 0.5 * np.sin(2 * t), -2 * np.sin(2 * t), 3.0 * ((t > 0.35) & (t < 0.75))
+    expected = closed_form(t)[:, 0] + carried * (a + GRAVITY * np.cos(q))
+    np.testing.assert_allclose(found["pin"].values[:, 0], expected, rtol=0, atol=1e-12)
+
+
 def test_json(run, files):
     status, told, _ = run(*files, "--json")
     record = json.loads(told)

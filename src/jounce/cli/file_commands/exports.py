@@ -67,7 +67,8 @@ def export(
     names = reading.chosen  # in the sequence that the controller wants, also of joints that rest
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always", SampleWarning)
-        model = reading.robot(robot)
+        model = reading.robot(robot, carries=True)
+        loads = reading.loads(model)
         motion = replace(reading, joints=None).trajectory(trajectory, model)
         if names is not None:
             motion = motion.part([name for name in motion.names if name in (*names, *model.joint_names)])
@@ -81,6 +82,7 @@ def export(
                 frequency,
                 joints=names,
                 torques=torques,
+                loads=loads,
                 header_units=header_units,
                 overwrite=overwrite,
             )
@@ -88,5 +90,9 @@ def export(
     recorded_cautions(caught)
     first, last = float(times[0]), float(times[-1])
     say(f"{len(times)} rows from {first:g} s to {last:g} s written to {out}")
-    say("\n".join(wrapped(line) for line in [*between_words(motion), *ends_words(ends)]))
+    say(
+        "\n".join(
+            wrapped(line) for line in [*between_words(motion), *ends_words(ends), *(load.words for load in loads)]
+        )
+    )
     return 0

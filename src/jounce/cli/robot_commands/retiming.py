@@ -45,6 +45,7 @@ def retime(
     duration: str | None = None,
     running: Path | None = None,
     at: str | None = None,
+    in_motion: bool = False,
     figure: Path | None = None,
     reading: RobotReading = PLAIN_ROBOT,
     output: TableOutput = NO_TABLE,
@@ -85,6 +86,8 @@ def retime(
         Trajectory that the robot follows now; start from its state at --at.
     at
         Instant of --running, such as 0.8s.
+    in_motion
+        Do not stop where loads change (--payload hand=3kg@0.8s:2s).
     figure
         Draw which limits are active when: .png, .svg or .pdf.
 
@@ -121,6 +124,8 @@ def retime(
         if file.suffix.lower() in DATA_FILES:
             if running is not None:
                 raise JounceError("is for robots; a mechanism starts at rest or with rates", name="--running")
+            if in_motion:
+                raise JounceError("belongs to robots; a mechanism has its masses in its file", name="--in-motion")
             if path is not None or repair or deviation is not None:
                 name = "--repair" if repair else "path" if path is not None else "--deviation"
                 raise JounceError("the path of a mechanism is that of its drivers, which is not repaired", name=name)
@@ -137,6 +142,7 @@ def retime(
                 reading,
                 output,
                 None if running is None or at is None else (running, instant_of(at)),
+                moving=in_motion,
             )
     _write_result(result, (file, path), figure, output)
     return 0 if result.retimed.report.kept else 1
@@ -215,13 +221,20 @@ def _of_robot(
     reading: RobotReading,
     output: TableOutput,
     running: tuple[Path, float] | None,
+    *,
+    moving: bool,
 ) -> _Result:
     from jounce.io import load_motion_limits, load_path
     from jounce.planning import retime as find
     from jounce.planning.retiming.quantities.limits import limits_of
     from jounce.trajectory import JointTrajectory
 
-    model = reading.robot(file)
+    model = reading.robot(file, carries=True)
+    settings = settings | {"loads": reading.loads(model, moving=moving)}
+    if moving and not settings["loads"]:
+        raise JounceError(
+            "says nothing without loads that change; give --payload LINK=MASS@FROM:TO", name="--in-motion"
+        )
     bounds = limits_of(model, None)
     if limits is not None:
         with expecting(limits, "limits"):

@@ -80,7 +80,8 @@ def check(
         from jounce.plot import check_figure
 
         check_figure(out, overwrite=overwrite)
-    model = reading.robot(robot)
+    model = reading.robot(robot, carries=True)
+    loads = reading.loads(model)
     bounds = limits_of(model, None)
     if limits is not None:
         with expecting(limits, "limits"):
@@ -90,7 +91,7 @@ def check(
         motion = _smoothed(reading.trajectory(trajectory, model), deviation, trajectory)
         with errors_about(trajectory, robot):
             spare_inputs(out, overwrite=overwrite)
-            report = check_motion(model, motion, bounds, hand_over=hand_over)
+            report = check_motion(model, motion, bounds, hand_over=hand_over, loads=loads)
     if report.worst is None:
         raise JounceError("there are no limits to compare with; give a file of limits with --limits", path=robot)
     if not json:
@@ -152,35 +153,41 @@ def torques(
     if not 0 <= rates <= MOST_RATES:
         raise JounceError(f"must be a whole number from 0 to {MOST_RATES}", name="--rates", value=rates)
     output.check()
-    model = reading.robot(robot)
+    model = reading.robot(robot, carries=True)
+    loads = reading.loads(model)
     motion = _smoothed(reading.trajectory(trajectory, model), deviation, trajectory)
     spare_inputs(output.out, overwrite=output.overwrite)
     with errors_about(trajectory, robot):
-        dataset = trajectory_torques(model, motion, rates, drives=not no_drives)
+        dataset = trajectory_torques(model, motion, rates, drives=not no_drives, loads=loads)
         ends = trajectory_ends(model, motion)
-        one_sided = _torques_at_breaks(model, motion, rates, drives=not no_drives)
+        one_sided = _torques_at_breaks(model, motion, rates, loads, drives=not no_drives)
     largest = table_peaks(dataset, one_sided)
     if not output.json:
-        say(torques_summary(dataset, motion, ends, robot, trajectory))
+        say("\n".join([torques_summary(dataset, motion, ends, robot, trajectory), *(load.words for load in loads)]))
         show_peaks(largest)
     output.write(lambda: dataset)
     output.tell("torques", lambda: torques_result(dataset, largest, motion, ends, (robot, trajectory), output.out))
     return 0
 
 
-def _torques_at_breaks(robot: Any, motion: Any, rates: int, *, drives: bool) -> Any:
-    """Return the torques on both sides of where laws jump or bend, at the instants of these; None without any."""
+def _torques_at_breaks(robot: Any, motion: Any, rates: int, loads: Any, *, drives: bool) -> Any:
+    """Return the torques on both sides of where laws jump or bend, or loads change; None without any."""
+    import numpy as np
+
     from jounce.dynamics.limits.trajectories import trajectory_torques
-    from jounce.trajectory.law_checks.breaks import both_sides, law_breaks
+    from jounce.robot.algorithms.carried_loads import LoadedRobot
+    from jounce.trajectory.law_checks.breaks import both_sides, distinct_instants, law_breaks
 
     first, last = float(motion.times[0]), float(motion.times[-1])
     breaks = law_breaks(motion.laws.values(), first, last, rates + 2)
+    changes = LoadedRobot(robot, loads, motion.start, motion.stop).changes
+    breaks = distinct_instants(np.append(breaks, changes), first, last)
     sides, which = both_sides(breaks, first, last)
     if not len(sides):
         return None
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", SampleWarning)  # the message covers all instants
-        torques_there = trajectory_torques(robot, motion, rates, times=sides, drives=drives)
+        torques_there = trajectory_torques(robot, motion, rates, times=sides, drives=drives, loads=loads)
     return torques_there.assign_coords(time=breaks[which])
 
 

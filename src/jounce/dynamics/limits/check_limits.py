@@ -2,7 +2,7 @@
 
 import dataclasses
 import warnings
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -15,10 +15,11 @@ from jounce.dynamics.limits.local_maxima import local_maxima
 from jounce.dynamics.limits.motion_ends import TrajectoryEnd, end_jumps, ends_of_jumps
 from jounce.dynamics.limits.trajectories import FollowedTrajectory, why_not
 from jounce.errors import RobotError, SampleWarning, TrajectoryError, flag
+from jounce.robot.algorithms.carried_loads import CarriedLoad
 from jounce.robot.model.links_and_joints import Limits
 from jounce.robot.robot import Robot
 from jounce.trajectory.joint_trajectory import JointTrajectory
-from jounce.trajectory.law_checks.breaks import at_breaks, law_breaks, with_sides
+from jounce.trajectory.law_checks.breaks import at_breaks, distinct_instants, law_breaks, with_sides
 
 FIELDS = ("position", "velocity", "acceleration", "jerk", "effort", "effort_rate")
 TURNING = dict(zip(FIELDS, ("rad", "rad/s", "rad/s^2", "rad/s^3", "N m", "N m/s"), strict=True))
@@ -42,6 +43,7 @@ def check_limits(
     times: ArrayLike | None = None,
     drives: bool = True,
     hand_over: bool = False,
+    loads: Sequence[CarriedLoad] = (),
 ) -> LimitReport:
     """Compare a trajectory, and the torques and torque rates that it needs, with the limits of the joints.
 
@@ -77,6 +79,9 @@ def check_limits(
         Whether torques contain armature inertia, damping and friction of the drives.
     hand_over : bool, default False
         Whether the robot moves already as the trajectory starts, and goes on moving as it stops.
+    loads : sequence of CarriedLoad, optional
+        What links carry during parts of the motion. Both sides of a change are compared with the limits; the step of
+        the torques between them, whose rate is infinite, is not, but `LimitReport.loads` tells it.
 
     Returns
     -------
@@ -107,7 +112,7 @@ def check_limits(
     (False, [('velocity', 0.5, 0.0), ('torque', 1.2263, 0.0)])
     """
     drives, hand_over = flag("drives", drives, error=RobotError), flag("hand_over", hand_over, error=RobotError)
-    followed = FollowedTrajectory(robot, trajectory)
+    followed = FollowedTrajectory(robot, trajectory, loads=loads)
     resting = followed.resting_joints
 
     def curves(times: np.ndarray) -> np.ndarray:
@@ -119,6 +124,7 @@ def check_limits(
     grid = _grid(trajectory) if times is None else _checked_times(times)
     first, last = float(grid[0]), float(grid[-1])
     breaks = law_breaks(trajectory.laws.values(), first, last, ORDER)
+    breaks = distinct_instants(np.append(breaks, followed.loaded.changes), first, last)
     grid = with_sides(grid, breaks)
     values = curves(grid)
     bounds = _Bounds(robot, merged, REST * np.abs(values[:, 1]).max(axis=0), trajectory.stop)
@@ -150,6 +156,7 @@ def check_limits(
         drives=drives,
         ends=ends,
         hand_over=hand_over,
+        loads=followed.load_changes(drives),
     )
 
 

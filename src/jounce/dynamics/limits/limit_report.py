@@ -8,6 +8,7 @@ from jaxtyping import Float
 
 from jounce.base.display import Displayed
 from jounce.dynamics.limits.motion_ends import TrajectoryEnd
+from jounce.robot.algorithms.carried_loads import LoadChange
 
 ROUNDING = 1e-9  # by which a ratio may exceed 1
 
@@ -113,6 +114,8 @@ class LimitReport(LimitRows, Displayed):
         What is met at the start and at the stop, and which limits a jump from rest, or to it, breaks there.
     hand_over : bool
         Whether the robot moves before the start and after the stop as the trajectory does there: nothing jumps then.
+    loads : tuple of LoadChange
+        Where what the robot carries changes, and what that does.
     """
 
     robot: str
@@ -125,6 +128,7 @@ class LimitReport(LimitRows, Displayed):
     drives: bool = True
     ends: tuple[TrajectoryEnd, ...] = ()
     hand_over: bool = False
+    loads: tuple[LoadChange, ...] = ()
 
     @property
     def kept(self) -> bool:  # a public name

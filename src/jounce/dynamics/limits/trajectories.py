@@ -1,7 +1,7 @@
 """A robot on a trajectory: its coordinates with derivatives, and the torques and rates that they need."""
 
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -10,7 +10,7 @@ from jaxtyping import Float
 from jounce.base.shapes import ArrayLike, seconds
 from jounce.errors import RobotError, SampleWarning, TrajectoryError, UnitWarning, flag, no_such
 from jounce.execution.chunks import in_chunks
-from jounce.robot.algorithms.inverse_dynamics import inverse_dynamics
+from jounce.robot.algorithms.carried_loads import CarriedLoad, LoadChange, LoadedRobot
 from jounce.robot.model.arguments import joints_of, whole_number
 from jounce.robot.model.links_and_joints import Limits
 from jounce.robot.robot import Robot
@@ -37,12 +37,16 @@ class FollowedTrajectory:
         Of some or all of its joints.
     given : bool, default True
         Whether a user gave it: then a warning says where angles are likely in degrees.
+    loads : sequence of CarriedLoad, optional
+        What links carry during parts of it, by time.
 
     Attributes
     ----------
     resting_joints : dict of str to float
         Joints that the trajectory does not name, and where they stand: at zero, or at the end of their range that is
         nearest to it.
+    loaded : LoadedRobot
+        The robot with its loads, and where they change.
     doubts : list of str
         Warnings about samples that do not support requested derivatives.
 
@@ -52,7 +56,9 @@ class FollowedTrajectory:
         If the robot has no joints, or the trajectory names one that it does not have, or that moves otherwise.
     """
 
-    def __init__(self, robot: Robot, trajectory: JointTrajectory, *, given: bool = True):
+    def __init__(
+        self, robot: Robot, trajectory: JointTrajectory, *, given: bool = True, loads: Sequence[CarriedLoad] = ()
+    ):
         if not joints_of(robot):
             raise RobotError("the robot has no moving joint; nothing can follow the trajectory", name="joints")
         for name in trajectory.names:
@@ -60,6 +66,7 @@ class FollowedTrajectory:
                 raise TrajectoryError(why_not(robot, name), name="joint", value=name)
         check_measures(robot, trajectory)
         self.robot, self.trajectory = robot, trajectory
+        self.loaded = LoadedRobot(robot, in_time(loads), trajectory.start, trajectory.stop)
         self.columns = [robot.joint_names.index(name) for name in trajectory.names]
         resting = [name for name in robot.joint_names if name not in trajectory.names]
         limits = robot.limits if resting else {}
@@ -96,9 +103,14 @@ class FollowedTrajectory:
         TrajectoryError
             If one is not finite.
         """
-        torques = _in_blocks(lambda block: inverse_dynamics(self.robot, block, drives=drives), q)
+        torques = in_chunks(lambda some: self.loaded.torques(q[some], times[some], drives), len(q), (BLOCK,), axis=0)
         self._check_finite(torques, times, EFFORTS)
         return torques
+
+    def load_changes(self, drives: bool) -> tuple[LoadChange, ...]:
+        """Return what each change of the loads does to the robot."""
+        changes = self.loaded.changes
+        return self.loaded.at_changes(self.coordinates(changes, 2), drives) if len(changes) else ()
 
     def _check_finite(self, values: np.ndarray, times: np.ndarray, names: tuple[str, ...]) -> None:
         bad = np.argwhere(~np.isfinite(values))
@@ -107,6 +119,17 @@ class FollowedTrajectory:
             quantity = names[level] if level < len(names) else f"derivative {level} of the {names[0]}"
             message = f"the {quantity} of this joint is not finite at t = {times[instant]:g} s"
             raise TrajectoryError(f"{message}; choose another law there", name=self.robot.joint_names[joint])
+
+
+def in_time(loads: Sequence[CarriedLoad]) -> Sequence[CarriedLoad]:
+    """Return loads, once all are by time, as those of a trajectory are."""
+    for load in loads:
+        if not isinstance(load, CarriedLoad):
+            raise TrajectoryError("must be CarriedLoads", name="loads", value=type(load).__name__)
+        if load.by != "time" and (load.start, load.stop) != (None, None):
+            message = f"of a trajectory a load changes at instants, not by {load.by}; give by='time'"
+            raise TrajectoryError(message, name=f"loads.{load.link}", value=load.by)
+    return loads
 
 
 def warn_of_degrees(robot: Robot, trajectory: JointTrajectory) -> None:
@@ -134,7 +157,13 @@ def drives_note(drives: bool) -> str:
 
 
 def trajectory_torques(
-    robot: Robot, trajectory: JointTrajectory, rates: int = 0, *, times: ArrayLike | None = None, drives: bool = True
+    robot: Robot,
+    trajectory: JointTrajectory,
+    rates: int = 0,
+    *,
+    times: ArrayLike | None = None,
+    drives: bool = True,
+    loads: Sequence[CarriedLoad] = (),
 ) -> "xarray.Dataset":
     """Return the torques and forces that a trajectory needs of the joints of a robot, with rates, labeled.
 
@@ -150,6 +179,8 @@ def trajectory_torques(
         Instants, s; those of the trajectory unless given.
     drives : bool, default True
         Whether torques contain armature inertia, damping and friction of the drives.
+    loads : sequence of CarriedLoad, optional
+        What links carry during parts of the motion; at the instant of a change it is what is carried after it.
 
     Returns
     -------
@@ -181,7 +212,7 @@ def trajectory_torques(
     import xarray
 
     rates, drives = whole_number("rates", rates), flag("drives", drives, error=RobotError)
-    followed = FollowedTrajectory(robot, trajectory)
+    followed = FollowedTrajectory(robot, trajectory, loads=loads)
     instants = trajectory.times if times is None else np.atleast_1d(seconds("times", times, TrajectoryError))
     values = followed.torques(followed.coordinates(instants, rates + 2), instants, drives)
     for message in followed.doubts:

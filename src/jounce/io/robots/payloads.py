@@ -1,14 +1,19 @@
-"""Loads that a robot holds, given from outside as ``LINK=MASS`` with units."""
+"""Loads that a robot holds, given from outside as ``LINK=MASS`` with units, or for a part of a motion."""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable
 
-from jounce.errors import JounceError, RobotError
+from jounce.errors import JounceError, RobotError, check_name
 from jounce.io.files.assignments import assignments
 from jounce.rigid.inertia import Inertia
+from jounce.robot.algorithms.carried_loads import CarriedLoad
 from jounce.robot.robot import Robot
 from jounce.units.values import parse_value
+
+OPTION = "--payload"
+PLACES = "instants such as 0.8 s, shares of a path such as 30 %, or waypoints such as 'waypoint 2'"
 
 
 def with_payloads(robot: Robot, texts: Iterable[str]) -> Robot:
@@ -24,7 +29,7 @@ def with_payloads(robot: Robot, texts: Iterable[str]) -> Robot:
     Raises
     ------
     RobotError
-        There is no such link, or no such mass.
+        There is no such link, no such mass, or it is carried for a part of a motion.
 
     Examples
     --------
@@ -35,12 +40,79 @@ def with_payloads(robot: Robot, texts: Iterable[str]) -> Robot:
     1.5
     """
     form = "a load is given by LINK=MASS, such as 'hand=3 kg'"
-    for link, mass in assignments(texts, "--payload", form, RobotError).items():
+    for link, mass in assignments(texts, OPTION, form, RobotError).items():
+        if "@" in mass:
+            message = "a load that is carried for a part of a motion is for check, torques, retime and export only"
+            raise RobotError(message, name=OPTION, value=f"{link}={mass}")
         try:
-            number = parse_value(mass, "mass").value
-            assert isinstance(number, float)  # no names are allowed, so that expressions are worked out
-            robot = robot.with_payload(link, Inertia(number))
+            robot = robot.with_payload(link, Inertia(_mass(mass)))
         except JounceError as error:
             value = link if error.name == "link" else mass
-            raise RobotError(error.message, name="--payload", value=value) from None
+            raise RobotError(error.message, name=OPTION, value=value) from None
     return robot
+
+
+def carried_loads(robot: Robot, texts: Iterable[str], *, moving: bool = False) -> list[CarriedLoad]:
+    """Return loads that links carry during parts of a motion.
+
+    Parameters
+    ----------
+    robot : Robot
+        The robot.
+    texts : iterable of str
+        ``LINK=MASS@FROM:TO``, the ends instants with a unit, shares of a path in percent, or ``waypoint NUMBER``, of
+        which the first is 1; one that is missing is an end of the motion.
+    moving : bool, default False
+        Whether they change in motion.
+
+    Raises
+    ------
+    RobotError
+        There is no such link, mass or place.
+
+    Examples
+    --------
+    >>> import jounce as jn
+    >>> robot = jn.load_robot("examples/robots/panda.urdf")
+    >>> [load.words for load in carried_loads(robot, ["panda_hand=3 kg@0.8 s:2 s"])]
+    ['panda_hand carries 3 kg from 0.8 s to 2 s']
+    """
+    form = f"a load for a part of a motion is given by LINK=MASS@FROM:TO, its ends {PLACES}"
+    loads = []
+    for text in texts:
+        link, _, rest = (part.strip() for part in text.partition("="))
+        mass, _, ends = (part.strip() for part in rest.partition("@"))
+        first, _, last = (part.strip() for part in ends.partition(":"))
+        if not (link and mass and (first or last)):
+            raise RobotError(form, name=OPTION, value=text)
+        try:
+            check_name("link", link, robot.links, RobotError, name="link")
+            (start, by), (stop, other) = _place(first), _place(last)
+            if by and other and by != other:
+                raise RobotError("both ends are of one kind", name="place")
+            loads.append(CarriedLoad(link, Inertia(_mass(mass)), start, stop, by or other or "time", moving))  # type: ignore[arg-type]
+        except JounceError as error:
+            raise RobotError(error.message, name=OPTION, value=text) from None
+    return loads
+
+
+def _mass(text: str) -> float:
+    number = parse_value(text, "mass").value
+    assert isinstance(number, float)  # no names are allowed, so that expressions are worked out
+    return number
+
+
+def _place(text: str) -> tuple[float | None, str | None]:
+    """Return what a text counts to, and by what; nothing of an empty one."""
+    if not text:
+        return None, None
+    if waypoint := re.fullmatch(r"waypoint\s*([0-9]+)", text):
+        return float(waypoint[1]), "waypoint"
+    if share := re.fullmatch(r"([0-9.]+)\s*%", text):
+        try:
+            return float(share[1]) / 100, "share"
+        except ValueError:
+            raise RobotError("is no number of percent", name="place") from None
+    number = parse_value(text, "time").value
+    assert isinstance(number, float)
+    return number, "time"

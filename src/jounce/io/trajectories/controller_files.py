@@ -12,7 +12,7 @@ from jaxtyping import Float
 from jounce.errors import TrajectoryError, check_name
 from jounce.io.files.writing import check_target, replacing
 from jounce.io.trajectories.controller_formats import FORMATS, ControllerFormat, checked_format
-from jounce.robot import Robot, inverse_dynamics
+from jounce.robot import CarriedLoad, LoadedRobot, Robot
 from jounce.settings import under_own_settings
 from jounce.trajectory import JointTrajectory
 
@@ -33,6 +33,7 @@ def export_trajectory(
     *,
     joints: Sequence[str] | None = None,
     torques: bool = False,
+    loads: Sequence[CarriedLoad] = (),
     header_units: bool = False,
     overwrite: bool = False,
 ) -> Float[np.ndarray, " time"]:
@@ -56,6 +57,8 @@ def export_trajectory(
     torques : bool, default False
         Write torques, too: ``tau_J_d_0`` without gravity on the side of the links, and its rate ``dtau_J_d_0``;
         ``target_moment_0``; ``effort``.
+    loads : sequence of CarriedLoad, optional
+        What links carry during parts of the motion, which torques follow.
     header_units : bool, default False
         Tell units in the heading of a table, as ``q_d_0 [rad]``.
     overwrite : bool, default False
@@ -86,9 +89,11 @@ def export_trajectory(
     names = _chosen(robot, trajectory, known, format, joints)
     frequency = _checked_rate(known, format, rate)
     if known is None:
-        text, times = _message(robot, trajectory, names, frequency, torques)
+        text, times = _message(robot, trajectory, names, frequency, torques, loads)
     else:
-        text, times = _table(robot, trajectory, names, frequency, known, torques=torques, units=header_units)
+        text, times = _table(
+            robot, trajectory, names, frequency, known, torques=torques, loads=loads, units=header_units
+        )
     with replacing(path, overwrite=overwrite) as scratch:
         scratch.write_text(text, encoding="utf-8")
     return times
@@ -125,12 +130,17 @@ def _checked_rate(known: ControllerFormat | None, name: str, rate: float | None)
 
 
 def _values(
-    robot: Robot, trajectory: JointTrajectory, names: tuple[str, ...], times: Any, efforts: int, known: Any
+    robot: Robot,
+    trajectory: JointTrajectory,
+    names: tuple[str, ...],
+    times: Any,
+    efforts: int,
+    known: Any,
+    loads: Sequence[CarriedLoad],
 ) -> list[np.ndarray]:
     """Return positions, velocities and accelerations at instants, then torques and their rates; (time, joints) each."""
-    from jounce.dynamics.limits.trajectories import (
-        FollowedTrajectory,  # a sixth of a second, which reading does not need
-    )
+    # a sixth of a second, which reading does not need
+    from jounce.dynamics.limits.trajectories import FollowedTrajectory, in_time
 
     order = max(2, efforts + 1)
     followed = FollowedTrajectory(robot, trajectory)
@@ -139,8 +149,9 @@ def _values(
     values = [q[:, k, columns] for k in range(3)]
     if efforts:
         felt = robot if known is None or known.gravity else robot.with_gravity([0.0, 0.0, 0.0])
-        tau = inverse_dynamics(felt, q, drives=known is None or known.drives)
-        values += [np.asarray(tau)[:, k, columns] for k in range(efforts)]
+        loaded = LoadedRobot(felt, in_time(loads), trajectory.start, trajectory.stop)
+        tau = loaded.torques(q, times, known is None or known.drives)
+        values += [tau[:, k, columns] for k in range(efforts)]
     return values
 
 
@@ -152,6 +163,7 @@ def _table(
     known: ControllerFormat,
     *,
     torques: bool,
+    loads: Sequence[CarriedLoad],
     units: bool,
 ) -> tuple[str, np.ndarray]:
     duration = trajectory.stop - trajectory.start
@@ -160,7 +172,7 @@ def _table(
     times = trajectory.start + np.arange(rows + (1 if exact else 2)) / frequency
     levels = (*known.levels, *(known.efforts if torques else ()))
     inside = np.minimum(times, trajectory.stop)
-    values = _values(robot, trajectory, names, inside, len(known.efforts) if torques else 0, known)
+    values = _values(robot, trajectory, names, inside, len(known.efforts) if torques else 0, known, loads)
     fastest, hardest = (float(np.abs(level[-1]).max()) for level in values[1:3])
     if not exact and (fastest > REST_SPEED or hardest > UNFORCED):
         message = (
@@ -186,14 +198,19 @@ def _units(robot: Robot, name: str) -> list[str]:
 
 
 def _message(
-    robot: Robot, trajectory: JointTrajectory, names: tuple[str, ...], frequency: float, torques: bool
+    robot: Robot,
+    trajectory: JointTrajectory,
+    names: tuple[str, ...],
+    frequency: float,
+    torques: bool,
+    loads: Sequence[CarriedLoad],
 ) -> tuple[str, np.ndarray]:
     """Return a ROS message as YAML; its times are whole nanoseconds, at which the values are taken."""
     duration = round((trajectory.stop - trajectory.start) * NANO)
     count = int(np.ceil(duration / NANO * frequency * (1 - 1e-12) - 1e-9))
     ticks = [*(tick for k in range(count) if (tick := round(k * NANO / frequency)) < duration), duration]
     times = np.minimum(trajectory.start + np.array(ticks) / NANO, trajectory.stop)
-    values = _values(robot, trajectory, names, times, int(torques), None)
+    values = _values(robot, trajectory, names, times, int(torques), None, loads)
     keys = (*LEVELS, "effort")[: len(values)]
     lines = [
         "header: {stamp: {sec: 0, nanosec: 0}, frame_id: ''}",

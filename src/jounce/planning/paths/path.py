@@ -34,6 +34,8 @@ class Path:
         What it is, for messages.
     instants : tuple of arrays, optional
         Values of s, and the instants of the samples there, s.
+    passed : tuple of arrays, optional
+        Values of s, and the instants of the trajectory, or what else its points count, there.
     points : Lines, optional
         The waypoints that it goes through.
     """
@@ -45,6 +47,7 @@ class Path:
     allowed: float | None = None
     words: str = ""
     instants: tuple[Float[np.ndarray, " place"], Float[np.ndarray, " place"]] | None = None
+    passed: tuple[Float[np.ndarray, " place"], Float[np.ndarray, " place"]] | None = None
     points: Any = None
 
     @property

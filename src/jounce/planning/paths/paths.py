@@ -177,7 +177,7 @@ def _between(lines: Lines, order: int, between: Between) -> Path:
     away = lines.distances(points, np.stack([polynomials_at(law, points) for law in laws.values()], axis=1))
     words = f"splines of degree {degree} through {len(lines.at)} waypoints"
     start, stop = float(lines.at[0]), float(lines.at[-1])
-    return Path(dict(laws), start, stop, float(away.max()), words=words, points=lines)
+    return Path(dict(laws), start, stop, float(away.max()), words=words, passed=(lines.at, lines.at), points=lines)
 
 
 def checked(path: Path, order: int = 1) -> Path:

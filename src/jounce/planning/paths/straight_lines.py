@@ -189,7 +189,9 @@ def rounded(lines: Lines, deviation: float, *, timed: bool = False) -> Path:
     laws = {name: SmoothPieces(begins[:-1], powers[:, :, k], float(begins[-1])) for k, name in enumerate(lines.names)}
     times = (knots, instants) if lines.kind == "samples" else None
     words = f"within {deviation:.3g} rad or m of the straight lines between {len(lines.at)} {lines.kind}"
-    return Path(laws, float(knots[0]), float(knots[-1]), float(distances.max()), deviation, words, times)
+    return Path(
+        laws, float(knots[0]), float(knots[-1]), float(distances.max()), deviation, words, times, (knots, instants)
+    )
 
 
 def _on(at: np.ndarray, knots: np.ndarray, points: _Points) -> Float[np.ndarray, "sample joint"]:

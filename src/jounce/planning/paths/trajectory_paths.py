@@ -9,6 +9,7 @@ parameter continues there stops exactly as long as it has to.
 import dataclasses
 import itertools
 import warnings
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -38,6 +39,9 @@ TURNING = 1e-2  # of the largest acceleration: more at a rest turns a trajectory
 NEWTON = 12  # steps
 HALVINGS = 60  # of the interval that contains the end of a stop
 GAUSS_NODES, WEIGHTS = np.polynomial.legendre.leggauss(6)
+
+
+_Places = Float[np.ndarray, " _"]  # of any length
 
 
 class Stops(NamedTuple):
@@ -94,7 +98,7 @@ class Ramps:
             pieces.append(np.polynomial.Polynomial([stop + width, 1.0]))
         height = max(len(piece.coef) for piece in pieces)
         powers = np.stack([np.pad(piece.coef, (0, height - len(piece.coef))) for piece in pieces], axis=1)
-        return JoinedPieces(np.array(begins), powers, total + float(self.gained[-1]))
+        return JoinedPieces(np.array(begins), powers, total + float(self.gained[-1]), "continue")
 
 
 def path_of_trajectory(trajectory: JointTrajectory, order: int) -> Path:
@@ -122,7 +126,7 @@ def path_of_trajectory(trajectory: JointTrajectory, order: int) -> Path:
             raise TrajectoryError("the path does not move: all its points are the same", name="path")
         rests = _rests(path, times, speeds, RESTING * largest)
         if min(speeds[0], speeds[-1]) > REST_SPEED * largest and _turns_well(path, times, rests):
-            return path
+            return dataclasses.replace(path, passed=(times, times))
         times = np.union1d(times, rests)
         lengths = np.append(0.0, np.cumsum(_between(path, times[:-1], times[1:])))
         stops = _stops(path, times, lengths, rests)
@@ -136,6 +140,42 @@ def path_of_trajectory(trajectory: JointTrajectory, order: int) -> Path:
                 break
     assert best is not None
     return best
+
+
+def stopping(path: Path, at: Float[np.ndarray, " stop"], order: int) -> tuple[Path, Callable[[_Places], _Places]]:
+    """Return a path over another parameter, at whose places a motion stops, and the values of that for those of s.
+
+    Parameters
+    ----------
+    path : Path
+        Where it leads.
+    at : array of shape (stop,)
+        Increasing values of its parameter, within it.
+    order : int
+        To which derivatives the motion is to vanish there.
+    """
+    lengths, total = at - path.start, path.stop - path.start
+    edges = np.concatenate([[0.0], lengths, [total]])
+    widths = np.minimum(WIDEST * total, np.minimum(np.diff(edges)[:-1], np.diff(edges)[1:]) / 2)
+    ramps = Ramps(lengths, widths, order + 1)
+    motion = ramps.motion(total)
+    leader = JoinedPieces(motion.breakpoints, _raised(motion.coefficients, path.start), float(motion.stop), "continue")
+    laws = {name: FollowingMotion(law, leader) for name, law in path.laws.items()}
+
+    def parameter(s: _Places) -> _Places:
+        return ramps.parameter(np.clip(s - path.start, 0.0, total))
+
+    words = f"{path.words}, with {len(at)} stop{'s' * (len(at) > 1)} where the load changes" if path.words else ""
+    instants = path.instants and (parameter(path.instants[0]), path.instants[1])
+    whole = dataclasses.replace(path, laws=laws, start=0.0, stop=float(leader.stop), instants=instants, words=words)
+    return dataclasses.replace(whole, passed=path.passed and (parameter(path.passed[0]), path.passed[1])), parameter
+
+
+def _raised(powers: np.ndarray, by: float) -> np.ndarray:
+    """Return polynomials raised by a number."""
+    raised = np.array(powers, float)
+    raised[0] += by
+    return raised
 
 
 def turns_back_within(trajectory: JointTrajectory, size: float) -> bool:
@@ -261,7 +301,7 @@ def _splined(path: Path, times: np.ndarray, lengths: np.ndarray, stops: Stops, o
         result, at = Path(laws, 0.0, float(leader.stop)), corners.parameter(own)
     at = np.clip(at, result.start, result.stop)
     off = np.linalg.norm(result.derivatives(at, 0)[:, 0] - path.derivatives(times, 0)[:, 0], axis=1)
-    return dataclasses.replace(result, deviation=float(off.max()))
+    return dataclasses.replace(result, deviation=float(off.max()), passed=(at, times))
 
 
 def _joined(knots: np.ndarray, values: np.ndarray, breaks: Int[np.ndarray, " break"]) -> JoinedPieces:

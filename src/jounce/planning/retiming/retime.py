@@ -16,6 +16,7 @@ from jounce.planning.paths.path import Path
 from jounce.planning.paths.paths import Between, GivenPath, cells_needed, checked, path_of
 from jounce.planning.paths.sampled_paths import path_of_samples
 from jounce.planning.retiming.fastest import fastest, slowed_only
+from jounce.planning.retiming.loads import along_path, in_time, with_stops
 from jounce.planning.retiming.mechanism import retime_mechanism
 from jounce.planning.retiming.quantities.limits import GivenLimits, MotionLimits, limits_of
 from jounce.planning.retiming.quantities.motion_limits_check import check_motion
@@ -26,6 +27,7 @@ from jounce.planning.retiming.rates.rate_motion import RateMotion
 from jounce.planning.retiming.retimed import RetimedTrajectory, active_limits
 from jounce.planning.retiming.search import Search
 from jounce.planning.solver import require_solver
+from jounce.robot.algorithms.carried_loads import CarriedLoad
 from jounce.robot.model.links_and_joints import Limits
 from jounce.robot.robot import Robot
 from jounce.trajectory import FollowingMotion, JointTrajectory
@@ -56,6 +58,7 @@ def retime(
     hand_over: bool = False,
     duration: float | None = None,
     state: ArrayLike | None = None,
+    loads: Sequence[CarriedLoad] = (),
 ) -> RetimedTrajectory:
     """Return the fastest motion along a path that keeps limits.
 
@@ -113,6 +116,11 @@ def retime(
         motion begins, of the joints of the path in its order. If it is not on the path, a polynomial leads onto it, and
         joins it where a motion is found that keeps the limits, the sooner the better. What exceeds a limit by less than
         a millionth is taken for rounding.
+    loads : sequence of CarriedLoad, optional
+        What links carry on parts of the path, as from the second waypoint to the fourth: limits of torques and of their
+        rates hold on both sides of each change. The motion stops there, unless the load is said to be ``moving``; a
+        repaired trajectory stops only where it did. Torques step as the load changes, so that their rate is infinite
+        then: the report tells by how much they step, and how fast the load moves.
 
     Returns
     -------
@@ -150,7 +158,7 @@ def retime(
     between = Between(deviation, parameter, degree)
     if isinstance(robot, Mechanism):
         given = {"repair": repair, "path": path is not None, "deviation": deviation is not None}
-        _check_of_robots(given | {"state": state is not None}, between)
+        _check_of_robots(given | {"state": state is not None, "loads": len(loads) > 0}, between)
         return retime_mechanism(robot, _of_mechanism(limits), _rates(rates), order, cells or CELLS, duration)
     if not isinstance(robot, Robot):
         raise TrajectoryError("must be a Robot or a Mechanism", name="robot", value=type(robot).__name__)
@@ -160,15 +168,16 @@ def retime(
         FollowedTrajectory(robot, path)  # checks its joints and units
     if repair:
         _check_not_repaired(duration=duration, state=state)
-        return _repaired(robot, path, limits, order, cells, drives, between, hand_over=hand_over)
+        return _repaired(robot, path, limits, order, cells, drives, between, hand_over=hand_over, loads=loads)
     chosen = _order(order, limits_of(robot, limits), robot)
     chosen_path = path_of(path, names if names is not None else robot.joint_names, chosen, between)
     if not isinstance(path, JointTrajectory):
         warn_of_degrees(robot, JointTrajectory(dict(chosen_path.laws), chosen_path.start, chosen_path.stop))
     conditions = Conditions(chosen, _rates(rates))
+    chosen_path, carried = with_stops(chosen_path, along_path(_check_loads(loads, state), chosen_path), chosen)
 
     def fastest_along(along: Path, conditions: Conditions) -> _Fastest:
-        source = RobotQuantities(robot, along, limits, drives=drives)
+        source = RobotQuantities(robot, along, limits, drives=drives, loads=carried)
         checked(along, chosen)
         source.check_range()
         own_cells = cells or cells_needed(along, chosen)
@@ -208,6 +217,14 @@ def _check_not_repaired(**given: Any) -> None:
 
 
 _Fastest = tuple[RobotQuantities, RateLaw, Search]
+
+
+def _check_loads(loads: Sequence[CarriedLoad], state: ArrayLike | None) -> tuple[CarriedLoad, ...]:
+    """Raise TrajectoryError if loads change on the way from a running state."""
+    if state is not None and loads:
+        message = "what is carried is not known to change on the way from a running state; leave one of both out"
+        raise TrajectoryError(message, name="loads")
+    return tuple(loads)
 
 
 def _from_state(
@@ -265,13 +282,15 @@ def _repaired(
     between: Between,
     *,
     hand_over: bool,
+    loads: Sequence[CarriedLoad],
 ) -> RetimedTrajectory:
     if not isinstance(trajectory, JointTrajectory):
         raise TrajectoryError("only a trajectory can be repaired", name="path", value=type(trajectory).__name__)
     between.check_without_points()
     chosen = _order(order, limits_of(robot, limits), robot)
     path = checked(path_of_samples(trajectory, chosen, between.deviation, timed=True), chosen)
-    source = RobotQuantities(robot, path, limits, drives=drives)
+    carried = along_path(loads, path, timed=True)
+    source = RobotQuantities(robot, path, limits, drives=drives, loads=carried)
     source.check_range()
     given = JointTrajectory(path.laws, path.start, path.stop, trajectory.times)
     ends = _ends(robot, given, source, drives, hand_over)
@@ -334,10 +353,12 @@ def _certified(
         progress = FollowingMotion(law.parameter, motion)
         laws = {name: FollowingMotion(own, progress) for name, own in path.laws.items()}
         bare = JointTrajectory(laws, 0.0, motion.duration, np.linspace(0.0, motion.duration, law.basis.cells + 1))
-        report = check_motion(robot, bare, source.limits, drives=drives, hand_over=hand_over)
+        loads = in_time(source.loaded.loads, progress, motion.duration)
+        report = check_motion(robot, bare, source.limits, drives=drives, hand_over=hand_over, loads=loads)
         over = (report.worst.ratio or 0.0) - 1 if report.worst else 0.0
         if over <= LIMIT_TOLERANCE:
-            return RetimedTrajectory(laws, bare.stop, path, progress, report, active_limits(search, law, motion))
+            active = active_limits(search, law, motion)
+            return RetimedTrajectory(laws, bare.stop, path, progress, report, active, loads)
         if attempt == ATTEMPTS - 1 or not np.isfinite(over):
             note = "" if report.worst is None else f" of the {report.worst.quantity} of {report.worst.joint}"
             message = f"the time law found breaks the limit{note}; try more cells"

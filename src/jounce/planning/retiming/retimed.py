@@ -1,6 +1,7 @@
 """Trajectories that were retimed, and what limits them where."""
 
-from collections.abc import Mapping
+import dataclasses
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -10,6 +11,7 @@ from jounce.planning.paths.path import Path
 from jounce.planning.retiming.rates.rate_law import RateLaw
 from jounce.planning.retiming.rates.rate_motion import RateMotion
 from jounce.planning.retiming.search import Search
+from jounce.robot.algorithms.carried_loads import CarriedLoad
 from jounce.trajectory import AbstractMotion, FollowingMotion, JointTrajectory
 
 BINDS = 1e-2  # of a limit: where less is left, it binds
@@ -34,6 +36,8 @@ class RetimedTrajectory(JointTrajectory):
         Over ``s`` and ``limit`` (such as "panda_joint1 torque rate"): ``share`` of the limit that is used; ``binds``,
         whether less than a hundredth of it is left; ``price``, by how much the duration would fall, s, were this limit
         raised along the path by a share of 1, divided among its points. Over ``s``: ``time``.
+    loads : tuple of CarriedLoad
+        What links carry during parts of the motion, by time.
     """
 
     def __init__(
@@ -44,9 +48,10 @@ class RetimedTrajectory(JointTrajectory):
         progress: FollowingMotion,
         report: LimitReport,
         active: Any,
+        loads: Sequence[CarriedLoad] = (),
     ):
         super().__init__(laws, 0.0, stop, np.linspace(0.0, stop, 201))
-        self.path, self.progress, self.report, self.active = path, progress, report, active
+        self.path, self.progress, self.report, self.active, self.loads = path, progress, report, active, tuple(loads)
 
     def slower(self, factor: float) -> "RetimedTrajectory":
         """Return the same motion, slower by a factor; its report is that of this one."""
@@ -55,10 +60,15 @@ class RetimedTrajectory(JointTrajectory):
         slow = motion.slower(factor)
         progress = FollowingMotion(parameter, slow)
         laws = {name: FollowingMotion(own, progress) for name, own in self.path.laws.items()}
-        return RetimedTrajectory(laws, slow.duration, self.path, progress, self.report, self.active)
+        loads = [
+            dataclasses.replace(load, **{end: x * factor for end in ("start", "stop") if (x := getattr(load, end))})
+            for load in self.loads
+        ]
+        return RetimedTrajectory(laws, slow.duration, self.path, progress, self.report, self.active, loads)
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return type(self), (dict(self.laws), self.stop, self.path, self.progress, self.report, self.active)
+        ends = self.report, self.active, self.loads
+        return type(self), (dict(self.laws), self.stop, self.path, self.progress, *ends)
 
     def __repr__(self) -> str:
         return f"RetimedTrajectory({', '.join(self.names)}; {self.stop:g} s)"

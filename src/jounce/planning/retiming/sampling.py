@@ -80,9 +80,9 @@ def fit_to_samples(
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", SampleWarning)
             read = JointTrajectory.from_samples(times, positions, slower.names, degree)
-            report = worst = check_motion(robot, read, limits, drives=drives, hand_over=hand_over)
+            report = worst = check_motion(robot, read, limits, drives=drives, hand_over=hand_over, loads=slower.loads)
         if report.kept:
-            worst = check_motion(robot, slower, limits, drives=drives, hand_over=True)
+            worst = check_motion(robot, slower, limits, drives=drives, hand_over=True, loads=slower.loads)
             if worst.kept:
                 slower.report = dataclasses.replace(worst, ends=trajectory.report.ends, hand_over=hand_over)
                 return slower, report

@@ -33,10 +33,12 @@ ZOOMS = 3  # how often they are refined
 ASIDE = 0.1  # of the way to the points beside, of those about a vertex
 SPARE = 2e-8  # of a limit, left to rounding
 SLOWINGS = 12
+LEAST_FALL = 1e-3  # of a limit, by a slowing of one
 HOPELESS = 0.1  # of a limit: no slowing as a whole is meant to mend so much
 MOST = 1e16
 EVENED, SAME = 20, 1e-12  # steps to a duration, and share of it that is none
 GIVEN = 4  # cells in which what is left of limits grows from nothing, after a state that is given
+BISECTIONS = 54  # to rounding
 FLOOR = 1e-7  # of the mean of z: its least value
 
 _Points = Float[np.ndarray, " _"]  # of any length
@@ -85,9 +87,20 @@ class Search:
         grid = ((np.arange(basis.cells)[:, None] + OFFSETS) / basis.cells).reshape(-1)
         ends = np.linspace(0.0, END_CELLS / basis.cells, END_POINTS)[1:]  # where it rests, limits change fast
         enforced = np.isin(np.arange(len(grid)) % len(OFFSETS), FIRST)
-        self.extend(np.concatenate([grid, ends, 1 - ends]), np.append(enforced, np.ones(2 * len(ends), bool)))
+        sides = np.array([self._share(s) for s in source.changes])[:, None] + ENDS / basis.cells * np.array([-1.0, 1.0])
+        enforced = np.append(enforced, np.ones(2 * len(ends) + sides.size, bool))
+        self.extend(np.concatenate([grid, ends, 1 - ends, sides.reshape(-1)]), enforced)
         self.nodes, self.weights = quadrature(basis.cells, 2)
         self.node_matrix = basis.matrices(self.nodes, 0)[0]
+
+    def _share(self, s: float) -> float:
+        """Return the u of a value of s."""
+        low, high = 0.0, 1.0
+        for _ in range(BISECTIONS):
+            middle = (low + high) / 2
+            below = float(self.parameter.derivatives(np.array([middle]), 0)[0, 0]) < s
+            low, high = (middle, high) if below else (low, middle)
+        return high
 
     def extend(self, points: _Points, enforced: Bool[np.ndarray, " point"]) -> None:
         """Look at more values of u; where `enforced`, all limits that are near hold from the beginning."""
@@ -258,13 +271,17 @@ class Search:
         SolveError
             If slowing does not help.
         """
+        before, step = np.inf, np.inf
         for _ in range(SLOWINGS):
             over = float(self.peaks(law)[1].max()) - 1 + SPARE
             if over <= SPARE / 2:
                 return law
             if over > HOPELESS:
                 break
-            law = self.tightened(law, over)
+            # a torque that holds weight for the most part falls by a small share of what the motion is slowed
+            fell = (before - over) / step if np.isfinite(step) else 1.0
+            step, before = over / float(np.clip(fell, LEAST_FALL, 1.0)), over
+            law = self.tightened(law, step)
         message = (
             "the time law found cannot be made to keep its limits; smooth the path where it bends sharply, or try "
             "another number of cells"

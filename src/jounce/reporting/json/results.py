@@ -16,6 +16,7 @@ from jounce.errors import UNSET, JounceError, show_value
 from jounce.kinematics import ChunkedMotion, Motion
 from jounce.reporting.facts.mechanism.mechanism_facts import grid_facts
 from jounce.reporting.facts.motion_facts import motion_facts
+from jounce.reporting.load_changes import load_facts
 from jounce.reporting.motion_ends import between_facts, ends_facts
 from jounce.reporting.peaks import Peak, peaks
 from jounce.trajectory import JointTrajectory
@@ -116,6 +117,7 @@ def limits_result(
         "limits": [{key: getattr(row, names.get(key, key)) for key in keys} for row in report.rows],
         "ends": ends_facts(report.ends),
         "hand_over": report.hand_over,
+        "loads": load_facts(report),
         "between": None if motion is None else between_facts(motion),
         "written": written,
     }

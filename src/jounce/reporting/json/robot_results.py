@@ -62,6 +62,15 @@ class TrajectoryResult(Result):
     written: str | None
 
 
+class LoadChangeFacts(TypedDict):
+    """What a change of the load does: kg by link, the speed of the load, m/s, and the steps of torques by joint, SI."""
+
+    time: float
+    masses: dict[str, float]
+    speed: float
+    steps: dict[str, float]
+
+
 class CheckResult(TrajectoryResult):
     """jounce check --json."""
 
@@ -72,6 +81,7 @@ class CheckResult(TrajectoryResult):
     drives: bool
     limits: list[LimitRow]
     hand_over: bool
+    loads: list[LoadChangeFacts]
 
 
 class TorquesResult(TrajectoryResult):
@@ -171,6 +181,7 @@ class RetimeResult(Result):
     limits: list[LimitRow]
     ends: list[EndFacts]
     hand_over: bool
+    loads: list[LoadChangeFacts]
     binding: list[BindingLimit]
     figure: str | None
 

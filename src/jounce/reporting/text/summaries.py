@@ -12,6 +12,7 @@ from jounce.dynamics.limits.limit_report import LimitReport
 from jounce.dynamics.limits.motion_ends import TrajectoryEnd
 from jounce.dynamics.limits.trajectories import drives_note
 from jounce.mechanism.time import last_step_words
+from jounce.reporting.load_changes import load_words
 from jounce.reporting.motion_ends import between_words, breaks_words, ends_words
 from jounce.reporting.text.law_facts import law_words
 from jounce.trajectory import JointTrajectory
@@ -170,7 +171,7 @@ def limits_summary(report: LimitReport, motion: JointTrajectory, robot: Path, tr
         limited = {row.quantity for row in report.limited}
         unlimited = [f"{word} of {', '.join(names)}" if word in limited else word for word, names in free.items()]
         lines.append(f"without a limit: {', '.join(unlimited)}")
-    lines += [*between_words(motion), *ends_words(report.ends)]
+    lines += [*between_words(motion), *ends_words(report.ends), *load_words(report)]
     return "\n".join(wrapped(line) for line in lines)
 
 

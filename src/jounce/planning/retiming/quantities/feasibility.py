@@ -7,13 +7,16 @@ from jounce.errors import TrajectoryError
 from jounce.planning.retiming.quantities.path_quantities import G, Labels, PathQuantities, Source
 
 POINTS = 1001  # places on the path
+BESIDE = 1e-12  # of the path: both sides of where a load changes
 STATIC = 1e-6  # of a limit, which what stands still must leave
 IDLE = 1e-9  # of its largest value: what moves by less does not move
 
 
 def check_possible(source: Source, labels: Labels, start: float, stop: float, *, bounded: bool = False) -> None:
     """Raise TrajectoryError where standing still breaks a limit, or nothing that has one moves."""
-    s = np.linspace(start, stop, POINTS)
+    near = BESIDE * (stop - start) * np.array([-1.0, 1.0])
+    even = np.linspace(start, stop, POINTS)
+    s = np.union1d(even, (source.changes[:, None] + near).reshape(-1))
     quantities = source(s)
     at_rest = quantities.second[:, :, G]
     spare = np.minimum(_spare(quantities.upper, at_rest), _spare(-quantities.lower, -at_rest))
@@ -30,10 +33,11 @@ def check_possible(source: Source, labels: Labels, start: float, stop: float, *,
         raise TrajectoryError(message, name=label.owner)
     if bounded:
         return
-    moving = _moving(quantities, rates=True)
-    stops = np.flatnonzero(moving < IDLE)
+    moving = _moving(quantities, rates=True)[np.isin(s, even)]
+    idle = moving < IDLE
+    stops = np.flatnonzero(idle[1:] & idle[:-1])  # at one place alone the motion may stop
     if len(stops):
-        where = source.location(float(s[stops[0]]))
+        where = source.location(float(even[stops[0]]))
         message = f"nothing with a limit moves at {where}, so that there is no fastest law; give more limits"
         raise TrajectoryError(message, name="limits")
 

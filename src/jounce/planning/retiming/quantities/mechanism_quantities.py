@@ -59,6 +59,7 @@ class MechanismQuantities:
         if not mechanism.drivers:
             raise MechanismError("a mechanism without a driver has no motion to be retimed", name="drivers")
         self.limits = dict(limits)
+        self.changes = np.zeros(0)  # nothing jumps along the path
         for name, entry in self.limits.items():
             check_name(
                 "driver or output", name, [*mechanism.drivers, *mechanism.outputs], MechanismError, name="limits"

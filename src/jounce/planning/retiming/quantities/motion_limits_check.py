@@ -2,7 +2,7 @@
 
 import dataclasses
 import warnings
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -17,10 +17,11 @@ from jounce.planning.paths.path import Path
 from jounce.planning.retiming.quantities.limits import MotionLimits, limits_of
 from jounce.planning.retiming.quantities.path_quantities import Curves
 from jounce.planning.retiming.quantities.robot_quantities import RobotQuantities
+from jounce.robot.algorithms.carried_loads import CarriedLoad
 from jounce.robot.model.links_and_joints import Limits
 from jounce.robot.robot import Robot
 from jounce.trajectory import JointTrajectory
-from jounce.trajectory.law_checks.breaks import at_breaks, law_breaks, with_sides
+from jounce.trajectory.law_checks.breaks import at_breaks, distinct_instants, law_breaks, with_sides
 
 EVEN = np.array([1.0, 0.0, 0.0, 0.0])  # z and its derivatives where the parameter is the time
 ZOOM, ZOOMS = 9, 8
@@ -32,7 +33,13 @@ _Infinite = Mapping[tuple[str, str], float]  # when a quantity of a joint is inf
 
 
 def check_motion(
-    robot: Robot, trajectory: JointTrajectory, limits: MotionLimits, *, drives: bool = True, hand_over: bool = False
+    robot: Robot,
+    trajectory: JointTrajectory,
+    limits: MotionLimits,
+    *,
+    drives: bool = True,
+    hand_over: bool = False,
+    loads: Sequence[CarriedLoad] = (),
 ) -> LimitReport:
     """Compare a trajectory with limits of all kinds, as `check_limits` does with constant ones.
 
@@ -48,6 +55,8 @@ def check_motion(
         Whether torques contain armature inertia, damping and friction of the drives.
     hand_over : bool, default False
         Whether the robot moves already as the trajectory starts, and goes on moving as it stops.
+    loads : sequence of CarriedLoad, optional
+        What links carry during parts of the motion, by time.
 
     Returns
     -------
@@ -56,7 +65,7 @@ def check_motion(
     """
     given = limits_of(robot, limits)
     constant = {name: _without(entry, given.own(name)) for name, entry in given.joints.items()}
-    report = check_limits(robot, trajectory, constant, drives=drives, hand_over=hand_over)
+    report = check_limits(robot, trajectory, constant, drives=drives, hand_over=hand_over, loads=loads)
     infinite = {(row.joint, row.quantity): row.time for row in report.rows if row.infinite}
     joints = {  # what is judged by the constant limits is not judged here
         name: Limits(**{field: getattr(given.joints[name], field, None) for field in given.own(name) - {"jounce"}})
@@ -66,7 +75,11 @@ def check_motion(
     if not (others.jounce or others.varying or others.points or others.backward):
         return report
     source = RobotQuantities(
-        robot, Path(dict(trajectory.laws), trajectory.start, trajectory.stop), others, drives=drives
+        robot,
+        Path(dict(trajectory.laws), trajectory.start, trajectory.stop),
+        others,
+        drives=drives,
+        loads=loads,
     )
     extra = _rows(source, trajectory, infinite)
     listed = {(row.joint, row.quantity) for row in extra}
@@ -116,6 +129,7 @@ def _rows(source: RobotQuantities, trajectory: JointTrajectory, infinite: _Infin
 
     ends = float(trajectory.start), float(trajectory.stop)
     breaks = law_breaks(trajectory.laws.values(), *ends, JOUNCE)
+    breaks = distinct_instants(np.append(breaks, source.changes), *ends)
     grid = with_sides(np.unique(np.concatenate([trajectory.times, np.linspace(*ends, 2001)])), breaks)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", SampleWarning)

@@ -240,7 +240,15 @@ def _over(values: Array, bounds: Array) -> Array:
 
 @runtime_checkable
 class Source(Protocol):
-    """Gives the quantities at values of s."""
+    """Gives the quantities at values of s.
+
+    Attributes
+    ----------
+    changes : array of shape (change,)
+        Values of s at which quantities jump; at these they are those after the jump.
+    """
+
+    changes: Float[np.ndarray, " change"]
 
     def __call__(self, s: Float[np.ndarray, " point"]) -> PathQuantities:
         """Return the quantities."""

@@ -1,6 +1,6 @@
 """The limited quantities of a robot on a path: of its joints, their torques, and points of its links."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from jaxtyping import Float
@@ -11,7 +11,7 @@ from jounce.errors import RobotError, TrajectoryError
 from jounce.planning.paths.path import Path
 from jounce.planning.retiming.quantities.limits import MotionLimits, limits_of
 from jounce.planning.retiming.quantities.path_quantities import Labels, PathQuantities, Quantity
-from jounce.robot.algorithms.inverse_dynamics import inverse_dynamics
+from jounce.robot.algorithms.carried_loads import CarriedLoad, LoadedRobot
 from jounce.robot.model.links_and_joints import Limits
 from jounce.robot.recursions.kinematics import forward_kinematics
 from jounce.robot.robot import Robot
@@ -37,6 +37,13 @@ class RobotQuantities:
         As `retime` takes them.
     drives : bool
         Whether torques contain armature inertia, damping and friction of the drives.
+    loads : sequence of CarriedLoad, optional
+        What links carry on parts of the path, by its parameter.
+
+    Attributes
+    ----------
+    changes : array of shape (change,)
+        Values of s where loads change.
 
     Raises
     ------
@@ -45,10 +52,18 @@ class RobotQuantities:
     """
 
     def __init__(
-        self, robot: Robot, path: Path, limits: MotionLimits | Mapping[str, Limits] | None, *, drives: bool = True
+        self,
+        robot: Robot,
+        path: Path,
+        limits: MotionLimits | Mapping[str, Limits] | None,
+        *,
+        drives: bool = True,
+        loads: Sequence[CarriedLoad] = (),
     ):
         self.robot, self.path, self.drives = robot, path, drives
         self.limits = limits_of(robot, limits)
+        self.loaded = LoadedRobot(robot, loads, path.start, path.stop)
+        self.changes = self.loaded.changes
         followed = FollowedTrajectory(robot, JointTrajectory(dict(path.laws), path.start, path.stop), given=False)
         self.columns, self.resting_joints = followed.columns, followed.resting_joints
         names = robot.joint_names
@@ -63,7 +78,7 @@ class RobotQuantities:
         """Return the quantities at values of s."""
         q = self.coordinates(s)
         first, bounds = self._first(q)
-        of_second = self._second(q, s == self.path.stop)
+        of_second = self._second(q, s)
         vectors, vector_bounds = self._vectors(q)
         chosen = self.with_jounce
         fourth = np.moveaxis(q[:, 1:, chosen], 1, 2)
@@ -93,7 +108,7 @@ class RobotQuantities:
                 bounds.append(np.full((len(q), 1), point.speed))
         return np.concatenate(values, axis=1), np.concatenate(bounds, axis=1)
 
-    def _second(self, q: np.ndarray, ends: np.ndarray) -> tuple[np.ndarray, _Table, _Table, _Table, _Table]:
+    def _second(self, q: np.ndarray, s: _Points) -> tuple[np.ndarray, _Table, _Table, _Table, _Table]:
         """Return the coefficients of accelerations and torques; lowest and highest of them, and of their rates."""
         chosen = self.with_acceleration
         motion = q[:, :, chosen]
@@ -104,25 +119,27 @@ class RobotQuantities:
         pairs = zip(self._both("acceleration", chosen, q), self._both("deceleration", chosen, q), strict=True)
         for (faster, slower), along in zip(pairs, (ahead, ~ahead), strict=True):
             slowing = np.where(np.isfinite(slower), slower, faster)
-            speeding = np.where(at_rest & ends[:, None], slowing, faster)  # what arrives has slowed down
+            speeding = np.where(
+                at_rest & (s == self.path.stop)[:, None], slowing, faster
+            )  # what arrives has slowed down
             sides.append(np.where(at_rest | along, speeding, slowing))
         jerk, jerk_back = self._both("jerk", chosen, q)
         tables = [(np.stack(parts, axis=-1), -sides[1], sides[0], -jerk_back, jerk)]
         if self.with_effort:
             effort, effort_back = self._both("effort", self.with_effort, q)
             rate, rate_back = self._both("effort_rate", self.with_effort, q)
-            tables.append((self._torques(q)[:, self.with_effort], -effort_back, effort, -rate_back, rate))
+            tables.append((self._torques(q, s)[:, self.with_effort], -effort_back, effort, -rate_back, rate))
         second, *bounds = (np.concatenate(x, axis=1) for x in zip(*tables, strict=True))
         lower, upper, rate_lower, rate_upper = bounds
         return second, lower, upper, rate_lower, rate_upper
 
-    def _torques(self, q: np.ndarray) -> Float[np.ndarray, "point joint 8"]:
+    def _torques(self, q: np.ndarray, s: _Points) -> Float[np.ndarray, "point joint 8"]:
         """Return the coefficients of the torques: exact values for a few rates of s, and the polynomials they are."""
         first, second = (x[:, None, None] for x in CASES.T)
         _, q1, q2, q3, _ = np.moveaxis(q, 1, 0)
         at = np.broadcast_to(q[:, 0], (len(CASES), *q[:, 0].shape))
         moving = (at, q1 * first, q1 * second + q2 * first**2, 3 * q2 * first * second + q3 * first**3)
-        torques = np.asarray(inverse_dynamics(self.robot, np.stack(moving, axis=2), drives=self.drives))
+        torques = self.loaded.torques(np.stack(moving, axis=2), s, self.drives)
         speeds = CASES[:3, 0]
         values, rates = np.moveaxis(torques, 2, 0)  # of cases, points, joints
         g, d, c = np.einsum("ij,jpn->ipn", np.linalg.inv(np.vander(speeds, increasing=True)), values[:3])

@@ -1,0 +1,122 @@
+"""Loads that are taken up and set down along a path: where on it, and when."""
+
+import dataclasses
+from collections.abc import Sequence
+
+import jax.numpy as jnp
+import numpy as np
+
+from jounce.errors import TrajectoryError
+from jounce.planning.paths.path import Path
+from jounce.planning.paths.trajectory_paths import stopping
+from jounce.robot.algorithms.carried_loads import CarriedLoad
+from jounce.trajectory import FollowingMotion
+from jounce.trajectory.laws.stacking import law_derivatives
+
+SAME = 1e-12  # of a path: changes that are nearer to each other, or to an end, are one
+RESTS = 1e-9  # of the largest speed along a path: what is slower stands still there already
+LOOKS = 65  # instants, among which one is sought, again and again
+
+
+def along_path(loads: Sequence[CarriedLoad], path: Path, *, timed: bool = False) -> tuple[CarriedLoad, ...]:
+    """Return loads by the parameter of a path.
+
+    Parameters
+    ----------
+    loads : sequence of CarriedLoad
+        By time of a trajectory, parameter, share of the path, or waypoints.
+    path : Path
+        The path.
+    timed : bool, default False
+        Whether its parameter is the time.
+
+    Raises
+    ------
+    TrajectoryError
+        If a place is not on the path, or the path has no such places.
+    """
+    return tuple(_along(load, path, timed) for load in loads)
+
+
+def with_stops(path: Path, loads: Sequence[CarriedLoad], order: int) -> tuple[Path, tuple[CarriedLoad, ...]]:
+    """Return a path that stops where loads change at rest, and the loads by its parameter.
+
+    Parameters
+    ----------
+    path : Path
+        The path.
+    loads : sequence of CarriedLoad
+        By its parameter.
+    order : int
+        To which derivatives the motion is to be continuous.
+    """
+    near = SAME * (path.stop - path.start)
+    edges = np.unique([x for load in loads if not load.moving for x in (load.start, load.stop) if x is not None])
+    edges = edges[(edges > path.start + near) & (edges < path.stop - near)] if len(edges) else edges
+    edges = edges[np.diff(edges, prepend=-np.inf) > near]
+    if len(edges):
+        speeds = np.abs(path.derivatives(np.append(edges, np.linspace(path.start, path.stop, LOOKS)), 1)[:, 1]).max(1)
+        edges = edges[speeds[: len(edges)] > RESTS * speeds.max()]
+    if not len(edges):
+        return path, tuple(loads)
+    stopped, parameter = stopping(path, edges, order)
+
+    def placed(load: CarriedLoad) -> CarriedLoad:
+        ends = [end for end in ("start", "stop") if getattr(load, end) is not None]
+        there = parameter(np.array([getattr(load, end) for end in ends], float)).tolist()
+        return dataclasses.replace(load, **dict(zip(ends, there, strict=True)))
+
+    return stopped, tuple(placed(load) for load in loads)
+
+
+def _along(load: object, path: Path, timed: bool) -> CarriedLoad:
+    if not isinstance(load, CarriedLoad):
+        raise TrajectoryError("must be CarriedLoads", name="loads", value=type(load).__name__)
+    ends = {end: _place(x, load, path, timed) for end in ("start", "stop") if (x := getattr(load, end)) is not None}
+    return dataclasses.replace(load, **ends, by="s")
+
+
+def _place(value: float, load: CarriedLoad, path: Path, timed: bool) -> float:
+    """Return the parameter of a place."""
+    name, by = f"loads.{load.link}", load.by
+    passed = (np.array([path.start, path.stop]),) * 2 if timed else path.passed
+    if by == "waypoint" and path.points is None:
+        raise TrajectoryError("the path has no waypoints; give by='time', 's' or 'share'", name=name, value=by)
+    if by == "time" and (passed is None or path.points is not None):
+        message = "the path says nothing of time; give by='s', 'share' or, of waypoints, 'waypoint'"
+        raise TrajectoryError(message, name=name, value=by)
+    if by == "s":
+        low, high, s = path.start, path.stop, value
+    elif by == "share":
+        low, high, s = 0.0, 1.0, path.start + value * (path.stop - path.start)
+    else:
+        assert passed is not None
+        at = path.points.at if by == "waypoint" else passed[1]
+        low, high = (1, len(at)) if by == "waypoint" else (float(at[0]), float(at[-1]))
+        counted = at[int(np.clip(value, low, high)) - 1] if by == "waypoint" else value
+        s = float(np.interp(counted, passed[1], passed[0]))
+    if not low <= value <= high:
+        what = {"waypoint": "waypoints", "time": "instants", "s": "s", "share": "shares of the path"}[by]
+        raise TrajectoryError(f"is not on the path, whose {what} go from {low:g} to {high:g}", name=name, value=value)
+    return float(s)
+
+
+def in_time(loads: Sequence[CarriedLoad], progress: FollowingMotion, duration: float) -> tuple[CarriedLoad, ...]:
+    """Return loads by time, of those by the parameter of a path, which is known over time."""
+
+    def instant(s: float) -> float:
+        low, high = 0.0, duration
+        while True:
+            looks = np.linspace(low, high, LOOKS)
+            after = int(np.searchsorted(np.asarray(law_derivatives([progress], jnp.asarray(looks), 0))[0, 0], s))
+            near = float(looks[max(after - 1, 0)]), float(looks[min(after, LOOKS - 1)])
+            if near == (low, high) or near[1] - near[0] <= np.spacing(duration):
+                return near[1]
+            low, high = near
+
+    return tuple(
+        dataclasses.replace(
+            load, **{end: instant(x) for end in ("start", "stop") if (x := getattr(load, end)) is not None}, by="time"
+        )
+        for load in loads
+    )

@@ -1,0 +1,33 @@
+"""What changes of the load do to a robot in motion, in words and as data."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from jounce.dynamics.limits.limit_report import LimitReport
+
+STILL = 1e-9  # m/s: slower stands still
+
+
+def load_words(report: LimitReport) -> list[str]:
+    """Word what changes, how fast it moves, and by how much the largest torque steps."""
+    units = {row.joint: row.unit for row in report.rows if row.unit in ("N", "N m")}
+    lines = []
+    for change in report.loads:
+        masses = " and ".join(f"{name} by {mass:+.6g} kg" for name, mass in change.masses.items())
+        moves = f"moving at {change.speed:.3g} m/s" if change.speed > STILL else "at rest"
+        line = f"load: {masses} at t = {change.time:.6g} s, {moves}"
+        if change.steps:
+            name = max(change.steps, key=lambda name: abs(change.steps[name]))
+            step = f"{change.steps[name]:.3g} {units.get(name, 'N m')}"
+            line += f"; torques step there, by {step} at most, of {name}, which no limit of their rate covers"
+        lines.append(line)
+    return lines
+
+
+def load_facts(report: LimitReport) -> list[dict[str, Any]]:
+    """Return the changes as plain data."""
+    return [
+        {"time": change.time, "masses": dict(change.masses), "speed": change.speed, "steps": dict(change.steps)}
+        for change in report.loads
+    ]

@@ -1,0 +1,195 @@
+"""Loads that links carry during a part of a motion: which robot moves when, and what a change of its load does."""
+
+import dataclasses
+import itertools
+from collections.abc import Mapping, Sequence
+from numbers import Real
+from typing import Literal
+
+import numpy as np
+from jaxtyping import Float
+
+from jounce.errors import TrajectoryError, check_name, flag
+from jounce.rigid.inertia import Inertia
+from jounce.robot.algorithms.inverse_dynamics import inverse_dynamics
+from jounce.robot.recursions.kinematics import forward_kinematics
+from jounce.robot.robot import Robot
+
+PLACES = ("time", "s", "share", "waypoint")
+SAME = 1e-12  # of a motion: changes that are nearer to each other, or to an end, are at once
+NO_STEP = 1e-12  # of the largest torque: rounding
+
+Place = Literal["time", "s", "share", "waypoint"]
+
+
+@dataclasses.dataclass(frozen=True)
+class CarriedLoad:
+    """A load that a link carries during a part of a motion.
+
+    Parameters
+    ----------
+    link : str
+        Name of the link.
+    inertia : Inertia
+        Of the load, in the frame of the link.
+    start, stop : float, optional
+        Where it is taken up and where it is set down; the ends of the motion unless given.
+    by : {"time", "s", "share", "waypoint"}, default "time"
+        What these count: instants, s, of the trajectory; values of the parameter of a path; shares of it, from 0 to 1;
+        or its waypoints, of which the first is 1.
+    moving : bool, default False
+        Whether it is taken up and set down in motion, as from a conveyor; otherwise `retime` stops there.
+
+    Raises
+    ------
+    TrajectoryError
+        If it is no such load, or is set down before it is taken up.
+
+    Examples
+    --------
+    >>> import jounce as jn
+    >>> jn.robot.CarriedLoad("hand", jn.Inertia(3.0), start=0.8, stop=2.0).words
+    'hand carries 3 kg from 0.8 s to 2 s'
+    """
+
+    link: str
+    inertia: Inertia
+    start: Real | None = None
+    stop: Real | None = None
+    by: Place = "time"
+    moving: bool = False
+
+    def __post_init__(self) -> None:
+        check_name("place of a load", self.by, PLACES, TrajectoryError, name="by")
+        flag("moving", self.moving, error=TrajectoryError)
+        if not isinstance(self.inertia, Inertia):
+            raise TrajectoryError("must be an Inertia", name="loads", value=type(self.inertia).__name__)
+        for name in ("start", "stop"):
+            value = getattr(self, name)
+            if value is None:
+                continue
+            if isinstance(value, bool) or not isinstance(value, int | float) or not np.isfinite(value):
+                raise TrajectoryError("must be a finite number", name=f"loads.{name}", value=value)
+            if self.by == "waypoint" and value != round(value):
+                raise TrajectoryError("must be the whole number of a waypoint", name=f"loads.{name}", value=value)
+            object.__setattr__(self, name, float(value))
+        if self.start is not None and self.stop is not None and self.start >= self.stop:
+            message = f"is set down at {self.stop:g}, but taken up at {self.start:g} only; the second must be later"
+            raise TrajectoryError(message, name=f"loads.{self.link}")
+
+    @property
+    def words(self) -> str:
+        """What is carried, and how long."""
+        unit = " s" if self.by == "time" else ""
+        ends = [f" from {self.start:g}{unit}"] * (self.start is not None)
+        ends += [f" to {self.stop:g}{unit}"] * (self.stop is not None)
+        return f"{self.link} carries {float(self.inertia.mass):g} kg{''.join(ends)}"
+
+
+@dataclasses.dataclass(frozen=True)
+class LoadChange:
+    """What a change of the load does to a robot in motion.
+
+    Parameters
+    ----------
+    time : float
+        The instant, s.
+    masses : dict of str to float
+        What is added to links, kg; negative what is taken from them.
+    speed : float
+        Of the center of mass of what is added or taken, m/s, the largest of several.
+    steps : dict of str to float
+        By how much the torque or force of each joint steps, N m or N.
+    """
+
+    time: float
+    masses: Mapping[str, float]
+    speed: float
+    steps: Mapping[str, float]
+
+
+class LoadedRobot:
+    """A robot whose links carry loads during parts of a motion.
+
+    Parameters
+    ----------
+    robot : Robot
+        The robot without them.
+    loads : sequence of CarriedLoad
+        All by what the motion runs over.
+    start, stop : float
+        Ends of the motion.
+
+    Attributes
+    ----------
+    changes : array of shape (change,)
+        Where loads change within the motion.
+    robots : tuple of Robot
+        Before the first change, from there to the next one, and so on.
+
+    Raises
+    ------
+    RobotError, TrajectoryError
+        If there is no such link, or a load is not carried during the motion.
+    """
+
+    def __init__(self, robot: Robot, loads: Sequence[CarriedLoad], start: float, stop: float):
+        self.loads, near, moved = tuple(loads), SAME * (stop - start), f"the motion runs from {start:g} to {stop:g}"
+        self.near = near
+        spans = []
+        for load in self.loads:
+            first, last = (start if load.start is None else load.start), (stop if load.stop is None else load.stop)
+            if first < start - near or last > stop + near or last - first <= near:
+                what = "is taken up or set down outside of the motion" if last > first else "is not carried at all"
+                raise TrajectoryError(f"{what}: {moved}", name=f"loads.{load.link}", value=[first, last])
+            spans.append((first, last))
+        edges = np.unique(np.array(spans).reshape(-1))
+        edges = edges[(edges > start + near) & (edges < stop - near)]
+        self.changes: Float[np.ndarray, " change"] = edges[np.diff(edges, prepend=-np.inf) > near]
+        self.robots = tuple(
+            self._carrying(robot, spans, (a + b) / 2)
+            for a, b in itertools.pairwise([start, *self.changes.tolist(), stop])
+        )
+
+    def _carrying(self, robot: Robot, spans: list[tuple[float, float]], at: float) -> Robot:
+        for load, (first, last) in zip(self.loads, spans, strict=True):
+            if first < at < last:
+                robot = robot.with_payload(load.link, load.inertia)
+            else:
+                check_name("link", load.link, robot.links, TrajectoryError, name="loads")
+        return robot
+
+    def torques(
+        self, q: Float[np.ndarray, "*some place derivative joint"], at: Float[np.ndarray, " place"], drives: bool
+    ) -> Float[np.ndarray, "*some place derivative-2 joint"]:
+        """Return the torques for coordinates at places; where a load changes, those after it."""
+        if len(self.robots) == 1:
+            return np.asarray(inverse_dynamics(self.robots[0], q, drives=drives))
+        which = np.searchsorted(self.changes, at, side="right")
+        found = np.zeros((*q.shape[:-2], q.shape[-2] - 2, q.shape[-1]))
+        for k in np.unique(which):
+            own = which == k
+            found[..., own, :, :] = inverse_dynamics(self.robots[k], q[..., own, :, :], drives=drives)
+        return found
+
+    def at_changes(self, q: Float[np.ndarray, "change derivative joint"], drives: bool) -> tuple[LoadChange, ...]:
+        """Return what each change does, for the coordinates there."""
+        return tuple(self._change(k, own[None, :3], drives) for k, own in enumerate(q))
+
+    def _change(self, k: int, q: Float[np.ndarray, "1 3 joint"], drives: bool) -> LoadChange:
+        before, after = self.robots[k : k + 2]
+        early, late = (np.asarray(inverse_dynamics(own, q, drives=drives))[0, 0] for own in (before, after))
+        least = NO_STEP * max(float(np.abs([early, late]).max()), np.finfo(float).tiny)
+        steps = {
+            name: float(x) for name, x in zip(before.joint_names, late - early, strict=True) if abs(float(x)) > least
+        }
+        time, masses, speed = float(self.changes[k]), dict[str, float](), 0.0
+        for load in self.loads:
+            for edge, sign in ((load.start, 1.0), (load.stop, -1.0)):
+                if edge is None or abs(edge - time) > self.near:
+                    continue
+                masses[load.link] = masses.get(load.link, 0.0) + sign * float(load.inertia.mass)
+                point = np.asarray(load.inertia.center_of_mass, float)
+                motion = np.asarray(forward_kinematics(before, q[:, :2], load.link, point).position)
+                speed = max(speed, float(np.linalg.norm(motion[0, 1])))
+        return LoadChange(time, masses, speed, steps)
