@@ -13,7 +13,7 @@ from jounce.robot.robot import Robot
 from jounce.units.values import parse_value
 
 OPTION = "--payload"
-PLACES = "instants such as 0.8 s, shares of a path such as 30 %, or waypoints such as 'waypoint 2'"
+PLACE_FORMS = "instants such as 0.8 s, shares of a path such as 30 %, or waypoints such as 'waypoint 2'"
 
 
 def with_payloads(robot: Robot, texts: Iterable[str]) -> Robot:
@@ -77,7 +77,7 @@ def carried_loads(robot: Robot, texts: Iterable[str], *, moving: bool = False) -
     >>> [load.words for load in carried_loads(robot, ["panda_hand=3 kg@0.8 s:2 s"])]
     ['panda_hand carries 3 kg from 0.8 s to 2 s']
     """
-    form = f"a load for a part of a motion is given by LINK=MASS@FROM:TO, its ends {PLACES}"
+    form = f"a load for a part of a motion is given by LINK=MASS@FROM:TO, its ends {PLACE_FORMS}"
     loads = []
     for text in texts:
         link, _, rest = (part.strip() for part in text.partition("="))

@@ -41,7 +41,7 @@ HALVINGS = 60  # of the interval that contains the end of a stop
 GAUSS_NODES, WEIGHTS = np.polynomial.legendre.leggauss(6)
 
 
-_Places = Float[np.ndarray, " _"]  # of any length
+_Parameters = Float[np.ndarray, " _"]  # of any length
 
 
 class Stops(NamedTuple):
@@ -142,7 +142,9 @@ def path_of_trajectory(trajectory: JointTrajectory, order: int) -> Path:
     return best
 
 
-def stopping(path: Path, at: Float[np.ndarray, " stop"], order: int) -> tuple[Path, Callable[[_Places], _Places]]:
+def stopping(
+    path: Path, at: Float[np.ndarray, " stop"], order: int
+) -> tuple[Path, Callable[[_Parameters], _Parameters]]:
     """Return a path over another parameter, at whose places a motion stops, and the values of that for those of s.
 
     Parameters
@@ -162,7 +164,7 @@ def stopping(path: Path, at: Float[np.ndarray, " stop"], order: int) -> tuple[Pa
     leader = JoinedPieces(motion.breakpoints, _raised(motion.coefficients, path.start), float(motion.stop), "continue")
     laws = {name: FollowingMotion(law, leader) for name, law in path.laws.items()}
 
-    def parameter(s: _Places) -> _Places:
+    def parameter(s: _Parameters) -> _Parameters:
         return ramps.parameter(np.clip(s - path.start, 0.0, total))
 
     words = f"{path.words}, with {len(at)} stop{'s' * (len(at) > 1)} where the load changes" if path.words else ""
