@@ -174,10 +174,10 @@ def retime(
     if not isinstance(path, JointTrajectory):
         warn_of_degrees(robot, JointTrajectory(dict(chosen_path.laws), chosen_path.start, chosen_path.stop))
     conditions = Conditions(chosen, _rates(rates))
-    chosen_path, carried = with_stops(chosen_path, along_path(_check_loads(loads, state), chosen_path), chosen)
+    chosen_path, path_loads = with_stops(chosen_path, along_path(_check_loads(loads, state), chosen_path), chosen)
 
     def fastest_along(along: Path, conditions: Conditions) -> _Fastest:
-        source = RobotQuantities(robot, along, limits, drives=drives, loads=carried)
+        source = RobotQuantities(robot, along, limits, drives=drives, loads=path_loads)
         checked(along, chosen)
         source.check_range()
         own_cells = cells or cells_needed(along, chosen)
@@ -289,8 +289,8 @@ def _repaired(
     between.check_without_points()
     chosen = _order(order, limits_of(robot, limits), robot)
     path = checked(path_of_samples(trajectory, chosen, between.deviation, timed=True), chosen)
-    carried = along_path(loads, path, timed=True)
-    source = RobotQuantities(robot, path, limits, drives=drives, loads=carried)
+    path_loads = along_path(loads, path, timed=True)
+    source = RobotQuantities(robot, path, limits, drives=drives, loads=path_loads)
     source.check_range()
     given = JointTrajectory(path.laws, path.start, path.stop, trajectory.times)
     ends = _ends(robot, given, source, drives, hand_over)

@@ -15,7 +15,7 @@ from jounce.robot.algorithms.inverse_dynamics import inverse_dynamics
 from jounce.robot.recursions.kinematics import forward_kinematics
 from jounce.robot.robot import Robot
 
-PLACES = ("time", "s", "share", "waypoint")
+COUNTED_BY = ("time", "s", "share", "waypoint")
 SAME = 1e-12  # of a motion: changes that are nearer to each other, or to an end, are at once
 NO_STEP = 1e-12  # of the largest torque: rounding
 
@@ -60,7 +60,7 @@ class CarriedLoad:
     moving: bool = False
 
     def __post_init__(self) -> None:
-        check_name("place of a load", self.by, PLACES, TrajectoryError, name="by")
+        check_name("place of a load", self.by, COUNTED_BY, TrajectoryError, name="by")
         flag("moving", self.moving, error=TrajectoryError)
         if not isinstance(self.inertia, Inertia):
             raise TrajectoryError("must be an Inertia", name="loads", value=type(self.inertia).__name__)
@@ -166,11 +166,11 @@ class LoadedRobot:
         if len(self.robots) == 1:
             return np.asarray(inverse_dynamics(self.robots[0], q, drives=drives))
         which = np.searchsorted(self.changes, at, side="right")
-        found = np.zeros((*q.shape[:-2], q.shape[-2] - 2, q.shape[-1]))
+        torques = np.zeros((*q.shape[:-2], q.shape[-2] - 2, q.shape[-1]))
         for k in np.unique(which):
             own = which == k
-            found[..., own, :, :] = inverse_dynamics(self.robots[k], q[..., own, :, :], drives=drives)
-        return found
+            torques[..., own, :, :] = inverse_dynamics(self.robots[k], q[..., own, :, :], drives=drives)
+        return torques
 
     def at_changes(self, q: Float[np.ndarray, "change derivative joint"], drives: bool) -> tuple[LoadChange, ...]:
         """Return what each change does, for the coordinates there."""

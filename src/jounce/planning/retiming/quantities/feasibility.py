@@ -7,14 +7,14 @@ from jounce.errors import TrajectoryError
 from jounce.planning.retiming.quantities.path_quantities import G, Labels, PathQuantities, Source
 
 POINTS = 1001  # places on the path
-BESIDE = 1e-12  # of the path: both sides of where a load changes
+SIDE_OFFSET = 1e-12  # of the path: both sides of where a load changes
 STATIC = 1e-6  # of a limit, which what stands still must leave
 IDLE = 1e-9  # of its largest value: what moves by less does not move
 
 
 def check_possible(source: Source, labels: Labels, start: float, stop: float, *, bounded: bool = False) -> None:
     """Raise TrajectoryError where standing still breaks a limit, or nothing that has one moves."""
-    near = BESIDE * (stop - start) * np.array([-1.0, 1.0])
+    near = SIDE_OFFSET * (stop - start) * np.array([-1.0, 1.0])
     even = np.linspace(start, stop, POINTS)
     s = np.union1d(even, (source.changes[:, None] + near).reshape(-1))
     quantities = source(s)
