@@ -91,7 +91,7 @@ def _place(value: float, load: CarriedLoad, path: Path, timed: bool) -> float:
         low, high, s = 0.0, 1.0, path.start + value * (path.stop - path.start)
     else:
         assert passed is not None
-        at = path.points.at if by == "waypoint" else passed[1]
+        at: np.ndarray = path.points.at if by == "waypoint" else passed[1]  # type: ignore[union-attr]
         low, high = (1, len(at)) if by == "waypoint" else (float(at[0]), float(at[-1]))
         counted = at[int(np.clip(value, low, high)) - 1] if by == "waypoint" else value
         s = float(np.interp(counted, passed[1], passed[0]))

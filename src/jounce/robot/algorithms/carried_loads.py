@@ -3,7 +3,6 @@
 import dataclasses
 import itertools
 from collections.abc import Mapping, Sequence
-from numbers import Real
 from typing import Literal
 
 import numpy as np
@@ -54,8 +53,8 @@ class CarriedLoad:
 
     link: str
     inertia: Inertia
-    start: Real | None = None
-    stop: Real | None = None
+    start: float | int | None = None
+    stop: float | int | None = None
     by: Place = "time"
     moving: bool = False
 
