@@ -1,4 +1,6 @@
-"""Double wishbone in closed form, by mpmath: two arms, an upright on two balls, a tie rod, by the angle of one arm.
+"""Double wishbone in closed form, by mpmath: two arms, an upright on two balls, a tie rod from the steering rack.
+
+Given are the angle of one arm and the displacement of the rack, to the left.
 
 Each of the three unknown angles, of the upper arm and of the upright about the line of its balls, is the solution of
 ``a cos(x) + b sin(x) = c``.
@@ -62,15 +64,15 @@ class Suspension:
         self.lower_ball, self.upper_ball = vector([0.01, 0.74, 0.18]), vector([-0.02, 0.69, 0.52])
         self.inner, self.outer = vector([-0.12, 0.38, 0.238]), vector([-0.13, 0.725, 0.235])
 
-    def upright(self, angle):
-        """Return the map of places of the upright, at an angle of the lower arm."""
+    def upright(self, angle, rack=0):
+        """Return the map of places of the upright, at an angle of the lower arm and a displacement of the rack."""
         lower = turned(self.lower_ball, *self.lower, angle)
         upper = met(self.upper_ball, *self.upper, lower, distance(self.upper_ball, self.lower_ball))
         before = triad(self.lower_ball, self.upper_ball, self.outer)
         ahead, behind = _frame(lower, upper), _frame(self.lower_ball, self.upper_ball)
         guess = lower + _put(ahead, behind, self.outer - self.lower_ball)
         # the tie rod turns the upright about the line of its balls
-        outer = met(guess, lower, upper - lower, self.inner, distance(self.inner, self.outer))
+        outer = met(guess, lower, upper - lower, self.inner + vector([0, rack, 0]), distance(self.inner, self.outer))
         now = triad(lower, upper, outer)
 
         def place(given, free=False):

@@ -14,10 +14,15 @@ from tests.oracles import double_wishbone as oracle
 ORDER = 4
 INSTANTS = np.array([-0.7, 0.2, 0.9])
 LAW = "0.15*sin(1.3*t) + 0.02*t"
+STEERING = "0.9*sin(0.8*t) - 0.3*t"  # of the pinion of 7.5 mm, which moves the rack to the right
 
 
 def law(t):
     return mp.mpf("0.15") * mp.sin(mp.mpf("1.3") * t) + t / 50
+
+
+def rack(t):
+    return -mp.mpf("0.0075") * (mp.mpf("0.9") * mp.sin(mp.mpf("0.8") * t) - mp.mpf("0.3") * t)
 
 
 def derivatives(function, t, order=ORDER):
@@ -44,11 +49,12 @@ def close(found, expected, tolerance=1e-10):
 
 @pytest.fixture(scope="module")
 def wishbone():
-    """Return the suspension driven at its lower arm."""
+    """Return the suspension driven at its lower arm, steered."""
     made = jn.load("examples/double_wishbone.yaml")
+    steering = dataclasses.replace(made.drivers["wheel"], motion=STEERING)
     driver = jn.drivers.RotationDriver(("ground", "lower_arm"), [1, 0.04, -0.02], LAW)
     second = {"bump_steer_2": jn.outputs.DerivativeOutput("toe", "wheel_z", 2)}
-    made = dataclasses.replace(made, drivers={"arm": driver}, outputs={**made.outputs, **second})
+    made = dataclasses.replace(made, drivers={"arm": driver, "wheel": steering}, outputs={**made.outputs, **second})
     return made, jn.solve(made, INSTANTS, order=ORDER)
 
 
@@ -57,7 +63,7 @@ def seen(name):
     its, axle = oracle.Suspension(), oracle.vector([0, 1, 0])
 
     def angle(t):
-        place = its.upright(law(t))
+        place = its.upright(law(t), rack(t))
         if name in ("toe", "camber"):
             x, y, z = place(axle, free=True)
             return mp.atan2(x, y) if name == "toe" else mp.atan2(-z, y)
@@ -68,7 +74,7 @@ def seen(name):
 
 
 def height(t):
-    return oracle.Suspension().upright(law(t))(oracle.vector([0, "0.78", "0.3"]))[2]
+    return oracle.Suspension().upright(law(t), rack(t))(oracle.vector([0, "0.78", "0.3"]))[2]
 
 
 @pytest.mark.slow
@@ -92,7 +98,7 @@ def test_the_instant_center_and_the_roll_center_of_a_suspension_are_those_of_its
     its = oracle.Suspension()
 
     def contact(k):
-        return lambda t: its.upright(law(t))(oracle.vector([0, "0.78", 0]))[k]
+        return lambda t: its.upright(law(t), rack(t))(oracle.vector([0, "0.78", 0]))[k]
 
     roll, center = [], []
     for t in INSTANTS:
@@ -104,17 +110,41 @@ def test_the_instant_center_and_the_roll_center_of_a_suspension_are_those_of_its
         roll.append(height_of_center)
         center.append(_center(its, t))
     close(wishbone[1].outputs["roll_center"][..., 2], roll)
-    np.testing.assert_allclose(wishbone[1].outputs["roll_center"][..., 1], 0.0, atol=1e-10)
+    np.testing.assert_allclose(wishbone[1].outputs["roll_center"][..., 1], 0.0, atol=1e-13)
     np.testing.assert_allclose(wishbone[1].outputs["instant_center"][:, 0, 1:], center, rtol=1e-10)
     np.testing.assert_allclose(wishbone[1].outputs["instant_center"][..., 0], 0.0, atol=1e-12)
+
+
+@pytest.mark.slow
+def test_where_both_lines_of_a_roll_center_are_one_only_that_of_a_symmetric_axle_is_known():
+    """Swing axles, which carry their wheels on hinges 0.2 m from the middle, level at t = 0: then each line is both."""
+    hinges = {"left": 0.2, "right": -0.2}
+    joints = {
+        side: jn.spatial.Revolute(("ground", side), [0, y, 0], [0, y, 0], [1, 0, 0], [1, 0, 0])
+        for side, y in hinges.items()
+    }
+    lift = {"left": "sin(t)", "right": "-sin(t)"}
+    drivers = {f"{side}_lift": jn.drivers.RotationDriver(("ground", side), [1, 0, 0], lift[side]) for side in hinges}
+    one = jn.outputs.SymmetricRollCenterOutput("left", [0, 0.7, 0], [1, 0, 0], [0, 1, 0])
+    two = jn.outputs.RollCenterOutput(("ground", "left", "right"), [1, 0, 0], [0, 0.7, 0], [0, -0.7, 0])
+    bodies = dict.fromkeys(hinges, jn.Body([0, 0, 0]))
+    time = np.array([-0.3, -1e-5, -1e-9, 0.0, 1e-7, 1e-3, 0.4])
+    expected = [derivatives(lambda t: -mp.tan(mp.sin(t)) / 5, t) for t in time]
+    for output, known, tolerance in ((one, np.ones(7, bool), 1e-12), (two, np.abs(time) > 0.1, 1e-2)):
+        made = jn.Mechanism(space="spatial", bodies=bodies, joints=joints, drivers=drivers, outputs={"R": output})
+        motion = jn.solve(made, time, order=ORDER, strict=False)
+        found, told = motion.outputs["R"], motion.status == Status.OK
+        assert told[known].all()
+        assert told[3] == known[3]
+        close(found[told][..., 2], np.array(expected)[told], tolerance)  # 1e-2 is what quotients are given to
+        np.testing.assert_array_less(np.abs(found[told][..., :2]), tolerance)
 
 
 def _center(its, t):
     """Return where in the plane of the wheel center the upright has no velocity in it, by linear algebra."""
     with mp.workdps(40):
-        angle = law(mp.mpf(float(t)))
-        now, step = its.upright(angle), mp.mpf(10) ** -12
-        later, before = its.upright(angle + step), its.upright(angle - step)
+        t, step = mp.mpf(float(t)), mp.mpf(10) ** -12
+        now, later, before = (its.upright(law(x), rack(x)) for x in (t, t + step, t - step))
 
         def velocity(y, z):  # of the place of the upright that is there now
             origin = now(oracle.vector([0, 0, 0]))

@@ -13,6 +13,8 @@ from jounce.mechanism.outputs.base import AbstractOutput
 from jounce.rigid import PlanarPose, SpatialPose
 from jounce.rigid.planar import perpendicular
 
+PERPENDICULAR = 1e-9  # cosine of the angle between unit vectors that are perpendicular
+
 
 class ProjectedAngleOutput(AbstractOutput):
     """Angle of the line from a point of body j to one of body m, projected on a plane of body i, rad.
@@ -45,6 +47,8 @@ class ProjectedAngleOutput(AbstractOutput):
 
 
 class _CenterOutput(AbstractOutput):
+    rate_names = ("position", "velocity", "acceleration", "jerk", "jounce")
+
     def is_vector(self, mechanism: Any) -> bool:
         del mechanism
         return True
@@ -139,7 +143,8 @@ class SymmetricRollCenterOutput(_CenterOutput):
     """Roll center of an axle of which one wheel is modeled, m, in the global frame: the other is its mirror image.
 
     As that of two wheels, relative to the ground, with the image of the `point` of contact of the body in the plane
-    through the global origin perpendicular to `vector_i`, the lateral direction; `normal` is the longitudinal one.
+    through the global origin perpendicular to `vector_i`, the lateral direction; `normal` is the longitudinal one,
+    perpendicular to it. So it is where the line of the wheel meets that plane, also where both lines are one.
     """
 
     point: Vector  # m, in the frame of the body
@@ -153,12 +158,15 @@ class SymmetricRollCenterOutput(_CenterOutput):
         normal = self.normal / length_of(self.normal)[None]
         lateral = self.vector_i / length_of(self.vector_i)[None]
         position = body.point(self.point)
-
-        def mirrored(vector: Jet) -> Jet:
-            return vector - 2.0 * (vector.dot(lateral) * lateral)
-
         velocity = position.differentiate()
-        return _intersection(normal, position, mirrored(position), velocity, mirrored(velocity))
+        line = cross(normal, velocity)
+        onward = line.dot(lateral)
+        center = position - line * (position.dot(lateral) / onward)
+        batch = jnp.ndim(onward.coefficients[0])
+        scale = sizes(position, batch)[0]
+        rate = rates_of(velocity - velocity.dot(normal) * normal, scale, batch)[1]
+        square = jnp.broadcast_to(jnp.abs(dot(normal, lateral)) < PERPENDICULAR, jnp.shape(scale))
+        return nan_where_rounding(center, rates_of(onward, scale, batch)[0], rate, lost=1, also=square)
 
 
 def _spin(body: SpatialPose) -> Jet:
@@ -192,8 +200,10 @@ def _intersection(normal: Any, first: Jet, second: Jet, first_rate: Jet, second_
     batch = jnp.ndim(area.coefficients[0])
     scale = sizes(between, batch)[0]
     slow, fast = sizes(v, batch)[0], sizes(w, batch)[0]
-    for speed in (v, w):
-        center = nan_where_rounding(center, *rates_of(speed, scale, batch))
+    rates = [rates_of(speed, scale, batch) for speed in (v, w)]
+    for pair in rates:
+        center = nan_where_rounding(center, *pair)
+    distinct = jnp.abs(area.coefficients[0]) > SMALLEST * slow * fast
     return nan_where_rounding(
-        center, jnp.zeros_like(scale), scale, also=jnp.abs(area.coefficients[0]) > SMALLEST * slow * fast
+        center, rates_of(area, scale, batch)[0], jnp.maximum(rates[0][1], rates[1][1]), lost=1, also=distinct
     )

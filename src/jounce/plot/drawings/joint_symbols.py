@@ -11,6 +11,7 @@ from jaxtyping import Float
 from jounce.mechanism import Mechanism
 from jounce.mechanism.building.belts import belt_course, belt_outline
 from jounce.mechanism.mechanism import GROUND
+from jounce.mechanism.outputs.linkage_outputs import SymmetricRollCenterOutput
 from jounce.plot.drawings import symbol_parts as parts
 from jounce.plot.drawings.cams import pitch_curve
 from jounce.plot.drawings.curve_lines import shown
@@ -39,7 +40,8 @@ def draw_symbols(drawing: Drawing, mechanism: Mechanism) -> None:
             DRIVERS_AND_FORCES.get(symbol.kind, _unknown)(drawing, symbol)
     for name, output in mechanism.outputs.items():
         bodies = getattr(output, "bodies", ())
-        if getattr(output, "point", None) is not None and len(bodies) == 1:
+        elsewhere = isinstance(output, SymmetricRollCenterOutput)  # its point is that of contact
+        if getattr(output, "point", None) is not None and len(bodies) == 1 and not elsewhere:
             link = seen.links[bodies[0]]
             for center in (point for point, names in zip(link.points, link.names, strict=True) if name in names):
                 drawing.owner, flat = f"outputs.{name}", drawing.flat(drawing.at(link.body, center))
