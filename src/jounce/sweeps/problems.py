@@ -18,8 +18,9 @@ from jounce.errors import MechanismError, RobotError, check_name
 from jounce.integrate import simulate_batch
 from jounce.integrate.steps.methods import AbstractMethod
 from jounce.integrate.steps.options import checked_options, instants_of
-from jounce.kinematics import Motion, Status, solve
+from jounce.kinematics import Status, solve
 from jounce.kinematics.families.design_sides import Sides, sides_of_designs
+from jounce.kinematics.families.known_outputs import with_outputs
 from jounce.kinematics.families.solve_batch import solve_with_sides
 from jounce.kinematics.position_analysis.solve import checked_settings
 from jounce.kinematics.results.motion import output_group
@@ -263,12 +264,11 @@ def outputs_of(mechanism: Mechanism, instants: Float[np.ndarray, " time"], order
     zeros = np.zeros_like(pose.position.coefficients[0])
     pose = pose.extended(zeros, None if mechanism.space == "planar" else zeros)  # for outputs that are rates
     of_motion = any(isinstance(output, AbstractMotionOutput) for output in mechanism.outputs.values())
-    motion: Motion | None = solve(mechanism, instants, order, strict=False) if of_motion else None
+    known = with_outputs(solve(mechanism, instants, order, strict=False))[1] if of_motion else {}
     outputs = []
     for name, output in mechanism.outputs.items():
         if isinstance(output, AbstractMotionOutput):
-            assert motion is not None
-            values = motion.outputs[name]
+            values = known[name]
             count = values.shape[2] if values.ndim == 3 else 1
         elif getattr(output, "turning", False):  # counted from where the mechanism is assembled
             count = 1

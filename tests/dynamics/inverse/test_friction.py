@@ -115,7 +115,7 @@ def test_a_wedge_needs_the_force_of_the_closed_form(mu):
 
 @pytest.mark.parametrize("mu", [2.0, 2.5, 40.0])
 def test_friction_that_locks_is_told(mu):
-    with pytest.raises(jn.errors.MechanismError, match=r"friction locks at t = 0 s: no force of the drivers"):
+    with pytest.raises(jn.errors.SolveError, match=r"friction locks at t = 0 s: no force of the drivers"):
         _ = jn.solve(wedge(mu), [0.0, 1.0], order=1).outputs["force"]
 
 
@@ -223,3 +223,32 @@ def test_a_ball_and_a_sleeve_resist_along_their_slip():
             for name, law in wanted.items():
                 rates = [float(x) for x in mp.diffs(law, mp.mpf(t), 2)]
                 np.testing.assert_allclose(found[name][k], rates, rtol=1e-12, atol=1e-12, err_msg=name)
+
+
+def test_designs_and_instants_whose_friction_locks_fail_alone_with_their_status():
+    """A ladder of 1 m, pushed along the floor to lift 3 kg in a guide: it locks where the tangent of its angle is mu."""
+    guide = jn.joints.Friction("mu", 1e-3)
+    made = jn.Mechanism(
+        space="planar",
+        gravity=[0, -10.0],
+        parameters={"mu": 0.1},
+        bodies={"foot": jn.Body([np.sqrt(0.91), 0]), "top": jn.Body([0, 0.3], mass=3.0)},
+        joints={
+            "floor": jn.planar.Prismatic(("ground", "foot"), [0, 0], [0, 0], [1, 0], [1, 0]),
+            "wall": jn.planar.Prismatic(("ground", "top"), [0, 0], [0, 0], [0, 1], [0, 1], friction=guide),
+            "ladder": jn.planar.DoubleRevolute(("foot", "top"), [0, 0], [0, 0], 1.0),
+        },
+        drivers={"push": jn.drivers.CoordinateDriver(("ground", "foot"), "x", "sqrt(1 - (0.3 + 0.4*t)**2)")},
+        outputs={"force": jn.outputs.DriverForceOutput("push")},
+    )
+    mu, time = np.array([0.1, 1.0, 0.2]), np.array([0.0, 0.6, 1.5])
+    found = jn.solve_batch(made, {"mu": mu}, time, order=2)
+    height = 0.3 + 0.4 * time
+    slope = height / np.sqrt(1 - height**2)
+    np.testing.assert_array_equal(found["status"], np.where(slope > mu[:, None], 0, 12))
+    expected = np.where(slope > mu[:, None], -30.0 / (slope - mu[:, None]), np.nan)
+    np.testing.assert_allclose(found["force"][..., 0], expected, rtol=1e-10)
+    motion = jn.solve(made.with_parameters(mu=1.0), time, order=2)
+    with pytest.raises(jn.errors.SolveError, match="friction locks at t = 0 s") as told:
+        motion.outputs["force"]  # noqa: B018 - forces are computed when they are asked for
+    assert (told.value.status, told.value.instants.tolist()) == (12, [0, 1])

@@ -8,7 +8,7 @@ from jaxtyping import Float
 from jounce.base.shapes import Numbers
 from jounce.dynamics.friction.coupling import joints_with_friction, rubs
 from jounce.dynamics.inverse.tooth_flanks import listed
-from jounce.errors import MechanismError
+from jounce.errors import SolveError
 from jounce.kinematics import Motion, Status
 from jounce.mechanism.system import Group, System, holding
 
@@ -21,7 +21,7 @@ def friction_left_out(group: Group) -> Group:
 
 
 def check_not_locked(motion: Motion, system: System, multipliers: Float[Numbers, "order row time"]) -> None:
-    """Raise MechanismError at the first instant at which no forces fulfill the laws of friction."""
+    """Raise SolveError with the instants at which no forces fulfill the laws of friction, by the first of them."""
     names = [] if motion.traced else joints_with_friction(motion.model, system)
     if not names:
         return
@@ -33,7 +33,8 @@ def check_not_locked(motion: Motion, system: System, multipliers: Float[Numbers,
             "prescribe, as friction grows as fast as the normal forces in joints; give a smaller coefficient or "
             "radius, gears a larger efficiency, or drivers more mechanical advantage"
         )
-        raise MechanismError(message, name=", ".join(f"{name}.friction" for name in names))
+        where = ", ".join(f"{name}.friction" for name in names)
+        raise SolveError(message, name=where, motion=motion, status=Status.LOCKED, instants=np.flatnonzero(locked))
 
 
 def without_open_rates(forces: Any, multipliers: Float[Numbers, "case order row time"]) -> Numbers:

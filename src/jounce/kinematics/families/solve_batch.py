@@ -18,6 +18,7 @@ from jounce.kinematics.continuation.solver import Solver
 from jounce.kinematics.families.design_paths import DesignPaths
 from jounce.kinematics.families.design_sides import Sides, sides_of_designs
 from jounce.kinematics.families.design_values import Designs
+from jounce.kinematics.families.known_outputs import with_outputs
 from jounce.kinematics.families.labels import labeled_family
 from jounce.kinematics.position_analysis.idle_holding import with_idle_held_in_family
 from jounce.kinematics.position_analysis.solve import LOWEST_ORDER, checked_settings, lost_orders, solve
@@ -361,6 +362,7 @@ class _Family:
         try:
             grid, indices = np.unique(self.all_instants[k], return_inverse=True)
             motion: Motion = solve(self.design(k), grid, self.order, tolerance=self.tolerance, strict=False)
+            motion, outputs = with_outputs(motion)
         except SPOILED as error:
             status = getattr(error, "status", None)
             self.status[k] = int(Status.NOT_ASSEMBLED if status is None else status)
@@ -368,7 +370,7 @@ class _Family:
         except JounceError as error:
             raise self._located(error, k) from None
         self.status[k] = motion.status[indices]
-        for name, values in motion.outputs.items():
+        for name, values in outputs.items():
             values = values[indices]
             self._put(name, np.array([k]), values[None] if values.ndim == 3 else values[None, ..., None])
 
