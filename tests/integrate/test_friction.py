@@ -96,7 +96,7 @@ def test_a_simulation_that_friction_locks_says_so(mu, locks):
     if not locks:
         assert (jn.simulate(mechanism, [0.0, 0.01]).status == 0).all()
         return
-    words = r"friction locks at t = 0 s: joints\.guide: locked: no acceleration"
+    words = r"friction locks at t = 0 s: joints\.guide: locked: no force or acceleration"
     with pytest.raises(jn.errors.SolveError, match=words) as caught:
         jn.simulate(mechanism, [0.0, 0.01])
     assert caught.value.status == jn.Status.LOCKED

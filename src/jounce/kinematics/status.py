@@ -50,8 +50,8 @@ _ADVICE = {
     "residual smooth, or ask for a `longest_step` as short as the feature",
     Status.END_OF_CURVE: "a point has come to an end of the curve that it is held on, and there is no curve beyond; "
     "ask for a shorter motion, or give a longer curve, or a closed one",
-    Status.LOCKED: "friction locks: no force or acceleration fulfills its law, as it grows as fast as the normal force "
-    "on the joint; give a smaller coefficient or radius, gears a larger efficiency, drivers more mechanical advantage, "
-    "or a simulation a start that is slower, as friction is less below its speed",
+    Status.LOCKED: "no force or acceleration fulfills the law of friction, which grows as fast as the normal force on "
+    "the joint; give a smaller coefficient or radius, gears a larger efficiency, drivers more mechanical advantage, or "
+    "a simulation a start that is slower, as friction is less below its speed",
     Status.NOT_REACHED: "not computed, because the motion could not be followed up to here",
 }
