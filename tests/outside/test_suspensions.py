@@ -7,32 +7,40 @@ import jounce as jn
 
 # Suspension Explorer (github.com/suspension-explorer/suspension-explorer-core, tests/data/geometry.yaml, sweep.yaml and
 # e2e/output.csv, 2026): a double wishbone whose wheel travels from -40 to 120 mm while its rack moves from -40 to 40 mm.
-# Its program solves the distances between points by least squares to about 1e-6 mm, and so the toe to 2e-6 deg.
+# Its program solves the distances between points by least squares to about 1e-6 mm, so the toe to 2e-6 deg.
 POINTS = """
 space: spatial
 parameters: {height: 0 mm, bump: 0 mm, rack: 0 mm, steering: 0 mm, duration: 1 s}
-bodies: {lower: {position: [0, 0, 0]}, upper: {position: [0, 0, 0]}, upright: {position: [0, 0, 0]}, bar: {position: [0, 0, 0]}}
+bodies: {lower: {position: [0, 0, 0]}, upper: {position: [0, 0, 0]}, upright: {position: [0, 0, 0]}, bar: {position:
+    [0, 0, 0]}}
 joints:
-  lower_axis: {type: revolute, bodies: [ground, lower], points: [[250 mm, 400 mm, 200 mm], [250 mm, 400 mm, 200 mm]], axes: [[500, -50, 0], [500, -50, 0]]}
-  upper_axis: {type: revolute, bodies: [ground, upper], points: [[225 mm, 350 mm, 500 mm], [225 mm, 350 mm, 500 mm]], axes: [[1, 0, 0], [1, 0, 0]]}
+  lower_axis: {type: revolute, bodies: [ground, lower], points: [[250 mm, 400 mm, 200 mm], [250 mm, 400 mm, 200 mm]],
+      axes: [[500, -50, 0], [500, -50, 0]]}
+  upper_axis: {type: revolute, bodies: [ground, upper], points: [[225 mm, 350 mm, 500 mm], [225 mm, 350 mm, 500 mm]],
+      axes: [[1, 0, 0], [1, 0, 0]]}
   lower_ball: {type: spherical, bodies: [lower, upright], points: [[0, 900 mm, 200 mm], [0, 900 mm, 200 mm]]}
   upper_ball: {type: spherical, bodies: [upper, upright], points: [[-25 mm, 750 mm, 500 mm], [-25 mm, 750 mm, 500 mm]]}
-  housing: {type: prismatic, bodies: [ground, bar], points: [[50 mm, 0, 250 mm], [50 mm, 0, 250 mm]], axes: [[0, 1, 0], [0, 1, 0]], normals: [[1, 0, 0], [1, 0, 0]]}
+  housing: {type: prismatic, bodies: [ground, bar], points: [[50 mm, 0, 250 mm], [50 mm, 0, 250 mm]], axes: [[0, 1,
+      0], [0, 1, 0]], normals: [[1, 0, 0], [1, 0, 0]]}
   tie_rod:
     type: double_spherical
     bodies: [bar, upright]
     points: [[50 mm, 200 mm, 250 mm], [150 mm, 800 mm, 275 mm]]
     length: sqrt(0.1**2 + 0.6**2 + 0.025**2)
 drivers:
-  wheel: {type: slide, bodies: [ground, upright], points: [[0, 0, 313.426 mm], [-20 mm, 950 mm, 313.426 mm]], vector: [0, 0, 1], motion: height + bump*t/duration}
-  steering: {type: slide, bodies: [ground, bar], points: [[0, 0, 0], [0, 0, 0]], vector: [0, 1, 0], motion: rack + steering*t/duration}
+  wheel: {type: slide, bodies: [ground, upright], points: [[0, 0, 313.426 mm], [-20 mm, 950 mm, 313.426 mm]], vector:
+      [0, 0, 1], motion: height + bump*t/duration}
+  steering: {type: slide, bodies: [ground, bar], points: [[0, 0, 0], [0, 0, 0]], vector: [0, 1, 0], motion: rack +
+      steering*t/duration}
 outputs:
   center: {body: upright, point: [-20 mm, 950 mm, 313.426 mm]}
   bar: {body: bar, point: [0, 0, 0]}
   toe: {bodies: [ground, upright], quantity: angle, axis: [0, 0, -1], vectors: [[0, 1, 0], [0, 150, 5]]}
   camber: {bodies: [ground, upright], quantity: angle, axis: [-1, 0, 0], vectors: [[0, 1, 0], [0, 150, 5]]}
-  caster: {bodies: [ground, upright, upright], quantity: projected_angle, normal: [0, -1, 0], vector: [0, 0, 1], points: [[0, 900 mm, 200 mm], [-25 mm, 750 mm, 500 mm]]}
-  kingpin: {bodies: [ground, upright, upright], quantity: projected_angle, normal: [1, 0, 0], vector: [0, 0, 1], points: [[0, 900 mm, 200 mm], [-25 mm, 750 mm, 500 mm]]}
+  caster: {bodies: [ground, upright, upright], quantity: projected_angle, normal: [0, -1, 0], vector: [0, 0, 1],
+      points: [[0, 900 mm, 200 mm], [-25 mm, 750 mm, 500 mm]]}
+  kingpin: {bodies: [ground, upright, upright], quantity: projected_angle, normal: [1, 0, 0], vector: [0, 0, 1],
+      points: [[0, 900 mm, 200 mm], [-25 mm, 750 mm, 500 mm]]}
 """
 # share of the sweep; camber, caster, kingpin inclination and toe, deg
 PUBLISHED = {
