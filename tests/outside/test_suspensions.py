@@ -6,7 +6,7 @@ import pytest
 import jounce as jn
 
 # Suspension Explorer (github.com/suspension-explorer/suspension-explorer-core, tests/data/geometry.yaml, sweep.yaml and
-# e2e/output.csv, 2026): a double wishbone whose wheel travels from -40 to 120 mm while its rack moves from -40 to 40 mm.
+# e2e/output.csv, 2026): a double wishbone; the wheel travels from -40 to 120 mm while its rack moves from -40 to 40 mm.
 # Its program solves the distances between points by least squares to about 1e-6 mm, so the toe to 2e-6 deg.
 POINTS = """
 space: spatial
