@@ -395,13 +395,12 @@ class SolveError(JounceError):
     ``Motion.status``, ``instants`` the indices of those that failed, where others did not.
     """
 
-    def __init__(
-        self, message: str, *, motion: Any = None, status: Any = None, instants: Any = None, **location: Any
-    ) -> None:
+    instants: Any = None
+
+    def __init__(self, message: str, *, motion: Any = None, status: Any = None, **location: Any) -> None:
         super().__init__(message, **location)
         self.motion = motion
         self.status = status
-        self.instants = instants
 
 
 class AssemblyError(SolveError):

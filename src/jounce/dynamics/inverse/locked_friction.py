@@ -34,7 +34,9 @@ def check_not_locked(motion: Motion, system: System, multipliers: Float[Numbers,
             "radius, gears a larger efficiency, or drivers more mechanical advantage"
         )
         where = ", ".join(f"{name}.friction" for name in names)
-        raise SolveError(message, name=where, motion=motion, status=Status.LOCKED, instants=np.flatnonzero(locked))
+        error = SolveError(message, name=where, motion=motion, status=Status.LOCKED)
+        error.instants = np.flatnonzero(locked)
+        raise error
 
 
 def without_open_rates(forces: Any, multipliers: Float[Numbers, "case order row time"]) -> Numbers:
