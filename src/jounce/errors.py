@@ -392,10 +392,8 @@ class SolveError(JounceError):
     """A solve did not reach its end.
 
     ``motion`` holds what was computed (None when nothing was), ``status`` the reason, by the names of
-    ``Motion.status``, ``instants`` the indices of those that failed, where others did not.
+    ``Motion.status``.
     """
-
-    instants: Any = None
 
     def __init__(self, message: str, *, motion: Any = None, status: Any = None, **location: Any) -> None:
         super().__init__(message, **location)

@@ -1,9 +1,10 @@
 """Where friction in a motion locks, and where its rates are not determined, by the names of joints."""
 
+import copy
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 
 from jounce.base.shapes import Numbers
 from jounce.dynamics.friction.coupling import joints_with_friction, rubs
@@ -21,7 +22,7 @@ def friction_left_out(group: Group) -> Group:
 
 
 def check_not_locked(motion: Motion, system: System, multipliers: Float[Numbers, "order row time"]) -> None:
-    """Raise SolveError with the instants at which no forces fulfill the laws of friction, by the first of them."""
+    """Raise SolveError where no forces fulfill the laws of friction, with the motion, of the status LOCKED there."""
     names = [] if motion.traced else joints_with_friction(motion.model, system)
     if not names:
         return
@@ -34,9 +35,16 @@ def check_not_locked(motion: Motion, system: System, multipliers: Float[Numbers,
             "radius, gears a larger efficiency, or drivers more mechanical advantage"
         )
         where = ", ".join(f"{name}.friction" for name in names)
-        error = SolveError(message, name=where, motion=motion, status=Status.LOCKED)
-        error.instants = np.flatnonzero(locked)
-        raise error
+        raise SolveError(message, name=where, motion=_locked_at(motion, locked), status=Status.LOCKED)
+
+
+def _locked_at(motion: Motion, locked: Bool[np.ndarray, " time"]) -> Motion:
+    """Return a motion with the status of instants at which friction locks."""
+    twin = copy.copy(motion)
+    twin.__dict__.pop("dataset", None)
+    twin.derived, twin._known_outputs = {}, {}
+    twin.status = np.where(locked, int(Status.LOCKED), motion.status)
+    return twin
 
 
 def without_open_rates(forces: Any, multipliers: Float[Numbers, "case order row time"]) -> Numbers:
