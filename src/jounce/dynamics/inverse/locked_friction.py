@@ -35,7 +35,7 @@ def check_not_locked(motion: Motion, system: System, multipliers: Float[Numbers,
             "radius, gears a larger efficiency, or drivers more mechanical advantage"
         )
         where = ", ".join(f"{name}.friction" for name in names)
-        raise SolveError(message, name=where, motion=_locked_at(motion, locked), status=Status.LOCKED)
+        raise SolveError(message, name=where, motion=_locked_at(motion, np.asarray(locked)), status=Status.LOCKED)
 
 
 def _locked_at(motion: Motion, locked: Bool[np.ndarray, " time"]) -> Motion:
