@@ -22,6 +22,7 @@ from jounce.robot.algorithms.wrench_laws import WrenchLaws
 from jounce.robot.model.joint_laws import AbstractJointLaws
 from jounce.robot.recursions.tree_equations import TreeEquations, TreeState, Unknowns, free_base
 
+SMOOTH_POINTS = 3  # on a step where nothing jumps: the series departs from the equations most at the end
 STUCK = 64  # steps that hardly move on, one after the other: a force that switches without end
 STUCK_STEP = 10 * SHORTEST  # of the run: joints that stick switch after steps that are little longer than the shortest
 AGAIN = 10  # such steps over a jump that end where there is no number: others are tried
@@ -81,6 +82,11 @@ class RobotProblem(Module):
     def blind(self) -> bool:
         """Whether nothing of it could be overlooked: no law changes."""
         return not (self.forces.changing or self.prescribed.changing or self.wrenches.changing)
+
+    @property
+    def smooth(self) -> bool:
+        """Whether its equations are sums and products of coordinates, rates, sines and cosines, with no jump."""
+        return self.blind and not (self.equations.drives and self.equations.tree.shape.rubbing)
 
     def motion(self, state: RobotState) -> TreeState:
         """Return where all bodies are."""
@@ -272,6 +278,7 @@ def march_robot(
         How many there are.
     """
     duration = jnp.abs(stop - begun)
+    points = SMOOTH_POINTS if problem.smooth else POINTS
 
     def look(polynomial: RobotState, time: Any, step: Any, first: Any, usual: Any) -> tuple[Any, Any]:
         """Return the error that a part of the places on a step shows, as part of what is allowed, and if it is finite.
@@ -279,8 +286,7 @@ def march_robot(
         A velocity that is wrong goes on to the end of the run, so that jumps count by what they move until then. What
         the equations miss at the beginning, where the series follows from them, is rounding.
         """
-        point_count = jnp.maximum(_point_count(step), POINTS)
-        shares = jnp.concatenate([jnp.zeros(1), (first + jnp.arange(1.0, POINTS + 1)) / point_count])
+        shares = jnp.concatenate([jnp.zeros(1), (first + jnp.arange(1.0, points + 1)) / _point_count(step)])
         since = jnp.minimum(shares, 1.0) * step
         state, rates = at(polynomial, since), rates_at(polynomial, since)
         gap, size = problem.departures(state, rates, (time + since)[None])
@@ -292,7 +298,7 @@ def march_robot(
         return jnp.maximum(local, lasting), jnp.all(jnp.isfinite(gap))
 
     def _point_count(step: Any) -> Any:
-        return float(POINTS) if problem.blind else jnp.maximum(RUN_POINTS * jnp.abs(step) / duration, POINTS)
+        return float(points) if problem.blind else jnp.maximum(RUN_POINTS * jnp.abs(step) / duration, points)
 
     def fits(polynomial: RobotState, time: Any, step: Any, usual: Any) -> tuple[Any, Any, Any]:
         """Tell whether a step keeps to the equations all along, whether it is finite, and whether it leads over a jump.
@@ -303,7 +309,7 @@ def march_robot(
         def further(carry: Any) -> Any:
             first, error, finite = carry
             crossed, fine = look(polynomial, time, step, first, usual)
-            return first + POINTS, jnp.maximum(error, crossed), finite & fine
+            return first + points, jnp.maximum(error, crossed), finite & fine
 
         def open_(carry: Any) -> Any:
             first, error, finite = carry
@@ -318,7 +324,8 @@ def march_robot(
         sizes = _sizes(problem, whole)
         known = jnp.all(jnp.isfinite(sizes[:NEEDED]))
         sizes = jnp.where(jnp.isfinite(sizes), sizes, jnp.inf)
-        used, reach = furthest(sizes, jnp.full(time.shape, tolerance), UNUSUAL * current.longest)
+        allowed = jnp.full(time.shape, jnp.maximum(tolerance, HARMLESS))
+        used, reach = furthest(sizes, allowed, UNUSUAL * current.longest, duration)
         polynomial = jax.tree.map(lambda c: jnp.where(used[: len(c), None], c, 0.0), whole)
         step = jnp.minimum(jnp.minimum(reach[0], longest), jnp.abs(left))
         step = jnp.where(step >= 0.999 * jnp.abs(left), jnp.abs(left), step)

@@ -3,7 +3,7 @@
 import dataclasses
 import itertools
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any
 
@@ -14,9 +14,11 @@ from jaxtyping import Float, Int
 
 from jounce.base.shapes import ArrayLike, Numbers, seconds
 from jounce.errors import RobotError
-from jounce.execution.backends import joined, xla_backend
+from jounce.execution.backends import joined
 from jounce.execution.chunks import in_chunks
-from jounce.execution.compilation import compiled
+from jounce.execution.compilation import LARGE
+from jounce.execution.mapped import Mapped, mapped
+from jounce.execution.store.programs import is_wanted_soon
 from jounce.integrate.marching.robot_marching import RobotProblem, RobotState, RobotSteps, at
 from jounce.integrate.steps.methods import Lanes
 from jounce.jet import Jet, compose
@@ -32,7 +34,7 @@ from jounce.units.shown_units import derivatives_of, time_axes
 if TYPE_CHECKING:
     import xarray
 
-WIDTHS = (64,)  # instants that are computed together: one program for few and for many
+WIDTHS = (8, 64)  # instants that are computed together: those of a short list, and of a long one
 MUCH_LONGER = 1e3  # than the step over a jump are those beside it
 CLOSE = 1e-5  # of the longest step: steps that come so near to a jump are of that
 
@@ -81,19 +83,19 @@ class RobotSimulation(Tabulated):
         steps_backends: Iterable[str] = (),
     ):
         self._steps_backends = tuple(steps_backends)
-        self.backend = joined({xla_backend(), *self._steps_backends})
         self.robot, self.time, self.order, self.steps = robot, instants, order, steps
         self.events = [] if events is None else events
         self._problem, self._ending, self._wrenches = problem, ending, wrenches
-        reached, state = _states(steps, instants)
+        reached, chosen, since = _steps_of(steps, instants)
         levels = max(order - 2, 0)
 
-        def chunk(lanes: np.ndarray) -> Any:
-            part = jax.tree.map(lambda x: x[..., lanes], state)
-            return derivatives_at(problem, part, instants[lanes], order=levels)
+        def lanes_of(lanes: np.ndarray) -> Any:
+            polynomial = jax.tree.map(lambda c: np.moveaxis(np.asarray(c)[chosen[lanes]], 0, -1), steps.polynomial)
+            return polynomial, since[lanes], instants[lanes]
 
-        q, twist = in_chunks(chunk, len(instants), WIDTHS)
+        (state, q, twist), backend = self._at_instants(expanded_robot, lanes_of, order=levels)
         self._state = state
+        self.backend = joined({backend, *self._steps_backends})
         self.q = _derivatives(q)[:, : order + 1]
         self.base: BaseMotion | None = None
         if twist is not None:
@@ -188,11 +190,7 @@ class RobotSimulation(Tabulated):
     @cached_property
     def applied(self) -> Float[np.ndarray, "time n"]:
         """Forces that the laws of the joints give, (time, n), N m or N; none of those that are driven."""
-
-        def chunk(lanes: np.ndarray) -> Any:
-            return forces_at(self._problem, jax.tree.map(lambda x: x[..., lanes], self._state), self.time[lanes])
-
-        return np.where(self.status == Status.OK, in_chunks(chunk, len(self.time), WIDTHS), np.nan).T
+        return np.where(self.status == Status.OK, self._at_instants(forces_at, self._states_of)[0], np.nan).T
 
     @property
     def energy(self) -> Float[np.ndarray, " time"]:
@@ -206,10 +204,18 @@ class RobotSimulation(Tabulated):
 
     @cached_property
     def _energies(self) -> Float[np.ndarray, "2 time"]:
-        def chunk(lanes: np.ndarray) -> Any:
-            return np.stack(energy_at(self._problem, jax.tree.map(lambda x: x[..., lanes], self._state)))
+        energies = np.stack(self._at_instants(energy_at, self._states_of)[0])
+        return np.where(self.status == Status.OK, energies, np.nan)
 
-        return np.where(self.status == Status.OK, in_chunks(chunk, len(self.time), WIDTHS), np.nan)
+    def _states_of(self, lanes: np.ndarray) -> tuple[RobotState, np.ndarray]:
+        return jax.tree.map(lambda x: x[..., lanes], self._state), self.time[lanes]
+
+    def _at_instants(self, function: Mapped, lanes_of: Callable[[np.ndarray], Any], **static: Any) -> tuple[Any, str]:
+        """Return what a function of the problem and of an instant gives for all of them, and what computes it."""
+        example = lanes_of(np.zeros(1, int))
+        how: Any = {"large": LARGE, "hasty": is_wanted_soon(), **static}
+        program = function.program(self._problem, example, **how)
+        return in_chunks(lambda lanes: program(lanes_of(lanes)), len(self.time), WIDTHS), program.backend
 
     def at(self, time: ArrayLike, order: int | None = None) -> "RobotSimulation":
         """Return the same simulation at other instants, without integrating again.
@@ -240,21 +246,15 @@ class RobotSimulation(Tabulated):
         return xarray.Dataset(variables, axes, attrs={"title": self.robot.name, "source": "jounce"})
 
 
-_at = jax.jit(at)  # outside of a program its loop would be compiled at each call
-
-
-def _states(steps: RobotSteps, instants: np.ndarray) -> tuple[np.ndarray, RobotState]:
-    """Return which instants the steps reach, and the states there, batch last."""
+def _steps_of(steps: RobotSteps, instants: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return which instants the steps reach, in which step each is, and the time since its beginning, s."""
     direction = 1.0 if steps.length[0] >= 0 else -1.0
     rounding = 1e-14 * max(abs(steps.start[0]), abs(steps.end))
     reached = (direction * (instants - steps.start[0]) >= -rounding) & (direction * (instants - steps.end) <= rounding)
     chosen = np.clip(
         np.searchsorted(direction * steps.start, direction * instants, side="right") - 1, 0, len(steps.start) - 1
     )
-    since = instants - steps.start[chosen]
-    since = np.where(reached, since, 0.0)
-    polynomial = jax.tree.map(lambda c: np.moveaxis(np.asarray(c)[chosen], 0, -1), steps.polynomial)
-    return reached, jax.tree.map(np.asarray, _at(polynomial, since))
+    return reached, chosen, np.where(reached, instants - steps.start[chosen], 0.0)
 
 
 def _derivatives(coefficients: np.ndarray) -> np.ndarray:
@@ -263,31 +263,43 @@ def _derivatives(coefficients: np.ndarray) -> np.ndarray:
     return np.moveaxis(np.asarray(coefficients) * factorials[:, None, None], -1, 0)
 
 
-@compiled("order")
-def derivatives_at(
-    problem: RobotProblem, state: RobotState, time: Lanes, *, order: int
-) -> tuple[Float[Numbers, "level n batch"], Any]:
-    """Return Taylor coefficients of coordinates in states, to the order + 2, and those of the twist, to the order + 1.
+@mapped(widths=WIDTHS)
+def expanded_robot(
+    problem: RobotProblem, lanes: tuple[RobotState, Lanes, Lanes], order: int
+) -> tuple[RobotState, Float[Numbers, "level n batch"], Any]:
+    """Return states at instants, and Taylor coefficients there, which follow from the equations of motion.
 
-    They follow from the equations of motion there.
+    Parameters
+    ----------
+    problem : RobotProblem
+        What moves the robot.
+    lanes : tuple
+        Of each instant: the polynomial of the step that it is in, the time since the beginning of that, s, and the
+        instant itself, s.
+    order : int
+        Coefficients of the coordinates go to the order + 2, those of the twist of a free base to the order + 1.
     """
+    polynomial, since, time = lanes
+    state = at(polynomial, since)
     series = problem.series(state, time[None], order)
     last = series.accelerations.joints[order:] / ((order + 1) * (order + 2))
     q = jnp.concatenate([series.motion.coordinates[: order + 2], last])
     if series.motion.base is None:
-        return q, None
+        return state, q, None
     rate = series.accelerations.base
     assert rate is not None
-    return q, jnp.concatenate([series.motion.base.twist[: order + 1], rate[order:] / (order + 1)])
+    return state, q, jnp.concatenate([series.motion.base.twist[: order + 1], rate[order:] / (order + 1)])
 
 
-@compiled()
-def energy_at(problem: RobotProblem, state: RobotState) -> tuple[Lanes, Lanes]:
-    """Return kinetic and potential energy in states, J."""
+@mapped(widths=WIDTHS)
+def energy_at(problem: RobotProblem, lanes: tuple[RobotState, Lanes]) -> tuple[Lanes, Lanes]:
+    """Return kinetic and potential energy in states at instants, J."""
+    state, _ = lanes
     return problem.equations.energy(problem.motion(state))
 
 
-@compiled()
-def forces_at(problem: RobotProblem, state: RobotState, time: Lanes) -> Float[Numbers, "n batch"]:
-    """Return the forces of the laws of the joints in states."""
+@mapped(widths=WIDTHS)
+def forces_at(problem: RobotProblem, lanes: tuple[RobotState, Lanes]) -> Float[Numbers, "n batch"]:
+    """Return the forces of the laws of the joints in states at instants, N m or N."""
+    state, time = lanes
     return problem.forces(time[None], state.coordinates, state.rates)

@@ -174,7 +174,9 @@ def in_proportion(allowed: Lanes, step: Lanes, usual: Lanes) -> Lanes:
     return allowed * jnp.minimum(step / jnp.maximum(usual, 1e-300), 1.0)
 
 
-def furthest(sizes: Sizes, allowed: Lanes, usual: Lanes | None = None) -> tuple[Bool[Numbers, "order batch"], Lanes]:
+def furthest(
+    sizes: Sizes, allowed: Lanes, usual: Lanes | None = None, duration: Number | None = None
+) -> tuple[Bool[Numbers, "order batch"], Lanes]:
     """Return which coefficients of series to keep, from order zero on, so that they carry furthest, and how far, s.
 
     Parameters
@@ -186,6 +188,8 @@ def furthest(sizes: Sizes, allowed: Lanes, usual: Lanes | None = None) -> tuple[
     usual : array of shape (batch,), optional
         Length of steps, s, below which the error is allowed by the square of the proportion: rounding beside a jump
         grows from term to term, so that all that is allowed is left out.
+    duration : float, optional
+        Of the run, s, to whose end a velocity moves on that the step leaves wrong by the error of its accelerations.
     """
     orders = np.arange(1.0, len(sizes) + 1)
     roots = -jnp.log(jnp.maximum(sizes, 1e-300)) / orders[:, None]  # logarithms: powers would cost far more
@@ -193,6 +197,10 @@ def furthest(sizes: Sizes, allowed: Lanes, usual: Lanes | None = None) -> tuple[
     counted = (orders >= (cuts + 1) // 2) & (orders <= cuts + 1)  # the upper half of what is kept, and the next
     reaches = jnp.min(jnp.where(counted[:, :, None], roots[None], jnp.inf), axis=1)
     steps = reaches + jnp.log(allowed)[None] / (cuts + 1.0)
+    if duration is not None:
+        highest = cuts.astype(float)
+        lasting = (highest + 1.0) * steps - np.log(highest * (highest + 1.0)) - jnp.log(duration)
+        steps = jnp.minimum(steps, lasting / highest)
     if usual is not None:
         shorter = (cuts + 1.0) * steps - 2.0 * jnp.log(jnp.maximum(usual, 1e-300))[None]
         steps = jnp.minimum(steps, shorter / (cuts - 1.0))

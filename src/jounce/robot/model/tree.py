@@ -35,6 +35,8 @@ class Shape:
         Springs and tendons; balls with drives.
     armed, lifted : bool
         Whether drives of balls, or tendons, have armature; whether some bodies feel less than all of gravity.
+    rubbing : bool
+        Whether a joint, a tendon or the drive of a ball has Coulomb friction.
     """
 
     bodies: int
@@ -47,6 +49,7 @@ class Shape:
     balls: int = 0
     armed: bool = False
     lifted: bool = False
+    rubbing: bool = False
 
 
 @jax.tree_util.register_dataclass
@@ -267,6 +270,7 @@ def arrange(
             balls=balls.select.shape[1],
             armed=bool(balls.armature.any() or tendons.armature.any()),
             lifted=bool(lifted),
+            rubbing=bool(friction.any() or tendons.friction.any() or balls.friction.any()),
         ),
     )
     return tree, frames
