@@ -11,8 +11,8 @@ from jounce.base.shapes import ArrayLike, is_traced
 from jounce.errors import RobotError, UnsupportedError, check_name, flag
 from jounce.execution.backends import backend_of
 from jounce.integrate.marching.joint_events import JointEvent, JointEventDetector
-from jounce.integrate.marching.marching import Outcome
-from jounce.integrate.marching.robot_marching import Progress, RobotProblem, RobotState, RobotSteps, march_robot
+from jounce.integrate.marching.marching import Outcome, steps_between_looks
+from jounce.integrate.marching.robot_marching import STUCK, Progress, RobotProblem, RobotState, RobotSteps, march_robot
 from jounce.integrate.results.robot_simulation import RobotSimulation
 from jounce.integrate.steps.events import EventLog
 from jounce.integrate.steps.methods import AbstractMethod, Taylor
@@ -28,7 +28,6 @@ from jounce.robot.recursions.tree_equations import TreeEquations
 from jounce.robot.robot import Robot
 from jounce.trajectory.motion import AbstractMotion
 
-STEPS = 64  # taken between two looks at progress and events
 MOST = 1_000_000
 
 
@@ -153,6 +152,8 @@ class _Run:
     ):
         self.problem, self.tolerance, self.longest, self.order = problem, tolerance, longest, order
         self.events = EventLog(detectors)
+        numbers = (order + 2) * 2 * len(problem.scale)
+        self.count = steps_between_looks(numbers, watched=bool(detectors))
         self.parts: list[RobotSteps] = []
         self.ending = (Status.OK, "")
         self.backends: set[str] = set()
@@ -191,7 +192,7 @@ class _Run:
     def _marched(self, current: Progress, begun: float, stop: float) -> Any:
         limits = (np.float64(x) for x in (begun, stop, self.tolerance, self.longest))
         try:
-            return march_robot(self.problem, current, *limits, order=self.order, count=STEPS)
+            return march_robot(self.problem, current, *limits, order=self.order, count=self.count)
         except TypeError as error:
             if "has no rule for Taylor series" not in str(error):
                 raise
@@ -201,7 +202,7 @@ class _Run:
     def _explained(self, current: Progress) -> tuple[Status, str]:
         """Return why steps did not go on."""
         time = float(current.time[0])
-        if int(current.stuck) >= STEPS // 2:
+        if int(current.stuck) >= STUCK // 2:
             words = (
                 f"a force of a joint switches without end at t = {time:g} s, as friction of a joint that sticks does: "
                 "smooth it, as by tanh(v/v0)"

@@ -23,21 +23,25 @@ from jounce.trajectory import AbstractMotion, Expression, ExpressionMotion, Func
 from jounce.trajectory.curves import resolve_curve
 from jounce.trajectory.laws.user_laws import read_laws
 
+_ROWS, _REAL = frozenset((list, tuple)), frozenset((int, float))  # read first: to ask for what is abstract takes long
+_MOST_AXES = {"scalar": 0, "vector": 1, "tensor": 2}
+_NUMBERS = frozenset((float, np.float64, np.ndarray))
 Element = Module
 """A joint, driver, force or output."""
 
 
 def resolve(value: Any, parameters: Mapping[str, Any]) -> Any:
     """Return the number or array that a value stands for; it may be given by an expression of the parameters."""
-    if type(value) is float:
+    kind = type(value)
+    if kind is float:
         return value
+    if kind in _ROWS and _REAL.issuperset(map(type, value)):
+        return np.array(value, float)
     if isinstance(value, str):
         value = Expression(value)
     if isinstance(value, Expression):
         return value.evaluate(parameters)
     if isinstance(value, Sequence):
-        if set(map(type, value)) <= {int, float}:
-            return np.array(value, float)
         entries = [resolve(entry, parameters) for entry in value]
         if any(isinstance(entry, Tracer) for entry in entries):
             return jnp.stack([jnp.asarray(entry, float) for entry in entries])
@@ -187,11 +191,11 @@ def check_value(kind: str, value: Any, components: int, sign: str = "any") -> No
     """Raise MechanismError unless a value fits its field: shape, finite, and of the `sign` that its class states."""
     if isinstance(value, Tracer):
         return
-    size = components
-    shapes = {"scalar": ((),), "vector": ((size,),), "tensor": ((size,), (size, size))}[kind]
     array = value if isinstance(value, np.ndarray) and value.dtype.kind == "f" else None
-    if (array is None and not isinstance(value, float)) or (() if array is None else array.shape) not in shapes:
-        expected = "one number" if kind == "scalar" else f"a vector of {size} numbers"
+    shape = array.shape if array is not None else () if isinstance(value, float) else None
+    most = _MOST_AXES[kind]
+    if shape is None or not min(most, 1) <= len(shape) <= most or any(size != components for size in shape):
+        expected = "one number" if kind == "scalar" else f"a vector of {components} numbers"
         raise MechanismError(f"must be {expected}", value=_plain(value))
     entries = [value] if array is None else array.ravel().tolist()  # Python is faster than NumPy for so few numbers
     if not all(map(math.isfinite, entries)):
@@ -327,7 +331,7 @@ def group_key(element: Element, values: Mapping[str, Any]) -> Any:
     static = static_fields(type(element))
     words = (len(element.bodies), *(getattr(element, name) for name in static))
     numbers_only = {name: value for name, value in values.items() if name not in static}
-    if all(isinstance(value, float | np.ndarray | jax.Array) for value in numbers_only.values()):  # traced ones too
+    if all(type(value) in _NUMBERS or isinstance(value, jax.Array) for value in numbers_only.values()):  # traced, too
         shapes = tuple((name, np.shape(value)) for name, value in numbers_only.items())
         return type(element), words, shapes  # the whole structure, without flattening
     leaves, structure = jax.tree.flatten(numbers_only)
@@ -352,7 +356,7 @@ def stack_elements(elements: Sequence[Element], values: Sequence[Mapping[str, An
 
 def along_instances(*values: Any) -> Any:
     """Return values of one shape side by side, (..., instances, 1); they may be traced by JAX."""
-    if any(isinstance(value, Tracer) for value in values):
+    if any(issubclass(kind, Tracer) for kind in set(map(type, values))):
         return jnp.stack([jnp.asarray(value) for value in values], axis=-1)[..., None]
     rows = np.array(values)  # in a fraction of the time of np.stack
     return np.ascontiguousarray(rows.transpose(*range(1, rows.ndim), 0))[..., None]

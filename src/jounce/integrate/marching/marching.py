@@ -38,6 +38,8 @@ SMALLEST_STEP = FINEST / 8.0  # of the span, or of the time itself
 REFUSED = 0.45  # of a step that was refused is tried next: no power of two, or it would end where others have ended
 SHORT = 1.0 / 4.0  # of the longest step so far: shorter ones leave out as much less
 STUCK = 64  # steps that hardly move on, one after the other: a force that switches without end
+AT_LEAST, AT_MOST = 64, 256  # steps tried between two looks at progress and events,
+NUMBERS = 2**15  # of their polynomials: to make room for more takes longer than another call
 STUBBORN = 3  # steps refused one after the other: no series that is only too short for its step needs so many
 
 
@@ -278,6 +280,19 @@ def march(
     previous = room_for_steps(method, current, count) if keep else None
     start = (current, previous, 0)
     return jax.lax.while_loop(unfinished, iterate, start)
+
+
+def steps_between_looks(numbers: int, *, watched: bool) -> int:
+    """Return how many steps are tried in a call: few where an event may end the run, or polynomials are long.
+
+    Parameters
+    ----------
+    numbers : int
+        Of the polynomials of a step.
+    watched : bool
+        Whether events are looked for.
+    """
+    return AT_LEAST if watched else min(max(NUMBERS // numbers, AT_LEAST), AT_MOST)
 
 
 def room_for_steps(

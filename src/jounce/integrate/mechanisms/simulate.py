@@ -193,7 +193,7 @@ def simulate(
     limits = float(tolerance), float(longest_step)
 
     def prepare(model: Model) -> None:
-        prepare_run(mechanism, model, instants, order, method, limits)
+        prepare_run(mechanism, model, instants, order, method, limits, watched=bool(events))
 
     start = consistent_start(mechanism, first, prepare)
     _check_forces(start, first)
@@ -201,7 +201,7 @@ def simulate(
     watched = [*events, *_events_at_ends(start)]
     detectors = [_detector_of(event, mechanism, start) for event in watched]
     prepare(start.model)
-    run = _Run(start, method, limits, detectors)
+    run = _Run(start, method, limits, detectors, watched=bool(events))
     with Count("simulating", report=progress) as tell:
         run.go(instants, tell)
     run.note_ends(len(events))
@@ -324,8 +324,10 @@ class _Run:
         method: AbstractMethod,
         limits: tuple[float, float],
         detectors: Sequence[EventDetector],
+        *,
+        watched: bool,
     ):
-        self.start, self.method, self.limits = start, method, limits
+        self.start, self.method, self.limits, self.watched = start, method, limits, watched
         self.events = EventLog(detectors)
         self.parts: list[DenseOutput] = []
         self.ending = (Status.OK, "")
@@ -343,7 +345,9 @@ class _Run:
         self.direction = direction = np.sign(instants[-1] - instants[0])
         order = self.method.expansion_order(self.limits[0])
         current = unexpanded(equations, self.start.state, instants[:1], order=order)
-        (_, _, *how), options = march_arguments(equations, current, stop, self.limits, self.method)
+        (_, _, *how), options = march_arguments(
+            equations, current, stop, self.limits, self.method, watched=self.watched
+        )
         while current.outcome.item() in GOING and self.events.stopped_at is None:
             current, steps, attempts = march(equations, current, *how, **options)
             output, taken = steps

@@ -14,6 +14,8 @@ from jounce.mechanism.mechanism import Mechanism
 from jounce.trajectory import AbstractMotion, SplineMotion
 from jounce.trajectory.sample_errors import unsupported_derivative, unsupported_words
 
+_PLAIN = frozenset((float, int, str, type(None), np.ndarray))  # no law
+
 
 def check_laws(mechanism: Mechanism, instants: np.ndarray, order: int, *, forces: bool) -> None:
     """Raise for laws that end before the instants do, and warn of samples that do not support the derivatives.
@@ -72,6 +74,8 @@ def _motions(element: AbstractConstraint | AbstractForce) -> Iterator[tuple[str,
     """Return the motion laws among the values of a driver or a force, by field."""
     for field in value_fields(type(element)):
         value = getattr(element, field)
+        if type(value) in _PLAIN:
+            continue
         entries = (
             value.parts if isinstance(value, VectorLaw) else value if isinstance(value, list | tuple) else (value,)
         )
