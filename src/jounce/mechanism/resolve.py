@@ -4,7 +4,7 @@ import dataclasses
 import math
 import numbers
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from functools import lru_cache
+from functools import cache, lru_cache
 from typing import Any
 
 import jax
@@ -24,7 +24,6 @@ from jounce.trajectory.curves import resolve_curve
 from jounce.trajectory.laws.user_laws import read_laws
 
 _ROWS, _REAL = frozenset((list, tuple)), frozenset((int, float))  # read first: to ask for what is abstract takes long
-_MOST_AXES = {"scalar": 0, "vector": 1, "tensor": 2}
 _NUMBERS = frozenset((float, np.float64, np.ndarray))
 Element = Module
 """A joint, driver, force or output."""
@@ -187,17 +186,26 @@ def parameter_value(name: str, value: Any) -> Any:
     return float(number)
 
 
+@cache
+def _shapes(kind: str, components: int) -> tuple[tuple[int, ...], ...]:
+    """Return the shapes that values of a kind may have."""
+    vector = (components,)
+    return {"scalar": ((),), "vector": (vector,), "tensor": (vector, vector * 2)}[kind]
+
+
 def check_value(kind: str, value: Any, components: int, sign: str = "any") -> None:
     """Raise MechanismError unless a value fits its field: shape, finite, and of the `sign` that its class states."""
-    if isinstance(value, Tracer):
+    if isinstance(value, float):
+        shape, entries = (), [value]
+    elif isinstance(value, np.ndarray) and value.dtype.kind == "f":
+        shape, entries = value.shape, value.ravel().tolist()  # Python is faster than NumPy for so few numbers
+    elif isinstance(value, Tracer):
         return
-    array = value if isinstance(value, np.ndarray) and value.dtype.kind == "f" else None
-    shape = array.shape if array is not None else () if isinstance(value, float) else None
-    most = _MOST_AXES[kind]
-    if shape is None or not min(most, 1) <= len(shape) <= most or any(size != components for size in shape):
+    else:
+        shape, entries = None, []
+    if shape not in _shapes(kind, components):
         expected = "one number" if kind == "scalar" else f"a vector of {components} numbers"
         raise MechanismError(f"must be {expected}", value=_plain(value))
-    entries = [value] if array is None else array.ravel().tolist()  # Python is faster than NumPy for so few numbers
     if not all(map(math.isfinite, entries)):
         raise MechanismError("must be finite", value=_plain(value))
     if sign == "any":

@@ -19,7 +19,7 @@ from jounce.linear_algebra.fronts import Fronts
 from jounce.linear_algebra.pattern import Pattern
 from jounce.mechanism.carriages import carriages
 from jounce.mechanism.resolve import along_instances, group_key, resolve_element, stack_elements
-from jounce.mechanism.user_code import READINGS, readings_of, users_class, with_readings
+from jounce.mechanism.user_code import READINGS, has_own_methods, readings_of, users_class, with_readings
 from jounce.rigid import SpatialPose
 from jounce.rigid.body_arrays import each_jet
 from jounce.rigid.pose import Pose
@@ -182,11 +182,12 @@ def group_elements(
 ) -> tuple[tuple[Group, ...], tuple[tuple[str, ...], ...]]:
     """Return the groups of all elements, and the names of the instances in each."""
     members_by_key: dict[Any, list[tuple[str, Any, dict]]] = {}
+    written = {kind for kind in set(map(type, elements.values())) if has_own_methods(kind)}
     for name, element in elements.items():
         values = resolve_element(element, parameters, components, name)
         try:
             check_no_own_code(element)
-            readings = readings_of(element, values, components)
+            readings = readings_of(element, values, components) if type(element) in written else {}
         except UnsupportedError as error:
             raise error.located(name=name) from None
         if readings:

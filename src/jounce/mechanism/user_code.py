@@ -64,6 +64,11 @@ def readings_of(element: Any, values: Mapping[str, Any], components: int) -> dic
     return {name: reader.reading(name) for name in names} | {"": Verbatim(_words(kind), old=False)}
 
 
+def has_own_methods(kind: type) -> bool:
+    """Tell whether a user may have written a method by which elements of a class compute."""
+    return bool(_read_methods(kind))
+
+
 def with_readings(element: Any, readings: Mapping[str, Reading]) -> Any:
     """Return an element whose methods do what was read off; its values may be those of stacked instances."""
     return unchecked(_class_for(type(element)), vars(element) | {READINGS: dict(readings)})
