@@ -51,6 +51,7 @@ class StepState(NamedTuple):
     instant: Float[Numbers, " batch"]  # when that is, s
     planned: Bool[Numbers, ""]  # whether they are decided
     next_up: Int[Numbers, ""]  # among the instants of the grid
+    det_rate: Number  # there where the step leads to, as a batch before has found it; NaN where none has
 
 
 class Records(NamedTuple):
@@ -124,8 +125,13 @@ def take_steps(
     """
 
     def solved(run: StepState) -> Any:
+        unknown = jnp.isnan(run.det_rate)
+        tolerance, refine, search, finite_order = settings._replace(search=settings.search & unknown)
+        arrival = found(run, tolerance, refine, search, finite_order)
+        return arrival._replace(det_rate=jnp.where(unknown, arrival.det_rate, run.det_rate))
+
+    def found(run: StepState, tolerance: Any, refine: Any, search: Any, finite_order: Any) -> Any:
         if native is not None:
-            tolerance, refine, search, finite_order = settings
             first = np.arange(len(run.instant)) == 0
             lanes = run.known, run.away, run.instant, None, search & first
             arrival = called(native, (system, tolerance, refine, finite_order), lanes)
@@ -133,7 +139,8 @@ def take_steps(
                 return arrival._replace(det_rate=arrival.det_rate[:1])
             there = partial(det_rate_at, system, pose_type, arrival.coordinates, run.instant)
             return arrival._replace(det_rate=jax.lax.cond(search, there, lambda: jnp.zeros(1)))
-        return _batch(system, *run.known, run.away, run.instant, *settings, pose_type=pose_type, order=order)
+        how = tolerance, refine, search, finite_order
+        return _batch(system, *run.known, run.away, run.instant, *how, pose_type=pose_type, order=order)
 
     def going(state: TakenSteps) -> Any:
         return (state.run.control.ending == int(StopReason.UNFINISHED)) & (state.count < most)
@@ -167,7 +174,7 @@ def _typed(values: Any, like: Any) -> Any:
 
 def _planned(run: StepState, grid: Float[Numbers, " time"], limits: StepLimits) -> StepState:
     """Plan the next step of a run, or end it with a reason."""
-    return _aimed(run, plan_next_step(run.control, limits), grid)
+    return _aimed(run._replace(det_rate=jnp.full((), jnp.nan)), plan_next_step(run.control, limits), grid)
 
 
 def _aimed(run: StepState, control: StepControl, grid: Float[Numbers, " time"]) -> StepState:
@@ -199,6 +206,9 @@ def _after(
     behind = jnp.sum(_next_up(run, grid) <= target)  # a few are solved from the next anchor, which is near them
     taken = good & (behind <= jnp.where(target < limits.stop, lanes // 2, 0))  # else the same step with those left
     known = jax.tree.map(lambda new, old: jnp.where(taken, new[..., :1], old), known, run.known)
-    run = _aimed(run._replace(known=known), next_control(control, status, arrived, limits, (good, taken)), grid)
+    again = jnp.where(good & ~taken, arrived.det_rate, jnp.nan)
+    run = _aimed(
+        run._replace(known=known, det_rate=again), next_control(control, status, arrived, limits, (good, taken)), grid
+    )
     solved = (arrival.coordinates, arrival.outputs, arrival.sign, arrival.status)
     return run, Records(*solved, jnp.concatenate([jnp.full(1, -1), lane]), arrived, taken)

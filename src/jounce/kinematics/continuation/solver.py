@@ -253,7 +253,7 @@ def _run_from(
     control = initial_control(ExpansionPoint(*map(np.asarray, expansion_point)), np.asarray(here[0]))
     control = control._replace(largest=np.asarray(largest), crawled=np.asarray(crawled))
     decided, first = np.asarray(instant is not None), np.zeros((), int)
-    return StepState(known, control, nothing if away is None else away, here, decided, first)
+    return StepState(known, control, nothing if away is None else away, here, decided, first, np.full((), np.nan))
 
 
 def _limits(stop: float, smallest: float) -> StepLimits:
