@@ -19,7 +19,7 @@ import numpy as np
 import pytest
 
 import jounce as jn
-from jounce import jet
+from jounce import integrate, jet, trajectory
 from jounce.constraints import MotionLaw
 from jounce.execution import translated
 from jounce.execution.backends import VARIABLE
@@ -96,21 +96,21 @@ class Settings:
     amplitude: Any = dataclasses.field(compare=False)
 
 
-class WordedMotion(jn.trajectory.AbstractMotion):
+class WordedMotion(trajectory.AbstractMotion):
     settings: Settings = eqx.field(static=True)
 
     def __call__(self, time: jn.Jet) -> jn.Jet:
         return self.settings.amplitude[0] * jet.sin(time)
 
 
-class ClassMotion(jn.trajectory.AbstractMotion):
+class ClassMotion(trajectory.AbstractMotion):
     amplitude = 1.0
 
     def __call__(self, time: jn.Jet) -> jn.Jet:
         return self.amplitude * jet.sin(time)
 
 
-class PickingMotion(jn.trajectory.AbstractMotion):
+class PickingMotion(trajectory.AbstractMotion):
     """A law that looks at single coefficients, which is no composition of operations."""
 
     amplitude = 1.0
@@ -185,11 +185,11 @@ def test_laws_of_drivers(door):
 @pytest.mark.parametrize("door", ["list", "class", "class that picks"])
 def test_laws_of_trajectories(door):
     law, change = motion_doors()[door]
-    law = jn.laws.FunctionMotion(law) if callable(law) and not isinstance(law, jn.trajectory.AbstractMotion) else law
-    trajectory = jn.JointTrajectory({"pin": law}, start=0.0, stop=1.0)
+    law = jn.laws.FunctionMotion(law) if callable(law) and not isinstance(law, trajectory.AbstractMotion) else law
+    path = jn.JointTrajectory({"pin": law}, start=0.0, stop=1.0)
     for amplitude in (1.0, 2.0):
         change(amplitude)
-        found = trajectory.derivatives([0.5], order=2)[0, :, 0]
+        found = path.derivatives([0.5], order=2)[0, :, 0]
         assert found == pytest.approx(amplitude * np.array([np.sin(0.5), np.cos(0.5), -np.sin(0.5)]), abs=1e-14)
     change(1.0)
 
@@ -546,12 +546,12 @@ class Controller:
 def fresh(stiffness: float) -> Controller:
     """Return another controller, of another class."""
     kind = types.new_class("Other", (Controller,))
-    kind.stiffness = stiffness  # pyright: ignore[reportAttributeAccessIssue]
+    kind.stiffness = stiffness
     return kind()
 
 
-def last_angle(**given: Any) -> float:
-    return float(jn.simulate(ARM, [0.0, 1.0], order=1, state=START, **given).q[-1, 0, 0])
+def last_angle(order: int = 1, **given: Any) -> float:
+    return float(jn.simulate(ARM, [0.0, 1.0], order=order, state=START, **given).q[-1, 0, 0])
 
 
 @pytest.mark.parametrize("name", ["torque", "single", "driven"])
@@ -602,7 +602,7 @@ def test_a_run_keeps_the_wrenches_that_it_had():
 
 def test_events_of_joints():
     controller = Controller()
-    event = jn.integrate.JointEvent(controller.crossing)
+    event = integrate.JointEvent(controller.crossing)
     for controller.stiffness in (0.2, -0.2):
         run = jn.simulate(ARM, [0.0, 0.5], order=1, state=START, events=[event])
         crossed = run.at([run.events[0][0]]).q[0, 0, 0]
@@ -664,8 +664,8 @@ def test_machine_code_and_kept_programs(monkeypatch, machine_code, folder):
                 right = np.exp(-10 * c[0])
                 assert rate_after_half(torque, Drag(("rod",))) == pytest.approx(right, abs=1e-13)
                 controller.stiffness = 100 * c[0]
-                moved = last_angle(torque=controller.torque)
-                assert moved == pytest.approx(last_angle(torque=fresh(controller.stiffness).torque), abs=1e-14)
+                moved = last_angle(3, torque=controller.torque)  # of an order that no program before was for
+                assert moved == pytest.approx(last_angle(3, torque=fresh(controller.stiffness).torque), abs=1e-14)
             if not again:
                 jax.clear_caches()  # what is found again comes from the store
     finally:
@@ -686,8 +686,8 @@ def compilations(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[str]]:
         found.append("machine code")
         return made(*arguments, **keywords)
 
-    def listener(event: str, duration: float, **_: Any) -> None:
-        del duration
+    def listener(event: str, duration_secs: float, **_: Any) -> None:
+        del duration_secs
         if "backend_compile" in event:
             found.append(event)
 
@@ -723,7 +723,7 @@ def test_two_hundred_controllers_compile_once(monkeypatch):
         parts: dict[str, Any] = {
             "torque": lambda t, q, rate: controller.torque(t, q, rate),
             "wrenches": [jn.robot.Wrench("rod", force=controller.of_state)],
-            "events": [jn.integrate.JointEvent(lambda t, q, rate: q[0] - 0.01 * controller.stiffness)],
+            "events": [integrate.JointEvent(lambda t, q, rate: q[0] - 0.01 * controller.stiffness)],
         }
         return float(jn.simulate(ARM, [0.0, stop], order=1, state=START, **parts).q[-1, 0, 0])
 

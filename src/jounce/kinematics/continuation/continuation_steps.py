@@ -127,10 +127,10 @@ def take_steps(
     def solved(run: StepState) -> Any:
         unknown = jnp.isnan(run.det_rate)
         tolerance, refine, search, finite_order = settings._replace(search=settings.search & unknown)
-        arrival = found(run, tolerance, refine, search, finite_order)
+        arrival = arrived_at(run, tolerance, refine, search, finite_order)
         return arrival._replace(det_rate=jnp.where(unknown, arrival.det_rate, run.det_rate))
 
-    def found(run: StepState, tolerance: Any, refine: Any, search: Any, finite_order: Any) -> Any:
+    def arrived_at(run: StepState, tolerance: Any, refine: Any, search: Any, finite_order: Any) -> Any:
         if native is not None:
             first = np.arange(len(run.instant)) == 0
             lanes = run.known, run.away, run.instant, None, search & first
