@@ -109,7 +109,19 @@ class Equilibrium(Displayed):
             if self.degrees_of_freedom and not self.singular
             else []
         )
-        return (*kinks, *((SINGULAR,) if self.singular else ()), *self._slack)
+        return (*kinks, *((SINGULAR,) if self.singular else ()), *self._slack, *self._friction)
+
+    @property
+    def _friction(self) -> tuple[str, ...]:
+        """That friction of joints, which is smoothed by a speed, does not stick."""
+        rubbing = [name for name, joint in self.mechanism.joints.items() if getattr(joint, "friction", None)]
+        if not rubbing or not self.degrees_of_freedom:
+            return ()
+        others = f" and {len(rubbing) - 1} more" if len(rubbing) > 1 else ""
+        where = f"joints.{rubbing[0]}{others}"
+        return (
+            f"friction of {where} does not stick: slower than its speed it is viscous; dry, it could hold elsewhere",
+        )
 
     @cached_property
     def _slack(self) -> tuple[str, ...]:

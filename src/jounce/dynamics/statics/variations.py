@@ -17,6 +17,7 @@ from jounce.base.shapes import Numbers
 from jounce.dynamics.energy.driver_coordinates import with_changes
 from jounce.dynamics.forward.accelerations import Equations, conjugate
 from jounce.dynamics.forward.loads import inertia_forces, mass_matrices
+from jounce.dynamics.friction.free_motion import FreeFriction
 from jounce.dynamics.motion_values import pose_of
 from jounce.execution.compilation import compiled
 from jounce.jet import Jet
@@ -69,14 +70,16 @@ def variations(
     clock : array of shape (3, 1, 1)
         Those of time.
     multipliers : array of shape (rows, 1)
-        Of the scaled rows, held while the bodies change.
+        Of the scaled rows, held while the bodies change: friction follows them, and where nothing slips, their own
+        changes do not count in it.
     changes : array of shape (3, coordinates, bodies, lanes)
         Taylor coefficients, in m and rad.
 
     Returns
     -------
     forces : array of shape (3, coordinates, bodies, lanes)
-        Inertia less weight, applied forces with the minus sign, and ``Phi_q^T lambda``, of the moving bodies.
+        Inertia less weight, applied forces with the minus sign, and ``Phi_q^T lambda`` with the friction of joints, of
+        the moving bodies.
     rows : array of shape (3, rows, lanes)
         Taylor coefficients of the variation of the scaled residuals.
     """
@@ -84,10 +87,15 @@ def variations(
     system, now = equations.system, time.truncate(0)
 
     def evaluated(moved: Pose) -> tuple[Any, Any]:
-        def loosened(change: Any) -> Any:
-            return system.variation(moved.truncate(0), change, now).coefficients[0]
+        friction = FreeFriction(system, moved.truncate(1), now)
 
-        joints = conjugate(loosened, moved.truncate(0), multipliers)
+        def loosened(change: Any) -> Any:
+            return [system.variation(moved.truncate(0), change, now).coefficients[0], *friction.slips(change)]
+
+        weights = [multipliers]
+        if friction.groups:
+            weights += friction.resisting(friction.normal_forces(multipliers))
+        joints = conjugate(loosened, moved.truncate(0), weights)
         forces = jnp.stack([*_loads(equations, moved, time), joints])
         return forces[:, :, 1:, 0], stacked(system.residual(moved, time))[..., 0]
 

@@ -8,7 +8,7 @@ import numpy as np
 from jounce.base.modules import with_fields
 from jounce.base.shapes import Real, Refused
 from jounce.dynamics.forward.accelerations import Equations
-from jounce.dynamics.friction.coupling import check_no_friction
+from jounce.dynamics.friction.coupling import check_no_friction, check_unique_pressing
 from jounce.dynamics.masses import gravity_of, masses_of, required_masses
 from jounce.dynamics.motion_values import cut
 from jounce.dynamics.statics.equilibrium_search import BALANCED, SearchResult, remains
@@ -42,7 +42,9 @@ def linearize(
     """Return the equations of small motions of a mechanism: mass, damping and stiffness matrix, state space, modes.
 
     They are exact: forces, inertia and constraints are differentiated along changes of the motion, to the second order
-    of the constraints, with what joints bear. Along a motion they hold at one instant.
+    of the constraints, with what joints bear. Along a motion they hold at one instant. Friction of joints is as its law
+    smoothed by a speed is at rest: viscous, the coefficient times the normal force over the speed; this is what happens
+    to motions slower than that speed, which do not stick. About a motion it is refused.
 
     Parameters
     ----------
@@ -96,17 +98,15 @@ def linearize(
         raise MechanismError("is for robots; a mechanism has its own guess", name="q")
     if isinstance(subject, Mechanism):
         required_masses(subject, "small motions")
-        check_no_friction(subject, "small motions")
         subject = equilibrium(subject, time)
     elif isinstance(subject, Equilibrium) and time is not None:
         raise MechanismError("an equilibrium has its instant already", name="time", value=time)
     if isinstance(subject, Equilibrium):
         required_masses(subject.mechanism, "small motions")
-        check_no_friction(subject.mechanism, "small motions")
         about, point = subject, subject.point
     elif isinstance(subject, Motion):
         required_masses(subject.mechanism, "small motions")
-        check_no_friction(subject.mechanism, "small motions")
+        check_no_friction(subject.mechanism, "small motions about a motion, not about an equilibrium,")
         point = point_along(subject, time)
     else:
         message = "must be a jn.Mechanism, a jn.Motion, an equilibrium or a jn.Robot"
@@ -114,6 +114,7 @@ def linearize(
     released = named("release", release)
     for name in released:
         check_name("driver", name, point.mechanism.drivers, MechanismError, name="release")
+    check_unique_pressing(point.model, point.equations.system)
     _check_free(point, about, released)
     names = None if coordinates is None else named("coordinates", coordinates)
     reduction = reduced(point, names, released, prefer_outputs=about is not None and about.of_robot)
