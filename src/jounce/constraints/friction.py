@@ -152,6 +152,16 @@ class GearFriction(Module):
                 raise MechanismError(message, name=name, value=getattr(self, name))
 
     @property
+    def losses(self) -> tuple[Any, Any]:
+        """Shares of the torque passed on that gear i loses fast: the mean of forward and backward, half the difference.
+
+        At rest it loses any torque within the mean to both sides of half the difference.
+        """
+        forward, backward = self.efficiencies
+        onward, back = 1.0 / forward - 1.0, 1.0 - backward
+        return 0.5 * (onward + back), 0.5 * (onward - back)
+
+    @property
     def efficiencies(self) -> tuple[Any, Any]:
         """Efficiency where gear i drives gear j, and where gear j drives gear i."""
         if self.coefficient is None:
@@ -169,10 +179,8 @@ class GearFriction(Module):
 
         Where no torque is passed on, its rates are not determined, and those of zero are returned.
         """
-        forward, backward = self.efficiencies
-        onward, back = 1.0 / forward - 1.0, 1.0 - backward
-        side = jnp.sign(passed.coefficients[0])
-        return passed * (resisting * (0.5 * (onward - back)) + 0.5 * (onward + back) * side)
+        mean, difference = self.losses
+        return passed * (resisting * difference + mean * jnp.sign(passed.coefficients[0]))
 
 
 def friction_class(kind: type[Any]) -> type[Any]:

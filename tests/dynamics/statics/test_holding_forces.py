@@ -1,5 +1,6 @@
 """The range of forces that hold a mechanism with friction at rest: closed forms, friction circles, and a search."""
 
+import dataclasses
 import itertools
 
 import numpy as np
@@ -8,6 +9,15 @@ from scipy.optimize import minimize
 
 import jounce as jn
 from tests.dynamics.inverse.test_friction import ORIGIN, UP, screw_jack, slider_crank, vars_of, wedge
+from tests.dynamics.inverse.test_gear_friction import (
+    BASIC,
+    LEAD,
+    friction_of_worm,
+    pair,
+    planetary,
+    torques_of_mueller,
+    worm,
+)
 from tests.oracles import friction_circles
 from tests.oracles.friction_circles import CIRCLES, COUPLER, CRANK, GROUND, ROCKER
 
@@ -208,6 +218,70 @@ def test_a_press_is_held_between_what_slow_strokes_take_both_ways():
             )  # fmt: skip
             slow.append(float(jn.driver_force(jn.solve(moved, [0.0], order=2), "motor")[0, 0]))
         np.testing.assert_allclose(bounds[[0, 2]], sorted(slow), rtol=1e-6)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("coefficient", [0.0, 0.05, 0.12])
+def test_a_worm_holds_between_the_formulas_of_its_thread(coefficient):
+    """Of 0.12 it holds by itself, and its wheel moves it no way against its load."""
+    rho = np.arctan(coefficient)
+    found = held(worm("0.7 + 2*t", "-60", friction_of_worm(coefficient)), "turn")
+    expected = 60.0 / 30.0 * np.tan([LEAD - rho, LEAD, LEAD + rho]) / np.tan(LEAD)
+    np.testing.assert_allclose(np.sort(found * np.sign(found[1])), expected, rtol=1e-11, atol=1e-12)
+    assert (found[0] <= 0 <= found[2]) == (coefficient > 0.1)
+    pushed = held(worm("0.3*t", "-0.5", friction_of_worm(coefficient), drives="wheel"), "turn")
+    pushed = np.sort(pushed * np.sign(pushed[1]))
+    back = np.tan(LEAD - rho) / np.tan(LEAD)
+    most = 15.0 / back if back > 0 else np.inf
+    np.testing.assert_allclose(pushed, [15.0 * np.tan(LEAD) / np.tan(LEAD + rho), 15.0, most], rtol=1e-11)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("fixed, driven", [("ring", "sun"), ("carrier", "ring"), ("sun", "carrier")])
+def test_a_planetary_train_holds_between_what_it_takes_to_turn_it_both_ways(fixed, driven):
+    train = planetary(fixed, driven)
+    for (one, two), load in itertools.product(BASIC, (5.0, -5.0)):
+        found = held(train.with_parameters(one=one, two=two, load=load), f"{driven}_driven")
+        ways = [torques_of_mueller(one * two, fixed, driven, load, speed)[driven] for speed in (3.0, -3.0)]
+        np.testing.assert_allclose(found[[0, 2]], np.sort(ways), rtol=1e-11)
+        np.testing.assert_allclose(found[1], torques_of_mueller(1.0, fixed, driven, load)[driven], rtol=1e-11)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("load", ["-10", "7"])
+@pytest.mark.parametrize("rubs", [False, True])
+def test_gears_hold_between_slow_motions_also_with_friction_in_their_bearings(load, rubs):
+    def made(law):
+        gears = pair(law, load, jn.joints.GearFriction(speed=1e-12, efficiency=0.9, backward=0.65))
+        pins = {n: dataclasses.replace(gears.joints[n], friction=jn.joints.Friction(0.2, 1e-12, 0.01)) for n in "AB"}
+        return dataclasses.replace(gears, joints={**gears.joints, **pins}) if rubs else gears
+
+    found = held(made("0.4 + 0*t"), "turn")
+    slow = [float(jn.solve(made(f"0.4 + {v}*t"), [0.0], order=1).outputs["torque"][0, 0]) for v in (-1e-6, 1e-6)]
+    np.testing.assert_allclose(found[[0, 2]], np.sort(slow), rtol=1e-9)
+    frictionless = dataclasses.replace(pair("0.4 + 0*t", load, jn.joints.GearFriction(speed=1.0, efficiency=1.0)))
+    np.testing.assert_allclose(found[1], held(frictionless, "turn")[1], rtol=1e-12)
+
+
+@pytest.mark.parametrize("weight", [30.0, -30.0])
+def test_a_rack_and_a_belt_hold_between_their_efficiencies(weight):
+    """A rack on a disc of 0.05 m, which a belt turns from a pulley of a third of its size: 0.5 N m at the disc."""
+    o, loss = [0, 0], {"speed": 1.0, "efficiency": 0.8, "backward": 0.7}
+    machine = jn.Mechanism(
+        space="planar",
+        bodies={"motor": jn.Body([0, 0.5]), "disc": jn.Body([0, 0]), "rack": jn.Body([0, -0.05], mass=1.0)},
+        joints={
+            "M": jn.planar.Revolute(("ground", "motor"), [0, 0.5], o),
+            "D": jn.planar.Revolute(("ground", "disc"), o, o),
+            "R": jn.planar.Prismatic(("ground", "rack"), [0, -0.05], o, [1, 0], [1, 0]),
+            "belt": jn.planar.Belt(("motor", "disc"), o, o, 0.02, 0.06, friction=jn.joints.GearFriction(**loss)),
+            "teeth": jn.planar.Rolling(("rack", "disc"), o, o, [1, 0], 0.05, friction=jn.joints.GearFriction(**loss)),
+        },
+        forces={"pull": jn.forces.PointForce("rack", o, [f"{weight}", "0"])},
+        drivers={"turn": jn.drivers.CoordinateDriver(("ground", "motor"), "angle", "0*t")},
+    )
+    found = np.sort(np.abs(held(machine, "turn")))
+    np.testing.assert_allclose(found, 0.5 * np.array([0.7**2, 1.0, 1 / 0.8**2]), rtol=1e-11)
 
 
 def ball_and_sleeve():

@@ -98,7 +98,12 @@ def pressing(
     forces: Float[Numbers, "row instance batch"],
     pose_type: type[Pose],
 ) -> Any:
-    """Return what presses joints with friction, (components, instances, time), for multipliers of order zero."""
+    """Return what presses joints with friction, (components, instances, time), for multipliers of order zero.
+
+    Of gears it is the torque that they pass on.
+    """
+    if loses_torque(element):
+        return element.passed_on(Jet([forces[0]])).coefficients[0][None]
     bodies = tuple(pose_of(pose, pose_type, 0) for pose in poses)
     held = constraint_forces.wrench(slope[:1], forces[None])[0][: bodies[0].shifts]
     return pressing_force(element, bodies, Jet([held])).coefficients[0]

@@ -1,5 +1,6 @@
 """The joints with friction of a driven motion: which they are, what presses them, and the power that they take."""
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -73,10 +74,20 @@ class JointFriction:
 
     @property
     def coefficients(self) -> Float[np.ndarray, " joint"]:
-        """Coefficients of friction, in the order of the joints by their groups."""
+        """Coefficients of friction, of gears the mean share that they lose, of the joints in the order of their groups."""
+        return self._of_joints(lambda gear: gear.losses[0], lambda friction: friction.coefficient)
+
+    @property
+    def differences(self) -> Float[np.ndarray, " joint"]:
+        """Half the difference of the shares that gears lose forward and backward; zero for other joints."""
+        return self._of_joints(lambda gear: gear.losses[1], lambda _: 0.0)
+
+    def _of_joints(self, of_gears: Callable[[Any], Any], of_others: Callable[[Any], Any]) -> np.ndarray:
+        """Return a value of the friction of each joint, in their order by their groups."""
         groups = [self.forces._joined.groups[k] for k in self.first_rows]
-        values = [np.broadcast_to(np.ravel(g.element.friction.coefficient), g.instances) for g in groups]
-        return np.concatenate([np.zeros(0), *values])
+        values = [(of_gears if loses_torque(g.element) else of_others)(g.element.friction) for g in groups]
+        pairs = zip(values, groups, strict=True)
+        return np.concatenate([np.zeros(0), *(np.broadcast_to(np.ravel(x), g.instances) for x, g in pairs)])
 
     def directions(self) -> list[int]:
         """Return the joint of each direction of slip, in the order of the joints."""
@@ -111,7 +122,8 @@ class JointFriction:
         components = forces.pose_type.shifts + forces.pose_type.turns
         loads = np.zeros((group.instances, count, components, bodies + 1, len(lanes)))
         for direction in range(count):
-            unit = holding(group, "friction", UnitFriction(group.element.friction.radius, direction)).element
+            radius = None if loses_torque(group.element) else group.element.friction.radius
+            unit = holding(group, "friction", UnitFriction(radius, direction)).element
             for slot in group.moving_slots:
                 slope = np.asarray(programs.friction_slopes(unit, moving, forces.pose_type, slot, 1))[0, :, 0]
                 for instance, body in enumerate(group.bodies[slot]):
@@ -119,7 +131,10 @@ class JointFriction:
         return loads[:, :, :, 1:].reshape(-1, components, bodies, len(lanes))
 
     def pressing(self, multipliers: Float[Numbers, "row time"]) -> Float[np.ndarray, "joint component time"]:
-        """Return what presses the surfaces of each joint, N, for multipliers of order zero; zeros fill it up."""
+        """Return what presses the surfaces of each joint, N, for multipliers of order zero; zeros fill it up.
+
+        Of gears it is the torque that they pass on, N m.
+        """
         forces = self.forces
 
         def chunk(lanes: np.ndarray) -> Any:

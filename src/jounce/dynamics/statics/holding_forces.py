@@ -4,11 +4,12 @@ import copy
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from jaxtyping import Float
 
 from jounce.base.shapes import Numbers
 from jounce.constraints.spin_hold import SpinHold
-from jounce.dynamics.friction.coupling import loses_torque
 from jounce.dynamics.friction.extreme_friction import ExtremeFriction
+from jounce.dynamics.inverse.joint_friction import JointFriction
 from jounce.dynamics.inverse.motion_forces import MotionForces
 from jounce.dynamics.inverse.tooth_flanks import listed
 from jounce.dynamics.motion_values import check_motion
@@ -21,6 +22,7 @@ from jounce.units.shown_units import time_axes
 if TYPE_CHECKING:
     import xarray
 
+SMALLEST = 1e-12  # determinant: nearer to zero friction locks
 BOUNDS = ("least", "frictionless", "greatest")
 
 
@@ -28,8 +30,9 @@ def holding_forces(motion: Motion) -> "xarray.Dataset":
     """Return between which forces of each driver a mechanism stays at rest, in the positions of a motion.
 
     The mechanism is held still in each of these positions, under weights and applied forces as they are at that instant
-    and without velocity. In each joint, friction at rest is any within its cone, ``|f| <= mu |R|``; what it can do at
-    most, for and against the driver, is found over all friction in all joints together. Where zero lies between, the
+    and without velocity. In each joint, friction at rest is any within its cone, ``|f| <= mu |R|``, and gears lose any
+    torque between what they lose forward and backward; what all this can do at most, for and against the driver, is
+    found over all joints together. Where zero lies between, the
     mechanism stays without the driver: it locks by itself. A force beyond the range moves it.
 
     Of several drivers each has its own range, whatever the others exert meanwhile. What is least and greatest is mostly
@@ -54,8 +57,7 @@ def holding_forces(motion: Motion) -> "xarray.Dataset":
     MechanismError
         If nothing has a mass and no force is applied, or there is no driver.
     UnsupportedError
-        If some motion is free, constraints are redundant, teeth press on their flanks, or gears lose torque, where
-        joints have friction.
+        If some motion is free, constraints are redundant, or teeth press on their flanks, where joints have friction.
 
     Examples
     --------
@@ -129,8 +131,6 @@ def _check_determined(forces: MotionForces, name: str) -> None:
         reasons.append("drivers do not hold all that can move: drive it, and look whether zero is within the range")
     if forces.flanks:
         reasons.append("teeth press on either flank: give gears without pressure_angle")
-    if any(loses_torque(group.element) for group in forces._joined.groups):
-        reasons.append("gears lose a share of what they pass on: move slowly one way and the other instead")
     if any(isinstance(group.element, SpinHold) for group in model.system.groups):
         reasons.append("a body may spin about an axis of itself: hold it by a joint")
     if reasons:
@@ -142,18 +142,41 @@ def _check_determined(forces: MotionForces, name: str) -> None:
 def _ranges(forces: MotionForces, plain: dict[str, Numbers]) -> dict[str, Any]:
     """Return the bounds of the force of each driver, and the instants at which they are not proven."""
     friction = forces.friction
-    responses = friction.responses()
+    middle, responses = _about_the_middle(forces.friction, np.asarray(forces.multipliers[0]))
     changes = np.array([friction.pressing(response) for response in responses])
-    extreme = ExtremeFriction(
-        friction.pressing(forces.multipliers[0]), changes, friction.directions(), friction.coefficients
-    )
+    extreme = ExtremeFriction(friction.pressing(middle), changes, friction.directions(), friction.coefficients)
     columns = [_with_multipliers(forces, response) for response in responses]
     ranges = {}
     for name, free in plain.items():
+        center = np.asarray(_with_multipliers(forces, middle).driver_force(name)[0, 0])
         along = -np.array([of_one.driver_force(name)[0, 0] for of_one in columns])
         (more, sure), (less, sure_too) = extreme.most(along), extreme.most(-along)
-        ranges[name] = [free - less, free, free + more], np.flatnonzero(~(sure & sure_too))
+        ranges[name] = [center - less, free, center + more], np.flatnonzero(~(sure & sure_too))
     return ranges
+
+
+def _about_the_middle(
+    friction: JointFriction, free: Float[np.ndarray, "row time"]
+) -> tuple[Float[np.ndarray, "row time"], Float[np.ndarray, "direction row time"]]:
+    """Return multipliers at which each friction is in the middle of its range, and by how much they are less for one.
+
+    The middle is zero, but of gears a share d of the torque T that they pass on, half the difference of what they lose
+    forward and backward. So ``T = (1 + R d)^-1 (T_0 - R f)`` with the torque T_0 without friction, the response R of
+    the torques to what is lost, and any further loss f.
+    """
+    responses, differences = friction.responses(), friction.differences
+    if not differences.any():
+        return free, responses
+    joints = np.array(friction.directions())
+    gears = np.flatnonzero(differences[joints])  # each slips in one direction
+    share = differences[joints[gears]]
+    torques = np.array([friction.pressing(x)[joints[gears], 0].T for x in (free, *responses)])  # (.., time, gear)
+    matrix = np.einsum("etj,e->tje", torques[1 + gears], share) + np.eye(len(gears))
+    regular = np.abs(np.linalg.det(matrix)) > SMALLEST
+    matrix = np.where(regular[:, None, None], matrix, np.nan)
+    lost = np.linalg.solve(matrix, torques[..., None])[..., 0].swapaxes(1, 2) * share[:, None]
+    middle = free - np.einsum("et,ert->rt", lost[0], responses[gears])
+    return middle, responses - np.einsum("det,ert->drt", lost[1:], responses[gears])
 
 
 def _with_multipliers(forces: MotionForces, multipliers: Numbers) -> MotionForces:
