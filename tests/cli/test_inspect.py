@@ -437,3 +437,15 @@ def test_run_reports_what_holds_a_jack_at_rest(run, facts):
     assert status == 0
     assert re.search(rf"crank +N\*mm +{-1000 * up:.6g} .* {1000 * down:.6g} .* everywhere", out)
     assert "holding" not in facts("run", jack, "--order", "0")[1]
+
+
+@pytest.mark.slow
+def test_run_writes_what_holds_a_jack_at_rest(run, tmp_path):
+    jack, target = EXAMPLES / "screw_jack.yaml", tmp_path / "torque.csv"
+    assert run("run", jack, "--order", "0", "--holding-out", target)[0] == 0
+    held = jn.dynamics.holding_forces(jn.solve(jn.load(jack), order=0))
+    found = np.genfromtxt(target, delimiter=",", names=True)
+    assert found.dtype.names == ("time", "crank_least", "crank_frictionless", "crank_greatest")
+    for bound in ("least", "frictionless", "greatest"):
+        np.testing.assert_array_equal(found[f"crank_{bound}"], held["crank"].sel(bound=bound))
+    assert run("run", jack, "--holding-out", tmp_path / "torque.txt")[0] == 2

@@ -17,6 +17,7 @@ from jounce.cli.options import (
     TableOutput,
     errors_about,
     spare_inputs,
+    written,
 )
 from jounce.cli.robot_motion import RobotRun, simulate_robot_file
 from jounce.errors import JounceError
@@ -39,6 +40,7 @@ def run(
     tolerance: float = 1e-12,
     no_refine: bool = False,
     holding: bool = False,
+    holding_out: Path | None = None,
     reading: MechanismReading = PLAIN_MECHANISM,
     heading: Heading = PLAIN,
     output: TableOutput = NO_TABLE,
@@ -57,6 +59,8 @@ def run(
         Search peaks at the instants only, not between them.
     holding
         Print the range of drive forces that hold it at rest.
+    holding_out
+        Write this range at every instant to this .csv file, SI.
 
     Examples
     --------
@@ -65,19 +69,26 @@ def run(
       jounce run examples/four_bar.yaml --set "BC=15 cm" --set tau=3
       jounce run examples/four_bar.yaml --units angle=deg,length=mm
       jounce run examples/screw_jack.yaml --holding
+      jounce run examples/worm_gearhead.yaml --holding-out torque.csv
     """
     output.check()
+    if holding_out is not None:
+        from jounce.io.files.writing import check_target
+
+        check_target(holding_out, (".csv",), "a table of holding forces", overwrite=output.overwrite)
     units = heading.units
     mechanism = reading.mechanism(file)
-    spare_inputs(output.out, overwrite=output.overwrite)
-    refine = not no_refine
+    for target in (output.out, holding_out):
+        spare_inputs(target, overwrite=output.overwrite)
+    refine, holding = not no_refine, holding or holding_out is not None
     if _is_long(mechanism, file):
         if holding:
             raise JounceError("is for motions of fewer instants: give a coarser time grid", name="--holding", path=file)
         motion = _streamed(mechanism, file, order, tolerance, output, refine=refine, heading=units)
         return _write_result("run", motion, file, output, refine=refine)
     motion = solved(mechanism, file, order, tolerance)
-    return _finished("run", motion, file, output, refine=refine, heading=units, holding=holding)
+    held: Any = {"holding": holding, "holding_out": holding_out}
+    return _finished("run", motion, file, output, refine=refine, heading=units, **held)
 
 
 def simulate(
@@ -187,6 +198,7 @@ def _finished(
     refine: bool,
     heading: bool | None,
     holding: bool = False,
+    holding_out: Path | None = None,
 ) -> int:
     """Print and write the results of a motion, and return the exit status."""
 
@@ -197,10 +209,15 @@ def _finished(
 
     held = None
     if holding:
-        from jounce.reporting.facts.holding_facts import holding_facts
+        from jounce.dynamics import holding_forces
+        from jounce.reporting.facts.holding_facts import holding_facts, write_holding
 
         with errors_about(file):
-            held = holding_facts(motion)
+            ranges = holding_forces(motion)
+        held = holding_facts(ranges)
+        if holding_out is not None:
+            target = holding_out
+            written(lambda: write_holding(ranges, target, overwrite=output.overwrite))
     return _write_result(command, motion, file, output, refine=refine, write=write, held=held)
 
 

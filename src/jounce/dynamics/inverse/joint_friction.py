@@ -74,7 +74,7 @@ class JointFriction:
 
     @property
     def coefficients(self) -> Float[np.ndarray, " joint"]:
-        """Coefficients of friction, of gears the mean share that they lose, of the joints in the order of their groups."""
+        """Coefficients of friction, of gears the mean share that they lose, of joints in the order of their groups."""
         return self._of_joints(lambda gear: gear.losses[0], lambda friction: friction.coefficient)
 
     @property

@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
-from typing import Any
+import csv
+from os import PathLike
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from typing_extensions import TypedDict
 
-from jounce.dynamics import holding_forces
-from jounce.kinematics import Motion
+from jounce.io.files.writing import replacing
 from jounce.reporting.text.tables import Table, table
 from jounce.units.shown_units import ShownUnits
+
+if TYPE_CHECKING:
+    import xarray
 
 STAYS = {True: "everywhere", False: "nowhere", None: "in places"}
 
@@ -32,24 +37,38 @@ class HoldingFacts(TypedDict):
     remark: str
 
 
-def holding_facts(motion: Motion) -> list[dict[str, Any]]:
+def holding_facts(dataset: xarray.Dataset) -> list[dict[str, Any]]:
     """Return between which forces each driver holds a mechanism at rest, over a motion: HoldingFacts.
 
     Parameters
     ----------
-    motion : Motion
-        As `jounce.dynamics.holding_forces` takes it.
+    dataset : xarray.Dataset
+        As `jounce.dynamics.holding_forces` returns it.
 
     Examples
     --------
     >>> import jounce as jn
     >>> jack = jn.load("examples/screw_jack.yaml")
-    >>> (crank,) = holding_facts(jn.solve(jack, [0.0], order=0))
+    >>> (crank,) = holding_facts(jn.dynamics.holding_forces(jn.solve(jack, [0.0], order=0)))
     >>> crank["driver"], crank["unit"], round(crank["least"], 2), round(crank["greatest"], 2), crank["self_locking"]
     ('crank', 'N*m', -148.37, 97.69, True)
     """
-    dataset = holding_forces(motion)
-    return [_of_driver(str(name), dataset[name], motion.time) for name in dataset.data_vars]
+    return [_of_driver(str(name), dataset[name], dataset["time"].values) for name in dataset.data_vars]
+
+
+def write_holding(dataset: xarray.Dataset, path: str | PathLike[str], *, overwrite: bool = False) -> None:
+    """Write the forces that hold a mechanism at rest to a .csv file, a row for each position, whole or not at all.
+
+    A driver has three columns, ``DRIVER_least``, ``DRIVER_frictionless`` and ``DRIVER_greatest``, N m or N; they are
+    ``inf`` where friction locks that way, and ``nan`` where they are not known.
+    """
+    names = [f"{name}_{bound}" for name in dataset.data_vars for bound in dataset["bound"].values.tolist()]
+    values = np.concatenate([dataset[name].values for name in dataset.data_vars], axis=1)
+    with replacing(Path(path), overwrite=overwrite) as scratch, scratch.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(["time", *names])
+        for instant, row in zip(dataset["time"].values.tolist(), values.tolist(), strict=True):
+            writer.writerow([f"{x:.17g}" for x in (instant, *row)])
 
 
 def _of_driver(name: str, array: Any, time: np.ndarray) -> dict[str, Any]:
