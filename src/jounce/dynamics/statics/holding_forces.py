@@ -171,7 +171,7 @@ def _about_the_middle(
     gears = np.flatnonzero(differences[joints])  # each slips in one direction
     share = differences[joints[gears]]
     torques = np.array([friction.pressing(x)[joints[gears], 0].T for x in (free, *responses)])  # (.., time, gear)
-    matrix = np.einsum("etj,e->tje", torques[1 + gears], share) + np.eye(len(gears))
+    matrix = np.einsum("gtk,g->tkg", torques[1 + gears], share) + np.eye(len(gears))
     regular = np.abs(np.linalg.det(matrix)) > SMALLEST
     matrix = np.where(regular[:, None, None], matrix, np.nan)
     lost = np.linalg.solve(matrix, torques[..., None])[..., 0].swapaxes(1, 2) * share[:, None]
