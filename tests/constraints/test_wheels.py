@@ -6,6 +6,7 @@ from typing import Any
 import mpmath as mp
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 import jounce as jn
 from jounce import drivers, spatial
@@ -231,3 +232,82 @@ def test_a_file_has_the_plane_as_one_key(tmp_path):
     path.write_text(text.replace("normal:", "up:"))
     with pytest.raises(jn.errors.MechanismFileError, match="point and normal"):
         jn.load(path)
+
+
+def sleigh(turned=None):
+    """A body of 3 kg, level, whose center of mass is 0.25 m ahead of its one wheel; the whole may be turned."""
+    turned = Rotation.identity() if turned is None else turned
+    x, y, z = turned.apply(np.eye(3)).tolist()
+    start = {"position": [0.1 * c for c in z], "orientation": turned.as_quat(scalar_first=True).tolist()}
+    return jn.Mechanism(
+        space="spatial",
+        gravity=[-9.81 * c for c in z],
+        bodies={
+            "body": jn.Body(**start, mass=3.0, inertia=[0.3, 0.4, 0.5], center_of_mass=[0.25, 0, 0.02]),
+            "wheel": jn.Body(**start, mass=0.4, inertia=[0.001, 0.002, 0.001]),
+        },
+        joints={
+            "pitch": spatial.Dot1(("ground", "body"), x, Z),
+            "roll": spatial.Dot1(("ground", "body"), y, Z),
+            "axle": spatial.Revolute(("body", "wheel"), ORIGIN, ORIGIN, Y, Y),
+            "track": spatial.Wheel(("ground", "wheel"), ORIGIN, Y, 0.1, ORIGIN, z),
+        },
+        initial={
+            "go": drivers.SpatialSlideDriver(("ground", "body"), ORIGIN, ORIGIN, x, "-0.4*t"),
+            "turn": drivers.RotationDriver(("ground", "body"), z, "2*t", x, X),
+        },
+        outputs={
+            "place": jn.outputs.PointOutput("body", ORIGIN),
+            "heading": jn.outputs.PointOutput("body", X),
+            "center": jn.outputs.PointOutput("body", [0.25, 0, 0.02]),
+            "hub": jn.outputs.PointOutput("wheel", ORIGIN),
+            "ground": jn.outputs.GroundForceOutput(),
+        },
+    )
+
+
+def sleigh_in_closed_form(t):
+    """Return the speed, the rate of turn, the heading and the place of the wheel at a time, by mpmath.
+
+    Of Chaplygin's sleigh, ``M u' = m a w^2`` and ``K w' = -m a u w``: the wheel adds its mass and that of its spin.
+    """
+    mass, reach = mp.mpf(3) + mp.mpf("0.4") + mp.mpf("0.002") / mp.mpf("0.01"), mp.mpf("0.25")
+    moment = mp.mpf("0.5") + 3 * reach**2 + mp.mpf("0.001")
+    speed, turning = mp.mpf("-0.4"), mp.mpf(2)
+    energy = mass * speed**2 + moment * turning**2
+    fastest, most = mp.sqrt(energy / mass), mp.sqrt(energy / moment)
+    rate = 3 * reach * fastest / moment
+    phase = mp.atanh(speed / fastest)
+
+    def heading(s):
+        return most / rate * 2 * (mp.atan(mp.tanh((rate * s + phase) / 2)) - mp.atan(mp.tanh(phase / 2)))
+
+    def along(s):
+        return fastest * mp.tanh(rate * s + phase)
+
+    place = [mp.quad(lambda s, f=f: along(s) * f(heading(s)), mp.linspace(0, t, 5)) for f in (mp.cos, mp.sin)]
+    return along(t), most * mp.sech(rate * t + phase), heading(t), place
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("turned", [None, Rotation.from_rotvec([0.7, -1.1, 0.4])])
+def test_the_sleigh_of_chaplygin_turns_round_and_runs_ahead(turned):
+    """It starts backward and turning, and ends straight on; in any frame, with rates, energy and reactions."""
+    time = np.linspace(0.0, 2.0, 5)
+    found = jn.simulate(sleigh(turned), time)
+    back = np.eye(3) if turned is None else turned.as_matrix()
+    place, ahead = (found.outputs[name] @ back for name in ("place", "heading"))
+    ahead = ahead - place
+    for k, t in enumerate(time):
+        speed, turning, heading, (x, y) = sleigh_in_closed_form(mp.mpf(float(t)))
+        cos, sin = float(mp.cos(heading)), float(mp.sin(heading))
+        np.testing.assert_allclose(place[k, 0], [float(x), float(y), 0.1], rtol=0, atol=1e-10)
+        np.testing.assert_allclose(ahead[k, 0], [cos, sin, 0], rtol=0, atol=1e-10)
+        np.testing.assert_allclose(place[k, 1], float(speed) * np.array([cos, sin, 0]), rtol=0, atol=1e-10)
+        np.testing.assert_allclose(ahead[k, 1], float(turning) * np.array([-sin, cos, 0]), rtol=0, atol=1e-10)
+        acceleration = np.array([0.75 * float(turning) ** 2 / 3.6, float(speed * turning)])
+        np.testing.assert_allclose(place[k, 2, :2], acceleration @ [[cos, sin], [-sin, cos]], rtol=0, atol=1e-9)
+    assert np.ptp(found.energy) < 1e-12 * abs(found.energy[0])
+    weight = 3.4 * np.array(sleigh(turned).gravity)
+    inertia = 3.0 * found.outputs["center"][:, 2] + 0.4 * found.outputs["hub"][:, 2]
+    np.testing.assert_allclose(found.outputs["ground"][:, 0], weight - inertia, rtol=0, atol=1e-9)
