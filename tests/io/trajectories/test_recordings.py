@@ -142,6 +142,32 @@ def test_what_does_not_agree_is_refused(tmp_path, header, columns, words):
             jn.load_trajectory(path)
 
 
+def test_a_single_outlier_of_a_velocity_is_refused_and_a_knock_is_not(tmp_path):
+    generator = np.random.default_rng(3)
+    noisy = [TIMES, Q[0] + 1e-5 * generator.normal(size=51), V[0] + 1e-3 * generator.normal(size=51)]
+    spike = np.where(np.arange(51) == 20, 3.0, 0.0)
+    path = table(tmp_path, "time,a,a_vel", [*noisy[:2], noisy[2] + spike])
+    with pytest.raises(TrajectoryError, match=r"line 22, a: velocities have an outlier at t = 0.4 s: .* leave the row"):
+        jn.load_trajectory(path)
+    knock = np.clip(1.0 - np.abs(np.arange(51) - 20) / 1.5, 0.0, None)  # of some samples, in positions too
+    moved = np.append(0.0, np.cumsum(np.diff(TIMES) * (knock[1:] + knock[:-1]) / 2))
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", jn.errors.RecordingWarning)
+        jn.load_trajectory(table(tmp_path, "time,a,a_vel", [TIMES, Q[0] + moved, V[0] + knock]))
+
+
+def test_the_index_of_pandas_counts_rows_or_is_the_time(tmp_path):
+    rows = np.arange(51)
+    check(jn.load_trajectory(table(tmp_path, ",time,shoulder,elbow", [rows, TIMES, *Q])))
+    check(jn.load_trajectory(table(tmp_path, ",shoulder,elbow", [TIMES, *Q])))
+    with pytest.raises(TrajectoryError, match="no column has this name, got 'time'"):
+        jn.load_trajectory(table(tmp_path, ",shoulder,elbow", [rows, *Q]))  # numbers of rows are no seconds
+    waypoints = jn.io.load_path(table(tmp_path, ",shoulder,elbow", [rows, *Q]))
+    assert waypoints.names == ("shoulder", "elbow")
+    with pytest.raises(TrajectoryError, match="column 1 has no name"):
+        jn.load_trajectory(table(tmp_path, ",time,shoulder", [Q[1], TIMES, Q[0]]))
+
+
 def test_two_positions_at_one_stamp(tmp_path):
     times = np.insert(TIMES, 25, TIMES[25])
     path = table(tmp_path, "time,shoulder,elbow", [times, *np.insert(Q, 25, Q[:, 25] + 1e-4, axis=1)])

@@ -102,11 +102,14 @@ class RobotProblem(Module):
         pushes = self.wrenches(time[0], motion.coordinates, motion.rates)
         return Unknowns(forces, None if motion.base is None else jnp.zeros_like(motion.base.twist)), pushes
 
-    def series(self, state: RobotState, time: Float[Numbers, "1 batch"], order: int) -> MotionSeries:
+    def series(
+        self, state: RobotState, time: Float[Numbers, "1 batch"], order: int, *, reversible: bool = False
+    ) -> MotionSeries:
         """Return the series of the motion; the order is that of the accelerations."""
         ticking = jnp.concatenate([time[None], jnp.ones((1, *time.shape)), jnp.zeros((max(order - 1, 0), *time.shape))])
         driven = self._prescribed_accelerations(state, time, order)
-        return motion_series(self.equations, self.motion(state), self.applied, ticking[: order + 1], driven, order)
+        given = ticking[: order + 1], driven, order
+        return motion_series(self.equations, self.motion(state), self.applied, *given, reversible=reversible)
 
     def prescribed_series(self, like: Any, time: Any, order: int) -> Any:
         """Return the series of the prescribed coordinates, zero for the others, (order + 1, n, batch)."""

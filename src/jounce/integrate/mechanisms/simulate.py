@@ -22,6 +22,7 @@ from jounce.execution.compilation import compiled
 from jounce.execution.store.programs import expect
 from jounce.integrate.marching.marching import MOVING, STUCK, DenseOutput, IntegratorState, Outcome, march, unexpanded
 from jounce.integrate.mechanisms.programs_ahead import march_arguments, prepare_run
+from jounce.integrate.results.robot_sensitivities import of_traced_robots
 from jounce.integrate.results.robot_simulation import RobotSimulation
 from jounce.integrate.results.sensitivities import traced_simulation
 from jounce.integrate.results.simulation import Simulation
@@ -83,6 +84,7 @@ def simulate(
     base: BaseMotion | None = None,
     wrenches: Sequence[Wrench] = (),
 ) -> RobotSimulation: ...
+@of_traced_robots
 @concrete_or(traced_simulation)
 def simulate(
     mechanism: Mechanism | Robot,

@@ -20,6 +20,9 @@ from jounce.units.shown_units import unit_size
 SEPARATORS = {";": "semicolons", "\t": "tabs", " ": "spaces"}
 """What other programs put between entries, and its name."""
 
+ROW_NUMBER = "(row)"
+"""Name of a first column without one that counts the rows, as pandas writes it; nothing is read of it."""
+
 _RATE = re.compile(r"_d([0-9]{1,2})$")
 
 
@@ -143,7 +146,11 @@ def read_table(
     """
     table = Table(str(path), error_type)
     check_named(table)
-    return {name: np.array(table.column(k, rates(("angle", "length"), 0))) for k, name in enumerate(table.header)}
+    return {
+        name: np.array(table.column(k, rates(("angle", "length"), 0)))
+        for k, name in enumerate(table.header)
+        if name != ROW_NUMBER
+    }
 
 
 def has_column(path: str | Path, names: Iterable[str], error_type: type[JounceError] = MechanismFileError) -> bool:
@@ -224,6 +231,7 @@ class Table:
         if self.numbers is not None:
             self.header_line = self.numbers.header_line
             self._name(self.numbers.names)
+            self._name_index()
             return
         self.rows = [(line, row) for line, row in read_rows(path, error_type) if any(row)]
         if not self.rows:
@@ -235,10 +243,23 @@ class Table:
         if any(_number(entry) is None for entry in self.rows[0][1]):
             self.header_line, names = self.rows.pop(0)
             self._name(names)
+            self._name_index()
 
     def _name(self, names: Sequence[str]) -> None:
         pairs = [name_and_unit(known_name(name)) for name in names]
         self.header, self.units = [name for name, _ in pairs], [unit for _, unit in pairs]
+
+    def _name_index(self) -> None:
+        """Name a first column without a name, the index that pandas writes: numbers of rows, or the times."""
+        if len(self.header) < 2 or self.header[0] or not all(self.header[1:]) or not len(self):
+            return
+        first = [row[0] for _, row in self.rows] if self.numbers is None else self.numbers.values[:, 0].tolist()
+        numbers = [_number(str(entry)) for entry in first]
+        begin = numbers[0]
+        if begin in (0.0, 1.0) and all(number == begin + k for k, number in enumerate(numbers)):
+            self.header[0] = ROW_NUMBER
+        elif "time" not in self.header:
+            self.header[0] = "time"
 
     def __len__(self) -> int:
         return len(self.rows) if self.numbers is None else len(self.numbers.values)

@@ -14,6 +14,9 @@ CONTRADICTS, DOUBTFUL = 0.2, 0.05
 """Of the change over a stretch: from there on a column is refused, or mentioned."""
 WINDOWS = 50  # of a recording, over which changes are compared
 NOISES = 6.0  # times the deviation of what noise makes of a change: a smaller difference says nothing
+FEWEST = 12  # samples, of which one may be an outlier
+PARTS = 5
+OUTLYING = 0.05  # of the range of a derivative: a smaller distance is none of an outlier
 BLOCK = 20_000  # samples that noise is estimated from
 
 
@@ -34,7 +37,8 @@ def check_agreement(recording: Recording) -> list[str]:
     Raises
     ------
     TrajectoryError
-        If they differ by more than a fifth: the message names the joint and the line.
+        If they differ by more than a fifth, or a single sample of a derivative is an outlier: the message names the
+        joint and the line.
     """
     doubts = []
     for level in range(1, recording.values.shape[1]):
@@ -43,6 +47,14 @@ def check_agreement(recording: Recording) -> list[str]:
             if len(rows) < 4:
                 continue
             below, rate = recording.values[rows, level - 1, k], recording.values[rows, level, k]
+            if (outlier := _outlier(recording.times[rows], below, rate)) is not None:
+                row, expected = outlier
+                instant = recording.times[rows[row]]
+                message = (
+                    f"{LEVELS[level]} have an outlier at t = {instant:.6g} s: {rate[row]:.6g}, where the samples "
+                    f"beside it and {LEVELS[level - 1]} say {expected:.6g}; correct it, or leave the row out"
+                )
+                raise recording.error(message, int(rows[row]), name=name)
             worst = _difference(recording.times[rows], below, rate)
             if worst is None or worst.share < DOUBTFUL:
                 continue
@@ -56,6 +68,35 @@ def check_agreement(recording: Recording) -> list[str]:
                 raise recording.error(message, int(rows[worst.row]), name=name)
             doubts.append(f"{name}: {fact}")
     return doubts
+
+
+def _outlier(times: np.ndarray, below: np.ndarray, rate: np.ndarray) -> tuple[int, float] | None:
+    """Return the sample of a rate that is far from what the level below says, and from its neighbors, and that value.
+
+    It is farther from both than noise makes it, and than the rate itself changes over the samples about it: neither a
+    jump of the rate nor a knock, which positions show too, is an outlier.
+    """
+    if len(times) < FEWEST:
+        return None
+    before, after = np.diff(times)[1:-2], np.diff(times)[2:-1]  # about all but the two first and the two last
+    falls, rises = np.diff(below)[1:-2] / before, np.diff(below)[2:-1] / after
+    middle = (falls * after + rises * before) / (before + after)  # of the parabola through three samples
+    own = rate[2:-2]
+    change = np.abs(rate[3:-1] - rate[1:-3]) + np.abs(rate[4:] - rate[:-4]) + np.abs(rises - falls)
+    between = rate[1:-3] + (rate[3:-1] - rate[1:-3]) * before / (before + after)
+    sigmas = [float(np.median([noise(times[b], x[b]) for b in _blocks(len(times))])) for x in (below, rate)]
+    by_noise = NOISES * (sigmas[1] + 2 * sigmas[0] / np.minimum(before, after))
+    far = np.minimum(np.abs(own - middle), np.abs(own - between)) - by_noise - change
+    worst = int(np.argmax(far))
+    if far[worst] <= OUTLYING * float(np.ptp(np.delete(rate, worst + 2))):
+        return None
+    return worst + 2, float(middle[worst])
+
+
+def _blocks(count: int) -> list[slice]:
+    """Return parts of samples over which noise is estimated, since an outlier raises the estimate of its own part."""
+    length = max(count // PARTS, FEWEST)
+    return [slice(first, first + length) for first in range(0, max(count - length, 0) + 1, length)][:PARTS]
 
 
 def _difference(times: np.ndarray, below: np.ndarray, rate: np.ndarray) -> _Difference | None:

@@ -7,11 +7,12 @@ import re
 from collections.abc import Mapping, Sequence
 
 from jounce.errors import TrajectoryError
+from jounce.io.files.samples import ROW_NUMBER
 from jounce.io.trajectories.stamps import NANO
 
 TIMES = ("time", "__time", "%time", "timestamp", "Time", "stamp", "t")
 """Names of columns of times: of results, PlotJuggler, rostopic, controllers."""
-SPARE = ("seq", "frame_id", "success_rate", "control_command_success_rate", "robot_mode")
+SPARE = (ROW_NUMBER, "seq", "frame_id", "success_rate", "control_command_success_rate", "robot_mode")
 POSITION, VELOCITY, ACCELERATION, OTHER = 0, 1, 2, 3
 WORDS = {
     **dict.fromkeys(("position", "positions", "pos"), POSITION),
@@ -158,7 +159,7 @@ def _of_names(header: Sequence[str]) -> Columns | None:
     bases, checked = {*header, *positioned}, {}
     for column, name in enumerate(header):
         rate, match = _RATE.fullmatch(name), suffixes.get(column)
-        if column == time:
+        if column == time or name == ROW_NUMBER:
             continue
         if rate and rate["joint"] in bases:
             if name == f"{rate['joint']}_d1":

@@ -1,0 +1,202 @@
+"""The motion of a simulated robot as a function of inertias that JAX traces: its steps once more, with lengths held.
+
+How long steps are is taken from the simulation, and so are all numbers: the program here adds to them how they change.
+A change may move faster than the motion, as beside an equilibrium, where the motion has no series to speak of: steps
+are divided until the series of every change of the state converges on them.
+"""
+
+import dataclasses
+import functools
+import math
+from collections.abc import Callable
+from typing import Any, ParamSpec, TypeVar
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax.core import Tracer
+from jaxtyping import Float
+
+from jounce.base.modules import with_fields
+from jounce.base.shapes import is_traced
+from jounce.errors import UnsupportedError
+from jounce.execution.compilation import compiled
+from jounce.integrate.marching.robot_marching import RobotProblem, RobotState, at, polynomial_of
+from jounce.integrate.results.robot_simulation import RobotSimulation
+from jounce.rigid.inertia import Inertia, TracedInertia
+from jounce.robot.robot import Robot
+
+ORDER = 24  # of the series of a step
+CONVERGED = 1e-16  # of a change: the last terms of its series
+LAST = 4  # terms that are looked at, since every other one may vanish
+PARTS = 4096  # of one step at most
+
+P = ParamSpec("P")
+R = TypeVar("R")
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class TracedRobotMotion:
+    """The motion of a simulated robot of which JAX traces inertias.
+
+    Attributes
+    ----------
+    robot : Robot
+        As it was given.
+    time : numpy.ndarray of shape (time,)
+        s.
+    order : int
+        Highest derivative.
+    q : jax.Array of shape (time, order + 1, n)
+        Coordinates and their derivatives, rad or m by s.
+    """
+
+    robot: Robot
+    time: Float[np.ndarray, " time"]
+    order: int
+    q: Any
+
+
+def of_traced_robots(simulate: Callable[P, R]) -> Callable[P, R]:
+    """Return what simulates, also robots of which JAX traces inertias."""
+
+    @functools.wraps(simulate)
+    def door(*arguments: P.args, **keywords: P.kwargs) -> R:
+        robot = arguments[0] if arguments else keywords.get("mechanism")
+        if not isinstance(robot, Robot) or not is_traced(robot.tree):
+            return simulate(*arguments, **keywords)
+        others = {name: value for name, value in keywords.items() if name != "mechanism"}
+        return _traced_motion(simulate, robot, arguments[1:], others)  # type: ignore[return-value]
+
+    return door
+
+
+def _traced_motion(
+    simulate: Callable[..., Any], robot: Robot, positional: tuple[Any, ...], options: dict[str, Any]
+) -> TracedRobotMotion:
+    """Return the motion of a robot as a function of its inertias.
+
+    Raises
+    ------
+    UnsupportedError
+        For events, a free base, within `jax.jit` or `jax.vmap`, and where a force jumps.
+    """
+    for name in ("events", "base"):
+        if options.get(name):
+            message = "a simulation of a robot is differentiated without events, and on a base that is fixed"
+            raise UnsupportedError(message, name=name)
+    simulation = _recorded(simulate, robot, positional, options)
+    if simulation.steps.kink.any():
+        instant = float(simulation.steps.start[int(np.argmax(simulation.steps.kink))])
+        message = (
+            f"a force jumps at t = {instant:.10g} s, and how that instant moves is not known, so that a simulation is "
+            "not differentiated over it: let it pass steeply, such as tanh(v/v0)"
+        )
+        raise UnsupportedError(message, name="torque")
+    known = simulation._problem
+    problem = with_fields(known, equations=with_fields(known.equations, tree=robot.tree))
+    start, length = _divided(known, simulation)
+    first = jax.tree.map(lambda x: jnp.asarray(x)[0, 0, :, None], simulation.steps.polynomial)
+    direction = 1.0 if length[0] >= 0 else -1.0
+    instants = simulation.time
+    which = np.searchsorted(direction * start, direction * instants, side="right") - 1
+    which = np.clip(which, 0, len(start) - 1)
+    since = np.clip(direction * (instants - start[which]), 0.0, None) * direction
+    levels = max(simulation.order - 2, 0)
+    series = _marched(problem, first, start, length, which, since, instants, levels=levels)
+    scale = np.array([float(math.factorial(k)) for k in range(len(series))])
+    changing = jnp.moveaxis(series * scale[:, None, None], -1, 0)[:, : simulation.order + 1]
+    q = simulation.q + (changing - jax.lax.stop_gradient(changing))
+    return TracedRobotMotion(robot, instants, simulation.order, q)
+
+
+def _recorded(
+    simulate: Callable[..., Any], robot: Robot, positional: tuple[Any, ...], options: dict[str, Any]
+) -> RobotSimulation:
+    """Return the simulation at the values that JAX traces."""
+    names = [name for name, link in robot.links.items() if isinstance(link.inertia, TracedInertia)]
+    made: list[RobotSimulation] = []
+
+    @jax.custom_jvp
+    def record(values: list[Any]) -> Any:
+        if not any(isinstance(x, Tracer) for x in jax.tree.leaves(values)):
+            links = dict(robot.links)
+            for name, (mass, center, tensor) in zip(names, values, strict=True):
+                inertia = Inertia(float(mass), np.asarray(center), np.asarray(tensor), strict=robot.strict)
+                links[name] = dataclasses.replace(links[name], inertia=inertia)
+            made.append(simulate(robot.changed(links=list(links.values())), *positional, **options))
+        return jnp.zeros(())
+
+    @record.defjvp
+    def record_jvp(primals: tuple[Any], _: tuple[Any]) -> tuple[Any, Any]:
+        return record(*primals), jnp.zeros(())
+
+    inertias = [robot.links[name].inertia for name in names]
+    record([(x.mass, x.center_of_mass, x.tensor) for x in inertias if x is not None])
+    if not made:
+        message = "a simulation of a robot decides by values: differentiate it outside of jax.jit and jax.vmap"
+        raise UnsupportedError(message, name=robot.name)
+    return made[-1]
+
+
+def _divided(problem: RobotProblem, simulation: RobotSimulation) -> tuple[np.ndarray, np.ndarray]:
+    """Return the starts and lengths of the steps of a simulation, divided as changes of the state ask for."""
+    steps = simulation.steps
+    states = jax.tree.map(lambda c: np.moveaxis(np.asarray(c)[:, 0], 0, -1), steps.polynomial)
+    growth = np.asarray(_growth(problem, states, steps.start))  # of orders, steps
+    orders = np.arange(ORDER + 2 - LAST, ORDER + 2)
+    with np.errstate(divide="ignore"):
+        reach = ((CONVERGED / growth[-LAST:]) ** (1 / orders[:, None])).min(axis=0)
+    parts = np.ceil(np.abs(steps.length) / reach).clip(1, None)
+    if not np.isfinite(parts).all() or parts.max(initial=0) > PARTS:
+        message = "changes of the motion grow too fast beside it to be followed; look at a shorter time"
+        raise UnsupportedError(message, name="time")
+    counts = parts.astype(int)
+    share = np.concatenate([np.arange(n) / n for n in counts])
+    start, length = np.repeat(steps.start, counts), np.repeat(steps.length, counts)
+    return start + share * length, length / np.repeat(counts, counts)
+
+
+@compiled(narrow=True)
+def _growth(problem: RobotProblem, states: RobotState, time: Any) -> Any:
+    """Return how large the terms of the series of changes of the state are, by change, (order, step)."""
+
+    def coefficients(q: Any, rates: Any) -> Any:
+        state = states._replace(coordinates=q, rates=rates)
+        return polynomial_of(problem.series(state, time[None], ORDER)).coordinates
+
+    def of(direction: Any) -> Any:
+        given = (states.coordinates, states.rates)
+        along = tuple(jnp.broadcast_to(x[:, None], states.rates.shape) for x in jnp.split(direction, 2))
+        return jnp.max(jnp.abs(jax.jvp(coefficients, given, along)[1]), axis=1)
+
+    return jnp.max(jax.lax.map(of, jnp.eye(2 * states.rates.shape[0])), axis=0)
+
+
+@compiled("levels", narrow=True)
+def _marched(
+    problem: RobotProblem,
+    first: RobotState,
+    start: Any,
+    length: Any,
+    which: Any,
+    since: Any,
+    instants: Any,
+    *,
+    levels: int,
+) -> Any:
+    """Return Taylor coefficients of the coordinates at instants, as steps lead there from a start."""
+
+    def series(state: RobotState, time: Any) -> RobotState:
+        return polynomial_of(problem.series(state, time[None], ORDER, reversible=True))
+
+    def step(state: RobotState, given: Any) -> tuple[RobotState, RobotState]:
+        time, onwards = given
+        return at(series(state, time[None]), onwards[None]), state
+
+    _, begun = jax.lax.scan(step, first, (start, length))
+    own = jax.tree.map(lambda x: jnp.moveaxis(x[which, :, 0], 0, -1), begun)
+    there = at(series(own, start[which]), since)
+    expanded = problem.series(there, instants[None], levels, reversible=True)
+    last = expanded.accelerations.joints[levels:] / ((levels + 1) * (levels + 2))
+    return jnp.concatenate([expanded.motion.coordinates[: levels + 2], last])
