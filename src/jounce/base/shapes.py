@@ -38,7 +38,8 @@ Refused = object
 
 def is_traced(values: Any) -> bool:
     """Tell whether JAX traces an array in a pytree: then there are no numbers to check or to choose by."""
-    return any(isinstance(x, Tracer) for x in jax.tree.leaves(values))
+    # of an array, JAX is slow to tell
+    return any(type(x) is not np.ndarray and isinstance(x, Tracer) for x in jax.tree.leaves(values))
 
 
 def real_numbers(

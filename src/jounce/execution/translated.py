@@ -31,7 +31,7 @@ _thread = threading.local()
 
 def shaped(leaf: Any) -> Any:
     """Return a leaf as an array of NumPy; a form, which has only shape and type, stays as it is."""
-    return leaf if isinstance(leaf, jax.ShapeDtypeStruct) else np.asarray(leaf)
+    return leaf if type(leaf) in (np.ndarray, jax.ShapeDtypeStruct) else np.asarray(leaf)
 
 
 def traces_one_instant() -> bool:

@@ -9,8 +9,9 @@ that arrives on the other side to rounding, and is recorded.
 import bisect
 import dataclasses
 import itertools
+from collections.abc import Sequence
 from functools import partial
-from typing import Any
+from typing import Any, NamedTuple
 
 import jax
 import numpy as np
@@ -36,16 +37,15 @@ SAMPLES_A_STEP = (
 )
 
 
-@dataclasses.dataclass(frozen=True, slots=True)
-class Anchor:
+class Anchor(NamedTuple):
     """A solved instant of a motion that is followed, and how far it may be followed from there.
 
-    Parameters
+    Attributes
     ----------
     instant : float
         s.
-    state : tuple
-        Jets of the coordinates and of the outputs, and the sign of the determinant of the Jacobian.
+    leaves, structure
+        Of the state, which most motions never ask for.
     safe_step, radius : float
         How far the Taylor series carries, s: with all its terms, and with the first three where its terms grow to one.
     det_rate : float
@@ -55,17 +55,24 @@ class Anchor:
     """
 
     instant: float
-    state: SolvedState
+    leaves: Sequence[np.ndarray]
+    structure: Any
     safe_step: float
     radius: float
     det_rate: float
     status: Status
 
+    @property
+    def state(self) -> SolvedState:
+        """Jets of the coordinates and of the outputs, and the sign of the determinant of the Jacobian."""
+        return jax.tree.unflatten(self.structure, self.leaves)
+
     @classmethod
     def of(cls, arrival: StepResult, instant: float) -> "Anchor":
         """Build the anchor from the first lane of a batch that was searched for singular positions."""
         safe_step, radius, det_rate = (float(x[0]) for x in (arrival.safe_step, arrival.radius, arrival.det_rate))
-        return cls(float(instant), arrival.state(slice(1)), safe_step, radius, det_rate, Status(int(arrival.status[0])))
+        status = Status(int(arrival.status[0]))
+        return cls(float(instant), *jax.tree.flatten(arrival.state(slice(1))), safe_step, radius, det_rate, status)
 
     @property
     def expansion_point(self) -> tuple[float, float, float, float]:
@@ -107,20 +114,21 @@ class FollowedPath:
 
     def add(self, done: TakenSteps, first: int) -> None:
         """Add the anchors of a run, and the instants of the grid that it solved, which begin with the first."""
-        self.backends.add(backend_of(done.records.status))
-        count = int(done.count)
-        records = jax.tree.map(lambda x: np.asarray(x)[:count], done.records)
-        leaves, structure = jax.tree.flatten((records.coordinates, records.outputs, records.sign))
-        steps = np.flatnonzero(records.taken)
-        taken = [x[steps, ..., :1] for x in leaves]  # copies: an anchor is kept for long, the other lanes are not
-        values = zip(*(x[steps].tolist() for x in (*records.expansion_point, records.status[:, 0])), strict=True)
-        for parts, (instant, safe_step, radius, det_rate, status) in zip(zip(*taken, strict=True), values, strict=True):
-            state = jax.tree.unflatten(structure, parts)
-            self.anchors.append(Anchor(instant, state, safe_step, radius, det_rate, Status(status)))
-        solved = (records.lane >= 0) & (records.status == Status.OK)
+        records, count = done.records, int(done.count)
+        self.backends.add(backend_of(records.status))
+        parts, structure = jax.tree.flatten((records.coordinates, records.outputs, records.sign))
+        leaves = [np.asarray(x)[:count] for x in parts]
+        status, lane = np.asarray(records.status)[:count], np.asarray(records.lane)[:count]
+        steps = np.flatnonzero(np.asarray(records.taken)[:count])
+        # copies: an anchor is kept for long, the other lanes are not
+        states = zip(*(x[steps, ..., :1] for x in leaves), strict=True)
+        values = zip(*(np.asarray(x)[steps].tolist() for x in (*records.expansion_point, status[:, 0])), strict=True)
+        for state, (instant, *reaches, outcome) in zip(states, values, strict=True):
+            self.anchors.append(Anchor(instant, state, structure, *reaches, Status(outcome)))
+        solved = (lane >= 0) & (status == Status.OK)
         if solved.any():
-            states = [np.moveaxis(x, 0, -2)[..., solved] for x in leaves]
-            self.solved_instants.append((first + records.lane[solved], jax.tree.unflatten(structure, states)))
+            solutions = [np.moveaxis(x, 0, -2)[..., solved] for x in leaves]
+            self.solved_instants.append((first + lane[solved], jax.tree.unflatten(structure, solutions)))
 
     def anchors_around(self, first: float, last: float) -> list[Anchor]:
         """Return the anchors between two instants, with one before them and one after, where there are some."""

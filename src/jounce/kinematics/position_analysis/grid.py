@@ -85,7 +85,9 @@ class GridSolver:
         with Threads(threads, compiled=self.solver.is_compiled) as pool:
             if count > LONG_GRID:
                 left = self._in_blocks(left, stride, pool, report)
-            if self.path.solved_instants or left.any() or not self._reached.all():
+            for lanes, state in self.path.solved_instants:
+                self._store_lanes(lanes, state)
+            if left.any() or not self._reached.all():
                 self._insert_anchors()
             size = self.solver.together if count > LONG_GRID else SMALL_BATCH
             for lanes in _levels(left, stride):
@@ -152,16 +154,11 @@ class GridSolver:
                 self._rescue(int(lanes[k]))
 
     def _insert_anchors(self) -> None:
-        """Put the anchors behind the instants, those solved on the way among them, and zeros where none is reached."""
+        """Put the anchors behind the instants, from which others start, and zeros where none is reached."""
         count, reached = len(self.time), int(np.count_nonzero(self._reached))
-
-        def insert(whole: np.ndarray, *parts: np.ndarray) -> None:
+        for whole, *parts in zip(jax.tree.leaves(self._store), *(x.leaves for x in self._anchors), strict=True):
             whole[..., reached:count] = 0
-            whole[..., count : len(self._instants)] = np.concatenate(parts, axis=-1)
-
-        jax.tree.map(insert, self._store, *(anchor.state for anchor in self._anchors))
-        for lanes, state in self.path.solved_instants:
-            self._store_lanes(lanes, state)
+            whole[..., count:] = np.concatenate(parts, axis=-1)
 
     def _store_lanes(self, lanes: slice | Indices, state: SolvedState) -> None:
         def put(whole: np.ndarray, part: np.ndarray) -> None:

@@ -11,7 +11,6 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import lru_cache
 from typing import Any, NamedTuple
 
-import jax
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
@@ -117,7 +116,7 @@ def _neighbors(count: int, stride: int) -> tuple[Indices, Bool[np.ndarray, " lan
 
 def _begin(buffer: SolveBuffer, time: Float[np.ndarray, " time"], anchors: Sequence[Anchor], stride: int) -> None:
     """Load the instants of a block, s, and the anchors around it into a buffer."""
-    buffer.put_anchors(zip(*(jax.tree.leaves(anchor.state) for anchor in anchors), strict=True))
+    buffer.put_anchors(zip(*(anchor.leaves for anchor in anchors), strict=True))
     neighbor, known = _neighbors(len(time), stride)
     instants = np.array([anchor.instant for anchor in anchors])
     nearest = nearest_instants(instants, time)

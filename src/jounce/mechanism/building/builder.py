@@ -17,6 +17,7 @@ from jounce.constraints.facts import facts_of, field_kinds, value_fields
 from jounce.jet import Jet
 from jounce.linear_algebra.fronts import Fronts, elimination
 from jounce.linear_algebra.pattern import Pattern
+from jounce.mechanism.building.contents import contents_of, holds_numbers_only, made_or_known, owned_arrays
 from jounce.mechanism.building.starting_guess import pose_at, starting_guess
 from jounce.mechanism.carriages import ENDING
 from jounce.mechanism.mechanism import Mechanism
@@ -89,9 +90,10 @@ def group_rows(model: Model) -> list[slice]:
     """Return where the rows of each group stand: those of all its instances in turn, once for each row of the joint."""
     slices, first = [], 0
     for group in model.system.groups:
-        names, last = model.rows[first : first + group.instances], first
-        while model.rows[last : last + group.instances] == names:
-            last += group.instances
+        count = group.instances
+        names, last = model.rows[first : first + count], first
+        while model.rows[last : last + count] == names:
+            last += count
         slices.append(slice(first, last))
         first = last
     return slices
@@ -117,6 +119,23 @@ def build(mechanism: Mechanism, like: Model | None = None, *, initial: bool = Fa
     ExpressionError
         If an expression uses a name that is not a parameter.
     """
+    if like is not None:
+        return _built(mechanism, like, initial=initial)
+    contents = contents_of(mechanism, initial)
+    return made_or_known(contents, lambda: _built(mechanism, None, initial=initial), _owned)
+
+
+def _owned(model: Model) -> Model | None:
+    """Return a model that shares no arrays with others, so that it may be kept; None for one with curves or parts."""
+    system = model.system
+    if not all(holds_numbers_only(group.element) for group in (*system.groups, *system.forces, *system.outputs)):
+        return None
+    system, guess = owned_arrays((system, model.guess))
+    history = None if model.history is None else AttitudeHistory(guess["quaternion"], np.zeros(1))
+    return dataclasses.replace(model, system=system, guess=guess, reference=guess, history=history)
+
+
+def _built(mechanism: Mechanism, like: Model | None, *, initial: bool) -> Model:
     parameters, components = mechanism.parameter_values, POSITION_COMPONENTS[mechanism.space]
     (groups, names), (forces, force_names), (outputs, output_names) = grouped_elements(mechanism, initial=initial)
     if like is not None:
