@@ -174,7 +174,7 @@ class Compiled:
         arguments, keywords, static, leaves, tree = self._parts(arguments, keywords)
         traced = [leaf for leaf in leaves if isinstance(leaf, Tracer)]
         if not traced and (code := self._code(arguments, keywords, static, leaves, tree)) is not None:
-            return code([np.asarray(leaf) for leaf in leaves])
+            return code(list(map(shaped, leaves)))
         static |= self._otherwise
         if traced:
             whole = self.jitted if all(map(runs_at_once, traced)) else self._within

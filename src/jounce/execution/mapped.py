@@ -249,7 +249,14 @@ class Mapped:
 
     @under_own_settings
     def program(
-        self, shared: Any, lanes: Any, *, large: int | None = None, hasty: bool = False, width: int = 1, **static: Any
+        self,
+        shared: Any,
+        lanes: Any,
+        *,
+        large: int | None = None,
+        hasty: bool = False,
+        width: Callable[[], int] | None = None,
+        **static: Any,
     ) -> OnLlvm | OnXla:
         """Return what runs it for arguments of a structure; `lanes` are an example of these.
 
@@ -261,8 +268,8 @@ class Mapped:
             Arrays of more numbers are in memory in machine code, as `object_file` has it.
         hasty : bool, default False
             Whether machine code is to be there soon rather than fast.
-        width : int, optional
-            Instants of a round of XLA.
+        width : callable, optional
+            Returns how many instants a round of XLA has.
         **static
             Further arguments of the function.
         """
@@ -273,7 +280,7 @@ class Mapped:
             code = self.machine_code.program((arrays, structure), (parts, form), static, large=large, hasty=hasty)
             if code is not None:
                 return OnLlvm(code, arrays)
-        return OnXla(self, shared, form, tuple(static.items()), width)
+        return OnXla(self, shared, form, tuple(static.items()), 1 if width is None else width())
 
     def _block(self, shared: Any, lanes: Any, how: tuple[tuple[str, Any], ...]) -> Any:
         return self._many(shared, lanes, **dict(how))

@@ -58,6 +58,8 @@ def _number(value: Any) -> float:
 
 def _are_numbers(entries: list[Any]) -> bool:
     """Tell whether entries are numbers, or rows of numbers of one length."""
+    if set(map(type, entries)) <= {float}:
+        return True
     numeric = all(isinstance(x, float) or (isinstance(x, np.ndarray) and x.dtype.kind == "f") for x in entries)
     return numeric and len({np.shape(x) for x in entries}) <= 1
 
@@ -239,7 +241,7 @@ def resolve_element(element: Element, parameters: Mapping[str, Any], components:
         try:
             if kind == "motion":
                 value = resolve_motion(value, parameters)
-            elif isinstance(element, AbstractForce) and kind in ("law", "laws"):
+            elif kind in ("law", "laws") and isinstance(element, AbstractForce):
                 value = resolve_law(value, element, parameters, None if kind == "law" else components)
             elif kind in ("scalar", "vector") and (value is not None or field.default is not None):
                 value = resolve(value, parameters)
@@ -350,16 +352,22 @@ def stack_elements(elements: Sequence[Element], values: Sequence[Mapping[str, An
     """Return one element whose values hold all instances, along an axis that stands before the batch axis."""
     kind = type(elements[0])
     static = static_fields(kind)
-    stacked = {"bodies": ()} | {field.name: field.default for field in dataclasses.fields(kind) if not field.init}
+    stacked: dict[str, Any] = {"bodies": (), **_found_later(kind)}
     for name in value_fields(kind):  # those of no `init` are found later, from the pose of the bodies
         its = [v[name] for v in values]
-        if name in static:
+        if name in static or its[0] is None:
             stacked[name] = its[0]
         elif isinstance(its[0], float | np.ndarray):
             stacked[name] = along_instances(*its)
         else:
             stacked[name] = jax.tree.map(along_instances, *its)
     return unchecked(kind, stacked)  # the checks were made for each instance
+
+
+@lru_cache(maxsize=1000)
+def _found_later(kind: type[Element]) -> Mapping[str, Any]:
+    """Return the fields of a class that are not given, with what they are until they are found."""
+    return {field.name: field.default for field in dataclasses.fields(kind) if not field.init}
 
 
 def along_instances(*values: Any) -> Any:

@@ -63,7 +63,7 @@ class DriverLag(NamedTuple):
 
 def driver_lag(model: Model, instant: float, residual: Float[np.ndarray, " row"]) -> DriverLag | None:
     """Return the lag of the drivers where the residual is that of the guess; None where a driver has several rows."""
-    rows = [k for k, name in enumerate(model.rows) if name.partition(".")[0] in ("drivers", "initial")]
+    rows = [k for k, name in enumerate(model.rows) if name.startswith(("drivers.", "initial."))]
     groups = [group for group in model.system.groups if group.is_driver]
     if len(rows) != sum(group.instances for group in groups) or not np.isfinite(residual).all():
         return None

@@ -136,17 +136,6 @@ class FollowedPath:
         end = bisect.bisect_left(self.anchors, last, key=_instant)
         return self.anchors[max(min(begin, len(self.anchors) - 1), 0) : end + 1]
 
-    def history(self) -> AttitudeHistory | None:
-        """Return the attitudes of all bodies in space along the motion: at the anchors, and by their series between."""
-        if "quaternion" not in self.anchors[0].state[0]:
-            return None
-        times = np.array([anchor.instant for anchor in self.anchors])
-        series = np.concatenate([anchor.state[0]["quaternion"] for anchor in self.anchors], axis=-1)
-        between = partial(attitudes_between, times, np.where(np.isfinite(series), series, 0.0))
-        since = np.diff(times)[:, None] * (np.arange(SAMPLES_A_STEP) / SAMPLES_A_STEP)
-        instants = np.append((times[:-1, None] + since).ravel(), times[-1])
-        return AttitudeHistory(between(instants), instants, between=between)
-
     def ended(self, status: Status, instant: float, fault: str) -> "FollowedPath":
         """End the path, with status, instant and fault."""
         self.status, self.ended_at, self.fault = status, instant, fault
@@ -170,6 +159,18 @@ class FollowedPath:
         ahead = [x for x in since if _is_just_beyond(x, end)]
         largest = max((x.radius for x in ahead), default=0.0)
         return [ChangePoint(x.instant + x.reach, x.radius) for x in ahead if x.radius >= 0.5 * largest][:1]
+
+
+def history_of(anchors: Sequence[Anchor]) -> AttitudeHistory | None:
+    """Return the attitudes of all bodies in space along a motion: at its anchors, and by their series between."""
+    if "quaternion" not in anchors[0].state[0]:
+        return None
+    times = np.array([anchor.instant for anchor in anchors])
+    series = np.concatenate([anchor.state[0]["quaternion"] for anchor in anchors], axis=-1)
+    between = partial(attitudes_between, times, np.where(np.isfinite(series), series, 0.0))
+    since = np.diff(times)[:, None] * (np.arange(SAMPLES_A_STEP) / SAMPLES_A_STEP)
+    instants = np.append((times[:-1, None] + since).ravel(), times[-1])
+    return AttitudeHistory(between(instants), instants, between=between)
 
 
 def _is_left(point: "Anchor | ExpansionPoint") -> Any:

@@ -3,7 +3,7 @@
 import dataclasses
 import math
 from collections.abc import Mapping, Sequence
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any
 
 import jax
@@ -172,8 +172,8 @@ class Solver:
         tables = max(map(np.size, jax.tree.leaves(laws)), default=0) > LARGE
         how = {"large": (LARGE_BESIDE_TABLES if tables else None) if small else LARGE, "hasty": self.hasty}
         shared = system, tolerance, refine, finite_order
-        width = round_width(system)
-        return advance_instant.program(shared, instants, **how, width=width, pose_type=kind, order=self.order)
+        how |= {"width": partial(round_width, system), "pose_type": kind, "order": self.order}
+        return advance_instant.program(shared, instants, **how)
 
     @cached_property
     def _batches(self) -> int:

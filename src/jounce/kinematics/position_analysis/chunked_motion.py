@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from jounce.kinematics.continuation.path_following import FollowedPath
+from jounce.kinematics.continuation.path_following import FollowedPath, history_of
 from jounce.kinematics.continuation.solver import Solver
 from jounce.kinematics.position_analysis import grid_storage
 from jounce.kinematics.position_analysis.grid_storage import solved_chunks
@@ -67,7 +67,7 @@ class ChunkedMotion:
 
     def __iter__(self) -> Iterator[Motion]:
         """Solve and yield one chunk after another; the results of an instant are those of `jounce.solve`."""
-        history, model = self._path.history(), self._solver.model
+        history, model = history_of(self._path.anchors), self._solver.model
         for first, part in solved_chunks(self._solver, self._path, self.time, self._progress, self._threads):
             failed = np.flatnonzero(part.status != Status.OK)
             self.status[first + failed] = part.status[failed]

@@ -3,6 +3,7 @@
 import dataclasses
 import numbers
 from collections.abc import Callable, Mapping
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -15,7 +16,7 @@ from jounce.execution.background import prepare_later
 from jounce.execution.store.programs import expect, is_wanted_soon
 from jounce.execution.threads import thread_count
 from jounce.kinematics.assembly.assemble import assemble
-from jounce.kinematics.continuation.path_following import FollowedPath, follow
+from jounce.kinematics.continuation.path_following import FollowedPath, follow, history_of
 from jounce.kinematics.continuation.solver import NO_GRID, Solver
 from jounce.kinematics.curves.choice import chosen
 from jounce.kinematics.position_analysis.chunked_motion import ChunkedMotion
@@ -45,7 +46,7 @@ from jounce.mechanism.laws.cam_laws import check_turns
 from jounce.mechanism.laws.law_checks import check_laws
 from jounce.mechanism.laws.output_drivers import output_laws
 from jounce.mechanism.time import Instants, TimeLike, instants_of
-from jounce.mechanism.transmissions.axis_angles import AttitudeHistory, lost_count
+from jounce.mechanism.transmissions.axis_angles import lost_count
 
 LOWEST_ORDER = 4  # of the jets inside: predictions need some, also where the user wants positions only
 HIGHEST_ORDER = 30  # of derivatives of outputs
@@ -156,9 +157,10 @@ def solve(
         solution = solve_grid(solver, path, instants, tell, count, keep=keep)
     state = solution.coordinates, solution.outputs
     outcome = solution.status, solution.faults, path.change_points
-    history, backend = path.history(), _backend(solver, path, instants)
-    _check_count(solver.model, history)
-    motion = actuated(Motion(mechanism, solver.model, instants, order, state, *outcome, history, backend))
+    backend = _backend(solver, path, instants)
+    _check_count(solver.model, path)
+    outcome = *outcome, partial(history_of, path.anchors), backend
+    motion = actuated(Motion(mechanism, solver.model, instants, order, state, *outcome))
     check_room(motion)
     if strict:
         raise_for_status(motion)
@@ -267,8 +269,10 @@ def _followed(
     return solver, path
 
 
-def _check_count(model: Model, history: AttitudeHistory | None) -> None:
+def _check_count(model: Model, path: FollowedPath) -> None:
     """Raise SolveError where gears in space have lost count of their turns on the way."""
+    groups = [group for group in model.system.groups if getattr(group.element, "whole", None) is not None]
+    history = history_of(path.anchors) if groups else None
     lost = None if history is None else lost_count(model.system.groups, history)
     if lost is not None:
         group, instance, instant = lost

@@ -93,8 +93,6 @@ class Motion(Tabulated):
         Outcome at each instant, see `Status`; where it is not 0, all results are NaN.
     faults : dict of int to str
         For the instants that failed, by index: the body farthest from its prediction, or the driver at fault.
-    history : AttitudeHistory, optional
-        Attitudes that all bodies in space went through, by which turns are counted; None where none are kept.
     change_points : numpy.ndarray of shape (points,)
         When the motion passed a singular position smoothly, where assembly branches cross, s: there another motion
         could have branched off, and forces are not determined: they are NaN there, and so are their rates where
@@ -124,18 +122,16 @@ class Motion(Tabulated):
         status: Numbers,
         faults: dict[int, str],
         passages: Sequence[ChangePoint] = (),
-        history: AttitudeHistory | None = None,
+        history: AttitudeHistory | Callable[[], AttitudeHistory | None] | None = None,
         backend: str = "",
     ):
         self.backend = backend or xla_backend()
-        self.mechanism, self.time, self.order, self.status = mechanism, time, order, status
-        self.faults = faults
-        self.passages = tuple(passages)
+        self.mechanism, self.time, self.order = mechanism, time, order
+        self.status, self.faults, self.passages = status, faults, tuple(passages)
         self.change_points = np.array([point.instant for point in self.passages])
         self.derived: dict[str, Any] = {}
-        self.model, self.solved_model, self.history = model, model, history
-        self._bodies, groups = state
-        self._groups = dict(zip(model.outputs, groups, strict=True))
+        self.model, self.solved_model, self._history = model, model, history
+        self._bodies, self._groups = state[0], dict(zip(model.outputs, state[1], strict=True))
         self._known_outputs: dict[str, Any] = {}
         self._actuated: Mechanism | None = None  # with laws, where those of drivers follow from outputs
 
@@ -143,6 +139,11 @@ class Motion(Tabulated):
     def _coordinates(self) -> dict[str, Any]:
         """Taylor coefficients of the coordinates of all bodies, computed again where they were not kept."""
         return self._bodies() if callable(self._bodies) else self._bodies
+
+    @cached_property
+    def history(self) -> AttitudeHistory | None:
+        """Attitudes that all bodies in space went through, by which turns are counted; None where none are kept."""
+        return self._history() if callable(self._history) else self._history
 
     @property
     def poses(self) -> tuple[type, dict[str, Any]]:
@@ -169,7 +170,7 @@ class Motion(Tabulated):
     def moved_by(self, model: Model, actuated: Mechanism) -> "Motion":
         """Return the same motion of the same bodies, with a model of the drivers that move them, and their laws."""
         state = self._bodies, tuple(self._groups.values())
-        outcome = self.status, self.faults, self.passages, self.history, self.backend
+        outcome = self.status, self.faults, self.passages, self._history, self.backend
         motion = Motion(self.mechanism, model, self.time, self.order, state, *outcome)
         motion._actuated, motion.solved_model = actuated, self.model
         return motion
@@ -392,7 +393,7 @@ class Motion(Tabulated):
     def _derivatives(
         self, coefficients: Float[Numbers, "order component time"]
     ) -> Float[np.ndarray, "time derivative *component"]:
-        """Turn Taylor coefficients (order, component, time) into derivatives (time, derivative[, component])."""
+        """Turn Taylor coefficients into derivatives."""
         return self._shown(plain_derivatives(np.asarray(coefficients[: self.order + 1])))
 
     def _shown(self, values: Float[Numbers, "order component time"]) -> Float[np.ndarray, "time derivative *component"]:

@@ -39,6 +39,8 @@ from jounce.rigid.pose import Pose
 from jounce.trajectory import AbstractMotion
 from jounce.trajectory.curves import CurveLaw
 
+Shape = tuple[int, ...]
+
 
 @dataclasses.dataclass(frozen=True)
 class Model:
@@ -311,20 +313,24 @@ def _layout(
 
 
 def _row_count(group: Group, pose_type: type[Pose], guess: dict[str, Any]) -> int:
-    leaves, structure = jax.tree.flatten((law_left_out(group), guess))
-    return _row_count_of(structure, tuple(map(np.shape, leaves)), pose_type)
+    leaves, structure = jax.tree.flatten(law_left_out(group))
+    poses = tuple([(name, np.shape(x)) for name, x in guess.items()])
+    return _row_count_of(structure, tuple(map(np.shape, leaves)), pose_type, poses)
 
 
 @lru_cache(maxsize=1000)
-def _row_count_of(structure: Any, shapes: tuple[tuple[int, ...], ...], pose_type: type[Pose]) -> int:
+def _row_count_of(
+    structure: Any, shapes: tuple[Shape, ...], pose_type: type[Pose], poses: tuple[tuple[str, Shape], ...]
+) -> int:
     """Read the number of rows off the shape of the residual; it depends on the structure only, so is kept."""
 
-    def residual(leaves: tuple[Any, ...], time: Any) -> Any:
-        group, guess = jax.tree.unflatten(structure, leaves)
+    def residual(leaves: tuple[Any, ...], guess: dict[str, Any], time: Any) -> Any:
+        group = jax.tree.unflatten(structure, leaves)
         return group.residual(pose_at(guess, pose_type), Jet([time])).coefficients[0]
 
     leaves = tuple(jax.ShapeDtypeStruct(shape, np.float64) for shape in shapes)
-    return jax.eval_shape(residual, leaves, np.zeros((1, 1))).shape[0]
+    guess = {name: jax.ShapeDtypeStruct(shape, np.float64) for name, shape in poses}
+    return jax.eval_shape(residual, leaves, guess, np.zeros((1, 1))).shape[0]
 
 
 def with_offsets(group: Group, pose_type: type[Pose], guess: dict[str, Any]) -> Group:

@@ -16,6 +16,7 @@ import jax
 import numpy as np
 
 from jounce.base.modules import Module, is_ours
+from jounce.constraints.friction import Friction, GearFriction
 from jounce.mechanism.mechanism import Mechanism
 from jounce.mechanism.user_code import methods_of_users
 from jounce.trajectory import Expression
@@ -25,6 +26,7 @@ Contents = tuple[tuple[type, ...], bytes]
 FIELDS = ("space", "bodies", "joints", "drivers", "forces", "initial", "outputs", "gravity")
 """Of a mechanism: those that a model is built of, beside the values of parameters."""
 PLAIN = frozenset({float, int, bool, str, type(None)})
+CHECKED = frozenset({Friction, GearFriction})  # with code of the joint that has it, each time
 LARGE = 10_000  # entries of an array: comparing more takes as long as a model
 MOST = 4  # models that are kept
 _kept: OrderedDict[Contents, Any] = OrderedDict()  # None where contents were seen once
@@ -65,7 +67,8 @@ def contents_of(mechanism: Mechanism, *more: Any) -> Contents | None:
             pending += map(own.__getitem__, names)
         else:
             return None
-    if any(map(methods_of_users, dict.fromkeys(kinds))):
+    own = dict.fromkeys(kinds)
+    if not own.keys().isdisjoint(CHECKED) or any(map(methods_of_users, own)):
         return None
     return tuple(kinds), marshal.dumps(values, 2)  # in later versions, bytes depend on who else has a value
 

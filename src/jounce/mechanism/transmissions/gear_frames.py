@@ -8,6 +8,7 @@ the axis of a shaft in the frame m, and that of a pinion on its rack.
 import dataclasses
 import math
 from collections.abc import Mapping, Sequence
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 import jax.numpy as jnp
@@ -65,6 +66,12 @@ def on_line(element: Any) -> bool:
     return is_toothed(element) or isinstance(element, planar.Belt)
 
 
+@lru_cache(maxsize=1000)
+def may_have_frame(kind: type) -> bool:
+    """Tell whether elements of a class need what only the whole mechanism shows: gears, belts, ropes, cams, racks."""
+    return issubclass(kind, (planar.Gear, planar.Belt, Rope, spatial.Gear, Cam, spatial.Rolling))
+
+
 def grouped_with_frames(mechanism: Mechanism, elements: Mapping[str, Any]) -> Grouped:
     """Return the groups of some elements of a mechanism, by name with their kinds; gears with their frames."""
     index = {name: k for k, name in enumerate((GROUND, *mechanism.bodies))}
@@ -98,7 +105,9 @@ def _find_arms(mechanism: Mechanism, elements: Mapping[str, Any]) -> dict[str, A
     MechanismError
         If a center distance differs from that of the pitch radii, or pulleys overlap.
     """
-    toothed = {name: element for name, element in elements.items() if on_line(element)}
+    toothed = {
+        name: element for name, element in elements.items() if may_have_frame(type(element)) and on_line(element)
+    }
     if not toothed:
         return {}
     pins = joined_vectors(mechanism, pinned)
@@ -180,7 +189,7 @@ def _with_slots(elements: Mapping[str, Any]) -> dict[str, Any]:
     """Return elements in which a rope with several points on a body names the body once."""
     changed = dict(elements)
     for name, element in elements.items():
-        if shares_points(element):
+        if may_have_frame(type(element)) and shares_points(element):
             bodies, slots = distinct(element.bodies)
             changed[name] = unchecked_copy(element, bodies=bodies, slots=slots)
     return changed
@@ -206,6 +215,8 @@ def _with_carriers(
     group: Group, members: Sequence[str], arms: Mapping[str, Arm], mechanism: Mechanism, elements: Mapping[str, Any]
 ) -> Group:
     """Return a group of gears with the frames that are known; other groups as they are."""
+    if not may_have_frame(type(group.element)):
+        return group
     if on_line(group.element) and all(name in arms for name in members):
         return holding(group, "arm", along_instances(*(_number(arms[name].angle) for name in members)))
     if shares_points(elements[members[0]]):
