@@ -63,7 +63,7 @@ def is_toothed(element: Any) -> bool:
 
 def on_line(element: Any) -> bool:
     """Return whether an element, teeth or a belt, turns planar bodies relative to the line of their centers."""
-    return is_toothed(element) or isinstance(element, planar.Belt)
+    return may_have_frame(type(element)) and (is_toothed(element) or isinstance(element, planar.Belt))
 
 
 @lru_cache(maxsize=1000)
@@ -105,9 +105,7 @@ def _find_arms(mechanism: Mechanism, elements: Mapping[str, Any]) -> dict[str, A
     MechanismError
         If a center distance differs from that of the pitch radii, or pulleys overlap.
     """
-    toothed = {
-        name: element for name, element in elements.items() if may_have_frame(type(element)) and on_line(element)
-    }
+    toothed = {name: element for name, element in elements.items() if on_line(element)}
     if not toothed:
         return {}
     pins = joined_vectors(mechanism, pinned)

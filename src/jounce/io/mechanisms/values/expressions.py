@@ -11,8 +11,6 @@ from collections.abc import Callable, Iterable
 from dataclasses import MISSING
 from typing import Annotated, Any
 
-from pydantic_core import PydanticCustomError, core_schema
-
 from jounce.constraints.facts import at_coordinate, facts_of, value_fields
 from jounce.errors import UNSET, JounceError, MechanismError, no_such
 from jounce.io.files.located_data import shows_value
@@ -23,11 +21,13 @@ from jounce.units.expression import Expression
 from jounce.units.values import Value, parse_value
 
 
-def problem(message: str, *at: str | int, value: object = ...) -> PydanticCustomError:
+def problem(message: str, *at: str | int, value: object = ...) -> ValueError:
     """Return an error for pydantic to collect; ``at`` leads on from the entry being validated.
 
     The value shown is that of the entry unless another is given, and none when it is ``UNSET``.
     """
+    from pydantic_core import PydanticCustomError  # here, as importing it takes a tenth of the first name's time
+
     return PydanticCustomError("jounce", "{message}", {"message": message, "at": at, "value": value})
 
 
@@ -38,7 +38,9 @@ class Checked:
         self.function = function
         self.schema = schema
 
-    def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> core_schema.CoreSchema:
+    def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> Any:
+        from pydantic_core import core_schema
+
         return core_schema.with_info_plain_validator_function(self.function)
 
     def __get_pydantic_json_schema__(self, schema: Any, handler: Any) -> dict[str, Any]:
