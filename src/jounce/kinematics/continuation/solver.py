@@ -19,7 +19,7 @@ from jounce.kinematics.status import Status
 from jounce.mechanism import Model
 
 SMALL_BATCH = 16  # lanes; a batch width compiles once, so a short grid uses one, and so do anchors
-LONGEST_LEG = 32  # batches
+LONGEST_RUN = 32  # batches
 RUN_ENTRIES = 2**19  # of what a run keeps: a large mechanism has shorter ones
 SPAN_ENTRIES = 2**19  # of the coordinates of what a thread solves at once: the cache holds them
 XLA_SPAN_ENTRIES = 2**21  # the same by XLA, whose rounds have more instants, and whose calls take longer
@@ -178,7 +178,7 @@ class Solver:
     @cached_property
     def _batches(self) -> int:
         """How many batches a run may have; static, so that each mechanism compiles one program."""
-        return min(LONGEST_LEG, max(1, RUN_ENTRIES // (SMALL_BATCH * self._entries)))
+        return min(LONGEST_RUN, max(1, RUN_ENTRIES // (SMALL_BATCH * self._entries)))
 
     @cached_property
     def _entries(self) -> int:

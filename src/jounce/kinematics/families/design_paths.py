@@ -235,12 +235,12 @@ class DesignPaths:
 
     def _count_turns(self, outputs: list[list[np.ndarray]], group: Group, designs: Indices) -> None:
         """Give angles about axes the turns that they make along the anchors of their designs."""
+        if not any(map(measures_angle, self.solver.model.system.outputs)):
+            return
         owner, at, parts, order = group.anchors_of(designs)
         owner, at = owner[order], at[order]
         system = self.designs.system(designs[owner])
         measuring = [(g, output) for g, output in zip(system.outputs, outputs, strict=True) if measures_angle(g)]
-        if not measuring:
-            return
         leaves = [np.concatenate(part, axis=-1)[..., order] for part in parts]
         coordinates = jax.tree.unflatten(jax.tree.structure(group.steps[0].state), leaves)[0]
         series = np.nan_to_num(coordinates["quaternion"], nan=0.0, posinf=0.0, neginf=0.0)

@@ -66,7 +66,7 @@ def ends_of(model: Model) -> list[CurveEnds]:
     """Return the ends of all open curves of a mechanism."""
     ends = []
     for group in model.system.groups:
-        for curve in (value for value in vars(group.element).values() if isinstance(value, CurveLaw)):
+        for curve in (x for x in vars(group.element).values() if type(x) is not np.ndarray and isinstance(x, CurveLaw)):
             if curve.ends is None:
                 continue
             limits, unit = (np.asarray(x, float) for x in (curve.ends, curve.unit))
