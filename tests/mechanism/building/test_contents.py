@@ -126,7 +126,7 @@ def test_nobody_writes_to_a_model_that_is_kept():
     assert array.flags.writeable
 
 
-class OwnJoint(jn.planar.Revolute, type="own_joint_of_contents"):
+class OwnJoint(jn.planar.Revolute):
     """A joint of a user."""
 
 
