@@ -55,7 +55,7 @@ def readings_of(element: Any, values: Mapping[str, Any], components: int) -> dic
         Of positions: 2 in the plane, 3 in space.
     """
     kind = type(element)
-    names = methods_of_users(kind)
+    names = _read_methods(kind)
     if not names:
         return {}
     reader = _Reader(element, values, components)
@@ -87,7 +87,7 @@ def holds_users_code(elements: Iterable[Any]) -> bool:
         return callable(value)
 
     return any(
-        methods_of_users(type(element)) or any(is_code(getattr(element, name)) for name in value_fields(type(element)))
+        _read_methods(type(element)) or any(is_code(getattr(element, name)) for name in value_fields(type(element)))
         for element in elements
     )
 
@@ -111,7 +111,7 @@ def users_class(kind: type) -> type:
     return vars(kind).get("stands_for", kind)
 
 
-def methods_of_users(kind: type) -> tuple[str, ...]:
+def _read_methods(kind: type) -> tuple[str, ...]:
     """Return the names of the methods of a class that a user may have written, or that call such."""
     known = {name: method for name in _methods_of(kind) if (method := getattr(kind, name, None)) is not None}
     if changes_parts(kind, tuple(_METHODS), known):

@@ -48,7 +48,7 @@ CHANGES = {
     "whole number": lambda: pinned([0.1321, 0]),
     "array": lambda: pinned(np.array([0.1321, 0.0])),
     "bodies": lambda: pinned(bodies=("rocker", "ground")),
-    "order": lambda: mechanism(joints=dict(reversed(mechanism().joints.items()))),
+    "order": lambda: mechanism(joints=dict([*mechanism().joints.items()][::-1])),
     "class": lambda: mechanism(outputs={"psi": jn.outputs.PointOutput("rocker", [0.0, 0.0])}),
     "formula": lambda: driven("0.5 + 2*t"),
     "guess": lambda: mechanism(bodies={"crank": jn.Body([0, 0], 0.5), "rocker": jn.Body([0.1321, 0.0], 1.71)}),

@@ -18,7 +18,7 @@ import numpy as np
 from jounce.base.modules import Module, is_ours
 from jounce.constraints.friction import Friction, GearFriction
 from jounce.mechanism.mechanism import Mechanism
-from jounce.mechanism.user_code import methods_of_users
+from jounce.mechanism.user_code import has_own_methods
 from jounce.trajectory import Expression
 
 T = TypeVar("T")
@@ -68,7 +68,7 @@ def contents_of(mechanism: Mechanism, *more: Any) -> Contents | None:
         else:
             return None
     own = dict.fromkeys(kinds)
-    if not own.keys().isdisjoint(CHECKED) or any(map(methods_of_users, own)):
+    if not own.keys().isdisjoint(CHECKED) or any(map(has_own_methods, own)):
         return None
     return tuple(kinds), marshal.dumps(values, 2)  # in later versions, bytes depend on who else has a value
 
