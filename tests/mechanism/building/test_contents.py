@@ -33,7 +33,7 @@ def pin(point=(0.1321, 0.0), bodies=("ground", "rocker"), kind=jn.planar.Revolut
 
 def pinned(*given, **named):
     """Return the mechanism with another joint of the rocker and the ground."""
-    return mechanism(joints=mechanism().joints | {"D": pin(*given, **named)})
+    return mechanism(joints={**mechanism().joints, "D": pin(*given, **named)})
 
 
 def driven(motion):

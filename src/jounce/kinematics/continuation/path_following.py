@@ -123,8 +123,8 @@ class FollowedPath:
         # copies: an anchor is kept for long, the other lanes are not
         states = zip(*(x[steps, ..., :1] for x in leaves), strict=True)
         values = zip(*(np.asarray(x)[steps].tolist() for x in (*records.expansion_point, status[:, 0])), strict=True)
-        for state, (instant, *reaches, outcome) in zip(states, values, strict=True):
-            self.anchors.append(Anchor(instant, state, structure, *reaches, Status(outcome)))
+        for state, (instant, safe_step, radius, det_rate, outcome) in zip(states, values, strict=True):
+            self.anchors.append(Anchor(instant, state, structure, safe_step, radius, det_rate, Status(outcome)))
         solved = (lane >= 0) & (status == Status.OK)
         if solved.any():
             solutions = [np.moveaxis(x, 0, -2)[..., solved] for x in leaves]

@@ -159,8 +159,8 @@ def solve(
     outcome = solution.status, solution.faults, path.change_points
     backend = _backend(solver, path, instants)
     _check_count(solver.model, path)
-    outcome = *outcome, partial(history_of, path.anchors), backend
-    motion = actuated(Motion(mechanism, solver.model, instants, order, state, *outcome))
+    history: Any = partial(history_of, path.anchors)  # made when somebody asks for turns
+    motion = actuated(Motion(mechanism, solver.model, instants, order, state, *outcome, history, backend))
     check_room(motion)
     if strict:
         raise_for_status(motion)
