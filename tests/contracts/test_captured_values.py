@@ -348,6 +348,44 @@ class Loose(jn.planar.Prismatic):
         return force * self.part
 
 
+class Slippery(jn.planar.Prismatic):
+    """A guide whose surfaces slip faster than its bodies, by a factor that the class knows."""
+
+    factor = 1.0
+
+    def slip(self, bodies, moving):
+        return jn.planar.Prismatic.slip(self, bodies, moving) * self.factor
+
+
+class Toothed(jn.planar.Rolling):
+    """A rack that passes on a share that the class knows."""
+
+    share = 1.0
+
+    def passed_on(self, multiplier):
+        return jn.planar.Rolling.passed_on(self, multiplier) * self.share
+
+
+def hoist(one: Any, two: Any, teeth: Any = jn.planar.Rolling, **parts: Any) -> jn.Mechanism:
+    """Return a motor that lifts 30 N by a belt of efficiency one, 1:3, and a rack of efficiency two on 0.05 m."""
+    loss = [jn.joints.GearFriction(speed=1e-4, efficiency=x) for x in (one, two)]
+    whole: dict[str, Any] = {
+        "space": "planar",
+        "bodies": {"motor": jn.Body([0, 0.5]), "disc": jn.Body([0, 0]), "rack": jn.Body([0, -0.05], mass=1.0)},
+        "joints": {
+            "M": jn.planar.Revolute(("ground", "motor"), [0, 0.5], [0, 0]),
+            "D": jn.planar.Revolute(("ground", "disc"), [0, 0], [0, 0]),
+            "R": jn.planar.Prismatic(("ground", "rack"), [0, -0.05], [0, 0], [1, 0], [1, 0]),
+            "belt": jn.planar.Belt(("motor", "disc"), [0, 0], [0, 0], 0.02, 0.06, friction=loss[0]),
+            "teeth": teeth(("rack", "disc"), [0, 0], [0, 0], [1, 0], 0.05, friction=loss[1]),
+        },
+        "forces": {"pull": jn.forces.PointForce("rack", [0, 0], ["30", "0"])},
+        "drivers": {"turn": jn.drivers.CoordinateDriver(("ground", "motor"), "angle", "t")},
+        "outputs": {"torque": jn.outputs.DriverTorqueOutput("turn")},
+    }
+    return jn.Mechanism(**whole | parts)
+
+
 def braked(friction: Any, joint: Any = jn.planar.Prismatic, **parts: Any) -> jn.Mechanism:
     """Return a sled of 2 kg, pressed with 20 N on its guide, that a driver pushes."""
     guide = joint(GROUND, [0, 0], [0, 0], [1, 0], [1, 0], friction=friction)
@@ -384,6 +422,53 @@ def test_friction_of_ones_own_is_refused_by_name():
         jn.solve(braked(Worn(0.3, 1e-3)), [0.0], order=1)
     with pytest.raises(jn.errors.UnsupportedError, match="cannot have friction, as its `pressing` is yours"):
         jn.solve(braked(jn.joints.Friction(0.3, 1e-3), Loose), [0.0], order=1)
+    with pytest.raises(jn.errors.UnsupportedError, match="cannot have friction, as its `slip` is yours"):
+        jn.solve(braked(jn.joints.Friction(0.3, 1e-3), Slippery), [0.0], order=1)
+    with pytest.raises(jn.errors.UnsupportedError, match="cannot have friction, as its `passed_on` is yours"):
+        jn.solve(hoist(0.9, 0.8, teeth=Toothed), [0.0], order=1)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", [float, np.float32, jnp.asarray])
+def test_efficiencies_of_any_kind_of_number_are_followed(kind):
+    """Of a belt and a rack that lift 30 N: 0.5 N m at the motor without losses; changed after a first solution."""
+    for one, two in ((0.5, 0.75), (0.75, 1.0)):
+        motion = jn.solve(hoist(kind(one), kind(two)), [0.0, 0.5], order=1)
+        assert float(motion.outputs["torque"][1, 0]) == pytest.approx(0.5 / (one * two), rel=1e-9)
+    named = hoist("one", "two", parameters={"one": kind(0.5), "two": 0.75})
+    for one in (0.5, 0.8125):
+        found = jn.solve(named.with_parameters(one=kind(one)), [0.0, 0.5], order=1).outputs["torque"][1, 0]
+        assert float(found) == pytest.approx(0.5 / (one * 0.75), rel=1e-9)
+    lifted = jn.solve_batch(named, {"one": [0.5, 0.625]}, [0.0, 0.5], order=1)["torque"]
+    np.testing.assert_allclose(lifted[:, 1, 0], 0.5 / (np.array([0.5, 0.625]) * 0.75), rtol=1e-9)
+
+    def torque(one: Any) -> Any:
+        return jn.solve(named.with_parameters(one=one), [0.0, 0.5], order=1).outputs["torque"][1, 0]
+
+    assert float(jax.grad(torque)(0.5)) == pytest.approx(-0.5 / (0.25 * 0.75), rel=1e-9)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", [float, jnp.asarray])
+def test_coefficients_of_worms_are_followed(kind):
+    lead = np.arctan(0.1)
+    axes = {"screw": [1.0, 0, 0], "wheel": [0, 1.0, 0]}
+    thread = jn.joints.GearFriction(speed=1e-3, coefficient="mu", lead_angle=float(lead))
+    gearhead = jn.Mechanism(
+        space="spatial",
+        parameters={"mu": kind(0.05)},
+        bodies={name: jn.Body([0, 0, 0], mass=0.1, inertia=[1e-3] * 3) for name in axes},
+        joints={
+            **{k: jn.spatial.Revolute(("ground", k), [0, 0, 0], [0, 0, 0], axis, axis) for k, axis in axes.items()},
+            "mesh": jn.spatial.Gear(("screw", "wheel", "ground"), *axes.values(), "1/30", friction=thread),
+        },
+        forces={"load": jn.forces.SpatialTorque(("ground", "wheel"), axes["wheel"], "-60")},
+        drivers={"turn": jn.drivers.RotationDriver(("ground", "screw"), axes["screw"], "3*t")},
+        outputs={"torque": jn.outputs.DriverTorqueOutput("turn")},
+    )
+    for mu in (0.05, 0.25, 0.125):
+        found = jn.solve(gearhead.with_parameters(mu=kind(mu)), [0.0, 0.5], order=1).outputs["torque"][1, 0]
+        assert float(found) == pytest.approx(2.0 * np.tan(lead + np.arctan(mu)) / np.tan(lead), rel=1e-9)
 
 
 @pytest.mark.slow  # `.ci/run` runs it each time
