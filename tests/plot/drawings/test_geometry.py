@@ -9,6 +9,7 @@ import jounce as jn
 from jounce.mechanism.carriages import carriage_of
 from jounce.plot.drawings.frames import assembled, frames, guessed, points_at, within
 from jounce.plot.drawings.geometry import skeleton
+from jounce.plot.drawings.scene import scene_of
 
 ROOT = pathlib.Path(__file__).resolve().parents[3]
 FILES = sorted((ROOT / "examples").glob("*.yaml"))
@@ -148,3 +149,9 @@ def test_instants_that_failed_are_nowhere():
     assert np.any(motion.status != 0)
     found = points_at(frames(motion)["crank"], np.array([0.04, 0.0]))
     np.testing.assert_array_equal(np.isnan(found).any(axis=1), motion.status != 0)
+
+
+def test_a_carrier_hides_no_gear():
+    shapes = scene_of(jn.load(ROOT / "examples" / "planetary_train.yaml")).shapes
+    filled = {body: [s.layer for s in shapes if s.owner == f"bodies.{body}" and s.fill] for body in ("carrier", "sun")}
+    assert max(filled["carrier"]) < min(filled["sun"])

@@ -14,7 +14,7 @@ from jaxtyping import Float, Int
 from jounce.kinematics import Motion
 from jounce.mechanism import Mechanism
 from jounce.mechanism.mechanism import GROUND
-from jounce.plot.drawings.drawing import BARS, PLATES, VIEW, Drawing, Label, Shape, View, tinted
+from jounce.plot.drawings.drawing import BARS, PLATES, VIEW, WHEELS, Drawing, Label, Shape, View, tinted
 from jounce.plot.drawings.frames import assembled, frames
 from jounce.plot.drawings.geometry import DrawnLink, skeleton
 from jounce.plot.drawings.joint_symbols import draw_symbols
@@ -113,7 +113,11 @@ def _draw_link(drawing: Drawing, link: DrawnLink) -> None:
     points = drawing.flat(drawing.at(link.body, link.points))  # time, n, 2
     ring = _ring(link)
     if ring:
-        drawing.curve(points[:, ring], closed=True, stroke=color, fill=tinted(color), width=2.0, layer=PLATES)
+        fill = tinted(color)
+        if any(wheel.body != link.body for wheel in drawing.skeleton.wheels):  # a carrier hides no gear
+            drawing.curve(points[:, ring], closed=True, stroke="", fill=fill, layer=WHEELS - 1)
+            fill = ""
+        drawing.curve(points[:, ring], closed=True, stroke=color, fill=fill, width=2.0, layer=PLATES)
     for edge in link.edges[len(ring) :]:
         drawing.curve(points[:, [*edge]], stroke=color, width=2.0 if ring else 4.0, layer=BARS)
     longest = max(link.edges, key=lambda edge: np.linalg.norm(np.diff(link.points[[*edge]], axis=0)), default=(0,))
