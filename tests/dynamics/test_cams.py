@@ -375,3 +375,22 @@ def test_the_least_preload_that_keeps_contact_at_a_dwell(tmp_path):
     """At 200 rpm the least force is that at rest, below: the spring and the weight of 1 kg balance at 46 mm."""
     found = jn.dynamics.contact_spring(jn.load("examples/camshaft.yaml"), "cam", "spring", np.linspace(0, 0.3, 31))
     np.testing.assert_allclose([found.free, found.margin], [0.046 + 9.81 / 5000, 5000 * 0.016 + 9.81], rtol=1e-9)
+
+
+@pytest.mark.slow
+def test_a_cam_in_space_repeats_its_law_from_turn_to_turn(tmp_path):
+    """Two turns back to three ahead: rises, a dwell and falls, as the shaft turns on."""
+    third, instants = 2 * mpmath.pi / 3, [-0.4, 0.05, 0.35, 1.1, 1.2]
+
+    def law(angle):
+        turned = angle - 2 * mpmath.pi * mpmath.floor(angle / (2 * mpmath.pi))
+        falls = turned > mpmath.pi
+        share = min((turned - mpmath.pi if falls else turned) / third, 1)
+        rise = mpmath.mpf("0.015") * (share - mpmath.sin(2 * mpmath.pi * share) / (2 * mpmath.pi))
+        return mpmath.mpf("0.015") - rise if falls else rise
+
+    made = load(tmp_path, RISES.replace("rise", "15 mm"), "theta", IN_SPACE)
+    found = jn.solve(made, instants, order=4).outputs["contact"]
+    exact = expected(law, instants)[0]
+    sizes = np.abs(exact).max(axis=0)
+    np.testing.assert_allclose(found / sizes, exact / sizes, rtol=0, atol=1e-10)
