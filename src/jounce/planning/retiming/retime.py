@@ -261,7 +261,10 @@ def _from_state(
         except (SolveError, TrajectoryError) as error:
             reason = error
     assert reason is not None
-    message = f"no way from this state onto the path keeps the limits; of the last one tried: {reason}"
+    message = (
+        "no way from this state onto the path was found that turns toward it without stopping and keeps the limits; "
+        f"brake first, and plan from where the robot will rest; of the last way tried: {reason}"
+    )
     raise SolveError(message, name="state")
 
 
