@@ -327,8 +327,10 @@ def march_robot(
         sizes = _sizes(problem, whole)
         known = jnp.all(jnp.isfinite(sizes[:NEEDED]))
         sizes = jnp.where(jnp.isfinite(sizes), sizes, jnp.inf)
-        allowed = jnp.full(time.shape, jnp.maximum(tolerance, HARMLESS))
-        used, reach = furthest(sizes, allowed, UNUSUAL * current.longest, duration)
+        # beside a jump the upper terms are rounding, which grows: steps that it made shorter would never lead away
+        least, lasting = (HARMLESS, duration) if problem.smooth else (0.0, None)
+        allowed = jnp.full(time.shape, jnp.maximum(tolerance, least))
+        used, reach = furthest(sizes, allowed, UNUSUAL * current.longest, lasting)
         polynomial = jax.tree.map(lambda c: jnp.where(used[: len(c), None], c, 0.0), whole)
         step = jnp.minimum(jnp.minimum(reach[0], longest), jnp.abs(left))
         step = jnp.where(step >= 0.999 * jnp.abs(left), jnp.abs(left), step)
