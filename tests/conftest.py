@@ -14,7 +14,7 @@ import jax
 import pytest
 from jax._src import core  # what is private to JAX has no public name
 
-import tests.type_checks  # isort: skip # noqa: F401 - before jounce
+from tests import type_checks  # isort: skip - before jounce
 import jounce.forces  # noqa: F401 - or its types would be taken back with those of the test that needs them first
 from jounce.base.private_folder import PrivateFolder
 from jounce.cli import main
@@ -58,7 +58,8 @@ for _name in ("SIGINT", "SIGHUP"):  # ignored in what runs in the background; th
     if _number is not None and signal.getsignal(_number) is signal.SIG_IGN:
         signal.signal(_number, signal.default_int_handler if _name == "SIGINT" else signal.SIG_DFL)
 LARGEST_STORE = 2**30  # bytes of compiled programs that are kept between runs
-LARGEST_MEMORY = 2**30  # bytes of a worker, after which compiled programs are forgotten
+_physical = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE") if hasattr(os, "sysconf") else 0
+LARGEST_MEMORY = max(2**30, _physical // 8)  # bytes of a worker, after which compiled programs are forgotten
 MEMORY_MAPS = 65530  # of a process, unless the system is set up otherwise
 
 
@@ -79,6 +80,12 @@ def pytest_collection_finish():
     gc.collect()
     gc.freeze()
     gc.set_threshold(100_000, 20, 20)
+
+
+@pytest.fixture(autouse=True, scope="session")
+def _types_are_checked():
+    """Run no test without the checks of types unless that was asked for."""
+    assert type_checks.installed == type_checks.wanted, "how pytest was called hid that this process runs tests itself"
 
 
 @pytest.fixture(autouse=True, scope="module")

@@ -8,6 +8,9 @@ from collections.abc import Iterator
 lock = threading.RLock()
 """Held while rooms are imported within functions: threads that import several at once may get each other's half."""
 
+frozen = threading.Event()
+"""Set once objects of others were found frozen, which takes as long as there are many of them to count."""
+
 
 @contextlib.contextmanager
 def uncollected() -> Iterator[None]:
@@ -23,7 +26,9 @@ def uncollected() -> Iterator[None]:
     try:
         yield
     finally:
-        if not gc.get_freeze_count():  # what is imported stays: it counts as old without being looked through
+        if not frozen.is_set() and gc.get_freeze_count():
+            frozen.set()
+        if not frozen.is_set():  # what is imported stays: it counts as old without being looked through
             gc.freeze()
             gc.unfreeze()
         gc.enable()

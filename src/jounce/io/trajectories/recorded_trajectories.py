@@ -84,7 +84,7 @@ def _as_points(recording: Recording, joint: int) -> AbstractMotion:
     return HermiteMotion(recording.times[rows], _trimmed(table[rows]), incomplete=True)
 
 
-def _trimmed(table: Float[np.ndarray, "row level"]) -> Float[np.ndarray, "row level"]:
+def _trimmed(table: Float[np.ndarray, "row level"]) -> Float[np.ndarray, "row known"]:
     """Leave out levels that no two points beside each other know."""
     known = ~np.isnan(table)
     both = (known[1:] & known[:-1]).any(axis=0)
