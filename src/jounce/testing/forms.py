@@ -22,7 +22,7 @@ from jounce.jet import Jet
 from jounce.mechanism import Body, Mechanism
 from jounce.rigid import PlanarPose, SpatialPose
 from jounce.testing.samples import BODIES, INSTANT, group_of, pose_of, random_motion
-from jounce.testing.subject import Broken, LeftOut, Subject, evaluated
+from jounce.testing.subject import Broken, LeftOut, Subject, residual
 
 LANES = 9  # instants: more than one vector of the processor, and a remainder
 
@@ -72,13 +72,9 @@ def files(subject: Subject) -> None:
         write_mechanism(mechanism, path)
         read = getattr(load(path), f"{role}s")["own"]
     motion = random_motion(subject.random(), space, 2)
-    first, second = (_residual(group_of([each], space), motion) for each in (element, read))
+    first, second = (residual(group_of([each], space), motion) for each in (element, read))
     if type(read) is not kind or not np.array_equal(first, second):
         raise Broken("a joint that was written to a file and read is not the same")
-
-
-def _residual(group: Any, motion: Any) -> np.ndarray:
-    return evaluated(group, pose_of(motion), Jet.variable(np.full((1, 1), INSTANT), len(motion["position"]) - 1))
 
 
 def back_ends(subject: Subject) -> None:

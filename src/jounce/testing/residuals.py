@@ -17,10 +17,12 @@ from jounce.testing.samples import (
     directions,
     displaced,
     group_of,
+    lanes_of,
     moved_together,
     pose_of,
     random_motion,
     time_jet,
+    widened,
     with_unknowns,
 )
 from jounce.testing.subject import Broken, LeftOut, Subject, evaluated, residual
@@ -47,9 +49,11 @@ def jacobian(subject: Subject) -> None:
         lanes[k, ..., 2 * k - 1] = 0
     lanes[1:, ..., 2 * order :] = 0
     lanes[1, ..., 2 * order :] = unit
+    count = lanes.shape[-1]
+    lanes = widened(lanes, lanes_of(subject.space))
     running = jnp.asarray(np.arange(lanes.shape[-1]) < 2 * order, float)[None]
     time = Jet((jnp.full_like(running, INSTANT), running, *[None] * (order - 1)))
-    derivative = evaluated(group, with_unknowns(motion, lanes), time)
+    derivative = evaluated(group, with_unknowns(motion, lanes), time)[..., :count]
 
     slopes = derivative[1, ..., 2 * order :]
     for k in range(1, order + 1):
@@ -59,7 +63,7 @@ def jacobian(subject: Subject) -> None:
         subject.same(change, slopes @ x, 1e-12, words)
 
     step = 1e-4
-    still = Jet([jnp.full((1, 4 * unit.shape[-1]), INSTANT)])
+    still = np.full(4 * unit.shape[-1], INSTANT)
     moved = displaced(motion, np.concatenate([s * step * unit for s in (2, 1, -1, -2)], axis=-1))
     far, near, behind, far_behind = np.split(residual(group, moved, still)[0], 4, axis=-1)
     differences = (-far + 8 * near - 8 * behind + far_behind) / (12 * step)
@@ -117,7 +121,7 @@ def _around(subject: Subject, group: Group, motion: Motion, jets: Any, reach: fl
         for name, series in motion.items()
     }
     around["position"][..., 0, :] = 0
-    values = residual(group, around, Jet([jnp.asarray(INSTANT + steps)[None]]))[0]
+    values = residual(group, around, INSTANT + steps)[0]
     if period := subject.period_of(group):
         values[-1] = np.unwrap(values[-1], period=period)
         values[-1] += period * np.round((jets[0, -1] - values[-1, :, [NODES // 2]]) / period)

@@ -179,6 +179,19 @@ def directions(space: str) -> np.ndarray:
     return np.concatenate([np.zeros((c, 1, moving * c)), np.swapaxes(each, 0, 1)], axis=1)
 
 
+def lanes_of(space: str) -> int:
+    """Return the number of lanes in which residuals are evaluated: differences of all coordinates take so many.
+
+    Other evaluations are filled up to it, so that they share its compiled operations.
+    """
+    return 4 * (len(BODIES) - 1) * coordinates_of(space)
+
+
+def widened(values: np.ndarray, lanes: int) -> np.ndarray:
+    """Return arrays of which the last lane is repeated until there are a number of lanes."""
+    return np.pad(values, [*[(0, 0)] * (values.ndim - 1), (0, max(lanes - values.shape[-1], 0))], mode="edge")
+
+
 def repeated(motion: Motion, batch: int) -> dict[str, np.ndarray]:
     """Return the motion at order zero, the same in every lane of a batch."""
     return {name: np.repeat(series[:1], batch, axis=-1) for name, series in motion.items()}

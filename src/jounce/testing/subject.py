@@ -4,11 +4,12 @@ import dataclasses
 from functools import cached_property
 from typing import Any
 
+import jax.numpy as jnp
 import numpy as np
 
 from jounce.jet import Jet
 from jounce.mechanism.system import Group
-from jounce.testing.samples import Motion, Samples, group_of, pose_of, random_motion, time_jet
+from jounce.testing.samples import Motion, Samples, group_of, lanes_of, pose_of, random_motion, time_jet, widened
 
 
 class LeftOut(Exception):  # noqa: N818 - it is no error
@@ -89,11 +90,19 @@ def random_start(subject: Subject, random: np.random.Generator) -> Motion:
     return random_motion(random, subject.space, 0)
 
 
-def residual(group: Group, motion: Motion, time: Jet | None = None) -> np.ndarray:
-    """Return coefficients of the residual on a motion, shape (order + 1, rows, instances, batch)."""
-    order = len(motion["position"]) - 1
-    time = time_jet(order, motion["position"].shape[-1]) if time is None else time
-    return evaluated(group, pose_of(motion), time)
+def residual(group: Group, motion: Motion, instants: np.ndarray | None = None) -> np.ndarray:
+    """Return coefficients of the residual on a motion, shape (order + 1, rows, instances, batch).
+
+    Time runs at the instant of all samples, or is held at one instant for each lane.
+    """
+    batch = motion["position"].shape[-1]
+    lanes = max(batch, lanes_of("planar" if "angle" in motion else "spatial"))
+    wide = {name: widened(series, lanes) for name, series in motion.items()}
+    if instants is None:
+        time = time_jet(len(motion["position"]) - 1, lanes)
+    else:
+        time = Jet([jnp.asarray(widened(instants, lanes))[None]])
+    return evaluated(group, pose_of(wide), time)[..., :batch]
 
 
 def evaluated(group: Group, pose: Any, time: Jet) -> np.ndarray:
