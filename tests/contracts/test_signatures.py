@@ -53,6 +53,15 @@ def test_functions_say_what_they_take_and_return():
     assert [f"{name}, {place}" for name, function in found.items() for place in open_places(function)] == []
 
 
+def test_help_shows_short_types():
+    signatures = {name: str(inspect.signature(function)) for name, function in functions().items()}
+    long = ("jaxtyping.", "_jax.Array | numpy.ndarray | collections")
+    assert [name for name, text in signatures.items() if "." not in name and any(part in text for part in long)] == []
+    assert "q: ArrayLike" in signatures["inverse_dynamics"]
+    assert signatures["inverse_dynamics"].endswith("-> Array")
+    assert "time: Optional[TimeLike] = None" in signatures["solve"]
+
+
 Anything = typing.Any
 
 

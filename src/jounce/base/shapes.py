@@ -3,20 +3,35 @@
 A shape stands in an annotation as jaxtyping writes it, and beartype checks it while tests run. Axes are named alike
 everywhere: within the library `order` first, components next, `*batch` last; at its doors `*batch` or `time` first,
 then `derivative`, then `joint`, `row`, `column` or a component. An axis `order` or `derivative` counts from zero.
+
+Public functions write `Array` for `Float`, and name the unions that they take by `TypeAliasType`: in a signature that
+``help`` shows such an alias is its name. The checks see what it stands for.
 """
 
 import datetime
 import re
 from collections.abc import Callable, Iterable, Sequence
-from typing import Any, Protocol, TypeGuard, runtime_checkable
+from typing import TYPE_CHECKING, Any, Protocol, TypeGuard, runtime_checkable
 
 import jax
 import jax.numpy as jnp
+import jaxtyping
 import numpy as np
 from jax.core import Tracer
+from typing_extensions import TypeAliasType
 
 Numbers = jax.Array | np.ndarray
 """An array of JAX or NumPy."""
+
+if TYPE_CHECKING:
+    from jaxtyping import Float as Array
+else:
+
+    class Array:
+        """An array of floats of some shape, as `jaxtyping.Float` writes it; ``help`` shows it by this short name."""
+
+        def __class_getitem__(cls, kind_and_shape: tuple[Any, str]) -> TypeAliasType:
+            return TypeAliasType("Array", jaxtyping.Float[kind_and_shape])
 
 
 @runtime_checkable
@@ -26,10 +41,10 @@ class Labeled(Protocol):
     def __array__(self, *args: Any, **options: Any) -> np.ndarray: ...
 
 
-ArrayLike = Numbers | Sequence | np.floating | np.integer | float | int | Labeled
+ArrayLike = TypeAliasType("ArrayLike", Numbers | Sequence | np.floating | np.integer | float | int | Labeled)
 """What becomes an array of numbers: an array, lists or tuples of numbers in any nesting, a number."""
 
-Real = Numbers | np.floating | np.integer | float | int
+Real = TypeAliasType("Real", Numbers | np.floating | np.integer | float | int)
 """Real numbers: an array or one number."""
 
 Refused = object

@@ -6,8 +6,9 @@ from typing import Any
 
 import numpy as np
 from jaxtyping import Float, Int
+from typing_extensions import TypeAliasType
 
-from jounce.base.shapes import ArrayLike, seconds
+from jounce.base.shapes import Array, ArrayLike, seconds
 from jounce.errors import MechanismError
 from jounce.mechanism.resolve import resolve
 from jounce.trajectory import Expression
@@ -41,7 +42,7 @@ class TimeGrid:
     count: Any = None
 
 
-TimeLike = ArrayLike | TimeGrid
+TimeLike = TypeAliasType("TimeLike", ArrayLike | TimeGrid)
 """Instants, s: a list or an array of them, or an evenly spaced grid."""
 
 
@@ -84,7 +85,7 @@ class SpacedInstants:
 Instants = Float[np.ndarray, " time"] | SpacedInstants
 
 
-def time_grid(time: TimeLike | None, parameters: Mapping[str, Any]) -> Float[np.ndarray, " time"]:
+def time_grid(time: TimeLike | None, parameters: Mapping[str, Any]) -> Array[np.ndarray, " time"]:
     """Return the instants of a grid, shape (time,), s; raise MechanismError as `instants_of` does."""
     return np.asarray(instants_of(time, parameters))
 

@@ -6,7 +6,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Bool, Float
 
-from jounce.base.shapes import Numbers, is_traced
+from jounce.base.shapes import Array, Numbers, is_traced
 from jounce.errors import JounceError, SingularityError, check_choice
 from jounce.jet import Jet, atan2, cos, cross, dot, matvec, sin, sqrt, stack, transpose
 from jounce.jet.algebra import JetLike, total
@@ -202,7 +202,7 @@ def angle_rates(sequence: str, angles: JetLike, angular_velocity: JetLike, frame
         known = rates.integrate(value)
 
 
-def singularity_distance(sequence: str, angles: JetLike) -> Float[Numbers, "*batch"]:
+def singularity_distance(sequence: str, angles: JetLike) -> Array[Numbers, "*batch"]:
     """Return how far an orientation is from a singular one: the volume that the three axes of rotation span.
 
     Parameters

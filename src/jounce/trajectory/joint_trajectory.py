@@ -10,7 +10,7 @@ import numpy as np
 from jaxtyping import Float
 
 from jounce.base.display import Displayed
-from jounce.base.shapes import ArrayLike, seconds
+from jounce.base.shapes import Array, ArrayLike, seconds
 from jounce.errors import JounceError, MechanismError, SampleWarning, TrajectoryError, check_name
 from jounce.jet import Jet
 from jounce.trajectory.checks import check_samples, finite, finite_numbers, finite_row, positive, whole_number
@@ -242,7 +242,7 @@ class JointTrajectory(Displayed):
 
     def derivatives(
         self, times: ArrayLike, order: int, names: Iterable[str] | None = None
-    ) -> Float[np.ndarray, "time derivative joint"]:
+    ) -> Array[np.ndarray, "time derivative joint"]:
         """Return the positions and their derivatives at instants.
 
         Parameters
@@ -284,7 +284,7 @@ class JointTrajectory(Displayed):
             raise TrajectoryError(message, name=f"laws.{chosen[joint]}")
         return result
 
-    def estimate_error(self, order: int, names: Iterable[str] | None = None) -> Float[np.ndarray, "derivative joint"]:
+    def estimate_error(self, order: int, names: Iterable[str] | None = None) -> Array[np.ndarray, "derivative joint"]:
         """Estimate the errors of the derivatives that come from samples, relative to their peaks.
 
         The error of interpolation is estimated from splines through every second sample; to it three

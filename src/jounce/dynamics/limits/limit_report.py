@@ -4,9 +4,9 @@ import dataclasses
 from collections.abc import Mapping
 
 import numpy as np
-from jaxtyping import Float
 
 from jounce.base.display import Displayed
+from jounce.base.shapes import Array
 from jounce.dynamics.limits.motion_ends import TrajectoryEnd
 from jounce.robot.algorithms.carried_loads import LoadChange
 
@@ -122,9 +122,9 @@ class LimitReport(LimitRows, Displayed):
     joint_names: tuple[str, ...]
     rows: tuple[LimitRow, ...]
     held: Mapping[str, float]
-    times: Float[np.ndarray, " time"]
-    values: Float[np.ndarray, "time 6 joint"]
-    shares: Float[np.ndarray, "time 6 joint"]
+    times: Array[np.ndarray, " time"]
+    values: Array[np.ndarray, "time 6 joint"]
+    shares: Array[np.ndarray, "time 6 joint"]
     drives: bool = True
     ends: tuple[TrajectoryEnd, ...] = ()
     hand_over: bool = False

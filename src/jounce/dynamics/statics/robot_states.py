@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 from jaxtyping import Float
+from typing_extensions import TypeAliasType
 
 from jounce.base.shapes import ArrayLike
 from jounce.dynamics.forward.initial_state import TOLERANCE
@@ -22,7 +23,7 @@ from jounce.robot.model.arguments import floats
 
 DRIVE = "_drive"
 
-GivenState = Mapping[str, float] | ArrayLike | None
+GivenState = TypeAliasType("GivenState", Mapping[str, float] | ArrayLike | None)
 """Coordinates, with or without their rates and second derivatives, or by name of the joint; others are zero."""
 
 

@@ -8,7 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
-from jounce.base.shapes import ArrayLike, Numbers, seconds
+from jounce.base.shapes import Array, ArrayLike, Numbers, seconds
 from jounce.dynamics.energy.energies import body_energy
 from jounce.dynamics.energy.potential import energy_of_forces
 from jounce.dynamics.forward.accelerations import Equations, Instants, Lanes, State, expand
@@ -178,17 +178,17 @@ class Simulation(Motion):
         return Simulation(self.mechanism, self._start, self.dense_output, instants, order, *outcome)
 
     @property
-    def energy(self) -> Float[np.ndarray, " time"]:
+    def energy(self) -> Array[np.ndarray, " time"]:
         """Kinetic energy, potential energy in gravity, and what springs have stored, J, shape (time,)."""
         return self._checked[0]
 
     @property
-    def drift(self) -> Float[np.ndarray, " time"]:
+    def drift(self) -> Array[np.ndarray, " time"]:
         """Largest residual of joints and drivers, rad or sizes of the mechanism, shape (time,)."""
         return self._checked[1]
 
     @property
-    def kinetic_energy(self) -> Float[np.ndarray, " time"]:
+    def kinetic_energy(self) -> Array[np.ndarray, " time"]:
         """Kinetic energy, J, shape (time,)."""
         return self._checked[2]
 

@@ -4,8 +4,8 @@ import dataclasses
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float
 
+from jounce.base.shapes import Array
 from jounce.kinematics.position_analysis.solve import solve
 from jounce.planning.elastic.driven_systems import DrivenMechanism, DrivenRobot
 from jounce.planning.elastic.motor_motion import Feedforward
@@ -34,9 +34,9 @@ class LinkErrors:
 
     names: tuple[str, ...]
     units: tuple[str, ...]
-    time: Float[np.ndarray, " time"]
-    exact: Float[np.ndarray, "time name"]
-    rigid: Float[np.ndarray, "time name"] | None
+    time: Array[np.ndarray, " time"]
+    exact: Array[np.ndarray, "time name"]
+    rigid: Array[np.ndarray, "time name"] | None
 
 
 def link_errors(feedforward: Feedforward, *, rigid: bool = True) -> LinkErrors:

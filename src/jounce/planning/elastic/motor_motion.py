@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Float
 
 from jounce.base.display import Displayed
-from jounce.base.shapes import ArrayLike, seconds
+from jounce.base.shapes import Array, ArrayLike, seconds
 from jounce.dynamics.limits.check_limits import worst_instants
 from jounce.dynamics.limits.limit_report import LimitRow, LimitRows
 from jounce.errors import TrajectoryError
@@ -52,13 +52,13 @@ class MotorMotion:
     """
 
     names: tuple[str, ...]
-    q: Float[np.ndarray, "*batch level joint"]
-    spring_torque: Float[np.ndarray, "*batch level joint"]
-    deflection: Float[np.ndarray, "*batch level joint"]
-    position: Float[np.ndarray, "*batch level joint"]
-    torque: Float[np.ndarray, "*batch torque_level joint"]
-    motor_position: Float[np.ndarray, "*batch level joint"]
-    motor_torque: Float[np.ndarray, "*batch torque_level joint"]
+    q: Array[np.ndarray, "*batch level joint"]
+    spring_torque: Array[np.ndarray, "*batch level joint"]
+    deflection: Array[np.ndarray, "*batch level joint"]
+    position: Array[np.ndarray, "*batch level joint"]
+    torque: Array[np.ndarray, "*batch torque_level joint"]
+    motor_position: Array[np.ndarray, "*batch level joint"]
+    motor_torque: Array[np.ndarray, "*batch torque_level joint"]
 
 
 def motor_motion(

@@ -11,6 +11,7 @@ from collections.abc import Callable
 import numpy as np
 from jaxtyping import Float
 
+from jounce.base.shapes import Array
 from jounce.errors import TrajectoryError
 from jounce.planning.elastic.pieces import ANALYSIS, POINTS, points_of, resolved
 
@@ -125,7 +126,7 @@ class SpringDeflection:
             deflection[level] = np.where(level <= last, expanded, beyond)
         return deflection.T
 
-    def at(self, times: Float[np.ndarray, " time"]) -> Float[np.ndarray, "time level joint"]:
+    def at(self, times: Array[np.ndarray, " time"]) -> Array[np.ndarray, "time level joint"]:
         """Return deflections and their derivatives at instants of the trajectory."""
         nodes = self.pieces.nodes
         if not len(self.damped):
@@ -147,7 +148,7 @@ class SpringDeflection:
         deflection[between] = moved
         return deflection
 
-    def expansion_errors(self) -> Float[np.ndarray, "order joint"]:
+    def expansion_errors(self) -> Array[np.ndarray, "order joint"]:
         """Return what the regular expansion misses of the deflection, cut after each order, by its peak; 0 undamped."""
         terms = self.at_nodes * (-self.time_constant) ** np.arange(self.levels)[:, None] / self.stiffness
         missed = np.abs(np.cumsum(terms, axis=1) - self.solution[:, :1]).max(axis=0)

@@ -4,9 +4,10 @@ import dataclasses
 from typing import Any
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Bool, Int
 
 from jounce.base.display import Displayed
+from jounce.base.shapes import Array
 from jounce.kinematics import Status
 from jounce.planning.tool_paths.task_rank import losing_joints
 
@@ -38,14 +39,14 @@ class JointPoses(Displayed):
         Which joints are at a limit at `closest`.
     """
 
-    q: Float[np.ndarray, "*batch n"]
+    q: Array[np.ndarray, "*batch n"]
     status: Int[np.ndarray, "*batch"]
-    closest: Float[np.ndarray, "*batch n"]
-    distance: Float[np.ndarray, "*batch"]
-    angle: Float[np.ndarray, "*batch"]
+    closest: Array[np.ndarray, "*batch n"]
+    distance: Array[np.ndarray, "*batch"]
+    angle: Array[np.ndarray, "*batch"]
     singular: Bool[np.ndarray, "*batch"]
-    singular_values: Float[np.ndarray, "*batch rank"]
-    shares: Float[np.ndarray, "*batch n"]
+    singular_values: Array[np.ndarray, "*batch rank"]
+    shares: Array[np.ndarray, "*batch n"]
     joint_names: tuple[str, ...]
     limited: Bool[np.ndarray, "*batch n"]
 

@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Float
 
 from jounce.base.display import Displayed
-from jounce.base.shapes import ArrayLike, seconds
+from jounce.base.shapes import Array, ArrayLike, seconds
 from jounce.dynamics.limits.local_maxima import local_maxima
 from jounce.errors import JounceError, TrajectoryError
 from jounce.jet import Jet, dot, sqrt
@@ -153,7 +153,7 @@ class ToolPath(Displayed):
         return min([MAX_ORDER, *(degree - 1 for degree in degrees)])
 
     @property
-    def knots(self) -> Float[np.ndarray, " knots"]:
+    def knots(self) -> Array[np.ndarray, " knots"]:
         """Instants within at which a derivative of a law is known to jump; those of `abs` in expressions are not."""
         if self._progress is not None:  # what the other laws are of is no time
             return knots(self._progress.laws["progress"], self.start, self.stop)
@@ -172,7 +172,7 @@ class ToolPath(Displayed):
     def __repr__(self) -> str:
         return f"<ToolPath of {', '.join(self.kinds)}; {self.start:g} to {self.stop:g} s>"
 
-    def position(self, times: ArrayLike, order: int = 0) -> Float[np.ndarray, "time derivative 3"]:
+    def position(self, times: ArrayLike, order: int = 0) -> Array[np.ndarray, "time derivative 3"]:
         """Return the position at instants with its derivatives, m by s.
 
         Raises
@@ -190,7 +190,7 @@ class ToolPath(Displayed):
             0,
         )
 
-    def series(self, times: Float[np.ndarray, " time"], order: int) -> Goal:
+    def series(self, times: Array[np.ndarray, " time"], order: int) -> Goal:
         """Return the Taylor coefficients of what is followed at instants, components first, the instants last.
 
         Raises

@@ -13,7 +13,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
-from jounce.base.shapes import ArrayLike, Numbers
+from jounce.base.shapes import Array, ArrayLike, Numbers
 from jounce.errors import RobotError, check_choice, flag
 from jounce.jet import Jet, components, cross, dot
 from jounce.jet.algebra import stacked, total
@@ -177,7 +177,7 @@ def _bias(tree: Tree, arrays: tuple[Series], _: Any, parts: frozenset[str], driv
 @stacked_arguments(2, "jn.mass_matrix(robot, q) for pin.crba(model, data, q)")
 def mass_matrix(
     robot: Robot, q: ArrayLike, *, rates: bool = False, drives: bool = True
-) -> Float[Numbers, "*batch joint joint"]:
+) -> Array[Numbers, "*batch joint joint"]:
     """Return the mass matrix of a robot, and on request its time derivatives to any order, exact to rounding.
 
     ``tau = M q'' + bias``, with `bias_forces`; and by Leibniz's rule ``tau^(k) = sum_j C(k, j) M^(j) q^(2 + k - j) +
@@ -231,7 +231,7 @@ def mass_matrix(
 @stacked_arguments(2, "jn.bias_forces(robot, np.stack([q, v])) for pin.nonLinearEffects(model, data, q, v)")
 def bias_forces(
     robot: Robot, q: ArrayLike, *, rates: bool = False, parts: str | Sequence[str] = PARTS, drives: bool | None = None
-) -> Float[Numbers, "*batch joint"]:
+) -> Array[Numbers, "*batch joint"]:
     """Return the joint torques or forces that velocities and gravity need, and on request their rates.
 
     What `inverse_dynamics` gives where all accelerations are zero: ``tau = M q'' + bias``, with `mass_matrix`.

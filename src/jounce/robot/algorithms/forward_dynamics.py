@@ -9,7 +9,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
-from jounce.base.shapes import ArrayLike, Numbers, is_traced
+from jounce.base.shapes import Array, ArrayLike, Numbers, is_traced
 from jounce.errors import RobotError, SingularityError, check_name, flag
 from jounce.robot.algorithms.base_motion import BaseMotion, base_arrays, base_body
 from jounce.robot.algorithms.motion_series import MotionSeries, motion_series
@@ -38,7 +38,7 @@ def forward_dynamics(
     drives: bool = True,
     base: None = None,
     strict: bool = True,
-) -> Float[Numbers, "*batch derivative joint"]: ...
+) -> Array[Numbers, "*batch derivative joint"]: ...
 @overload
 def forward_dynamics(
     robot: Robot,
@@ -51,7 +51,7 @@ def forward_dynamics(
     drives: bool = True,
     base: BaseMotion,
     strict: bool = True,
-) -> tuple[BaseMotion, Float[Numbers, "*batch derivative joint"]]: ...
+) -> tuple[BaseMotion, Array[Numbers, "*batch derivative joint"]]: ...
 @stacked_arguments(3, "jn.forward_dynamics(robot, np.stack([q, v]), tau[None])[2] for pin.aba(model, data, q, v, tau)")
 def forward_dynamics(
     robot: Robot,
@@ -64,7 +64,7 @@ def forward_dynamics(
     drives: bool = True,
     base: BaseMotion | None = None,
     strict: bool = True,
-) -> Float[Numbers, "*batch derivative joint"] | tuple[BaseMotion, Float[Numbers, "*batch derivative joint"]]:
+) -> Array[Numbers, "*batch derivative joint"] | tuple[BaseMotion, Array[Numbers, "*batch derivative joint"]]:
     """Return the motion that joint torques or forces cause, to any order: the inverse of `inverse_dynamics`.
 
     Articulated bodies (Featherstone 2008, Rigid Body Dynamics Algorithms, chapter 7), in a time linear in the number of

@@ -7,7 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
-from jounce.base.shapes import ArrayLike, Numbers
+from jounce.base.shapes import Array, ArrayLike, Numbers
 from jounce.errors import RobotError, check_choice, flag
 from jounce.jet import Jet, concatenate, cross, matvec
 from jounce.jet.algebra import stacked, total
@@ -32,7 +32,7 @@ def inverse_dynamics(
     time: ArrayLike | None = None,
     drives: bool = True,
     base: BaseMotion | None = None,
-) -> Float[Numbers, "*batch derivative joint"]:
+) -> Array[Numbers, "*batch derivative joint"]:
     """Return the joint torques or forces that a motion needs, and their rates, exact to rounding.
 
     Recursive Newton-Euler on jets: Negrean 2025, equations 123-125 and 144-146, to any order.
@@ -87,7 +87,7 @@ def inverse_dynamics(
 
 def joint_wrenches(
     robot: Robot, q: ArrayLike, *, wrenches: Sequence[Wrench] = (), time: ArrayLike | None = None, frame: str = "link"
-) -> Float[Numbers, "*batch derivative body 6"]:
+) -> Array[Numbers, "*batch derivative body 6"]:
     """Return the forces and moments that the joints carry, and their rates: what bearings and flanges feel.
 
     Parameters

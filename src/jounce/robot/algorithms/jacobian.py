@@ -4,9 +4,8 @@ import math
 from typing import Any
 
 import jax.numpy as jnp
-from jaxtyping import Float
 
-from jounce.base.shapes import ArrayLike, Numbers
+from jounce.base.shapes import Array, ArrayLike, Numbers
 from jounce.errors import RobotError, whole_number
 from jounce.jet import Jet, concatenate, cross
 from jounce.jet.algebra import stacked
@@ -45,7 +44,7 @@ def _jacobian(tree: Tree, arrays: tuple[Series], frame: Frame) -> Any:
 )
 def jacobian(
     robot: Robot, q: ArrayLike, link: str, point: ArrayLike = (0.0, 0.0, 0.0)
-) -> Float[Numbers, "*batch derivative 6 joint"]:
+) -> Array[Numbers, "*batch derivative 6 joint"]:
     """Return the Jacobian of a point of a link and its time derivatives, to any order.
 
     Parameters
@@ -83,7 +82,7 @@ def jacobian(
 
 def point_slope(
     robot: Robot, q: ArrayLike, link: str, point: ArrayLike = (0.0, 0.0, 0.0), *, n: int = 1, m: int = 1
-) -> Float[Numbers, "*batch 3 joint"]:
+) -> Array[Numbers, "*batch 3 joint"]:
     """Return ``dr^(n) / dq^(m)``: how the n-th derivative of a point changes with the m-th one of each coordinate.
 
     Negrean 2025, equations 50-55: ``C(n, m)`` times the rate of order n - m of the Jacobian of the point; where n is
@@ -135,7 +134,7 @@ def _operational(tree: Tree, arrays: tuple[Series], frame: Frame) -> Any:
 
 def operational_accelerations(
     robot: Robot, q: ArrayLike, link: str, point: ArrayLike = (0.0, 0.0, 0.0)
-) -> Float[Numbers, "*batch order 6"]:
+) -> Array[Numbers, "*batch order 6"]:
     """Return the operational velocity and accelerations of all orders of a point of a link: Negrean 2025, equation 59.
 
     Parameters

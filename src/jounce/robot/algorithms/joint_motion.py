@@ -10,7 +10,7 @@ import numpy as np
 from jax.core import Tracer
 from jaxtyping import Bool, Float
 
-from jounce.base.shapes import ArrayLike, Numbers
+from jounce.base.shapes import Array, ArrayLike, Numbers
 from jounce.errors import RobotError, SingularityError, check_choice
 from jounce.jet.algebra import stacked
 from jounce.linear_algebra.linear import singular_values
@@ -42,10 +42,10 @@ class JointMotion:
         What the motion lacks of the one prescribed: zero to rounding, unless damped or where joints are too few.
     """
 
-    q: Float[Numbers, "*batch derivative joint"]
-    singular_values: Float[Numbers, "*batch value"]
+    q: Array[Numbers, "*batch derivative joint"]
+    singular_values: Array[Numbers, "*batch value"]
     singular: Bool[Numbers, "*batch"] | np.bool
-    residual: Float[Numbers, "*batch derivative-1 row"]
+    residual: Array[Numbers, "*batch derivative-1 row"]
 
 
 @Batched

@@ -7,9 +7,8 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from jax.core import Tracer
-from jaxtyping import Float
 
-from jounce.base.shapes import ArrayLike, Numbers
+from jounce.base.shapes import Array, ArrayLike, Numbers
 from jounce.errors import RobotError, check_name
 from jounce.jet import Jet, sine_cosine
 from jounce.jet.algebra import stacked, total
@@ -105,9 +104,9 @@ class FrameMotion:
         Angular velocity, acceleration, jerk, ...; rad/s by s.
     """
 
-    position: Float[Numbers, "*batch derivative 3"]
-    rotation: Float[Numbers, "*batch derivative 3 3"]
-    angular_velocity: Float[Numbers, "*batch derivative-1 3"]
+    position: Array[Numbers, "*batch derivative 3"]
+    rotation: Array[Numbers, "*batch derivative 3 3"]
+    angular_velocity: Array[Numbers, "*batch derivative-1 3"]
 
 
 @Batched
@@ -166,7 +165,7 @@ def _center_of_mass(tree: Tree, arrays: tuple[Series], constants: Any) -> Any:
     return stacked(centers.map(lambda c: jnp.einsum("cbs,b->cs", c, share)))
 
 
-def center_of_mass(robot: AbstractRobot, q: ArrayLike) -> Float[Numbers, "*batch derivative 3"]:
+def center_of_mass(robot: AbstractRobot, q: ArrayLike) -> Array[Numbers, "*batch derivative 3"]:
     """Return the center of mass of the whole robot and its derivatives: Negrean 2025, equations 44-48 and 55.
 
     Parameters
