@@ -1,6 +1,6 @@
 """Kinetic energy and acceleration energies of any order, with their rates. Negrean 2025, equations 65-122.
 
-The acceleration energy of order p is the kinetic energy with derivatives of order p + 1 in the place of velocities,
+The acceleration energy of order p is the kinetic energy with derivatives of order p + 1 in place of velocities,
 ``E_p = 1/2 integral |r^(p+1)|^2 dm``; order 0 is the kinetic energy. With the second moments S of a body about its
 center of mass C and its axes a this is ``m/2 |r_C^(p+1)|^2 + 1/2 sum S_jk a_j^(p+1) . a_k^(p+1)`` (equation 107), exact
 for any motion. On jets the same two products give the rates.
@@ -43,19 +43,20 @@ Energies = Float[Numbers, "order body time"]
 """Taylor coefficients of energies of bodies along a motion."""
 
 EnergyFunction = Callable[..., tuple[Jet, ...]]
-"""What maps a pose, masses, centers, second moments and an order to energies, as `body_energy` does."""
+"""A function of a pose, masses, centers of mass, second moments and an order that returns energies: `body_energy`."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Energy:
-    """An energy of several bodies, translation and rotation apart, with its rates.
+    """The energy of several bodies with its rates, separately for translation and rotation.
 
-    Of a robot it holds plain arrays, of a motion `xarray.DataArray` of dimensions time, derivative and body.
+    The energy of a robot consists of plain arrays, that of a motion of `xarray.DataArray` with the dimensions time,
+    derivative and body.
 
     Parameters
     ----------
     translation, rotation : array of shape (..., rates + 1, bodies)
-        The parts of each body, kg m^2 / s^(2 p + 2) for order p, and their derivatives.
+        The two parts for each body, kg m^2 / s^(2 p + 2) for order p, and their derivatives.
     bodies : tuple of str
         Names along the last axis.
     order : int
@@ -74,7 +75,7 @@ class Energy:
 
 
 def summed(energies: Any) -> Any:
-    """Return energies of bodies added up; NaN where one of them is."""
+    """Return the sum of the energies of all bodies; it is NaN if one of them is."""
     return energies.sum("body", skipna=False) if hasattr(energies, "dims") else energies.sum(axis=-1)
 
 
@@ -86,9 +87,9 @@ def body_energy(
     Parameters
     ----------
     pose : SpatialPose, PlanarPose or Frames
-        Where the bodies are, as jets of order `order` + 1 or more.
+        Poses of the bodies, as jets of order `order` + 1 or higher.
     mass : array_like
-        kg; its shape is that of the batch axes of the pose.
+        Masses, kg, in the shape of the batch axes of the pose.
     center_of_mass : array of shape (3, ...) or (2, ...)
         In the frames of the bodies, m.
     second_moments : array of shape (3, 3, ...) or (2, 2, ...)
@@ -99,7 +100,7 @@ def body_energy(
     Returns
     -------
     translation, rotation : Jet
-        Shorter than the pose by `order` + 1.
+        Their order is lower than that of the pose by `order` + 1.
 
     Raises
     ------
@@ -130,7 +131,7 @@ def body_energy(
 
 
 def axes_of(pose: Pose | Frames) -> tuple[Jet, ...]:
-    """Return the axes of bodies, two in the plane, in components of the base."""
+    """Return the axes of the body frames, two in the plane, in components of the base frame."""
     return tuple(pose.direction(unit) for unit in np.eye(2)) if isinstance(pose, PlanarPose) else pose.axes
 
 
@@ -165,13 +166,13 @@ def acceleration_energy(
     order : int, default 1
         The order p; 0 is the kinetic energy.
     drives : bool, default True
-        Of a robot: count the rotors of the drives, ``1/2 I (q^(p+1))^2`` for the armature I of a joint, with the
-        rotation of the link that it moves; those of followers with that of their leader's.
+        For robots: include the rotors of the drives. The armature inertia I of a joint adds ``1/2 I (q^(p+1))^2`` to
+        the rotation of the link that the joint moves; for followers, of the link that their leader moves.
 
     Returns
     -------
     Energy
-        With K - p - 1 rates; for a motion of derivatives to order K, one for each instant.
+        With K - p - 1 rates; for a motion with derivatives to order K, at each instant.
 
     Raises
     ------
@@ -204,16 +205,16 @@ def energy_unit(order: int) -> str:
 
 
 def error_for(system: Any) -> type[JounceError]:
-    """Return the class of errors about a robot, or about the motion of a mechanism."""
+    """Return the class of errors for a robot, or for the motion of a mechanism."""
     return MechanismError if isinstance(system, Motion) else RobotError
 
 
 def energies_of(
     system: Robot | Motion, q: ArrayLike | None, order: int, function: EnergyFunction, drives: bool = False
 ) -> tuple[Any, ...]:
-    """Return what `body_energy`, or a function like it, gives for the bodies of a system, their names, and the order.
+    """Return what `body_energy`, or a function like it, returns for a system, the names of its bodies, and the order.
 
-    The energies of rotors, on request, are added to the last of what the function gives.
+    If `drives` is true, the energies of rotors are added to the last result of the function.
 
     Raises
     ------
@@ -238,9 +239,9 @@ def energies_of(
 
 
 def rotors_of(robot: Robot, *, drives: bool) -> tuple[tuple[int, ...], tuple[int, ...], tuple[tuple[int, int], ...]]:
-    """Return the bodies with whose rotation rotors count: those that coordinates move, and the links of balls.
+    """Return the bodies to whose rotation the rotors are added: those that coordinates move, and the links of balls.
 
-    Last come the tendons with armature, by number, each with the body that the first of its coordinates moves.
+    Tendons with armature come last, by number, each with the body that the first of its coordinates moves.
     """
     if not drives:
         return (), (), ()
@@ -256,7 +257,7 @@ def rotors_of(robot: Robot, *, drives: bool) -> tuple[tuple[int, ...], tuple[int
 def kinetic_energy(system: Robot | Motion, q: ArrayLike | None = None, *, drives: bool = True) -> Energy:
     """Return the kinetic energy of a robot or of a moving mechanism, and its rates: `acceleration_energy` of order 0.
 
-    Negrean 2025, equations 65-77 (Koenig's theorem). Of a robot the armature inertia of its joints counts, unless
+    Negrean 2025, equations 65-77 (Koenig's theorem). For a robot, the armature inertia of its joints is included unless
     `drives` is False.
 
     Examples
@@ -287,7 +288,7 @@ def energies_of_tree(
     turned: tuple[int, ...],
     lined: tuple[tuple[int, int], ...],
 ) -> tuple[Float[Numbers, "levels body batch"], ...]:
-    """Return energies of all bodies of a robot, with those of rotors, on Taylor coefficients."""
+    """Return the Taylor coefficients of the energies of all bodies of a robot, rotors included."""
     frames = body_frames(tree, arrays[0]).without_base()
     *parts, last = (stacked(part) for part in function(frames, *mass_arrays(tree), order))
     if leading:  # the bodies that coordinates move, in their order
@@ -306,7 +307,7 @@ def energies_of_tree(
 
 
 def energy_coefficients(motion: Motion, order: int, function: EnergyFunction = body_energy) -> tuple[Energies, ...]:
-    """Return what `body_energy`, or a function like it, gives for bodies as Taylor coefficients, the ground first.
+    """Return the results of `body_energy`, or of a function like it, as Taylor coefficients; the ground comes first.
 
     Raises
     ------

@@ -1,7 +1,7 @@
 """The equations of a mechanism as numbers: residual, Jacobian, right sides, multipliers. Sommer 2024, 1-8.
 
-Each is what the solver works with, read off the same residuals on jets, but in SI units and in the order of the file:
-the solver scales rows and columns, and keeps joints of one type together.
+They come from the same residuals on jets as those of the solver, but in SI units and in the order of the file; the
+solver scales rows and columns, and groups joints by type.
 """
 
 import dataclasses
@@ -53,48 +53,48 @@ def constraint_equations(
     Parameters
     ----------
     motion : Motion or Mechanism
-        A motion that was solved or simulated; or a mechanism at a state, which need not be one that can be solved.
+        A solved or simulated motion, or a mechanism at a state, for which no motion needs to exist.
     state : mapping of str to mapping, optional
         For each moving body ``position``, m, and its derivatives, (n + 1, c), or the position alone, (c,). In the plane
         ``angle``, rad, and its derivatives, (n + 1,). In space ``orientation``, in any form that a `Body` takes, and
-        from n = 1 on ``angular_velocity``, rad/s, along the axes of the body, and its derivatives, (n, 3). It need
-        not fulfill the joints. For a mechanism the starting guess of its bodies unless given.
+        for n = 1 and above ``angular_velocity``, rad/s, along the axes of the body, and its derivatives, (n, 3). The
+        state need not satisfy the constraints. By default, the starting guess of the bodies of the mechanism.
     time : float, optional
-        When the drivers are looked at for a state, s; 0 unless given. A motion has its instants.
+        Instant at which the drivers are evaluated for a state, s; 0 by default. A motion has its own instants.
 
     Returns
     -------
     xarray.Dataset
-        SI units, nothing is scaled. Rows are labeled "JOINT.1", "JOINT.2", ..., joints before drivers in the order of
+        In SI units, unscaled. Rows are labeled "JOINT.1", "JOINT.2", ..., joints before drivers in the order of
         the mechanism; columns "BODY.x", "BODY.y", "BODY.angle", in space "BODY.x", "BODY.y", "BODY.z", "BODY.wx",
         "BODY.wy", "BODY.wz": the global position of the origin, and the angular velocity along the axes of the body.
-        A variable has at ``derivative=k`` its k-th derivative, or what belongs to q^(k); NaN where it has none, as
-        `right_side` at 0 where there are multipliers. The coordinate ``column_unit`` holds the units of the columns, m
-        or rad.
+        At ``derivative=k`` a variable contains its k-th derivative, or its value for q^(k), and NaN if there is none,
+        such as `right_side` at 0 if there are multipliers. The coordinate ``column_unit`` contains the units of the
+        columns, m or rad.
 
         ``residual`` (time, row)
-            Phi; angles about axes within half a turn.
+            Phi; angles about axes are within half a turn.
         ``jacobian`` (time, row, column)
-            Phi_q; in space, by w instead of coordinates of attitude: there is no row of normalization.
+            Phi_q; in space, with respect to w instead of attitude parameters, so no row for normalization is needed.
         ``right_side`` (time, derivative, row)
             Phi_q q^(k) for k = 1 to the order of the motion; at a state with n derivatives, to n + 1.
         ``velocities`` (time, derivative, column)
-            q^(k) from k = 1 on; in space, r^(k) and w^(k-1).
+            q^(k) for k = 1 and above; in space, r^(k) and w^(k-1).
         ``position`` (time, body, component), and ``angle`` (time, body) or ``attitude`` (time, body, euler_parameter)
-            Where the bodies are, m; rad, or Euler parameters from the body to the global frame, the scalar first.
+            Positions of the bodies, m; angles, rad, or Euler parameters, body to global frame, scalar first.
         ``mass_matrix`` (time, column, other_column)
-            Where there are masses: M, symmetric, about the origins of the bodies.
+            If there are masses: M, symmetric, about the origins of the bodies.
         ``multipliers`` (time, derivative, row)
-            Where there are masses or applied forces: lambda, lambda', ..., with ``M q'' + Phi_q^T lambda = Q``; Q holds
-            forces, global, and moments about the origins, along the axes of the bodies, with the terms of inertia that
-            have no q'', and what friction of joints exerts. Two orders of the motion are used up. They are left out
-            where accelerations are not known; what redundant rows leave open is NaN, or as
-            `Mechanism.redundant_reactions` chooses it.
+            If there are masses or applied forces: lambda, lambda', ..., with ``M q'' + Phi_q^T lambda = Q``. Q consists
+            of forces along the global axes and moments about the origins along the axes of the bodies, including joint
+            friction and the inertia terms without q''. They require accelerations, and have two derivatives fewer than
+            the motion. Multipliers that redundant rows leave undetermined are NaN, or chosen by
+            `Mechanism.redundant_reactions`.
 
     Raises
     ------
     MechanismError
-        If a state is given that does not fit the mechanism, or a law has no finite value there.
+        If the state does not fit the mechanism, or a law has no finite value there.
 
     Examples
     --------
@@ -176,18 +176,18 @@ def equation_labels(mechanism: Mechanism, model: Model) -> dict[str, np.ndarray]
 
 
 def _in_order(mechanism: Mechanism, model: Model) -> list[tuple[str, ElementIndex]]:
-    """Return joints and drivers in the order of the mechanism, by name."""
+    """Return joints and drivers by name, in the order of the mechanism."""
     indices = element_indices(model)
     return [(name, indices[name]) for name in (*mechanism.joints, *mechanism.drivers)]
 
 
 def row_order(mechanism: Mechanism, model: Model) -> np.ndarray:
-    """Return which row of the system each row is, in the order of the mechanism."""
+    """Return the indices of the rows within the system, in the order of the mechanism."""
     return np.array([row for _, index in _in_order(mechanism, model) for row in index.own_rows], int)
 
 
 def in_si_units(model: Model) -> System:
-    """Return the constraints of a model alone, neither rows nor columns scaled."""
+    """Return the constraints of a model without forces, rows and columns unscaled."""
     system = model.system
     count = model.pose_type.shifts + model.pose_type.turns
     ones = np.ones((system.shape[0], 1)), np.ones(count)
@@ -218,7 +218,7 @@ def _numbers(motion: Motion, order: int) -> dict[str, np.ndarray]:
 
 
 def _without_unknowns(coordinates: Coordinates, order: int) -> Coordinates:
-    """Return coordinates once for each order from 1 on, one after the other, with those of that order set to zero."""
+    """Return copies of the coordinates along the batch: in the k-th copy those of order k are zero."""
     elements = {}
     for name, values in coordinates.items():
         first = name == "angular_velocity"  # its coefficients are those of rates
@@ -246,10 +246,10 @@ _position_equations = compiled("pose_type")(position_equations)
 def right_sides(
     system: System, bodies: Coordinates, instants: Lanes, pose_type: type[Pose]
 ) -> Float[Numbers, "derivative row instant"]:
-    """Return the right sides, from states of which the coefficient that each belongs to is zero.
+    """Return the right sides, from states in which the coefficient of the respective order is zero.
 
-    The coefficient of order k of the residual is affine in that of the coordinates, with the Jacobian as its slope:
-    what it is where that is zero is minus the right side, up to k!.
+    The coefficient of order k of the residual is affine in that of the coordinates, and the Jacobian is its slope. Its
+    value for a coefficient of zero is minus the right side divided by k!.
     """
     order = len(bodies["position"]) - 1
     residual = system.residual(pose_of(bodies, pose_type, order), Jet.variable(instants[None], order)).dense()
@@ -262,7 +262,7 @@ _right_sides = compiled("pose_type")(right_sides)
 
 
 def _velocities(motion: Motion, order: int) -> Float[np.ndarray, "time derivative column"]:
-    """Return the derivatives of the coordinates from the first on."""
+    """Return the derivatives of the coordinates, beginning with the first."""
     _, coordinates = motion.poses
     moving = {name: np.asarray(values)[..., 1:, :] for name, values in coordinates.items()}  # without the ground
     plain = {name: plain_derivatives(values) for name, values in moving.items()}
@@ -273,7 +273,7 @@ def _velocities(motion: Motion, order: int) -> Float[np.ndarray, "time derivativ
 
 
 def _positions(motion: Motion) -> dict[str, Any]:
-    """Return where the bodies are at all instants."""
+    """Return the positions and attitudes of the bodies at all instants."""
     coordinates = cut(motion.poses[1], 0)
     first = {name: np.moveaxis(np.asarray(values[0])[..., 1:, :], -1, 0) for name, values in coordinates.items()}
     variables = {"position": (("time", "body", "component"), np.swapaxes(first["position"], 1, 2))}
@@ -283,7 +283,7 @@ def _positions(motion: Motion) -> dict[str, Any]:
 
 
 def _forces(motion: Motion, jacobian: Float[np.ndarray, "time row column"]) -> dict[str, Any]:
-    """Return the mass matrix and the multipliers, where there are some."""
+    """Return the mass matrix and the multipliers, if there are any."""
     mechanism, forces = motion.mechanism, {}
     if any(body.mass is not None for body in mechanism.bodies.values()):
         forces["mass_matrix"] = (("time", "column", "other_column"), _mass_matrix(motion))
@@ -300,7 +300,7 @@ def _forces(motion: Motion, jacobian: Float[np.ndarray, "time row column"]) -> d
     ):
         return forces
     solved = MotionForces.of(motion)
-    if solved.flanks:  # which the equations do not have: what the teeth press apart moves nothing
+    if solved.flanks:  # not in the equations: the radial force between teeth does no work
         solved = MotionForces(motion, flanks=False)
     values = derivatives_along(motion, solved.unique_multipliers[:levels][:, row_order(motion.mechanism, motion.model)])
     return forces | {"multipliers": (("time", "derivative", "row"), values, 0)}
@@ -309,7 +309,7 @@ def _forces(motion: Motion, jacobian: Float[np.ndarray, "time row column"]) -> d
 def _determined(
     motion: Motion, jacobian: Float[np.ndarray, "row column"], mass: Float[np.ndarray, "column column"]
 ) -> bool:
-    """Tell whether the multipliers are determined at a state: those of a motion are, a state may be anything."""
+    """Tell whether the multipliers are determined at a state; those of a motion always are."""
     scale = np.tile(motion.model.system.column_scale, len(motion.mechanism.bodies))
     sizes = np.max(np.abs(jacobian * scale), axis=1, keepdims=True)
     whole = jacobian * scale / np.where(sizes > 0, sizes, 1.0)
@@ -341,11 +341,11 @@ def _body_masses(bodies: Coordinates, masses: Masses, pose_type: type[Pose]) -> 
 
 
 def _check_finite(numbers: dict[str, np.ndarray], rows: np.ndarray, instant: float) -> None:
-    """Raise MechanismError for a state at which a row is not a finite number."""
+    """Raise MechanismError if a row is not finite at a state."""
     for name, values in numbers.items() if len(rows) else ():
         bad = ~np.isfinite(np.moveaxis(values[0], -1 if name == "right_side" else 0, 0).reshape(len(rows), -1))
         if bad.any():
             row, k = np.argwhere(bad)[0]
             what = f"its derivative {k + 1}" if name == "right_side" else f"its {name}"
-            message = f"{what} has no finite value at t = {instant:g} s; check its law, and its points, there"
+            message = f"{what} has no finite value at t = {instant:g} s; check its law and its points there"
             raise MechanismError(message, name=str(rows[row]).rpartition(".")[0])

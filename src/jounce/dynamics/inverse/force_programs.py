@@ -1,7 +1,7 @@
-"""What is compiled of inverse dynamics.
+"""Compiled programs of inverse dynamics.
 
-What differs between mechanisms, the residuals, is compiled type by type on the poses of the bodies that it joins, so
-that all mechanisms share it.
+Residuals are compiled for each type of joint, on the poses of the bodies that it connects, so that all mechanisms share
+these programs.
 """
 
 import dataclasses
@@ -37,27 +37,27 @@ from jounce.mechanism.system import Group, System, movable, with_rows
 from jounce.mechanism.transmissions.axis_angles import with_turns
 from jounce.rigid.pose import Pose
 
-LARGE = 16  # numbers of an array that stays in memory in machine code of an instant
-SMALL_CHUNK = 16  # instants whose dense matrices are factored together
+LARGE = 16  # largest size of an array that is kept in memory by the machine code of an instant
+SMALL_CHUNK = 16  # number of instants whose dense matrices are factored together
 
 
 @compiled("pose_type", "slot", "levels", brief=True)
 def element_slopes(
     element: Any, poses: Sequence[Coordinates], instants: Lanes, pose_type: type[Pose], slot: int, levels: int
 ) -> Any:
-    """Return how the residual of a joint or driver changes with the body in a slot, as `slopes` does."""
+    """Return the derivative of the residual of a joint or driver by the body in a slot, as `slopes` does."""
     time = Jet.variable(instants[None], levels - 1)
     return slopes(element, [pose_of(pose, pose_type, levels - 1) for pose in poses], time, slot)
 
 
 @compiled("pose_type", "slot", "levels", brief=True)
 def friction_slopes(element: Any, poses: Sequence[Coordinates], pose_type: type[Pose], slot: int, levels: int) -> Any:
-    """Return what the friction of a normal force of one does to the body in a slot, as `friction_slope` does."""
+    """Return the wrench of friction on the body in a slot for a unit normal force, as `friction_slope` does."""
     return friction_slope(element, [pose_of(pose, pose_type, levels) for pose in poses], slot)
 
 
 def slip_directions(element: Any, poses: Sequence[Coordinates], pose_type: type[Pose]) -> int:
-    """Return in how many directions the surfaces of joints slip."""
+    """Return the number of directions in which the surfaces of joints slip."""
 
     def slip(poses: Sequence[Coordinates]) -> Any:
         return slip_velocity(element, [pose_of(pose, pose_type, 1) for pose in poses]).coefficients[0]
@@ -67,20 +67,20 @@ def slip_directions(element: Any, poses: Sequence[Coordinates], pose_type: type[
 
 @compiled("pose_type", "levels", brief=True)
 def resisting(element: Any, poses: Sequence[Coordinates], pose_type: type[Pose], levels: int) -> Any:
-    """Return which part of what presses resists slip, Taylor coefficients, (levels, directions, joints, time)."""
+    """Return the fraction of the normal force that resists slip, (levels, directions, joints, time)."""
     return stacked(coupling.resisting(element, [pose_of(pose, pose_type, levels) for pose in poses]))
 
 
 @compiled("pose_type", "levels", brief=True)
 def resisted(element: Any, poses: Sequence[Coordinates], pose_type: type[Pose], levels: int) -> Any:
-    """Return the power that friction takes for a normal force of one, Taylor coefficients, (levels, joints, time)."""
+    """Return the friction power for a unit normal force, as Taylor coefficients, (levels, joints, time)."""
     slip = slip_velocity(element, [pose_of(pose, pose_type, levels) for pose in poses])
     return stacked(element.friction.resisting(slip).dot(slip))
 
 
 @compiled(brief=True)
 def responses(system: System, blocks: Slopes, loads: Float[Numbers, "load coordinate body batch"]) -> Any:
-    """Return the multipliers that balance each of some loads, (loads, rows, time), of a system that is driven whole."""
+    """Return the multipliers that balance each of several loads, (loads, rows, time), in a fully driven system."""
 
     def of_chunk(blocks: Slopes, loads: Numbers) -> Any:
         return jax.vmap(constraint_forces.load_solver(system, blocks, None))(loads)
@@ -98,9 +98,9 @@ def pressing(
     forces: Float[Numbers, "row instance batch"],
     pose_type: type[Pose],
 ) -> Any:
-    """Return what presses joints with friction, (components, instances, time), for multipliers of order zero.
+    """Return the normal forces of joints with friction, (components, instances, time), at order zero.
 
-    Of gears it is the torque that they pass on.
+    For gears, return the torque that they transmit.
     """
     if loses_torque(element):
         return element.passed_on(Jet([forces[0]])).coefficients[0][None]
@@ -113,7 +113,7 @@ def pressing(
 def body_loads(
     system: System, bodies: Coordinates, instants: Lanes, masses: Masses, gravity: Gravity, pose_type: type[Pose]
 ) -> tuple[Any, Any]:
-    """Return what the constraints have to balance, and at which instants each applied force is finite."""
+    """Return the loads that the constraints balance, and at which instants each applied force is finite."""
     order = len(bodies["position"]) - 1
     pose = pose_of(bodies, pose_type, order)
     time = Jet.variable(instants[None], order)
@@ -148,18 +148,18 @@ def multipliers(
 
 @Mapped
 def _balanced(shared: Any, lanes: Any, *, pose_type: type[Pose]) -> tuple[Any, Any]:
-    """Return multipliers of one instant for some cases, and which applied forces are finite there.
+    """Return the multipliers of one instant for several cases, and which applied forces are finite there.
 
     Parameters
     ----------
     shared : tuple
-        The system, one of its forces alone, masses and gravity; and, where rows are redundant, what `least_multipliers`
-        takes beside the load, else None: then there is one case, that of `multipliers`.
+        The system, the system of its forces alone, masses and gravity. If rows are redundant, also the arguments of
+        `least_multipliers` other than the load; otherwise None, and the single case is that of `multipliers`.
     lanes : tuple
-        Of the instant: the coordinates of all bodies, the angles about axes that forces measure, the flanks on which
-        teeth press, and its time.
+        For the instant: the coordinates of all bodies, the angles about axes that forces measure, the loaded tooth
+        flanks, and the time.
     pose_type
-        Of the coordinates.
+        Type of the poses.
     """
     (system, loaded, masses, gravity, choice), (bodies, angles, flanks, instants) = shared, lanes
     system = with_fields(system, groups=with_flanks(system.groups, flanks))
@@ -187,14 +187,14 @@ def _balanced(shared: Any, lanes: Any, *, pose_type: type[Pose]) -> tuple[Any, A
 
 
 def without_constraints(system: System, forces: tuple[Group, ...]) -> System:
-    """Return a system with forces and nothing that joins its bodies."""
+    """Return the system of the forces alone, without constraints."""
     nothing = Pattern.of((), (), system.pattern.width, system.body_count)
     values = {"groups": (), "pattern": nothing, "row_scale": np.zeros((0, 1)), "rank": None, "fronts": None}
     return with_fields(system, **values, forces=forces)
 
 
 def balance_of_instant(shared: Any, lanes: Any, pose_type: type[Pose]) -> OnLlvm | None:
-    """Return machine code for `_balanced`, None where there is none; any instant serves as an example."""
+    """Return machine code for `_balanced`, or None if there is none; any instant serves as an example."""
     program = _balanced.program(shared, lanes, large=LARGE, hasty=is_wanted_soon(), pose_type=pose_type)
     return program if isinstance(program, OnLlvm) else None  # XLA's programs are those of each kind of joint
 
@@ -208,20 +208,20 @@ def least_multipliers(
     weights: Float[Numbers, " case"],
     bent: Float[Numbers, "case row"],
 ) -> Any:
-    """Return multipliers of redundant rows for some cases: a weight of the load, and what is bent, in each."""
+    """Return multipliers of redundant rows for several cases, each a factor of the load and a misalignment."""
 
     def of_chunk(blocks: Slopes, load: Numbers) -> Any:
         def of_case(weight: Any, bent: Numbers) -> Any:
             return redundant_forces.least_multipliers(system, blocks, weight * load, compliance, bent)
 
-        return jax.vmap(of_case)(weights, bent)  # all cases by one factorization
+        return jax.vmap(of_case)(weights, bent)  # one factorization for all cases
 
     return in_small_chunks(of_chunk, SMALL_CHUNK, blocks, load)
 
 
 @compiled(brief=True)
 def scaled_jacobian(system: System, blocks: Slopes) -> Any:
-    """Return the Jacobian of scaled rows and columns."""
+    """Return the Jacobian with scaled rows and columns."""
     return constraint_forces.jacobian_of(system, blocks)
 
 
@@ -229,7 +229,7 @@ def scaled_jacobian(system: System, blocks: Slopes) -> Any:
 def exerted(
     driver: Any, poses: Sequence[Coordinates], instants: Lanes, forces: Multipliers, pose_type: type[Pose]
 ) -> Any:
-    """Return what drivers exert along what they prescribe, Taylor coefficients."""
+    """Return the forces of drivers along their prescribed coordinates, as Taylor coefficients."""
     order = len(forces) - 1
     built = [pose_of(pose, pose_type, order) for pose in poses]
     return constraint_forces.exerted(driver, built, Jet.variable(instants[None], order), forces)
@@ -237,7 +237,7 @@ def exerted(
 
 @compiled("pose_type", "levels", brief=True)
 def applied(force: Any, poses: Sequence[Coordinates], instants: Lanes, pose_type: type[Pose], levels: int) -> Any:
-    """Return what applied forces exert, Taylor coefficients."""
+    """Return the applied forces, as Taylor coefficients."""
     built = [pose_of(pose, pose_type, levels) for pose in poses]
     time = Jet.variable(instants[None], levels)
     exerted = force.force(force.displacement(*built, time), force.velocity(*built, time), time).truncate(levels - 1)
@@ -248,7 +248,7 @@ def applied(force: Any, poses: Sequence[Coordinates], instants: Lanes, pose_type
 def force_slopes(
     force: Any, poses: Sequence[Coordinates], instants: Lanes, pose_type: type[Pose], slot: int, levels: int
 ) -> Any:
-    """Return how far applied forces act along as the body in a slot is displaced, as `slopes` does for residuals."""
+    """Return the derivative of the displacements of applied forces by the body in a slot, as `slopes` does."""
     time = Jet.variable(instants[None], levels - 1)
     built = tuple(movable(pose_of(pose, pose_type, levels - 1)) for pose in poses)
     unchanged = [jax.tree.map(jnp.zeros_like, pose) for pose in built]
@@ -262,7 +262,7 @@ def force_slopes(
 
 @compiled(brief=True)
 def wrenches(slope: Slope, forces: Multipliers) -> Any:
-    """Return what joints do to the body in a slot: force, global, and moment about its origin, in its axes."""
+    """Return the wrenches of joints on the body in a slot: global force, and moment about its origin in its axes."""
     return constraint_forces.wrench(slope, forces)
 
 
@@ -273,7 +273,7 @@ def passed_on(
     point: Float[Numbers, "component 1 1"],
     pose_type: type[Pose],
 ) -> Any:
-    """Return the counterpart of what acts on some bodies: force, and moment about a point, both global."""
+    """Return the opposite of the wrenches on several bodies: force, and moment about a point, both global."""
     order, wrenches = len(works[0]) - 1, []
     for work, body in zip(works, bodies, strict=True):
         pose = pose_of(body, pose_type, order)
@@ -291,7 +291,7 @@ def expressed(
     point: Float[Numbers, "component 1 1"],
     pose_type: type[Pose],
 ) -> tuple[Any, Any]:
-    """Return force and moment about a point of a body, in its axes or in those of another one."""
+    """Return force and moment about a point of a body, along its axes or those of another body."""
     order = len(work) - 1
     pose, *frame = (pose_of(body, pose_type, order) for body in bodies)
     force, moment = (Jet(tuple(part[:, :, None])) for part in (work[:, : pose.shifts], work[:, pose.shifts :]))

@@ -1,4 +1,4 @@
-"""The joints with friction of a driven motion: which they are, what presses them, and the power that they take."""
+"""The joints with friction in a driven motion: their names, normal forces and friction power."""
 
 from collections.abc import Callable
 from typing import Any
@@ -29,13 +29,13 @@ class JointFriction:
 
     @property
     def first_rows(self) -> dict[int, int]:
-        """Where the normal forces of groups with friction begin, below the multipliers, by the index of the group."""
+        """First rows of the normal forces of groups with friction, below the multipliers, by the index of the group."""
         rubbing = [k for k, group in enumerate(self.forces._joined.groups) if rubs(group)]
         counts = [self.forces._joined.groups[k].instances for k in rubbing]
         return {k: len(self.forces.model.rows) + sum(counts[:n]) for n, k in enumerate(rubbing)}
 
     def slopes(self, index: int, lanes: np.ndarray) -> programs.Rubbed:
-        """Return what is to be known of the friction of a group at some instants."""
+        """Return the coefficients of the friction equations of a group at some instants."""
         group = self.forces._joined.groups[index]
         moving = [self.forces.coordinates_at(slot, lanes, self.forces.levels + 1) for slot in group.bodies]
         slots = group.moving_slots
@@ -49,11 +49,11 @@ class JointFriction:
 
     @property
     def names(self) -> list[str]:
-        """The names of the joints with friction."""
+        """Names of the joints with friction."""
         return [name for name, place in self.forces.indices.items() if place.group in self.first_rows]
 
     def resisted(self, index: int, lanes: np.ndarray) -> Float[Numbers, "order instance time"]:
-        """Return the power that friction takes for a normal force of one, of a group at some instants."""
+        """Return the friction power of a group for a unit normal force, at some instants."""
         group = self.forces._joined.groups[index]
         moving = [self.forces.coordinates_at(slot, lanes, self.forces.levels + 1) for slot in group.bodies]
         return programs.resisted(group.element, moving, self.forces.pose_type, self.forces.levels)
@@ -61,8 +61,8 @@ class JointFriction:
     def pressing_force(
         self, name: str, multipliers: Numbers, lanes: np.ndarray
     ) -> Float[Numbers, "order component time"]:
-        """Return what multipliers of all rows exert in a joint on one of its bodies, as Taylor coefficients; of gears,
-        their multiplier.
+        """Return the force in a joint for multipliers of all rows, as Taylor coefficients; for gears, their
+        multiplier.
         """
         place = self.forces.indices[name]
         group = self.forces._joined.groups[place.group]
@@ -99,13 +99,13 @@ class JointFriction:
         return joints
 
     def _slips(self, index: int) -> int:
-        """Return in how many directions the joints of a group slip."""
+        """Return the number of directions in which the joints of a group slip."""
         lanes = np.zeros(1, int)
         moving = [self.forces.coordinates_at(slot, lanes, 2) for slot in self.forces._joined.groups[index].bodies]
         return programs.slip_directions(self.forces._joined.groups[index].element, moving, self.forces.pose_type)
 
     def responses(self) -> Float[np.ndarray, "direction row time"]:
-        """Return the multipliers that balance friction of one in each direction of slip, at rest."""
+        """Return the multipliers that balance a unit friction force in each direction of slip, at rest."""
         forces = self.forces
 
         def chunk(lanes: np.ndarray) -> Any:
@@ -115,7 +115,7 @@ class JointFriction:
         return np.asarray(forces.in_chunks(chunk))
 
     def _unit_loads(self, index: int, lanes: np.ndarray) -> Float[np.ndarray, "direction coordinate body time"]:
-        """Return what friction of one in each direction of slip does to bodies, of the joints of a group."""
+        """Return the wrenches on bodies for a unit friction force in each direction of slip of a group."""
         forces, group = self.forces, self.forces._joined.groups[index]
         moving = [forces.coordinates_at(slot, lanes, 2) for slot in group.bodies]
         count, bodies = self._slips(index), len(forces.model.bodies)
@@ -131,9 +131,9 @@ class JointFriction:
         return loads[:, :, :, 1:].reshape(-1, components, bodies, len(lanes))
 
     def pressing(self, multipliers: Float[Numbers, "row time"]) -> Float[np.ndarray, "joint component time"]:
-        """Return what presses the surfaces of each joint, N, for multipliers of order zero; zeros fill it up.
+        """Return the components of the normal force of each joint, N, at order zero, padded with zeros.
 
-        Of gears it is the torque that they pass on, N m.
+        For gears, return the torque that they transmit, N m.
         """
         forces = self.forces
 
@@ -155,8 +155,8 @@ class JointFriction:
         return next(place.rows for place in self.forces.indices.values() if place.group == index)
 
     def normal_force(self, name: str) -> Float[Numbers, "order 1 time"]:
-        """Return what presses the surfaces of a joint with friction together, N, as Taylor coefficients; of gears, the
-        torque that they lose, N m.
+        """Return the normal force between the surfaces of a joint with friction, N, as Taylor coefficients; for gears,
+        the torque loss, N m.
         """
         place = self.forces.indices[name]
         row = self.first_rows[place.group] + place.instance

@@ -1,4 +1,4 @@
-"""Inverse dynamics of mechanisms: multipliers, forces of drivers and wrenches of joints over a whole motion."""
+"""Inverse dynamics of mechanisms: multipliers, driver forces and joint wrenches over a whole motion."""
 
 import copy
 import dataclasses
@@ -36,18 +36,18 @@ class MotionForces:
     Parameters
     ----------
     motion : Motion
-        Of a mechanism with masses or applied forces.
+        The motion of a mechanism with masses or applied forces.
     gravity, applied : bool, default True
-        Whether the bodies have weight, and whether the applied forces act.
+        Whether to include the weight of the bodies, and the applied forces.
     flanks : bool, default True
-        Whether teeth press on their flanks, and so load bearings by their pressure angle.
+        Whether to include the radial forces between teeth, which load the bearings by the pressure angle.
     friction : bool, default True
-        Whether joints have the friction that the mechanism has.
+        Whether to include the joint friction of the mechanism.
 
     Raises
     ------
     MechanismError
-        If nothing has a mass and no force is applied, the motion has no accelerations, or the masses are not valid.
+        If there are neither masses nor applied forces, the motion has no accelerations, or the masses are not valid.
     """
 
     def __init__(
@@ -77,11 +77,11 @@ class MotionForces:
         self._kept: dict[tuple[Any, ...], Numbers] = {}
         self.flanks: teeth.Flanks = teeth.either_flank(system.groups, len(motion.time)) if flanks else {}
         self._reversals: dict[int, np.ndarray] = {}
-        self.passing: dict[str, np.ndarray] = {}  # instants at which nothing presses a joint with friction
+        self.passing: dict[str, np.ndarray] = {}  # instants at which a joint with friction carries no load
 
     @classmethod
     def of(cls, motion: Motion) -> "MotionForces":
-        """Return the forces of a motion, those computed before among them."""
+        """Return the forces of a motion; those computed before are reused."""
         if "forces" not in motion.derived:
             motion.derived["forces"] = idle_torques.checked(cls(motion))
         return motion.derived["forces"]
@@ -90,8 +90,8 @@ class MotionForces:
     def multipliers(self) -> Numbers:
         """Multipliers of the rows of all residuals, as Taylor coefficients, (levels, rows, time).
 
-        Where constraints are redundant, those of least norm, or by the stiffnesses that the mechanism has for it. NaN
-        at change points, where they are not determined, and next to them where rounding decides them.
+        For redundant constraints, the multipliers of least norm, or those that the stiffnesses of the mechanism give.
+        They are NaN at change points, where they are not determined, and next to them where rounding dominates.
         """
         multipliers = self._balancing[0][:, : len(self.model.rows)]
         passages, time = self.motion.passages, self.motion.time
@@ -102,7 +102,7 @@ class MotionForces:
 
     @cached_property
     def _balancing(self) -> Float[Numbers, "case level row time"]:
-        """Multipliers that balance the loads; after them some that balance none, where any are looked for."""
+        """Multipliers that balance the loads, followed by self-balanced ones if these are needed."""
         if not self.flanks:
             return self._balanced({})
         teeth.check_pitch(self.motion, self._joined.groups, lambda k: self._poses(k, np.arange(len(self.motion.time))))
@@ -113,13 +113,13 @@ class MotionForces:
         return multipliers
 
     def prepare(self) -> None:
-        """Make machine code that balances loads, of any motion of this form."""
+        """Compile the machine code that balances loads, for any motion of this form."""
         cases, rows = 1 + self._looks_for_open, len(self.model.rows)
         choice = np.zeros(rows), np.zeros(cases), np.zeros((cases, rows))
         self._balancing_code(None if self.model.system.rank is None else choice)
 
     def _balanced(self, flanks: teeth.Flanks) -> Float[Numbers, "case level row time"]:
-        """Return what balances the loads, and balances none, with flanks that teeth press on."""
+        """Return the multipliers that balance the loads, and self-balanced ones, given the loaded tooth flanks."""
         self.flanks = flanks
         choice = None if self.model.system.rank is None else self._choice
         code = self._balancing_code(choice)
@@ -145,13 +145,13 @@ class MotionForces:
         return without_open_rates(self, multipliers)
 
     def _balancing_code(self, choice: tuple[Numbers, Numbers, Numbers] | None) -> Any:
-        """Return what `balance_of_instant` does, for a choice among multipliers of redundant rows."""
+        """Return the code of `balance_of_instant` for a choice among the multipliers of redundant rows."""
         one = self._lanes(first := np.zeros(1, int))
         free = programs.without_constraints(self._joined, at_lanes(self.forces, first))
         return programs.balance_of_instant((self._joined, free, self.masses, self.gravity, choice), one, self.pose_type)
 
     def _lanes(self, lanes: np.ndarray) -> Any:
-        """Return what a balance takes of some instants."""
+        """Return the arguments of a balance for some instants."""
         angles = tuple(group.element.datum.near[..., lanes] for group in self.forces if measures_angle(group))
         pressed = tuple(flank[..., lanes] for flank in self.flanks.values())
         return self.coordinates_at(None, lanes, self.levels + 2), angles, pressed, self.motion.time[lanes]
@@ -163,16 +163,17 @@ class MotionForces:
         return self.open.compliance, np.array([1.0, 0.0][: len(bends)]), np.array(bends)
 
     def unique(self, quantity: Callable[["MotionForces"], Numbers], size: float = 1.0) -> Numbers:
-        """Return what is asked of the forces, NaN in components that redundant constraints leave open.
+        """Return a quantity of the forces, NaN in components that redundant constraints do not determine.
 
-        Unique is a component that vanishes for all multipliers that balance no load (Wojtyra 2005), at all instants.
+        A component is unique if it vanishes for all self-balanced multipliers (Wojtyra 2005) at all instants.
 
         Parameters
         ----------
         quantity : callable
-            Returns Taylor coefficients of it, (levels, components, time), from forces; linear in the multipliers.
+            Returns the Taylor coefficients of the quantity, (levels, components, time), from forces; it is linear in
+            the multipliers.
         size : float
-            Of the quantity for a force of one: 1 for a force, a length for a torque.
+            Magnitude of the quantity for a unit force: 1 for a force, a length for a torque.
         """
         values = quantity(self)
         if self.loose is None:
@@ -182,13 +183,13 @@ class MotionForces:
         level = np.abs(self.loose.multipliers[..., solved]).max(axis=-1, initial=0.0) * self.open.weights
         limits = OPEN * size * level.max(axis=-1)[:, None]
         open_ = given > limits
-        if np.count_nonzero(solved) > 1:  # what vanishes at all instants has no rates
+        if np.count_nonzero(solved) > 1:  # a quantity that vanishes at all instants has no rates
             open_[1:] = open_[0]
         return np.where(np.logical_or.accumulate(open_, axis=0)[..., None], np.nan, values)
 
     @cached_property
     def unique_multipliers(self) -> Numbers:
-        """Multipliers, NaN where redundant constraints leave them open."""
+        """Multipliers, NaN if redundant constraints do not determine them."""
         if self.loose is None:
             return self.multipliers
         weights = self.open.weights[:, None]
@@ -196,7 +197,7 @@ class MotionForces:
 
     @cached_property
     def loose(self) -> "MotionForces | None":
-        """Forces of chance that balance no load, where redundant constraints leave some open and none are chosen."""
+        """Random self-balanced forces, if redundant constraints leave forces undetermined and none are chosen."""
         if not self._looks_for_open:
             return None
         twin = copy.copy(self)
@@ -214,7 +215,7 @@ class MotionForces:
 
     @cached_property
     def open(self) -> OpenMultipliers:
-        """What redundant constraints leave open, at the first instant that was solved."""
+        """Forces that redundant constraints do not determine, at the first solved instant."""
         model = self.model
         lanes = np.flatnonzero(self.motion.status == Status.OK)[:1]
         lanes = lanes if len(lanes) else np.zeros(1, int)
@@ -230,11 +231,11 @@ class MotionForces:
 
     @cached_property
     def rates(self) -> Float[np.ndarray, " time"]:
-        """How fast the motion changes, 1/s."""
+        """Rates at which the motion changes, 1/s."""
         return teeth.rate_of(self.motion)
 
     def _blocks(self, lanes: np.ndarray) -> list[list[Any]]:
-        """Return the slopes of all groups by the bodies of their moving slots."""
+        """Return the derivatives of the residuals of all groups with respect to the bodies in their moving slots."""
         groups = enumerate(self.model.system.groups)
         return [[self._slopes(index, slot, lanes) for slot in group.moving_slots] for index, group in groups]
 
@@ -244,7 +245,7 @@ class MotionForces:
         return bool(sizes[list(self.indices[name].own_rows)].max(initial=0.0) > NOTHING * sizes.max(initial=0.0))
 
     def driver_force(self, name: str) -> Float[Numbers, "order 1 time"]:
-        """Return what a driver exerts along what it prescribes, as Taylor coefficients."""
+        """Return the force of a driver along its prescribed coordinate, as Taylor coefficients."""
         index = self.indices[name]
         driver = law_left_out(self.model.system.groups[index.group], only_if_evaluated=True).element
 
@@ -255,18 +256,18 @@ class MotionForces:
         return self._once(chunk, "driver", index.group)[:, index.instance : index.instance + 1]
 
     def reaction(self, name: str, body: int, frame: int | None, point: Numbers) -> tuple[Any, Any]:
-        """Return what a joint, driver or applied force does to a body, as force and moment about a point of it.
+        """Return the force of a joint, driver or applied force on a body, and its moment about a point of the body.
 
-        What it does to all bodies together has no resultant, as it moves no mechanism as a whole. So the ground has
-        the counterpart of what the moving bodies have: also of a residual that tells more than relative poses, such
-        as a coordinate of one body, or a ratio of angles, as it is in the frame of the ground that these are measured.
+        The forces on all bodies, the ground included, have no resultant. The force on the ground is therefore the
+        opposite of the sum of those on the moving bodies, also for residuals that depend on more than relative poses,
+        such as a coordinate of one body or a ratio of angles, because these are measured in the frame of the ground.
 
         Parameters
         ----------
         name : str
-            Of the joint, driver or force.
+            Name of the joint, driver or force.
         body, frame : int
-            Indices of the body and of the one in whose axes the result is wanted: 0 is the ground, None global.
+            Indices of the body, and of the body along whose axes the result is expressed: 0 is the ground, None global.
         point : array of shape (c,)
             In the frame of the body, m.
 
@@ -290,7 +291,7 @@ class MotionForces:
         return self._expressed(self.in_chunks(chunk), 0, frame, np.zeros(np.shape(point)))
 
     def point_of(self, name: str, body: int) -> Float[Numbers, " component"]:
-        """Return the point of a joint, driver or force on a body, or the origin of the body where it has none there."""
+        """Return the point of a joint, driver or force on a body; the origin of the body if it has none there."""
         group, instance = self._member(name)
         slots = [slot for slot, its in enumerate(group.bodies) if its[instance] == body]
         names = [f"point_{'ijmn'[slot : slot + 1]}" for slot in slots[:1]] + ["point"] * (len(group.bodies) == 1)
@@ -304,16 +305,16 @@ class MotionForces:
         return tuple(slot[instance] for slot in group.bodies)
 
     def _member(self, name: str) -> tuple[Group, int]:
-        """Return the group of a joint, driver or force, and which of it that is."""
+        """Return the group of a joint, driver or force, and its index in the group."""
         if element_index := self.indices.get(name):
             return self.model.system.groups[element_index.group], element_index.instance
         index, instance = self._force_index(name)
         return self.model.system.forces[index], instance
 
     def _wrench(self, name: str, slot: int) -> Float[Numbers, "order coordinate time"]:
-        """Return what a joint, driver or force does to the body in a slot, as Taylor coefficients.
+        """Return the wrench of a joint, driver or force on the body in a slot, as Taylor coefficients.
 
-        Force, global, and moment about the origin of the body, in its axes.
+        It consists of the force along the global axes and the moment about the origin of the body along its own axes.
         """
         if place := self.indices.get(name):
             first, group = self.friction.first_rows.get(place.group), self._joined.groups[place.group]
@@ -349,7 +350,7 @@ class MotionForces:
         return self._sizes(index)[:, :, instance]
 
     def _force_index(self, name: str) -> tuple[int, int]:
-        """Return the group of an applied force, and which of it the force is."""
+        """Return the group of an applied force, and its index in the group."""
         return next((k, names.index(name)) for k, names in enumerate(self.model.forces) if name in names)
 
     def _sizes(self, index: int) -> Float[Numbers, "order component instance time"]:
@@ -361,13 +362,13 @@ class MotionForces:
         return self._once(chunk, "size", index)
 
     def _acting(self, index: int, lanes: np.ndarray, levels: int) -> tuple[Any, tuple[dict[str, Any], ...], Any]:
-        """Return the forces of a group, where their bodies are to a number of coefficients, and the instants."""
+        """Return the forces of a group, the poses of their bodies to a number of coefficients, and the instants."""
         (group,) = at_lanes((self.motion.forces[index],), lanes)
         poses = tuple(self.coordinates_at(slot, lanes, levels) for slot in group.bodies)
         return group.element, poses, self.motion.time[lanes]
 
     def _once(self, chunk: Callable[[np.ndarray], Any], *key: Any) -> Numbers:
-        """Return what a function of indices of instants gives for all of them, kept by a key."""
+        """Return the values of a function of indices of instants for all of them, cached by a key."""
         if key not in self._kept:
             self._kept[key] = self.in_chunks(chunk)
         return self._kept[key]
@@ -378,9 +379,9 @@ class MotionForces:
         Parameters
         ----------
         work : array of shape (levels, coordinates, time)
-            Force, global, and moment about the origin of the body, in its axes.
+            Force along the global axes, and moment about the origin of the body along its own axes.
         body, frame : int
-            Indices of the body and of the one in whose axes the wrench is wanted: 0 is the ground, None global.
+            Indices of the body, and of the body along whose axes the wrench is expressed: 0 is the ground, None global.
         point : array of shape (c,)
             In the frame of the body, m.
         """
@@ -393,11 +394,11 @@ class MotionForces:
         return self.in_chunks(chunk)
 
     def in_chunks(self, function: Callable[[np.ndarray], Any]) -> Any:
-        """Return what a function of indices of instants gives, for all of them: arrays with the time last."""
+        """Return the values of a function of indices of instants for all of them, as arrays with the time last."""
         return along_motion(self.motion, function)
 
     def coordinates_at(self, bodies: tuple[int, ...] | None, lanes: np.ndarray, levels: int) -> dict[str, Any]:
-        """Return coordinates at some instants, of bodies and to a number of coefficients as `part_of` has them."""
+        """Return coordinates at some instants, for the bodies and the number of coefficients of `part_of`."""
         coordinates = part_of(self.coordinates, bodies, levels)
         return {name: values[..., lanes] for name, values in coordinates.items()}
 

@@ -1,4 +1,4 @@
-"""Whether a trajectory keeps the limits of a robot: position to jerk, torque and torque rate of every joint."""
+"""Compare a trajectory with the limits of a robot: position to jerk, torque and torque rate of every joint."""
 
 import dataclasses
 import warnings
@@ -47,46 +47,48 @@ def check_limits(
 ) -> LimitReport:
     """Compare a trajectory, and the torques and torque rates that it needs, with the limits of the joints.
 
-    An acceleration against the velocity is compared with the limit of deceleration, where there is one; a joint at rest
-    counts as one that speeds up, and where the trajectory ends as one that has slowed down.
+    An acceleration that opposes the velocity is compared with the deceleration limit, if there is one. A joint at rest
+    counts as speeding up; at the end of the trajectory it counts as slowing down.
 
-    All values are exact derivatives of the trajectory, at its own instants and at least three between each two of them,
-    2000 in all or more, and on both sides of where a derivative of a law is known to jump or bend. Around the highest
-    peaks of each curve the step is then refined to less than a millionth of the duration: what is reported are true
-    values of the curves.
+    All values are exact derivatives of the trajectory. They are evaluated at its own instants, at three or more between
+    each two of them, at 2000 or more in total, and on both sides of known jumps and kinks of derivatives. Around the
+    highest peaks of each curve the step is then refined to less than a millionth of the duration, so the reported
+    values are values of the curves themselves.
 
-    Where a derivative of a law jumps within the trajectory, those above it are infinite, and so may be torques and
-    their rates: a limit of them is broken there. Where pieces of laws meet is known; jumps and kinks of expressions and
-    of Python functions are looked for between the instants. There, what is below 1e-5 of the largest value or a fourth
-    of the change from one instant to the next is not found, nor a second one between the same two.
+    If a derivative of a law jumps within the trajectory, all higher derivatives are infinite there, and torques and
+    their rates may be, too; their limits are then exceeded. The instants at which pieces of laws meet are known. Jumps
+    and kinks of expressions and of Python functions are searched for between the evaluated instants; the search misses
+    those below 1e-5 of the largest value or below a fourth of the change between two instants, and a second one between
+    the same two.
 
-    Before the start and after the stop the robot is taken to rest. If a joint moves there, what is above the derivative
-    that jumps is infinite: the rows are those of the motion itself, but `LimitReport.ends` tells it, and limits of it
-    are not kept. What a spline through samples makes of their errors at the ends is no jump.
+    The robot is assumed to rest before the start and after the stop. If a joint moves there, the derivatives above the
+    one that jumps are infinite: the rows contain the values of the motion itself, `LimitReport.ends` lists the jumps,
+    and the limits of the infinite quantities count as exceeded. What remains of sampling errors at the ends of a spline
+    is not counted as a jump.
 
     Parameters
     ----------
     robot : Robot
-        The robot, with what it holds.
+        The robot, including its loads.
     trajectory : JointTrajectory
-        Joints that it does not name stand still at zero, or at the end of their range that is nearest to it; of them
-        only torques are compared.
+        Joints that it does not name are at rest at zero, or at the end of their range nearest to zero; only their
+        torques are compared.
     limits : dict of str to Limits, optional
-        Limits of some joints, in place of those that the robot has; those of joints that follow them hold as well.
+        Limits of some joints that replace those of the robot; the limits of joints that follow them still apply.
     times : array_like of shape (time,), optional
-        Increasing instants to look at, s, instead of those above.
+        Increasing instants at which to evaluate, s, instead of those above.
     drives : bool, default True
-        Whether torques contain armature inertia, damping and friction of the drives.
+        Whether torques include armature inertia, damping and friction of the drives.
     hand_over : bool, default False
-        Whether the robot moves already as the trajectory starts, and goes on moving as it stops.
+        Whether the robot already moves when the trajectory starts and continues to move when it stops.
     loads : sequence of CarriedLoad, optional
-        What links carry during parts of the motion. Both sides of a change are compared with the limits; the step of
-        the torques between them, whose rate is infinite, is not, but `LimitReport.loads` tells it.
+        Loads that links carry during parts of the motion. Both sides of a change are compared with the limits. The step
+        of the torques between them, whose rate is infinite, is not; `LimitReport.loads` lists it.
 
     Returns
     -------
     LimitReport
-        One row for each joint and quantity, also where there is no limit.
+        One row for each joint and quantity, with or without a limit.
 
     Raises
     ------
@@ -116,7 +118,7 @@ def check_limits(
     resting = followed.resting_joints
 
     def curves(times: np.ndarray) -> np.ndarray:
-        """Return all quantities of all joints, (time, 6, joints)."""
+        """Return all quantities of all joints, shape (time, 6, joints)."""
         q = followed.coordinates(times, ORDER)
         return np.concatenate([q, followed.torques(q, times, drives)], axis=1)
 
@@ -161,10 +163,10 @@ def check_limits(
 
 
 class _Bounds:
-    """What is allowed, in arrays of shape (6, joints), infinite where there is no bound.
+    """The bounds, in arrays of shape (6, joints), infinite where there is none.
 
-    Accelerations are held against one bound, whether they speed a joint up or slow it down, each weighted by that bound
-    over its own. What is at rest is going to speed up, but for the end of the trajectory, at `stop`.
+    Accelerations and decelerations are compared with one bound, after weighting each by the ratio of that bound to its
+    own. A joint at rest is about to speed up, except at the end of the trajectory, `stop`.
     """
 
     def __init__(self, robot: Robot, limits: Mapping[str, Limits], rest: np.ndarray, stop: float):
@@ -190,7 +192,7 @@ class _Bounds:
         self.scale = np.where(np.isfinite(half) & (half > 0), half, unit)
 
     def weights(self, values: np.ndarray, times: np.ndarray) -> np.ndarray:
-        """Return by how much values of shape (..., 6, joints) at instants (...,) count against the bounds."""
+        """Return the weights, relative to the bounds, of values of shape (..., 6, joints) at instants (...,)."""
         velocity, acceleration = values[..., 1, :], values[..., ACCELERATION, :]
         ends = (times == self.stop)[..., None]
         slows = np.where(np.abs(velocity) > self.rest, velocity * acceleration < 0, ends)
@@ -204,13 +206,13 @@ class _Bounds:
         return (values - upper + scale) / scale, (lower - values + scale) / scale
 
     def measure(self, values: np.ndarray, at: Any = ...) -> np.ndarray:
-        """Return what is worst where it is largest: the ratio, or the magnitude where there is no limit."""
+        """Return the measure whose maximum is the worst instant: the ratio, or the magnitude if there is no limit."""
         return np.where(self.limited[at], np.maximum(*self.sides(values, at)), np.abs(values))
 
     def or_infinite(
         self, infinite: Infinite, quantity: int, joint: int, time: float, value: float, weight: float
     ) -> tuple[float, float, float]:
-        """Return the instant, value and weight of a quantity, those of the first where it is infinite if it is."""
+        """Return the instant, value and weight of a quantity; those of its first infinite value if there is one."""
         weights = self.weights(infinite.before, infinite.times)[:, quantity, joint]
         at = np.flatnonzero((infinite.signs[:, quantity, joint] != 0) & (weights > 0))
         if not len(at):
@@ -220,7 +222,7 @@ class _Bounds:
         return float(infinite.times[first]), float(value), float(weights[first])
 
     def shares(self, values: np.ndarray, times: np.ndarray) -> np.ndarray:
-        """Return the ratios with the sign of the bound that is nearer, NaN where there is no limit."""
+        """Return the ratios with the sign of the nearer bound, NaN where there is no limit."""
         above, below = self.sides(values * self.weights(values, times))
         return np.where(self.limited, np.where(above >= below, np.maximum(above, 0), -np.maximum(below, 0)), np.nan)
 
@@ -232,10 +234,10 @@ def worst_instants(
     values: np.ndarray,
     limited: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return the worst instant of each limited curve, its value there and the weight of that.
+    """Return the worst instant of each limited curve, the value there and its weight.
 
-    Around the peaks that may be the highest, the best of a few instants becomes the middle of a shorter interval, again
-    and again. A jump between two instants is found from the side on which the curve is worse.
+    Around each peak that may be the highest, a grid search is refined: the best of a few instants becomes the middle of
+    a shorter interval, repeatedly. A jump between two instants is approached from the side with the worse value.
 
     Parameters
     ----------
@@ -244,7 +246,7 @@ def worst_instants(
     bounds : object
         Has `weights` and `measure`, as the bounds of this module have.
     grid, values
-        Instants to begin with, and what `curves` gives there.
+        Initial instants, and the values of `curves` there.
     limited : array of shape (curves, 2)
         Quantity and joint of each.
     """
@@ -290,7 +292,7 @@ def _row(
 def _ends(
     followed: FollowedTrajectory, values: Float[np.ndarray, "time derivative joint"], bounds: _Bounds, drives: bool
 ) -> tuple[TrajectoryEnd, ...]:
-    """Return what is met at both ends, and the limits that are broken there."""
+    """Return the jumps at both ends, and the limits that are exceeded there."""
     robot, jumps = followed.robot, end_jumps(followed, values)
     if np.array_equal(jumps.before, jumps.after):
         return ends_of_jumps(robot.joint_names, jumps)
@@ -324,7 +326,7 @@ def _merged(robot: Robot, limits: Mapping[str, Limits] | None) -> dict[str, Limi
 
 
 def _grid(trajectory: JointTrajectory) -> Float[np.ndarray, " time"]:
-    """Return the instants of a trajectory, its ends, and more between each two."""
+    """Return the instants of a trajectory, its ends, and further ones between each two."""
     own = np.unique(np.concatenate([[trajectory.start], trajectory.times, [trajectory.stop]]))
     steps = max(BETWEEN, -(-INSTANTS // (len(own) - 1)))
     between = own[:-1, None] + np.diff(own)[:, None] * (np.arange(steps) / steps)

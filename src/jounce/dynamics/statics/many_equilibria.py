@@ -1,4 +1,4 @@
-"""All positions in which a mechanism or a robot stands still that many searches find."""
+"""Equilibria of a mechanism or a robot from many starts: a multistart Newton search."""
 
 from collections.abc import Mapping, Sequence
 
@@ -18,7 +18,7 @@ from jounce.mechanism.building.preconditions import concrete
 from jounce.robot import Robot
 from jounce.robot.closed_loops.closures import GivenCoordinates, given_coordinates
 
-SAME = 1e-6  # rad or sizes of the mechanism: positions as near count as one
+SAME = 1e-6  # rad, or multiples of the size of the mechanism: positions this close count as one
 
 
 @concrete
@@ -36,28 +36,28 @@ def equilibria(
 ) -> tuple[Equilibrium, ...]:
     """Return all equilibria that Newton's method finds from many starts, of every assembly of the mechanism.
 
-    Each start is a random position of all bodies, assembled, or random coordinates of the joints of a robot, within
-    their limits; equilibria within 1e-6 rad and sizes of the mechanism count as one, and those that are indifferent are
-    one of a family. A body that lies turned over in a hinge or a guide is no assembly.
+    Each start is a random position of all bodies, then assembled, or random joint coordinates of a robot within their
+    limits. Equilibria within 1e-6 rad and 1e-6 of the size of the mechanism count as one; an indifferent equilibrium
+    represents a family. Assemblies in which a body is reversed in a hinge or a guide are excluded.
 
     Parameters
     ----------
     mechanism, time, without, q, hold, torques, drives
         As for `equilibrium`.
     starts : int, default 100
-        How many random positions are tried besides the starting guess.
+        Number of random positions in addition to the starting guess.
     seed : int, default 0
-        Of the random positions.
+        Seed of the random positions.
 
     Returns
     -------
     tuple of Equilibrium
-        The stable ones first, then in the order in which they were found; empty where none was.
+        Stable ones first, then in the order in which they were found; empty if none was found.
 
     Raises
     ------
     MechanismError, AssemblyError, SolveError
-        As for `equilibrium`, but for one that does not exist.
+        As for `equilibrium`, except that no error is raised if none exists.
 
     Examples
     --------
@@ -96,7 +96,7 @@ def _random_coordinates(
     hold: str | Sequence[str],
     drives: bool,
 ) -> Coordinates:
-    """Return where the bodies of a robot are at random coordinates of the joints that are not held."""
+    """Return the positions of the bodies of a robot for random coordinates of the joints that are not held."""
     values, limits = given_coordinates(robot, q), robot.limits
     fixed = robot.joint_names if hold == "all" else (hold,) if isinstance(hold, str) else hold
     for k, name in enumerate(robot.joint_names):
@@ -122,7 +122,7 @@ def _random_poses(start: OperatingPoint, random: np.random.Generator) -> Coordin
 
 
 def _closed(start: OperatingPoint, coordinates: Coordinates) -> OperatingPoint | None:
-    """Return the mechanism assembled from a position; None where that does not go, or turns a part over."""
+    """Return the mechanism assembled from a position, or None if that fails or reverses a part."""
     model, instant = start.model, float(start.clock[0, 0, 0])
     if model.rows:
         trial = assemble_from_guess(model, instant, TOLERANCE, coordinates)
@@ -136,7 +136,7 @@ def _closed(start: OperatingPoint, coordinates: Coordinates) -> OperatingPoint |
 
 
 def _same(one: OperatingPoint, other: OperatingPoint) -> bool:
-    """Tell whether two positions are the same but for rounding; whole turns count where a force counts them."""
+    """Tell whether two positions are equal up to rounding; whole turns matter only if a force depends on them."""
     a, b = one.coordinates, other.coordinates
     if np.abs(one.loads - other.loads).max() > SAME * np.abs(one.loads).max():
         return False

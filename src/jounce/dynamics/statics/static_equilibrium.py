@@ -1,4 +1,4 @@
-"""Positions in which a mechanism stands still under its forces, and whether it stays there."""
+"""Positions of static equilibrium of a mechanism under its forces, and their stability."""
 
 import dataclasses
 from collections.abc import Mapping, Sequence
@@ -31,32 +31,33 @@ from jounce.robot.closed_loops.closures import GivenCoordinates
 
 METHODS = ("settle", "newton")
 SLIGHT = 1e-9  # of the largest tension of a rope: less is rounding
-SINGULAR = "the position is singular, joints can move there that cannot elsewhere; what is near is not told"
+SINGULAR = "the position is singular, joints can move there that cannot elsewhere; positions nearby are not examined"
 
 
 class Equilibrium(Displayed):
-    """A position in which a mechanism stands still, the laws of its drivers and forces held at an instant.
+    """A position of static equilibrium, with the laws of drivers and forces frozen at an instant.
 
     Attributes
     ----------
     mechanism : Mechanism
-        That stands there, without the drivers that were released.
+        The mechanism, without the drivers that were released.
     time : float
         The instant, s.
     motion : Motion
-        The mechanism at rest, of one instant: outputs, and by `jounce.joint_reaction`, `jounce.driver_force` and
-        `jounce.dynamics.applied_force` the forces that hold it.
+        The mechanism at rest, at one instant, with its outputs; `jounce.joint_reaction`, `jounce.driver_force` and
+        `jounce.dynamics.applied_force` return the forces that hold it.
     stability : str
-        ``stable``; ``unstable``; ``indifferent``, where no force resists some motion; ``held``, where nothing can
-        move; or ``undetermined``.
+        ``stable``; ``unstable``; ``indifferent`` if no force resists some motion; ``held`` if nothing can move; or
+        ``undetermined``.
     reason : str
-        Why, in words.
+        The reason for this stability, in words.
     singular : bool
-        Whether joints can move there that cannot elsewhere, so that small motions are not told by linear equations.
+        Whether the position is singular: joints can move there that cannot elsewhere, and linear equations do not
+        describe small motions.
     of_robot : bool
-        Whether it is that of a robot, whose small motions are told by its joints.
+        Whether it is the equilibrium of a robot, whose small motions are described by its joints.
     cautions : tuple of str
-        What was left out of account.
+        What the analysis neglects.
     """
 
     def __init__(self, point: OperatingPoint, singular: bool, *, of_robot: bool = False):
@@ -70,12 +71,12 @@ class Equilibrium(Displayed):
 
     @property
     def degrees_of_freedom(self) -> int:
-        """How many independent small motions the constraints allow."""
+        """Number of independent small motions that the constraints allow."""
         return self.point.free.shape[1]
 
     @property
     def stable(self) -> bool | None:
-        """Whether the mechanism stays there, also where nothing can move; None where that is not determined."""
+        """Whether the mechanism stays there, true also if nothing can move; None if that is not determined."""
         return {"stable": True, "held": True, "unstable": False}.get(self.stability)
 
     @property
@@ -100,7 +101,7 @@ class Equilibrium(Displayed):
 
     @cached_property
     def cautions(self) -> tuple[str, ...]:
-        """What was left out of account."""
+        """What the analysis neglects."""
         kinks = (
             [
                 f"forces.{name} has a kink or a jump there: its slope is not the same on both sides"
@@ -125,12 +126,12 @@ class Equilibrium(Displayed):
 
     @cached_property
     def _slack(self) -> tuple[str, ...]:
-        """Which ropes would have to push, which none does."""
+        """Messages on ropes that would have to push, which no rope does."""
         ropes = [name for name, joint in self.mechanism.joints.items() if isinstance(joint, Rope)]
         tensions = {name: float(JointForceOutput(name).coefficients(self.motion)[0, 0, 0]) for name in ropes}
         size = max(map(abs, tensions.values()), default=0.0)
         return tuple(
-            f"joints.{name} is slack, as it would have to push with {-tension:.4g} N: nothing stands there so"
+            f"joints.{name} is slack, as it would have to push with {-tension:.4g} N: this is no equilibrium"
             for name, tension in tensions.items()
             if tension < -SLIGHT * size
         )
@@ -172,7 +173,7 @@ class Equilibrium(Displayed):
 
     @cached_property
     def _all_poses(self) -> dict[str, dict[str, Any]]:
-        """Those of carriages, too."""
+        """The poses of all moving bodies, those of carriages included."""
         poses = {}
         for k, name in enumerate(self.point.model.bodies, 1):
             position, attitude = (self.point.coordinates[key][0, ..., k, 0] for key in self._keys)
@@ -182,7 +183,7 @@ class Equilibrium(Displayed):
 
     @property
     def placed(self) -> Mechanism:
-        """The mechanism with its bodies guessed where they stand: a simulation starts from there."""
+        """The mechanism with this position as its starting guess, from which a simulation starts."""
         bodies = {name: _posed(self.mechanism.bodies[name], pose) for name, pose in self._all_poses.items()}
         return dataclasses.replace(self.mechanism, bodies=bodies, initial={})
 
@@ -214,33 +215,33 @@ def equilibrium(
     torques: Mapping[str, float] | None = None,
     drives: bool = True,
 ) -> Equilibrium:
-    """Return a position in which a mechanism stands still under its forces, and whether it is stable.
+    """Return a position of static equilibrium of a mechanism, and whether it is stable.
 
-    Velocities are zero; the laws of drivers and of forces are held at an instant. All forces balance there:
-    ``Q(q, 0, t) = Phi_q^T lambda``, ``Phi(q, t) = 0``. Bodies need no masses but for their weight.
+    Velocities are zero, and the laws of drivers and forces are frozen at an instant. All forces are in balance:
+    ``Q(q, 0, t) = Phi_q^T lambda``, ``Phi(q, t) = 0``. Bodies need masses only for their weight.
 
     Parameters
     ----------
     mechanism : Mechanism or Robot
-        With masses or applied forces. The search begins where its bodies can be assembled nearest to their starting
-        guess. A robot, with loops or without, is taken as the mechanism that it is (`Robot.mechanism`), whose outputs
-        are the coordinates of its joints.
+        With masses or applied forces. The search begins at the assembled position nearest to the starting guess. A
+        robot, with loops or without, is converted to a mechanism (`Robot.mechanism`), whose outputs are the coordinates
+        of its joints.
     time : float, optional
-        The instant, s; the first of the mechanism unless given, 0 if it has none.
+        The instant, s; by default the first of the mechanism, or 0 if it has none.
     without : sequence of str, optional
-        Drivers that are left out, so that what they drive is free.
+        Drivers to leave out, so that what they drive can move.
     method : {"settle", "newton"}, default "settle"
-        To settle, the bodies creep where the forces do work, until they rest: what is found is stable, unless the
-        search begins on another equilibrium. Newton's method goes to any equilibrium nearby.
+        With "settle", the bodies creep in the direction of the forces until they rest: the equilibrium found is stable,
+        unless the search begins at another one. Newton's method converges to any equilibrium nearby.
     q : array_like of shape (n,) or dict of str to float, optional
-        Of a robot: coordinates from which the search begins, and at which joints are held.
+        For robots: coordinates at which the search begins, and at which joints are held.
     hold : sequence of str, or "all", optional
-        Of a robot: joints that are held. ``jn.driver_force(found.motion, "JOINT_drive")`` is the torque that it takes.
+        For robots: joints that are held. ``jn.driver_force(found.motion, "JOINT_drive")`` returns the torque required.
     torques : dict of str to float, optional
-        Of a robot: constant torques, N m, or forces, N, of joints that are not held.
+        For robots: constant torques, N m, or forces, N, of joints that are not held.
     drives : bool, default True
-        Of a robot: count the armature inertia and the viscous damping of the joints, in stability and small motions.
-        Coulomb friction, which would hold it anywhere near, is left out.
+        For robots: include the armature inertia and the viscous damping of the joints in stability and small motions.
+        Coulomb friction, which would hold the robot anywhere nearby, is neglected.
 
     Returns
     -------
@@ -250,12 +251,12 @@ def equilibrium(
     Raises
     ------
     MechanismError
-        If a name or an option is not valid, or nothing has a mass and no force is applied.
+        If a name or an option is not valid, or there are neither masses nor applied forces.
     AssemblyError
         If the bodies cannot be assembled.
     SolveError
-        If no equilibrium is found: the message says what force stays on which body. Or if a force has no finite value
-        at rest.
+        If no equilibrium is found; the message names the remaining force and its body. Also if a force is not finite at
+        rest.
 
     Examples
     --------
@@ -286,7 +287,7 @@ def as_mechanism(
     torques: Mapping[str, float] | None,
     drives: bool,
 ) -> Mechanism:
-    """Return a robot as the mechanism that stands with some joints held, or a mechanism as it is.
+    """Return a robot as a mechanism at rest with some joints held; return a mechanism unchanged.
 
     Raises
     ------
@@ -304,7 +305,7 @@ def as_mechanism(
 def at_rest_from(
     mechanism: Mechanism, time: Real | Refused | None, without: Sequence[str], method: str
 ) -> OperatingPoint:
-    """Return the mechanism at rest where its bodies can be assembled, or raise where something is not valid."""
+    """Return the mechanism at rest in an assembled position; raise an error if something is not valid."""
     check_mechanism(mechanism)
     check_holonomic(mechanism, "an equilibrium")
     check_choice("method", method, METHODS, MechanismError)
@@ -324,7 +325,7 @@ def at_rest_from(
 
 
 def _outputs_without(mechanism: Mechanism, drivers: dict[str, Any]) -> dict[str, Any]:
-    """Return the outputs that a mechanism has with some of its drivers: what a driver exerts goes with it."""
+    """Return the outputs of a mechanism with some of its drivers, without the forces of removed drivers."""
     if len(drivers) == len(mechanism.drivers):
         return dict(mechanism.outputs)
     left = dataclasses.replace(mechanism, drivers=drivers, outputs={})
@@ -353,7 +354,7 @@ def _instant(mechanism: Mechanism, time: Any) -> float:
 
 
 def equilibrium_of(result: SearchResult, start: OperatingPoint, *, of_robot: bool = False) -> Equilibrium:
-    """Return the result; a position in which the constraints hold less than they do elsewhere is singular."""
+    """Return the result; a position in which the constraints restrain fewer motions than elsewhere is singular."""
     singular = result.point.free.shape[1] > start.free.shape[1]
     coordinates = {"position": result.point.coordinates["position"][0]}
     if beyond := beyond_end(result.point.model, coordinates):

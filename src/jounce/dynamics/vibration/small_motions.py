@@ -1,4 +1,4 @@
-"""From an equilibrium, or an instant of a motion, to the equations of small motions about it."""
+"""Linearized equations of small motions about an equilibrium or about an instant of a motion."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -41,33 +41,33 @@ def linearize(
 ) -> Linearization:
     """Return the equations of small motions of a mechanism: mass, damping and stiffness matrix, state space, modes.
 
-    They are exact: forces, inertia and constraints are differentiated along changes of the motion, to the second order
-    of the constraints, with what joints bear. Along a motion they hold at one instant. Friction of joints is as its law
-    smoothed by a speed is at rest: viscous, the coefficient times the normal force over the speed; this is what happens
-    to motions slower than that speed, which do not stick. About a motion it is refused.
+    The equations are exact: forces, inertia and constraints are differentiated along variations of the motion,
+    constraints to second order, multiplied by the joint reactions. About a motion they hold at one instant. Joint
+    friction follows its law, smoothed by a speed, at rest: it is viscous, the coefficient times the normal force over
+    that speed. This describes motions slower than that speed, which do not stick. About a motion, friction is refused.
 
     Parameters
     ----------
     subject : Mechanism, Equilibrium, Motion, Simulation or Robot
-        A mechanism is taken in its `jounce.equilibrium`. All bodies that can move need masses. A robot, with loops or
-        without, is taken as it moves through the state q under the torques that this needs: its coordinates are those
-        of its joints, its inputs what they exert beside these torques.
+        A mechanism is linearized about its `jounce.equilibrium`. All bodies that can move need masses. A robot, with
+        loops or without, is linearized about the state q under the torques that this state requires: the coordinates
+        are those of its joints, the inputs are torques in addition to these.
     time : float, optional
-        The instant, s: at which a mechanism is held, as for `jounce.equilibrium`; of a simulation, any that it has
-        reached; of another motion, one of its own.
+        The instant, s. For a mechanism, that at which its laws are frozen, as for `jounce.equilibrium`; for a
+        simulation, any instant that it has reached; for another motion, one of its own.
     coordinates : sequence of str, optional
-        As many as there are degrees of freedom: outputs that are functions of the poses, or their components such as
-        ``C_x``; or coordinates of bodies, ``BODY.x``, ``BODY.y``, ``BODY.angle``, in space ``BODY.x`` to ``BODY.z``
-        along the global axes and ``BODY.turn_x`` to ``BODY.turn_z`` about those of the body. Chosen among the latter
-        unless given, so that they are well independent.
+        One for each degree of freedom: outputs that are functions of the poses, or their components such as ``C_x``; or
+        coordinates of bodies, ``BODY.x``, ``BODY.y``, ``BODY.angle``, in space ``BODY.x`` to ``BODY.z`` along the
+        global axes and ``BODY.turn_x`` to ``BODY.turn_z`` about the axes of the body. By default, well-conditioned
+        coordinates of bodies are chosen.
     release : sequence of str, optional
-        Drivers that do not hold in small motions: their force stays as it is, their coordinates are the first of the
-        coordinates, and what they exert beside that force are the first inputs.
+        Drivers that exert a constant force in small motions instead of prescribing the motion. Their coordinates come
+        first among the coordinates, and forces in addition to the constant ones come first among the inputs.
     q : array_like of shape (n,), or (k, n) with k to 3, or dict of str to float, optional
-        Of a robot: coordinates, their rates and second derivatives; zero unless given.
+        For robots: coordinates, their rates and second derivatives; zero by default.
     drives : bool, default True
-        Of a robot: count the viscous damping and the armature inertia of the joints. Coulomb friction, which has no
-        slope where a joint moves and holds it where it rests, is left out.
+        For robots: include the viscous damping and the armature inertia of the joints. Coulomb friction, which is
+        constant while a joint moves and holds it at rest, is neglected.
 
     Returns
     -------
@@ -82,7 +82,7 @@ def linearize(
     MobilityError
         If nothing can move, or the position is singular.
     AssemblyError, SolveError
-        As `jounce.equilibrium`.
+        As for `jounce.equilibrium`.
 
     Examples
     --------
@@ -123,7 +123,7 @@ def linearize(
 
 
 def _of_robot(robot: Robot, q: GivenState, coordinates: Sequence[str] | None, drives: bool) -> Linearization:
-    """Return the equations of small motions of a robot about a state, in the coordinates of its joints."""
+    """Return the linearized equations of a robot about a state, in the coordinates of its joints."""
     joint_coordinates = None if coordinates is None else named("coordinates", coordinates)
     point, names = through_state(robot, q, joint_coordinates, drives)
     reduction = reduced(point, released=[name + DRIVE for name in names], drivers=False)
@@ -137,7 +137,8 @@ def point_along(motion: Motion, time: Real | None) -> OperatingPoint:
     Raises
     ------
     MechanismError
-        If the motion has no such instant or failed there, has no accelerations, or is none under its forces.
+        If the motion has no such instant or failed there, has no accelerations, or does not satisfy the equations of
+        motion.
     """
     motion, lane = _at(motion, time)
     pose_type, coordinates = motion.poses
@@ -162,7 +163,7 @@ def point_along(motion: Motion, time: Real | None) -> OperatingPoint:
 
 
 def _at(motion: Motion, time: Any) -> tuple[Motion, int]:
-    """Return a motion that has an instant, and its index."""
+    """Return a motion that contains an instant, and the index of the instant."""
     if time is None:
         if len(motion.time) > 1:
             raise MechanismError("a motion has many instants; name one", name="time")
@@ -182,7 +183,7 @@ def _at(motion: Motion, time: Any) -> tuple[Motion, int]:
 
 
 def _check_free(point: OperatingPoint, about: Equilibrium | None, released: Sequence[str]) -> None:
-    """Raise MobilityError where nothing can move, or more than the constraints allow elsewhere."""
+    """Raise MobilityError if nothing can move, or more motions are possible than elsewhere."""
     if about is not None and about.singular:
         raise MobilityError(f"there are no linear equations of motion: {about.reason}")
     if not point.free.shape[1] and not released:
@@ -192,7 +193,7 @@ def _check_free(point: OperatingPoint, about: Equilibrium | None, released: Sequ
 
 
 def _check(reduction: Reduction) -> None:
-    """Raise MechanismError where a body that can move has no mass, or a force is not smooth."""
+    """Raise MechanismError if a body that can move has no mass, or a force is not smooth."""
     point, mass = reduction.point, reduction.part(2)
     even = np.sqrt(np.maximum(np.diag(reduction.noise(2)), 1e-300))
     values, vectors = np.linalg.eigh((mass + mass.T) / 2 / np.outer(even, even))

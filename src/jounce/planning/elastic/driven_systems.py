@@ -101,10 +101,10 @@ def robot_drives(robot: Robot, drives: object, losses: bool) -> DriveArrays:
             raise RobotError(message, name="drives", value=name)
     tree, names = robot.tree, robot.joint_names
     if losses and np.any(tree.friction_skew):
-        message = "friction that differs by direction is not known to elastic joints; give one value for both"
+        message = "elastic joints do not support friction that depends on the direction; give one value for both"
         raise RobotError(message, name=f"joints.{names[int(np.flatnonzero(tree.friction_skew)[0])]}.friction")
     if tree.shape.armed:
-        message = "balls and tendons with armature are not known to elastic joints; set their armature to zero"
+        message = "elastic joints do not support balls and tendons with armature; set their armature to zero"
         raise RobotError(message, name="couplings")
     turning = [robot.joints[name].turning for name in names]
     friction = np.asarray(tree.friction) if losses else np.zeros(len(names))

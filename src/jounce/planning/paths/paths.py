@@ -241,7 +241,7 @@ def cells_needed(path: Path, order: int) -> int:
             return cells
     location = path.location(float(s[step // 2 + at * step]))
     message = (
-        f"the path waves or bends too finely at {location} for a time law that keeps limits: "
+        f"the path oscillates or bends too finely at {location} for a time law that keeps limits: "
         f"{CELLS[-1]} cells do not resolve it; allow a larger deviation, smooth it, or retime shorter parts of it"
     )
     raise TrajectoryError(message, name=path.names[joint])
@@ -263,7 +263,7 @@ def _kink(location: str, order: int, name: str) -> TrajectoryError:
         1: "has a kink (its direction jumps, or turns too sharply to be resolved)",
         2: "has a jump of curvature",
     }.get(order, "is not smooth")
-    limits = "" if order < 2 else ", where what is limited would be infinite"
+    limits = "" if order < 2 else ", where a limited quantity would be infinite"
     message = f"the path {what} at {location}{limits}; round it by a deviation, or stop there and retime both parts"
     return TrajectoryError(message, name=name)
 

@@ -41,7 +41,7 @@ def retime_mechanism(
     given = source.limits.values()
     least = 2 if any(x.jerk is not None or x.effort_rate is not None for x in given) else 1
     if order is not None and order < least:
-        message = f"the limits are kept by motions whose derivatives are continuous to {least} at least"
+        message = f"these limits require derivatives that are continuous to order {least} or higher"
         raise MechanismError(message, name="order", value=order)
     conditions = Conditions(order or least, rates)
     checked(source.path, conditions.order)

@@ -240,10 +240,10 @@ def _from_state(
     Raises
     ------
     TrajectoryError, SolveError
-        If no path is found that begins so and keeps the limits: what stood against the last one.
+        If no path that begins in this state and keeps the limits is found; the message says why the last one failed.
     """
     if any(conditions.rates[:1]):
-        message = "a state says the rate at the beginning itself; leave that one 0"
+        message = "the state determines the initial rate; leave the first rate at 0"
         raise TrajectoryError(message, name="rates", value=list(conditions.rates))
     state = clean_state(given, path.names, dict(limits_of(robot, limits).joints))
     if along := rates_along(path, state):
@@ -324,8 +324,8 @@ def _ends(robot: Robot, given: JointTrajectory, source: RobotQuantities, drives:
             owner, quantity = end.breaks[0]
             message = (
                 f"the trajectory does not rest at its {end.end}: from rest, or to it, the {quantity} of {owner} is "
-                "infinite there, which slowing it does not cure; let it rest there, retime it without repair, or say "
-                "hand_over if the robot moves already"
+                "infinite there, which slowing down does not change; let it rest there, retime it without repair, or "
+                "set hand_over if the robot moves already"
             )
             raise TrajectoryError(message, name="repair")
     return ends
@@ -389,7 +389,7 @@ def _order(order: int | None, limits: MotionLimits, robot: Robot) -> int:
         return least
     requested = whole_number("order", order, 1, MAX_ORDER, error=TrajectoryError)
     if requested < least:
-        message = f"the limits are kept by motions whose derivatives are continuous to {least} at least"
+        message = f"these limits require derivatives that are continuous to order {least} or higher"
         raise TrajectoryError(message, name="order", value=order)
     return requested
 

@@ -283,8 +283,8 @@ class Search:
             step, before = over / float(np.clip(fell, LEAST_FALL, 1.0)), over
             law = self.tightened(law, step)
         message = (
-            "the time law found cannot be made to keep its limits; smooth the path where it bends sharply, or try "
-            "another number of cells"
+            "the time law still exceeds its limits after tightening them; smooth the path where it bends sharply, or "
+            "try another number of cells"
         )
         raise SolveError(message)
 

@@ -168,8 +168,8 @@ class ToolPathMotion(Displayed):
         if values[rank - 1] <= WEAK * values[0]:
             return Status.SINGULAR, (
                 f"the path runs into a singular position at t = {time:.6g} s, where the motions of {lost} cancel at "
-                f"the tool (singular values from {values[0]:.2g} down to {values[rank - 1]:.2g}); lead it past, or "
-                "begin on another branch"
+                f"the tool (singular values from {values[0]:.2g} down to {values[rank - 1]:.2g}); let the path "
+                "avoid it, or begin on another branch"
             )
         if jump > JUMP:
             return Status.BRANCH_JUMP, f"the path jumps at t = {time:.6g} s; its laws must be continuous"
@@ -178,11 +178,11 @@ class ToolPathMotion(Displayed):
                 ("posture", "posture, other weights") if equations.has_posture else ("joints held", "law of them")
             )
             return Status.SINGULAR, (
-                f"the path is singular with the {kind} at t = {time:.6g} s: the coordinates turn round there; give "
+                f"the path is singular with the {kind} at t = {time:.6g} s: the coordinates reverse there; give "
                 f"another {other}, or another start"
             )
         return Status.SINGULAR, (
-            f"the path could not be followed beyond t = {time:.6g} s: joints and tool do not go on together there"
+            f"the path could not be followed beyond t = {time:.6g} s: no motion of the joints continues it there"
         )
 
     def __repr__(self) -> str:
@@ -190,15 +190,15 @@ class ToolPathMotion(Displayed):
         return f"<ToolPathMotion of {self.robot.name}: {solved} of {len(self.time)} instants to order {self.order}>"
 
     def explain(self, index: int) -> str:
-        """Return in words what is to be known of an instant: what failed and why, which joints lose a motion."""
+        """Return a description of an instant: what failed and why, and which joints lose a motion."""
         status, time, words = Status(int(self.status[index])), float(self.time[index]), []
         if status in (Status.SINGULAR, Status.BRANCH_JUMP, Status.NOT_REACHED):
             return self.ending or f"singular at t = {time:.6g} s"
         if status == Status.NOT_ASSEMBLED:
             words.append(
                 f"the joints cannot keep the tool on the path at t = {time:.6g} s: the pose misses it by "
-                f"{self.residual[index, 0]:.3g} rad, or sizes of the robot, or a derivative does; prescribe less, as a "
-                "direction in the place of an orientation"
+                f"{self.residual[index, 0]:.3g} rad, or sizes of the robot, or a derivative does; prescribe less, such "
+                "as a direction instead of an orientation"
             )
         if status == Status.NOT_CONVERGED:
             words.append(f"not converged at t = {time:.6g} s")

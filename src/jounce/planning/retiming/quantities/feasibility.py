@@ -13,7 +13,7 @@ IDLE = 1e-9  # of its largest value: what moves by less does not move
 
 
 def check_possible(source: Source, labels: Labels, start: float, stop: float, *, bounded: bool = False) -> None:
-    """Raise TrajectoryError where standing still breaks a limit, or nothing that has one moves."""
+    """Raise TrajectoryError if standing still exceeds a limit, or if no quantity with a limit changes."""
     near = SIDE_OFFSET * (stop - start) * np.array([-1.0, 1.0])
     even = np.linspace(start, stop, POINTS)
     s = np.union1d(even, (source.changes[:, None] + near).reshape(-1))
@@ -26,9 +26,9 @@ def check_possible(source: Source, labels: Labels, start: float, stop: float, *,
         limit = float((quantities.upper if value > 0 else quantities.lower)[at, column])
         where = source.location(float(s[at]))
         message = (
-            f"no time law exists that could halt everywhere: at {where} standing still needs a {label.word} of "
-            f"{value:.6g} {label.unit}, and the limit is {limit:.6g} {label.unit}; motions that "
-            "pass only by momentum are not sought; choose another path, or a smaller load"
+            f"the path cannot be stopped everywhere: at {where} standing still requires a {label.word} of {value:.6g} "
+            f"{label.unit}, and the limit is {limit:.6g} {label.unit}; motions that pass only by momentum are not "
+            "supported; choose another path, or a smaller load"
         )
         raise TrajectoryError(message, name=label.owner)
     if bounded:

@@ -241,6 +241,6 @@ class RobotQuantities:
                 if over[worst] > 1e-9 * max(1.0, abs(bound)):
                     message = (
                         f"the path leaves the range of this joint: {q[worst, column]:.6g} at s = {s[worst]:.6g} is "
-                        f"{word} {bound:g}; no time law mends that, choose another path"
+                        f"{word} {bound:g}; no time law changes that; choose another path"
                     )
                     raise TrajectoryError(message, name=name)
