@@ -19,6 +19,7 @@ from jounce.rigid import PlanarPose, SpatialPose
 
 KINDS = ("turn-turn", "turn-slide", "slide-turn", "slide-slide")
 ROLES = "ijmn"
+NO_PERIOD = 1e300  # which no equation goes through
 LARGEST_DENOMINATOR = 1000  # of ratios that are taken for those of whole numbers
 
 
@@ -62,8 +63,9 @@ def coordinate(
 class CoupledJoints(AbstractConstraint, type="coupled", space="spatial"):
     """A joint follows another one: ``weight_2 q_2 - weight_1 q_1 = offset``, up to whole periods.
 
-    The angles of turning joints are known up to whole turns. The weights are whole numbers where the ratio of the
-    joints is one of whole numbers, so that the joints never lose count over many turns.
+    The angles of turning joints are known up to whole turns. Unless given, the period is one turn
+    where both turn by whole weights, and otherwise that of the joint that turns, so that a continuous motion never
+    loses count over many turns.
     """
 
     roles: str = eqx.field(static=True)  # parent and child of each joint among the bodies i, j, m, n, such as ijim
@@ -106,7 +108,17 @@ class CoupledJoints(AbstractConstraint, type="coupled", space="spatial"):
         leader = coordinate(bodies[0], bodies[1], turning[0], first)
         follower = coordinate(bodies[2], bodies[3], turning[1], second)
         excess = self.weight_2 * follower - self.weight_1 * leader - self.offset
-        return excess if self.period is None else wrap(excess, self.period)
+        return wrap(excess, self._period(*turning)) if any(turning) or self.period is not None else excess
+
+    def _period(self, leader_turns: bool, follower_turns: bool) -> Any:
+        """Return by what the equation changes where a turning joint makes a whole turn."""
+        if self.period is not None:
+            return self.period
+        weight = jnp.abs(self.weight_2 if follower_turns else self.weight_1)
+        if leader_turns and follower_turns:
+            whole = (self.weight_1 == jnp.round(self.weight_1)) & (self.weight_2 == jnp.round(self.weight_2))
+            weight = jnp.where(whole, 1.0, weight)
+        return jnp.where(weight == 0, NO_PERIOD, WHOLE_TURN * weight)
 
 
 def coupled(leader: JointPlacement, follower: JointPlacement, multiplier: float, offset: float) -> CoupledJoints:
@@ -116,16 +128,11 @@ def coupled(leader: JointPlacement, follower: JointPlacement, multiplier: float,
     side of zero only; beyond it the motion cannot be followed.
     """
     bodies = list(dict.fromkeys([*leader.bodies, *follower.bodies]))
-    weights, period = (multiplier, 1.0), None
+    weights = (multiplier, 1.0)
     if leader.turning and follower.turning:
         ratio = Fraction(multiplier).limit_denominator(LARGEST_DENOMINATOR)
         if abs(ratio - Fraction(multiplier)) <= 1e-15 * abs(Fraction(multiplier)):
             weights = (float(ratio.numerator), float(ratio.denominator))
-        period = WHOLE_TURN
-    elif leader.turning:
-        period = WHOLE_TURN * abs(multiplier) or None
-    elif follower.turning:
-        period = WHOLE_TURN
     return CoupledJoints(
         tuple(bodies),
         "".join(ROLES[bodies.index(body)] for body in (*leader.bodies, *follower.bodies)),
@@ -135,7 +142,6 @@ def coupled(leader: JointPlacement, follower: JointPlacement, multiplier: float,
         weight_1=weights[0],
         weight_2=weights[1],
         offset=offset * weights[1],
-        period=period,
     )
 
 

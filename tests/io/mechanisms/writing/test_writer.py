@@ -182,6 +182,25 @@ def test_words_of_coupled_joints_are_checked(roles, kinds, words, tmp_path):
     assert dataclasses.asdict(jn.load(path).joints["J"])["roles"] == "ijim"
 
 
+@pytest.mark.parametrize("weights", ["weight_1: 3, weight_2: 40, offset: 0", "weight_1: -2, weight_2: 7, offset: 0.5"])
+def test_coupled_joints_keep_count_of_turns_without_a_period(weights, tmp_path):
+    path = tmp_path / "a.yaml"
+    text = COUPLED.format(roles="ijim", kinds="turn-turn").replace("weight_1: 2, weight_2: 1, offset: 0", weights)
+    hinge = "{{type: revolute, bodies: [ground, {0}], points: [[0, 0, 0], [0, 0, 0]], axes: [[0, 0, 1], [0, 0, 1]]}}"
+    path.write_text(
+        text + "".join(f"  {x}_hinge: {hinge.format(x)}\n" for x in "ab") + "drivers:\n"
+        "  motor: {type: rotation, bodies: [ground, a], axis: [0, 0, 1], motion: 40*t + 30*t**2}\n"
+    )
+    of = jn.outputs.RelativeAngleOutput(("ground", "b"), axis=[0, 0, 1])
+    mechanism = dataclasses.replace(jn.load(path), outputs={"turn": of})
+    turn = jn.solve(mechanism, np.linspace(0, 2, 5), order=2).outputs["turn"]
+    given = mechanism.joints["J"]
+    speed = given.weight_1 / given.weight_2
+    time = np.linspace(0, 2, 5)
+    expected = np.stack([speed * (40 * time + 30 * time**2) + given.offset / given.weight_2, speed * (40 + 60 * time)])
+    np.testing.assert_allclose(turn[:, :2].T, expected, rtol=1e-12, atol=1e-12)
+
+
 @pytest.mark.parametrize(
     "wrenches, words",
     [
