@@ -99,6 +99,17 @@ class LoadChange:
         Of the center of mass of what is added or taken, m/s, the largest of several.
     steps : dict of str to float
         By how much the torque or force of each joint steps, N m or N.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import jounce as jn
+    >>> robot = jn.load_robot("examples/robots/panda.urdf")
+    >>> load = jn.robot.CarriedLoad("panda_hand", jn.Inertia(3.0), start=0.8, stop=2.0)
+    >>> loaded = jn.robot.LoadedRobot(robot, [load], 0.0, 3.0)
+    >>> taken, _ = loaded.at_changes(np.zeros((2, 3, len(robot.joint_names))), drives=True)
+    >>> taken.time, taken.masses
+    (0.8, {'panda_hand': 3.0})
     """
 
     time: float
@@ -130,6 +141,14 @@ class LoadedRobot:
     ------
     RobotError, TrajectoryError
         If there is no such link, or a load is not carried during the motion.
+
+    Examples
+    --------
+    >>> import jounce as jn
+    >>> robot = jn.load_robot("examples/robots/panda.urdf")
+    >>> load = jn.robot.CarriedLoad("panda_hand", jn.Inertia(3.0), start=0.8, stop=2.0)
+    >>> jn.robot.LoadedRobot(robot, [load], 0.0, 3.0).changes.tolist()
+    [0.8, 2.0]
     """
 
     def __init__(self, robot: Robot, loads: Sequence[CarriedLoad], start: float, stop: float):
