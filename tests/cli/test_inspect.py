@@ -449,3 +449,13 @@ def test_run_writes_what_holds_a_jack_at_rest(run, tmp_path):
     for bound in ("least", "frictionless", "greatest"):
         np.testing.assert_array_equal(found[f"crank_{bound}"], held["crank"].sel(bound=bound))
     assert run("run", jack, "--holding-out", tmp_path / "torque.txt")[0] == 2
+
+
+def test_loops_of_a_file_beside_a_robot_are_listed(tmp_path, facts, run):
+    path = tmp_path / "loops.yaml"
+    path.write_text("closures:\n  tip: {type: ball, frames: [{link: base_link}, {link: tool0, xyz: [0.1, 0, 0]}]}\n")
+    status, data, _ = facts("inspect", EXAMPLES / "robots" / "ur5.urdf", "--closures", path)
+    assert status == 0
+    (loop,) = data["closures"]
+    assert (loop["name"], loop["type"], loop["links"]) == ("tip", "connect", ["base_link", "tool0"])
+    assert run("inspect", FOUR_BAR, "--closures", path)[0] == 2

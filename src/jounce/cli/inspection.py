@@ -26,6 +26,7 @@ def inspect(
     driver: str | None = None,
     as_: Annotated[str | None, Parameter(name="--as")] = None,
     model: str | None = None,
+    closures: Path | None = None,
 ) -> int:
     """Print what a mechanism or robot file contains, and if it can move.
 
@@ -54,6 +55,8 @@ def inspect(
         pinocchio, mujoco, drake, pybullet or yourdfpy.
     model
         Model to read from an SDF file with several.
+    closures
+        File with loops, springs and rotors to add to the robot.
 
     Examples
     --------
@@ -68,9 +71,11 @@ def inspect(
     with expecting(file, "mechanism", "robot"):
         check_ending(file, (*DATA_FILES, *ROBOT_FILES))
     if file.suffix.lower() in ROBOT_FILES:
-        facts = _robot(file, reading, model, as_, strict=strict)
+        robot = RobotReading(strict=strict, allow=reading.allow, model=model, closures=closures)
+        facts = _robot(file, reading, robot, as_)
     else:
-        for name, given in (("--strict", strict or None), ("--as", as_), ("--model", model)):
+        given_options = {"--strict": strict or None, "--as": as_, "--model": model, "--closures": closures}
+        for name, given in given_options.items():
             if given is not None:
                 raise JounceError("is for robot files", name=name, path=file)
         facts = _mechanism(file, reading, driver, range_=range_)
@@ -91,9 +96,7 @@ def inspect(
     return 0 if facts["ok"] else 1
 
 
-def _robot(
-    file: Path, reading: MechanismReading, model: str | None, reader: str | None, *, strict: bool
-) -> dict[str, Any]:
+def _robot(file: Path, reading: MechanismReading, of_robot: RobotReading, reader: str | None) -> dict[str, Any]:
     """Return what is in a robot file, and how another program numbers its coordinates."""
     if reading.set_:
         raise JounceError("is for mechanism files; a robot file has no parameters", name="--set", path=file)
@@ -101,7 +104,7 @@ def _robot(
         raise JounceError("is for mechanism files; results for robots are in SI units", name="--units", path=file)
     from jounce.reporting.facts.robot_facts import inspected_robot, other_reader
 
-    robot = RobotReading(strict=strict, allow=reading.allow, model=model).robot(file)
+    robot = of_robot.robot(file)
     facts = inspected_robot(robot, file)
     if reader is not None:
         try:

@@ -66,7 +66,7 @@ def smoothed_curve(
     Raises
     ------
     SolveError
-        If there is none: the value is the instant.
+        If there is none: the message has the instant.
     """
     knots = laid_knots(times, estimates, dwells)
     far = np.zeros(1, int)
@@ -77,7 +77,8 @@ def smoothed_curve(
             far = reason.samples
             knots = _halved(knots, times, far)
     at = float(times[far[0]])
-    raise SolveError("no smooth motion is within the deviation of the samples", name="deviation", value=at)
+    message = f"no smooth motion stays within the deviation of the samples near t = {at:g} s; allow a larger one"
+    raise SolveError(message, name="deviation", value=deviation)
 
 
 def laid_knots(
