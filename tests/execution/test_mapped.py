@@ -149,7 +149,7 @@ def test_rounds_are_a_loop_over_instants(monkeypatch, native):
     position, label = generator.normal(size=(3, 2, count + 1)), np.zeros(count + 1, np.int64)
     time, sources = generator.normal(size=count), np.maximum(np.arange(count) - 8, -1) % (count + 1)
     example = (position[..., :1], label[:1]), time[:1], np.array([True])
-    program = DRIFT.program((np.float64(0.5),), example, width=8)
+    program = DRIFT.program((np.float64(0.5),), example, width=lambda: 8)
     assert program.backend == ("llvm" if native == "1" else "xla")
     expected, before = position.copy(), label.copy()
     turns = np.arange(24).reshape(-1, program.width)

@@ -227,7 +227,7 @@ def test_a_folder_that_is_no_sweep_stays_as_it_is(tmp_path):
     foreign = tmp_path / "mine.zarr"
     foreign.mkdir()
     (foreign / "notes").write_text("mine")
-    with pytest.raises(OutputError, match="no sweep of jounce"):
+    with pytest.raises(OutputError, match="not a sweep of jounce"):
         swept(foreign)
     assert [x.name for x in foreign.iterdir()] == ["notes"]
     for name, message in (("a.nc", "ends in .zarr"), ("no/a.zarr", "does not exist")):
