@@ -436,6 +436,32 @@ def rubbing_in_space():
     )
 
 
+def cams():
+    """Shafts behind one another, a sled and a flap, each after what moves before it by the law of a cam."""
+    shaft, rocker = ("ground", "shaft"), ("shaft", "rocker")
+    up, side = [0, 0, 1.0], [1.0, 0, 0]
+    turning = drivers.RotationDriver(shaft, Z, 0.0)
+    nodding = drivers.RotationDriver(rocker, B, "0.3*t + 0.1*cos(2*t)")
+    sliding = drivers.SpatialSlideDriver(("ground", "sled"), [1, 0, 0], ZERO, A, "1.1 + 0.1*sin(t)")
+    folding = drivers.RotationDriver(("sled", "flap"), B, "0.3 + (t - 1)**2 - 0.2*t", A, [1.0, 0.3, 0.5])
+    lean = drivers.RotationDriver(rocker, B, 0.0, A, [1.0, 0.3, 0.5])
+    return in_space(
+        11,
+        {"shaft": ZERO, "rocker": [0.3, 0.5, 0.4], "sled": [2.1, 0.2, -0.1], "flap": [2.3, 0.2, 0.2]},
+        joints={
+            "axle": spatial.Revolute(shaft, ZERO, ZERO, Z, Z),
+            "pivot": spatial.Revolute(rocker, C, ZERO, B, B),
+            "guide": spatial.Prismatic(("ground", "sled"), [1, 0, 0], ZERO, A, A, up, up),
+            "hinge": spatial.Revolute(("sled", "flap"), [0.2, 0, 0.3], ZERO, B, B),
+            "nod": jn.joints.Cam(nodding, turning),
+            "lift": jn.joints.Cam(sliding, lean),
+            "fold": jn.joints.Cam(folding, sliding),
+        },
+        drivers={"motor": drivers.RotationDriver(shaft, Z, wave(0.2, 0.7, 0.4, 2.0), side, side)},
+        outputs={"on_rocker": CamTorqueOutput("nod"), "on_sled": CamForceOutput("lift")},
+    )
+
+
 def ropes():
     """A lever in space that lifts a weight by a rope through two rings of the ground."""
     return in_space(
@@ -581,6 +607,7 @@ MECHANISMS |= {
     "teeth": teeth,
     "lines": lines,
     "ropes": ropes,
+    "cams": cams,
     "rubbing": rubbing,
     "rubbing_in_space": rubbing_in_space,
 }
@@ -652,9 +679,10 @@ def test_every_joint_driver_force_and_output_has_its_frames_drawn_otherwise(spac
         for elements in mechanism.elements.values() if mechanism.space == space else ():
             for element in elements.values():
                 missing[type(element)] = missing.get(type(element), set()) - forms_of(element)
-    # a cam is made of coordinates of other elements, a derivative of other outputs: tests/dynamics/test_cams.py and
-    # tests/mechanism/outputs/test_linkage_outputs.py
-    for kind in (CamForceOutput, CamTorqueOutput, jn.outputs.DerivativeOutput):
+    # a derivative is made of other outputs, tests/mechanism/outputs/test_linkage_outputs.py, a cam in the plane of
+    # coordinates as they are, tests/dynamics/test_cams.py
+    missing[jn.outputs.DerivativeOutput] -= {"without"}
+    for kind in (CamForceOutput, CamTorqueOutput) if space == "planar" else ():
         missing[kind] -= {"without"}
     missing.pop(jn.outputs.SymmetricRollCenterOutput, None)  # its image is in a plane through the origin of the ground
     missing[GroundTorqueOutput] -= {"without"}  # about the origin, which is another point of the ground then

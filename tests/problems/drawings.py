@@ -102,6 +102,17 @@ class ShiftedMotion(AbstractMotion):
         return self.motion(time) + self.shift
 
 
+class CamMotion(AbstractMotion):
+    """A law of a cam, of angles of its leader and its follower that are counted from elsewhere."""
+
+    motion: AbstractMotion
+    leads: Any
+    follows: Any
+
+    def __call__(self, coordinate):
+        return self.motion(coordinate - self.leads) + self.follows
+
+
 class ShiftedLaw(AbstractLaw):
     """A law of a torque, of an angle that is counted from elsewhere."""
 
@@ -146,6 +157,10 @@ def redrawn(mechanism, drawings, moved):
 
     def element(name, it):
         changed = {}
+        if isinstance(it, jn.joints.Cam):
+            parts = [element("", part) for part in (it.follower, it.leader)]
+            by = [moved.get(f"{name}.{part}", 0.0) for part in ("leader", "follower")]
+            return jn.joints.Cam(*parts, motion=CamMotion(resolve_motion(it.motion, values), *by))
         for key, field in value_fields(type(it)).items():
             value = getattr(it, key)
             if value is not None and field_kind(field) == "vector" and key != "vector_part":
@@ -279,6 +294,8 @@ def attitudes_of(mechanism, coordinates):
 def counted(mechanism):
     """Return what measures an angle that frames alone change by a constant, by name; in space those without vectors."""
     named = {**mechanism.drivers, **mechanism.forces, **mechanism.outputs}
+    cams = {name: it for name, it in mechanism.joints.items() if isinstance(it, jn.joints.Cam)}
+    named |= {f"{name}.{part}": getattr(it, part) for name, it in cams.items() for part in ("leader", "follower")}
 
     def counts(it):
         if isinstance(it, PLANAR_ANGLES):
