@@ -8,7 +8,8 @@ import pytest
 import jounce as jn
 from jounce.design.objectives.objectives import Goals
 from jounce.design.optimization.law_knots import law_knots
-from jounce.design.optimization.problem import Problem
+from jounce.design.optimization.problem import Locked, Problem
+from tests.dynamics.inverse.test_friction import ladder
 
 TIME = np.linspace(-1.0, 1.0, 41)
 CRANK = jn.Mechanism(
@@ -217,6 +218,46 @@ def test_designs_that_lock_are_kept_away_from(four_bar):
         assert np.abs(other.outputs["psi"][:, 4]).max() > sampled
     with pytest.raises(jn.errors.DesignError, match=r"none of 16 designs .*assembled"):
         jn.optimize(four_bar, "peak(psi, 4)", {"BC": (0.5, 0.6)}, starts=2, samples=16)
+
+
+@pytest.mark.slow
+def test_where_friction_locks_in_all_designs_that_is_what_is_told():
+    words = r"friction locks in all 2 designs .*joints\.wall\.friction: friction locks at t = 0 s.*smaller coefficient"
+    made, bounds = ladder().with_parameters(mu=2.5), {"mu": (2.0, 3.0)}
+    with pytest.raises(jn.errors.DesignError, match=words):
+        jn.optimize(made, "peak(force)", bounds, time=[0.0, 0.6], starts=1, samples=2)
+
+
+@pytest.mark.slow
+def test_the_largest_friction_under_a_limit_of_force_is_that_of_the_closed_form():
+    """30 N over slope less coefficient, largest at the start; the mechanism as it is locks, and most samples."""
+    given = {"vary": {"mu": (0.05, 1.0)}, "subject_to": ["peak(force) <= 300"], "time": [0.0, 0.6, 1.5]}
+    found = jn.optimize(ladder().with_parameters(mu=1.0), "-mu", **given, starts=1, samples=8)
+    assert found.success
+    assert found.parameters["mu"] == pytest.approx(0.3 / np.sqrt(0.91) - 0.1, rel=1e-6)
+    assert "joints.wall.friction: friction locks at t = 0 s" in found.notes[-1]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("instants, locks", [([0.0, 1.0, 2.0], False), ([0.0, 0.5, 1.0], True)])
+def test_friction_that_locks_at_instants_where_no_goal_looks_is_no_design(instants, locks):
+    """The ladder goes down at whole seconds, where friction helps, and is pushed up at the half ones."""
+    made, bounds = ladder("0.4 - 0.1*sin(2*pi*t)", 0.4), {"mu": (0.05, 0.7)}
+    goals = Goals(made, "-mu", ["at(force, 0, 0) >= -1000"], tuple(bounds), {}, np.array(instants))
+    problem = Problem(goals, bounds)
+    if locks:
+        with pytest.raises(Locked, match=r"friction locks at t = 0\.5 s"):
+            problem.evaluate(np.array([1.0]))
+    else:
+        assert np.isfinite(problem.evaluate(np.array([1.0])).smooth).all()
+
+
+@pytest.mark.slow
+def test_friction_that_locks_between_the_instants_makes_no_optimum():
+    made, goal = ladder("0.4 - 0.1*sin(2*pi*t)", 0.4), "at(force, 0, 0) >= -1000"
+    found = jn.optimize(made, "-mu", {"mu": (0.05, 0.7)}, [goal], time=[0.0, 1.0, 2.0], starts=1)
+    assert not found.success
+    assert "between the instants the design locks" in found.message
 
 
 @pytest.mark.slow

@@ -220,22 +220,26 @@ def test_a_ball_and_a_sleeve_resist_along_their_slip():
                 np.testing.assert_allclose(found[name][k], rates, rtol=1e-12, atol=1e-12, err_msg=name)
 
 
-def test_designs_and_instants_whose_friction_locks_fail_alone_with_their_status():
+def ladder(law="0.3 + 0.4*t", start=0.3):
     """A ladder of 1 m, pushed along the floor, lifts 3 kg in a guide: it locks where the tangent of its slope is mu."""
     guide = jn.joints.Friction("mu", 1e-3)
-    made = jn.Mechanism(
+    return jn.Mechanism(
         space="planar",
         gravity=[0, -10.0],
         parameters={"mu": 0.1},
-        bodies={"foot": jn.Body([np.sqrt(0.91), 0]), "top": jn.Body([0, 0.3], mass=3.0)},
+        bodies={"foot": jn.Body([np.sqrt(1 - start**2), 0]), "top": jn.Body([0, start], mass=3.0)},
         joints={
             "floor": jn.planar.Prismatic(("ground", "foot"), [0, 0], [0, 0], [1, 0], [1, 0]),
             "wall": jn.planar.Prismatic(("ground", "top"), [0, 0], [0, 0], [0, 1], [0, 1], friction=guide),
             "ladder": jn.planar.DoubleRevolute(("foot", "top"), [0, 0], [0, 0], 1.0),
         },
-        drivers={"push": jn.drivers.CoordinateDriver(("ground", "foot"), "x", "sqrt(1 - (0.3 + 0.4*t)**2)")},
+        drivers={"push": jn.drivers.CoordinateDriver(("ground", "foot"), "x", f"sqrt(1 - ({law})**2)")},
         outputs={"force": jn.outputs.DriverForceOutput("push")},
     )
+
+
+def test_designs_and_instants_whose_friction_locks_fail_alone_with_their_status():
+    made = ladder()
     mu, time = np.array([0.1, 1.0, 0.2]), np.array([0.0, 0.6, 1.5])
     found = jn.solve_batch(made, {"mu": mu}, time, order=2)
     height = 0.3 + 0.4 * time
@@ -247,3 +251,15 @@ def test_designs_and_instants_whose_friction_locks_fail_alone_with_their_status(
     with pytest.raises(jn.errors.SolveError, match="friction locks at t = 0 s") as told:
         motion.outputs["force"]
     assert (told.value.status, told.value.motion.status.tolist()) == (12, [12, 12, 0])
+
+
+def test_a_sweep_keeps_which_designs_lock_and_the_statistics_of_the_others(tmp_path):
+    time = np.array([0.0, 0.6, 1.5])
+    found = jn.sweep(ladder(), {"mu": [0.1, 1.0, 0.2]}, tmp_path / "s.zarr", time, 2, workers=0, histories=True).load()
+    assert found["first_status"].values.tolist() == [0, jn.Status.LOCKED, 0]
+    assert found["failed_instants"].values.tolist() == [0, 2, 0]
+    assert found["status"].values.tolist() == [[0, 0, 0], [12, 12, 0], [0, 0, 0]]
+    slope, mu = 0.3 / np.sqrt(0.91), np.array([0.1, 0.2])
+    np.testing.assert_allclose(found["force_peak"].values[[0, 2], 0], 30.0 / (slope - mu), rtol=1e-10)
+    for name in ("peak", "rms", "min", "max"):
+        assert np.isnan(found[f"force_{name}"].values[1]).all()

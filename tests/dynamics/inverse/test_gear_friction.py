@@ -286,6 +286,22 @@ def test_a_wheel_drives_its_worm_or_locks(coefficient):
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("varied, values", [("mu", [0.05, 0.12, 0.08, 0.0]), ("lead", [0.2, 0.05, 0.12])])
+def test_designs_whose_worm_holds_its_wheel_fail_alone(varied, values):
+    friction = jn.joints.GearFriction(speed=1e-3, coefficient="mu", lead_angle="lead")
+    parameters = {"mu": 0.1, "lead": float(LEAD)}
+    driven = worm("2*t", "-0.5", friction, drives="wheel", parameters={**parameters, varied: values[0]})
+    found = jn.solve_batch(driven, {varied: values}, [0.0, 0.7], order=1)
+    mu, lead = (np.array(values) if name == varied else parameters[name] for name in ("mu", "lead"))
+    efficiency = np.tan(lead - np.arctan(mu)) / np.tan(lead)
+    status = np.where(efficiency > 0, jn.Status.OK, jn.Status.LOCKED)
+    assert set(status.tolist()) == {jn.Status.OK, jn.Status.LOCKED}
+    np.testing.assert_array_equal(found["status"], np.stack([status, status], axis=1))
+    expected = np.where(efficiency > 0, 0.5 * 30.0 / efficiency, np.nan)
+    np.testing.assert_allclose(abs(found["torque"][..., 0]), np.stack([expected, expected], axis=1), rtol=1e-9)
+
+
+@pytest.mark.slow
 def test_a_worm_that_pushes_its_driven_wheel_is_no_lock():
     found = jn.solve(worm("2*t", "0.5", friction_of_worm(0.12), drives="wheel"), [0.0, 0.7], order=1)
     forward = np.tan(LEAD) / np.tan(LEAD + np.arctan(0.12))

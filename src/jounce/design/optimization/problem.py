@@ -152,6 +152,8 @@ class Problem:
             outcome = Status(int(status[failed[0]]))
             message = f"at t = {self.goals.instants[failed[0]]:g} s {outcome.advice}"
             raise Locked(point, SolveError(message, status=outcome))
+        if not all(np.isfinite(x).all() for x in jax.tree.leaves(outputs)):
+            self._check_friction(point)  # also where no goal looks
         output_slopes, matrix_slopes = jax.tree.map(lambda x: jnp.moveaxis(x, -1, 0) * _along(self.width, x), slopes)
         (rows, smooth), (row_slopes, smooth_slopes) = self._measured(values, outputs, output_slopes)
         if not all(np.isfinite(x).all() for x in (*rows, smooth, *row_slopes, smooth_slopes)):
@@ -168,6 +170,14 @@ class Problem:
             margins,
             margin_slopes,
         )
+
+    def _check_friction(self, point: Float[np.ndarray, " parameter"]) -> None:
+        """Raise Locked where friction locks, which outputs with slopes do not tell."""
+        motion = solve(self.design(point), self.goals.instants, self.goals.order, strict=False)
+        try:
+            dict(motion.outputs.items())
+        except SolveError as error:
+            raise Locked(point, error) from None
 
     def _row_scale(self, matrix: Any) -> Float[np.ndarray, " row"]:
         """Return factors that make the largest entry of each row one in the first design; fixed, as slopes assume."""

@@ -5,7 +5,7 @@ import math
 from collections.abc import Mapping
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, Int
 
 from jounce.design.optimization.problem import Problem
 from jounce.errors import MechanismError, whole_number
@@ -18,7 +18,7 @@ MIN_DISTANCE = 0.05  # of starts from each other, over the diagonal between boun
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Samples:
-    """Points of designs, which of them move, and their merits.
+    """Points of designs, how far they move, and their merits.
 
     Attributes
     ----------
@@ -26,15 +26,21 @@ class Samples:
         Names of the parameters.
     points : array of shape (designs, parameters)
         From 0 to 1 between the bounds.
-    moving : array of bool of shape (designs,)
+    status : array of int of shape (designs,)
+        Outcome at the first instant that is not solved, `Status.OK` where all are.
     merits : array of shape (designs,)
         Smaller is better; infinite for those that do not move.
     """
 
     names: tuple[str, ...]
     points: Float[np.ndarray, "design parameter"]
-    moving: Bool[np.ndarray, " design"]
+    status: Int[np.ndarray, " design"]
     merits: Float[np.ndarray, " design"]
+
+    @property
+    def moving(self) -> Bool[np.ndarray, " design"]:
+        """Which designs move at all instants."""
+        return self.status == Status.OK
 
     @property
     def count(self) -> int:
@@ -88,14 +94,16 @@ def sampled(problem: Problem, count: int | None, seed: int) -> Samples:
     order = max(goals.order - FEWER, 0)
     rows = dict(zip(problem.names, values.T, strict=True))
     family = solve_batch(goals.mechanism, rows, goals.instants, order, alone=False)
-    moving = (family["status"].values == int(Status.OK)).all(axis=1)
+    outcomes = family["status"].values
+    status = np.take_along_axis(outcomes, np.argmax(outcomes != Status.OK, axis=1)[:, None], axis=1)[:, 0]
+    moving = status == Status.OK
     merits = np.full(len(points), np.inf)
     if moving.any():
         outputs = {name: _flat(family[name].values[moving]) for name in goals.mechanism.outputs}
         numbers = problem.sampled(values[moving], outputs)
         merits[moving] = _merits(numbers, np.array([c.relation.equal for c in goals.conditions], bool))
         merits[~np.isfinite(merits)] = np.inf
-    return Samples(problem.names, points, moving, merits)
+    return Samples(problem.names, points, status, merits)
 
 
 def _flat(values: Float[np.ndarray, "design time derivative *axes"]) -> Float[np.ndarray, "design time derivative *_"]:

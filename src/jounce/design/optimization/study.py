@@ -163,8 +163,13 @@ class Study:
         for _ in range(REFINEMENTS):
             if self.grid_error(result) <= AGREED:
                 break
-            self.problem.set_instants(_split(self.problem.goals.instants, 2))
-            result = self.search.from_point(result.point)
+            instants = self.problem.goals.instants
+            self.problem.set_instants(_split(instants, 2))
+            try:
+                result = self.search.from_point(result.point)
+            except Locked:  # between the instants, as `_judged` tells
+                self.problem.set_instants(instants)
+                break
         return result
 
     def grid_error(self, result: SearchResult) -> float:
@@ -242,6 +247,11 @@ class Study:
         """Return the status of a design, and its meaning in words."""
         if infeasible or not end.feasible:
             return "infeasible", "conditions do not hold"
+        if math.isinf(error):
+            return "feasible", (
+                "between the instants the design locks, or its objective or a condition is not finite; give more "
+                "instants, so that the search keeps away from there"
+            )
         if not error <= AGREED:
             return "feasible", (
                 f"objective and conditions differ by {error:.1e} on a finer grid; motion laws or forces may not be "
@@ -301,6 +311,9 @@ class Study:
 def _nothing_moves(lock: Locked | None, taken: Samples) -> DesignError:
     """Return the error where no design can be assembled and moved."""
     why = "" if lock is None else f"; the mechanism as it is: {lock}"
+    if (taken.status == Status.LOCKED).all():
+        locks = f"friction locks in all {taken.count} designs within the bounds"
+        return DesignError(f"{locks}; give bounds within which it does not{why}")
     bounds = "give bounds within which it can be, or a starting guess nearer to them"
     return DesignError(f"none of {taken.count} designs within the bounds can be assembled and moved; {bounds}{why}")
 
