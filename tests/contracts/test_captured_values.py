@@ -182,6 +182,34 @@ def test_laws_of_drivers(door):
     change(1.0)
 
 
+@pytest.mark.slow  # `.ci/run` runs it each time
+@pytest.mark.parametrize("door", ["object", "list", "global", "class", "class that picks", "not compared"])
+def test_laws_of_cams_that_turn_in_space(door):
+    """Angle of the follower, and torque of the shaft, which is the force on the follower times the slope."""
+    law, change = motion_doors()[door]
+    pins = {
+        name: jn.spatial.Revolute(("ground", name), *([0, 0, 0],) * 2, *([0, 0, 1],) * 2) for name in ("shaft", "rod")
+    }
+    turning = {name: jn.drivers.RotationDriver(pin.bodies, [0, 0, 1], law) for name, pin in pins.items()}
+    made = jn.Mechanism(
+        space="spatial",
+        bodies={name: jn.Body([0, 0, 0], mass=1.0, inertia=[0.1] * 3) for name in pins},
+        joints={**pins, "cam": jn.joints.Cam(turning["rod"], pins["shaft"])},
+        drivers={"motor": dataclasses.replace(turning["shaft"], motion="t")},
+        outputs={
+            "angle": jn.outputs.RelativeAngleOutput(("ground", "rod"), [0, 0, 1]),
+            "torque": jn.outputs.DriverTorqueOutput("motor"),
+        },
+    )
+    for amplitude in (1.0, 2.0):
+        change(amplitude)
+        found = jn.solve(made, [0.0, 0.5], order=2).outputs
+        assert float(found["angle"][1, 0]) == pytest.approx(amplitude * np.sin(0.5), abs=1e-13)
+        torque = -0.1 * amplitude**2 * np.sin(0.5) * np.cos(0.5)
+        assert float(found["torque"][1, 0]) == pytest.approx(torque, abs=1e-13)
+    change(1.0)
+
+
 @pytest.mark.parametrize("door", ["list", "class", "class that picks"])
 def test_laws_of_trajectories(door):
     law, change = motion_doors()[door]

@@ -14,7 +14,8 @@ from jounce import drivers, forces, planar, spatial
 from jounce.constraints.base import ROLES, catalogue
 from jounce.testing.reactions import acting, convolved, cross, resultant, spins_of, worked
 from jounce.testing.samples import BODIES
-from tests.contracts.test_frames import MECHANISMS
+from tests.constraints.test_wheels import sleigh
+from tests.contracts.test_frames import MECHANISMS, TURNED
 from tests.problems.bank import OWN
 
 RATES = 4
@@ -169,6 +170,7 @@ MOTIONS = {
     "lines": lambda: jn.solve(MECHANISMS["lines"](), [0.0, 0.3, 0.8], ORDER),
     "shafts": lambda: jn.solve(MECHANISMS["shafts"](), [0.0, 0.3, 0.8], ORDER),
     "cams": lambda: jn.solve(MECHANISMS["cams"](), [0.0, 0.3, 0.8], FEWER),
+    "wheels": lambda: jn.simulate(sleigh(TURNED), [0.0, 0.4, 1.1], order=FEWER),
     "robot with a loop": lambda: jn.solve(loop(), [0.0, 0.8], ORDER),
 }
 
@@ -180,7 +182,7 @@ def test_momentum_changes_by_what_is_applied_and_what_the_ground_gives(name):
     point = np.array([0.3, -0.2, 0.4])[: 2 if motion.mechanism.space == "planar" else 3]
     ground = [taylor(x.values) for x in dataclasses.astuple(jn.dynamics.ground_reaction(motion, point))]
     levels = len(ground[0])
-    assert levels == (FEWER if name == "cams" else ORDER) - 1
+    assert levels == {"cams": FEWER - 1, "wheels": FEWER + 1}.get(name, RATES + 1)
     changes, applied = balance_of_bodies(motion, point), loads(motion, point, levels)
     for whole, load, part in zip(changes, applied, ground, strict=True):
         change = whole[:levels]

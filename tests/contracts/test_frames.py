@@ -17,6 +17,7 @@ from jounce.mechanism.building.starting_guess import pose_at
 from jounce.mechanism.transmissions.axis_angles import with_datums
 from jounce.robot import CoupledJoints, LinkClosure, SlideOutput
 from jounce.testing.samples import group_of, pose_of, random_motion
+from tests.constraints.test_wheels import sleigh
 from tests.problems.drawings import (
     as_drawn,
     assert_same,
@@ -37,6 +38,7 @@ DRAWINGS = {
     "half a turn": [0, 1, 0, 0],
 }
 LAW = "0.4 + 0.7*t + 0.4*sin(2*t)"
+TURNED = Rotation.from_rotvec([0.7, -1.1, 0.4])
 LOSING = jn.joints.GearFriction(speed=0.7, efficiency=0.9, backward=0.6)
 
 
@@ -651,6 +653,18 @@ def test_no_quantity_depends_on_how_frames_are_drawn(name):
         assert_same(mechanism, kept.outputs, found.outputs, drawings, moved)
 
 
+@pytest.mark.slow
+def test_wheels_roll_the_same_however_frames_are_drawn():
+    """The sleigh of Chaplygin on a plane that lies askew, from its start on: all that can be asked of it."""
+    made, random = with_all_outputs(sleigh(TURNED)), np.random.default_rng(4)
+    assert not counted(made)
+    kept = jn.simulate(redrawn(made, as_drawn(made), {}), [0.0, 0.4, 1.1], order=2)
+    for _ in range(2):
+        drawings = random_drawings(made, random)
+        found = jn.simulate(redrawn(made, drawings, {}), [0.0, 0.4, 1.1], order=2)
+        assert_same(made, kept.outputs, found.outputs, drawings, {})
+
+
 def optional_fields(kind):
     """Return the names of the vectors, words and the like of a joint, driver, force or output that may be left out."""
     fields = value_fields(kind).items()
@@ -686,5 +700,5 @@ def test_every_joint_driver_force_and_output_has_its_frames_drawn_otherwise(spac
         missing[kind] -= {"without"}
     missing.pop(jn.outputs.SymmetricRollCenterOutput, None)  # its image is in a plane through the origin of the ground
     missing[GroundTorqueOutput] -= {"without"}  # about the origin, which is another point of the ground then
-    missing.pop(jn.spatial.Wheel, None)  # positions alone do not hold it: tests/constraints/test_wheels.py
+    missing.pop(jn.spatial.Wheel, None)  # positions alone do not hold it: it is simulated above
     assert {kind.__name__: left for kind, left in missing.items() if left} == {}

@@ -190,7 +190,7 @@ def redrawn(mechanism, drawings, moved):
         found = resolve_law(it.law, it, values, None)
         return found if shift is None else ShiftedLaw(found, shift)
 
-    kinds = ("joints", "drivers", "forces", "outputs")
+    kinds = ("joints", "drivers", "forces", "outputs", "initial")
     gravity = None if mechanism.gravity is None else world.direction(resolve(mechanism.gravity, values))
     return dataclasses.replace(
         mechanism,
@@ -293,7 +293,7 @@ def attitudes_of(mechanism, coordinates):
 
 def counted(mechanism):
     """Return what measures an angle that frames alone change by a constant, by name; in space those without vectors."""
-    named = {**mechanism.drivers, **mechanism.forces, **mechanism.outputs}
+    named = {**mechanism.drivers, **mechanism.forces, **mechanism.outputs, **mechanism.initial}
     cams = {name: it for name, it in mechanism.joints.items() if isinstance(it, jn.joints.Cam)}
     named |= {f"{name}.{part}": getattr(it, part) for name, it in cams.items() for part in ("leader", "follower")}
 
