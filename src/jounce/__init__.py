@@ -2,7 +2,7 @@
 
 Importing this package has no side effect but a mark that a process gets when it is forked: `jounce.base.interrupts`.
 The settings of JAX are left alone; everything is computed in double precision all the same, see `jounce.settings`.
-What the package offers stands in the stub beside this file, ``__init__.pyi``, and each name of it is imported when it
+The stub beside this file, ``__init__.pyi``, lists what the package offers, and each name of it is imported when it
 is first used: importing the package alone takes no time, and a command that computes nothing, such as
 ``jounce --help``, does not wait for JAX either. Names of release 0.4 work for one release, with a DeprecationWarning.
 """

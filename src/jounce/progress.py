@@ -13,7 +13,7 @@ def show() -> None:
     """Show from here on what is being computed, wherever that takes longer than two seconds.
 
     A line says what is solved, simulated or optimized, how much of it is done, and which program is compiled. In a
-    notebook it stands below the cell that runs, elsewhere it goes to standard error; it disappears with the work.
+    notebook it is shown below the cell that runs, elsewhere it goes to standard error; it disappears with the work.
 
     Examples
     --------

@@ -2,9 +2,9 @@
 
 JAX computes in single precision by default, stops at numbers that are not finite where its settings ask it to
 look for them, and takes hours where it is not to compile. Its settings hold for a thread or for the whole process,
-which belongs to whoever imports this package. So the settings of the process are left alone: what a room offers, and
-all that its objects can do, computes in a context of its own, entered at the first of nested calls. Threads, which
-inherit no context, enter it for themselves.
+which belongs to the program that imports this package. So the settings of the process are left alone: what a room
+offers, and all that its objects can do, computes in a context of its own, entered at the first of nested calls.
+Threads, which inherit no context, enter it for themselves.
 """
 
 import functools
@@ -232,7 +232,7 @@ def compute_under_own_settings(room: str) -> None:
     """Have all that a room offers compute in double precision: its functions, and the classes of all its modules.
 
     Classes that it does not offer count too, since its results are objects of them, and so do those of modules of the
-    rooms below that it is the first to import. It stands at the end of a room's ``__init__.py``, so that whatever is
+    rooms below that it is the first to import. It is at the end of a room's ``__init__.py``, so that whatever is
     added to the room is included.
     """
     _rooms.append(room)

@@ -29,7 +29,7 @@ class Activity:
 
 
 class Count:
-    """A count that goes on while something is computed; of nested ones, the outermost is reported to whoever asks.
+    """A count that goes on while something is computed; of nested ones, the outermost is reported.
 
     Parameters
     ----------

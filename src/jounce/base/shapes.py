@@ -1,6 +1,6 @@
 """Arrays in annotations: `Float[Numbers, "order 3 *batch"]` is an array of floats with that shape.
 
-A shape stands in an annotation as jaxtyping writes it, and beartype checks it while tests run. Axes are named alike
+An annotation states a shape as jaxtyping writes it, and beartype checks it while tests run. Axes are named alike
 everywhere: within the library `order` first, components next, `*batch` last; at its doors `*batch` or `time` first,
 then `derivative`, then `joint`, `row`, `column` or a component. An axis `order` or `derivative` counts from zero.
 

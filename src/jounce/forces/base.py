@@ -36,7 +36,7 @@ class AbstractForce(Module):
     Raises
     ------
     MechanismError
-        If the number of bodies is wrong or one stands there twice.
+        If the number of bodies is wrong or one is named twice.
 
     Examples
     --------

@@ -1,7 +1,7 @@
 """Elementary functions of jets, each by the recurrence of its differential equation, O(K^2) at order K.
 
 Every function takes a jet, an array or a number; what is not a jet is passed to JAX. Where the textbook
-recurrence loses digits, another form of the same equation stands here, with the reason beside it.
+recurrence loses digits, another form of the same equation is used, with the reason beside it.
 """
 
 import math

@@ -30,13 +30,13 @@ class Fronts(Module):
     Attributes
     ----------
     entries : array of int, shape (fronts, rows, columns)
-        Which entry of the matrix stands there before the elimination; one beyond the last where there is none.
+        Which entry of the matrix is there before the elimination; one beyond the last where there is none.
     rights : array of int, shape (fronts, rows)
         Which row of the matrix that is; one beyond the last where it is none.
     left_rows : array of int, shape (fronts, rows)
         Which row of all those that fronts leave over is taken in there; one beyond the last where there is none.
     left_columns : array of int, shape (fronts, rows, columns)
-        Which column of that row stands there; one beyond the last where there is none.
+        Which column of that row is there; one beyond the last where there is none.
     neighbors : array of int, shape (fronts, neighbors)
         Fronts of the bodies that the rest of the columns belong to; one beyond the last where there are fewer.
     of_body : array of int, shape (bodies,)

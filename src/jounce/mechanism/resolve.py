@@ -349,7 +349,7 @@ def group_key(element: Element, values: Mapping[str, Any]) -> Any:
 
 
 def stack_elements(elements: Sequence[Element], values: Sequence[Mapping[str, Any]]) -> Any:
-    """Return one element whose values hold all instances, along an axis that stands before the batch axis."""
+    """Return one element whose values hold all instances, along an axis before the batch axis."""
     kind = type(elements[0])
     static = static_fields(kind)
     stacked: dict[str, Any] = {"bodies": (), **_found_later(kind)}

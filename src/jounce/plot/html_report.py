@@ -84,7 +84,7 @@ def report(
     view : tuple of float, default (-60, 25)
         Azimuth and elevation from which a spatial mechanism is seen, degrees.
     source : str or path, optional
-        The file that the mechanism came from. Its name stands in the foot of the page; where it exists, the table of
+        The file that the mechanism came from. Its name is in the foot of the page; where it exists, the table of
         parameters shows how they are written in it.
     equations : bool, default False
         Whether the page ends with the constraint equations: joints with their numbers in Sommer 2024, the pattern of

@@ -65,7 +65,7 @@ class RunningMaxima:
         top = largest_indices(height, self._count)
         index = indices[top]
         heights = np.take_along_axis(height, top, axis=0)
-        for k in range(1, self._count):  # one that stands twice, for want of others, counts once
+        for k in range(1, self._count):  # one that is listed twice, for lack of others, counts once
             heights[k, (top[:k] == top[k]).any(axis=0)] = -np.inf
         candidates = [
             heights,

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 
 class HomogeneousSolid(NamedTuple):
-    """A kind of solid: its sizes, the axis it stands along by default, and how volume and moments follow.
+    """A kind of solid: its sizes, its axis by default, and how volume and moments follow.
 
     Attributes
     ----------

@@ -135,7 +135,7 @@ class SpatialPose(AbstractFrame):
             velocity = velocity.append(None if turn is None else k * turn)
         elif turn is not None:
             velocity = Jet((k * turn,)) if k == 1 else Jet((jnp.zeros_like(turn), *[None] * (k - 2), k * turn))
-        # the term with the newest w' stands last: the others are then shared between a trial and the solution
+        # the term with the newest w' is last: the others are then shared between a trial and the solution
         rates = [None] * k if velocity is None else velocity.coefficients
         w = list(zip(*(components(rate) if rate is not None else [None] * 3 for rate in rates), strict=True))
 

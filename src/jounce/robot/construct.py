@@ -120,7 +120,7 @@ def from_denavit_hartenberg(
             joints.append(
                 Joint(f"joint_{k}", parent, f"link_{k}", position=transform, rotation=about_x @ about_z, **moved)
             )
-        else:  # the axis of the joint does not pass through the frame of its link: a frame on the axis stands between
+        else:  # the axis of the joint does not pass through the frame of its link: a frame on the axis is added between
             joints.append(Joint(f"joint_{k}", parent, f"axis_{k}", **moved))
             links.append(Link(f"axis_{k}"))
             transform = about_z @ (row.a * X) + row.d * Z

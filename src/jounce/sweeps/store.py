@@ -199,7 +199,7 @@ class Store:
             shutil.rmtree(self.folder)
 
     def finish(self, count: int) -> str:
-        """Return the digest of the digests of all chunks, and put it into the manifest, whatever stands there.
+        """Return the digest of the digests of all chunks, and put it into the manifest, whatever is there.
 
         Raises
         ------

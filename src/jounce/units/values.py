@@ -206,7 +206,7 @@ def _parse_text(
 
 
 def _with_units_named(error: ExpressionError, text: str, known: Collection[str]) -> JounceError:
-    """Return an error that says so where a number with a unit stands within an expression, else the error as it is."""
+    """Return an error that says so where a number with a unit is part of an expression, else the error as it is."""
     for number, unit in _UNIT_WITHIN.findall(text)[:MOST_LOOKED_AT]:
         if unit in known or unit in CONSTANTS:
             continue

@@ -147,7 +147,7 @@ def test_locations_are_worded_with_dots_and_brackets():
         ('{"b": {"a": 1,\n"a": 2}}', ".json", 2, "b.a: duplicate name, already given in line 1"),
         ("a = 1\na = 2", ".toml", 2, "duplicate name"),
         ("[a]\nb = 1\n[a]\n", ".toml", 3, "duplicate name"),
-        ("a: 1\n\tb: 2", ".yaml", 2, "a tab stands where YAML wants spaces"),
+        ("a: 1\n\tb: 2", ".yaml", 2, "a tab is where YAML requires spaces"),
         ("a: b: 1", ".yaml", 1, "a second ':' in one line"),
         ("a: [1, 2\nb: 3", ".yaml", 2, "started in line 1"),
         ("a: 'b", ".yaml", 1, "the YAML cannot be read"),

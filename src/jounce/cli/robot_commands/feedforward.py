@@ -1,4 +1,4 @@
-"""The command for elastic joints: what motors must do behind springs, so that links move as told."""
+"""The command for elastic joints: what motors must do behind springs, so that links move as prescribed."""
 
 from __future__ import annotations
 

@@ -39,7 +39,7 @@ class SaddleFronts(Module):
     positions : array of int, shape (size,)
         Where each unknown, the coordinates first, and its equation stand in it.
     unknowns : array of int, shape (rows of the whole matrix,)
-        Which unknown stands there; one beyond the last where there is none.
+        Which unknown is there; one beyond the last where there is none.
     rows : array of int, shape (entries,)
         The row of each entry of the Jacobian, any where it is of the ground.
     """

@@ -90,7 +90,7 @@ class ExtremeFriction:
         Returns
         -------
         most : array of shape (instants,)
-            Infinite where friction locks, so that it does as much as one likes; NaN where it cannot be told.
+            Infinite where friction locks, so that friction has no bound; NaN where it is not determined.
         proven : array of bool, shape (instants,)
         """
         along = along[self._given]

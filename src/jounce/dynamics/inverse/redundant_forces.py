@@ -52,7 +52,7 @@ def least_multipliers(
     compliance : array of shape (rows,)
         Zero where a row is rigid.
     bent : array of shape (rows,)
-        What stands in the place of zero on the right side of the first equation; zero, or anything to find what is
+        What replaces zero on the right side of the first equation; zero, or anything to find what is
         open under no load.
     """
     scale, rows = jnp.asarray(system.column_scale), system.shape[0]

@@ -2,7 +2,7 @@
 
 With the Taylor coefficients c of ``y = (position, attitude, velocity, spin)`` at the two ends of a step h,
 ``y_1 = y_0 + sum_j p! (2p-j)! / ((2p)! (p-j)!) h^j (c_0[j] - (-1)^j c_1[j])``, j = 1..p, is right to order 2p. The end
-stands on both sides: it is found by iteration. Of the velocities the formula takes accelerations with p = 1, jerk with
+is on both sides: it is found by iteration. Of the velocities the formula takes accelerations with p = 1, jerk with
 p = 2, jounce with p = 3.
 """
 

@@ -58,11 +58,11 @@ class Source:
         return self.error_type(message, **self.error_fields(location), **value)
 
     def error_fields(self, location: Location = ()) -> dict[str, Any]:
-        """Return where an entry stands, as errors take it: file, line and dotted name."""
+        """Return the place of an entry, as errors take it: file, line and dotted name."""
         return {"path": self.path, "line": self.line(location), "name": dotted(location) or None}
 
     def at(self, location: Location) -> Any:
-        """Return what stands at a location, None where nothing does."""
+        """Return the value at a location, None where there is none."""
         entry = self.data
         for step in location:
             entry = entry.get(step) if isinstance(entry, dict) else None

@@ -114,7 +114,7 @@ def _yaml_error(path: str, error: Exception) -> MechanismFileError:
     context = getattr(error, "context", None)
     text = f"{context}: {problem}" if context else str(problem)
     if "'\\t'" in text:
-        text = "a tab stands where YAML wants spaces"
+        text = "a tab is where YAML requires spaces"
     elif (
         "block mapping" in text
         and "expected <block end>" in text
@@ -123,7 +123,7 @@ def _yaml_error(path: str, error: Exception) -> MechanismFileError:
         and mark.column > start.column
     ):
         text = (
-            f"the line is indented further than the entries that it stands beside ({mark.column} spaces, not "
+            f"the line is indented further than the entries beside it ({mark.column} spaces, not "
             f"{start.column}); entries of one mapping begin in one column"
         )
     elif "mapping values are not allowed" in text:

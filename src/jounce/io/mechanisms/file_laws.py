@@ -39,7 +39,7 @@ class FileLaws:
         Parameters
         ----------
         location : tuple
-            Where it stands in the file.
+            Its place in the file.
         value : object
             As the schema gives it.
         following : tuple of str, optional

@@ -206,7 +206,7 @@ def _planar(reader: str, name: str, element: Element) -> TheirJoint:
 
 
 def _of_mjcf(path: str | PathLike[str], robot: Robot) -> Iterator[TheirJoint]:
-    """Give the joints of an MJCF file by their number in MuJoCo; what they became stands in the same order."""
+    """Give the joints of an MJCF file by their number in MuJoCo; what they became is in the same order."""
     import mujoco as package
 
     from jounce.io.robots.mjcf.files import quiet_mujoco

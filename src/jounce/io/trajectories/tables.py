@@ -18,7 +18,7 @@ from jounce.io.trajectories.table_columns import Columns, columns_of
 from jounce.units.dimensions import TIME, Dimension
 
 NOTHING = ("", "nan", "NaN", "NAN")
-"""What stands where a series has no value."""
+"""What a table has where a series has no value."""
 
 
 def read_recording(path: str, joints: Iterable[str] | None = None) -> Recording:

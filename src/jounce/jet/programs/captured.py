@@ -132,7 +132,7 @@ def read_off(function: Callable[..., Any], *examples: Any) -> ReadOff:
         program = Program(*key, tuple(np.shape(x) for x in captured), whole)
     with _lock:
         _known.pop(key, None)
-        _known[key] = program  # the last one used stands last
+        _known[key] = program  # the last one used is last
         while len(_known) > MOST_TRACED:
             del _known[next(iter(_known))]
     return ReadOff(program, captured, closed, result)

@@ -212,7 +212,7 @@ def nearest_to_guess(model: Model, attempt: AssemblyAttempt, instant: float) -> 
 def check_assembled(model: Model, attempt: AssemblyAttempt, instant: float, *, free: bool = False) -> None:
     """Raise AssemblyError, with the joints concerned and by how much they stay open, where gaps are not closed.
 
-    What is missing for every motion to be prescribed is told too, unless degrees of freedom may be left (`free`).
+    What is missing for every motion to be prescribed is reported too, unless degrees of freedom may be left (`free`).
     """
     gaps = attempt.gaps
     if not (known := np.isfinite(gaps)).all():

@@ -18,7 +18,7 @@ VANISHING = 1e-12  # of the largest term: what is left where a root is located, 
 
 @dataclasses.dataclass(frozen=True)
 class LimitPosition:
-    """A configuration in which the driver stands while the mechanism moves: a dead point of this driver.
+    """A configuration in which the driver stands still while the mechanism moves: a dead point of this driver.
 
     Attributes
     ----------
@@ -45,7 +45,7 @@ class LimitPosition:
 def limits_between(point: CurvePoint, stop: float, unit: float) -> list[LimitPosition]:
     """Return the limit positions from a point, that excluded, to an arc length, that included.
 
-    The unit of the value is what it is worth as an unknown; a driver that stands all the way has none.
+    The unit of the value is what it is worth as an unknown; a driver that stands still all the way has none.
     """
     step = stop - point.arc_length
     orders = np.arange(len(point.value))

@@ -214,7 +214,7 @@ class GridSolver:
 
 
 def empty_state(state: Any, lanes: int) -> Any:
-    """Return arrays for the states of so many instants and anchors; whoever solves an instant is first to touch it."""
+    """Return arrays for the states of so many instants and anchors; the threads that solve them first touch them."""
     return jax.tree.map(lambda x: np.empty((*x.shape[:-1], lanes)), state)
 
 

@@ -33,9 +33,9 @@ _kept: OrderedDict[Contents, Any] = OrderedDict()  # None where contents were se
 
 
 def contents_of(mechanism: Mechanism, *more: Any) -> Contents | None:
-    """Return all that the model of a mechanism depends on, and `more`; None where that cannot be told by values.
+    """Return all that the model of a mechanism depends on, and `more`; None where values do not determine it.
 
-    Values are told apart with their types, and to the last bit: 0.0 from -0.0, and 1 from 1.0.
+    Values are distinguished with their types, and to the last bit: 0.0 from -0.0, and 1 from 1.0.
     """
     values: list[Any] = []
     kinds: list[type] = []

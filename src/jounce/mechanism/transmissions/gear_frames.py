@@ -1,8 +1,8 @@
 """Frames of gears: the body that both centers are pinned to, and the axes of shafts in the frame that they turn in.
 
 The centers of toothed gears, and of the pulleys of most belts, keep their distance where one body carries both. The
-pins show this body: a center stands on every body that is pinned there. The joints that hold directions parallel show
-the axis of a shaft in the frame m, and that of a pinion on its rack.
+pins show this body: a center is a point of every body that is pinned there. The joints that hold directions parallel
+show the axis of a shaft in the frame m, and that of a pinion on its rack.
 """
 
 import dataclasses

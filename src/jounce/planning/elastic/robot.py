@@ -31,7 +31,7 @@ def elastic_robot(robot: Robot, drives: Mapping[str, Drive], *, losses: bool = T
     """Return a robot whose elastic joints are two: that of the link, and that of the rotor, ``NAME_motor``.
 
     Nothing joins the two: the springs are forces, which `simulate_elastic` adds. Coordinates of rotors are those seen
-    at the joints, and their inertia stands in the armatures, so that `drives=True` is needed wherever it shall count.
+    at the joints, and their inertia is part of the armatures, so that `drives=True` is needed wherever it shall count.
 
     Parameters
     ----------

@@ -206,7 +206,7 @@ class Search:
         return solution.coefficients * scale
 
     def _why_none(self, program: Program, labels: np.ndarray, at: np.ndarray) -> SolveError:
-        """Return the error of a program without a solution: which limit stands against it most."""
+        """Return the error of a program without a solution: which limit prevents it most."""
         elastic = solve_program(program, elastic=True)
         prices = elastic.prices[: len(at)]
         if elastic.coefficients is None or not prices.size or elastic.slack < 1e-5:

@@ -116,7 +116,7 @@ def followed(
         if passed.all():
             return Nodes(time, series, None)
         lost = ~at_node[1:]
-        until = int(np.argmax(lost)) + 1 if lost.any() else len(passed)  # what follows stands on nothing
+        until = int(np.argmax(lost)) + 1 if lost.any() else len(passed)  # what follows has no basis
         bad = np.flatnonzero(~passed[:until])
         short = bad[steps[bad] <= SHORTEST * (end - begin)]
         if short.size:

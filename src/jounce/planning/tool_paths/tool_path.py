@@ -48,7 +48,7 @@ class ToolPath(Displayed):
     start, stop : float
         First and last instant, s.
     progress : AbstractMotion, Expression or str, optional
-        Law of what stands in the place of ``t`` in all other laws, itself of ``t``: another time law along the same
+        Law, a function of ``t``, that replaces ``t`` in all other laws: another time law along the same
         path. `start` and `stop` are instants, not values of it.
 
     Raises

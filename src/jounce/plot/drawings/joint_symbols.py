@@ -64,7 +64,7 @@ def _draw_wheel(drawing: Drawing, wheel: Wheel) -> None:
     if wheel.internal:
         drawing.disc(center, radius + rim, width=1.2, **look)
     drawing.disc(center, radius, fill="" if wheel.internal else tinted(color, 0.15), width=1.6, **look)
-    if not drawing.skeleton.links[body].edges:  # its name stands in the wheel, or at its rim
+    if not drawing.skeleton.links[body].edges:  # its name is in the wheel, or at its rim
         above = np.array([0.0, radius if wheel.internal else 0.55 * radius])
         drawing.move_name(f"bodies.{body}", center + above)
     marked = (radius + rim, radius) if wheel.internal else (0.0, radius)

@@ -18,7 +18,7 @@ from jounce.reporting.text.tables import Table, number, table, vector
 
 
 class EquilibriumFacts(TypedDict):
-    """Where a mechanism stands."""
+    """The equilibrium of a mechanism."""
 
     time: float
     stability: str
@@ -79,7 +79,7 @@ def equilibrium_facts(rest: Equilibrium, without: list[str]) -> EquilibriumFacts
 
 
 def equilibrium_words(facts: EquilibriumFacts) -> str:
-    """Word where a mechanism stands, and whether it stays there."""
+    """Describe the equilibrium of a mechanism, and whether it is stable."""
     freedom = count(facts["degrees_of_freedom"], "degree of freedom", "degrees of freedom")
     freed = f" without {', '.join(facts['without'])}" if facts["without"] else ""
     lines = [f"equilibrium at t = {facts['time']:g} s{freed}: {facts['stability']} ({facts['reason']})", freedom]

@@ -141,7 +141,7 @@ class InspectedRobot(RobotFacts):
 
 
 def robot_facts(robot: Robot) -> dict[str, Any]:
-    """Return what stands in a robot, before its loops are looked at: RobotFacts.
+    """Return the contents of a robot, before its loops are examined: RobotFacts.
 
     Parameters
     ----------

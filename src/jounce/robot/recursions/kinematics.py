@@ -75,7 +75,7 @@ def link_frame(tree: Tree, q: Series, frame_in_body: Frame) -> Frames:
 
 
 def frame_at(robot: AbstractRobot, link: str, point: ArrayLike) -> Frame:
-    """Return where the frame of a link, moved to a point, is in its body; the base stands after the moving bodies.
+    """Return where the frame of a link, moved to a point, is in its body; the base follows the moving bodies.
 
     Raises
     ------

@@ -151,7 +151,7 @@ class SegmentedMotion(SplineMotion):
         ]
         try:
             return SegmentedMotion(known_segments, known(initial), known(start), beyond)
-        except TrajectoryError as error:  # where it stands is known to the mechanism, which names the law
+        except TrajectoryError as error:  # its location is known to the mechanism, which names the law
             raise TrajectoryError(f"{error.name}: {error.message}", value=error.value) from None
 
     def __call__(self, time: Jet) -> Jet:

@@ -1,4 +1,4 @@
-"""The server of a page: on this machine only, for whoever has its address, with the token, and for no other origin.
+"""The server of a page: on this machine only, for those who have its address with the token, and for no other origin.
 
 A server that listens on this machine only can still be reached from it by every program, and by every page that is open
 in a browser here: scripts may open a WebSocket to any port (only its Origin says whose script it is), and a name of an

@@ -35,7 +35,7 @@ class Parameter:
     low, high : float
         Ends of the slider.
     group : str, default ""
-        Heading under which it stands.
+        Heading under which it is listed.
     derived : bool, default False
         It follows from others, by an expression, and is shown only.
     unit : str, default ""

@@ -54,7 +54,7 @@ def robot_appearance(robot: Robot, path: Path | None = None, allow: Iterable[str
             ]
     bars = _bars(robot, size)
     bare = not any(shapes_of_links.values())
-    for link in links:  # a base without shapes stands on nothing, as in its file, unless all is bars
+    for link in links:  # a base without shapes has no stand, as in its file, unless all is bars
         if not shapes_of_links[link] and (bare or link != robot.base):
             shapes_of_links[link] = bars[link]
     return Appearance(shapes_of_links, (), list(_points(robot)), size, upward(robot.gravity))

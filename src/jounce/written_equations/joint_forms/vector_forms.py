@@ -114,7 +114,7 @@ def _has_components(row: Polynomial) -> bool:
 
 
 def _of_one_vector(row: Polynomial, c: int) -> Polynomial | None:
-    """Return a row as that of a vector, by the component in which it stands; None where it is none."""
+    """Return a row as that of a vector, by its component; None where it is none."""
     terms = {}
     for monomial, factor in row.terms.items():
         vectors = [a for a in monomial if a[0] in _COMPONENTS]

@@ -129,7 +129,7 @@ class NumPyModule:
         return "\n".join([*lines, "    return out"])
 
     def parameter(self, argument: Argument) -> str:
-        """Return an argument as it stands in a definition."""
+        """Return an argument as a definition has it."""
         return argument.name
 
     def before(self, function: Function) -> list[str]:

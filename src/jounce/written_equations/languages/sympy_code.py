@@ -64,7 +64,7 @@ class SymPyModule(NumPyModule):
         return lines
 
     def parameter(self, argument: Argument) -> str:
-        """Return an argument as it stands in a definition: a symbol unless given."""
+        """Return an argument as a definition has it: a symbol unless given."""
         return f"{argument.name}={argument.name}"
 
     def constant(self, value: Any) -> Text:

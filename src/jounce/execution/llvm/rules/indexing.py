@@ -272,7 +272,7 @@ def _taken(values: Sequence[Value], table: np.ndarray) -> Values:
 
 
 def filler(params: Mapping[str, Any], dtype: Any) -> Any:
-    """Return what stands where an index points beyond an array."""
+    """Return the value for an index that points beyond an array."""
     if params["mode"] != GatherScatterMode.FILL_OR_DROP:
         return 0
     if params["fill_value"] is not None:

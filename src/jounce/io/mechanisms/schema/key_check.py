@@ -16,7 +16,7 @@ from jounce.io.files.source import read_source
 __all__ = ["ROLES", "check_keys", "unknown_key", "unknown_type"]
 
 ROLES = {"joints": "joint", "drivers": "driver", "forces": "force", "initial": "driver"}
-"""The sections of a file that hold what is told apart by ``type``, and the role of each."""
+"""The sections of a file whose entries are distinguished by ``type``, and the role of each."""
 
 LARGEST = 200_000  # bytes of a file that is read twice
 _HINTS = {

@@ -99,7 +99,7 @@ def is_cam(space: str, entry: dict[str, Any]) -> bool:
 
 
 def location_of(keys: Iterable[FileKey], field: str) -> Location:
-    """Return where in a file the value of a field stands, below its joint, driver or output."""
+    """Return the place in a file of the value of a field, below its joint, driver or output."""
     for key in keys:
         if field in key.fields:
             index = key.fields.index(field)

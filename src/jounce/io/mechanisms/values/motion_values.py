@@ -185,7 +185,7 @@ def _output_law(raw: dict[str, Any], info: Any, variables: dict[str, Dimension |
 
 
 def _below(single: Checked, raw: object, info: Any, at: str | int) -> Any:
-    """Return what a check makes of an entry below another one; what is wrong is told with where it is."""
+    """Return what a check makes of an entry below another one; errors state where."""
     try:
         return single.function(raw, info)
     except PydanticCustomError as error:

@@ -176,7 +176,7 @@ def _rate_law(
 
 
 def _place(name: str | None) -> tuple[str | int, ...]:
-    """Return where in the entry a name such as ``segments[2].to`` stands."""
+    """Return the place in the entry of a name such as ``segments[2].to``."""
     if not name or not name.startswith("segments"):
         return (name,) if name else ()
     index, _, key = name.removeprefix("segments").partition("].")

@@ -1,4 +1,4 @@
-"""Which element of a robot file stands behind a name that the robot's own checks speak of."""
+"""Which element of a robot file has a name that the robot's own checks report."""
 
 from __future__ import annotations
 

@@ -28,7 +28,7 @@ def inertia_of_shapes(name: str, link: Element, inertial: Element, frames: Frame
     """Return the inertia of a link in its frame, from its collision shapes, as the reference library of SDF adds them.
 
     The density is that of the collision, else that of ``<inertial>``, else 1000 kg/m^3. A ``<mass>`` scales the whole
-    to that mass. A cone stands along z, its middle at the pose of the collision.
+    to that mass. A cone has its axis along z, its middle at the pose of the collision.
 
     Parameters
     ----------

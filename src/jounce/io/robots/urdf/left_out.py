@@ -178,7 +178,7 @@ def _of_gazebo(
     *,
     moving: bool,
 ) -> Iterator[tuple[str, str, Element]]:
-    """Give what an element for Gazebo changes: the heading, of which link or joint, and where it stands."""
+    """Give what an element for Gazebo changes: the heading, of which link or joint, and its place."""
     about = gazebo.attributes.get("reference", "").strip()
     moves = any(joint.moving for joint in names.get(about, ()))
     frame = robot.frames.get(about)

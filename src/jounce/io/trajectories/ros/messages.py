@@ -139,7 +139,7 @@ def _started(source: Source, recording: Recording) -> Recording:
 
 
 def _at(source: Source, location: Location) -> Any:
-    """Return what stands at a location, also within lists; None where nothing does."""
+    """Return the value at a location, also within lists; None where there is none."""
     entry = source.data
     for step in location:
         if isinstance(step, int):

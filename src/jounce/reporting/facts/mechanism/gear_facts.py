@@ -17,7 +17,7 @@ from jounce.mechanism.transmissions.axis_angles import turned
 from jounce.mechanism.transmissions.gear_frames import carriers
 from jounce.reporting.facts.mechanism.freedom_facts import StartingState
 
-LARGEST_TEETH = 1000  # of ratios that are told as fractions
+LARGEST_TEETH = 1000  # of ratios that are given as fractions
 WHOLE = 1e-9
 STILL = 1e-12
 
@@ -83,7 +83,7 @@ def train_facts(state: StartingState) -> list[dict[str, Any]]:
     Parameters
     ----------
     state : StartingState
-        Of a mechanism whose drivers determine it; else nothing is told.
+        Of a mechanism whose drivers determine it; else nothing is reported.
 
     Examples
     --------

@@ -139,7 +139,7 @@ class InspectedMechanism(MechanismFacts):
 
 
 def mechanism_facts(mechanism: Mechanism, path: str | PathLike[str] | None = None) -> dict[str, Any]:
-    """Return what stands in a mechanism, before anything is assembled: MechanismFacts.
+    """Return the contents of a mechanism, before anything is assembled: MechanismFacts.
 
     Parameters
     ----------
