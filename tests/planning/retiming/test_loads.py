@@ -73,7 +73,7 @@ def test_places_that_are_not_on_the_path_are_told():
         with pytest.raises(TrajectoryError, match=words):
             jn.retime(robot, path, loads=[CarriedLoad("cart", jn.Inertia(0.5), **place)])
     load = CarriedLoad("cart", jn.Inertia(2.0), 0.5, by="share")
-    with pytest.raises(TrajectoryError, match="standing still needs a force of 29"):
+    with pytest.raises(TrajectoryError, match="standing still requires a force of 29"):
         jn.retime(cart((0, 0, 1), effort=25.0), path, loads=[load])
     with pytest.raises(TrajectoryError, match="running state"):
         jn.retime(robot, path, loads=[load], state=[[0.0], [0.1]])

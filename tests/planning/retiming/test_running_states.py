@@ -80,5 +80,5 @@ def test_bad_states_are_named(state, message):
 
 def test_a_state_is_not_given_twice():
     path, state = [[0.0, 0.0], [1.0, 0.4]], np.zeros((2, 2))
-    with pytest.raises(TrajectoryError, match="rates: a state says the rate"):
+    with pytest.raises(TrajectoryError, match="rates: the state determines the initial rate"):
         jn.retime(table(), path, LIMITS, state=state, rates=(0.1, 0.0))

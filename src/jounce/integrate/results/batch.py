@@ -4,10 +4,9 @@ import dataclasses
 from typing import Any, NamedTuple
 
 import numpy as np
-from jaxtyping import Int
+from jaxtyping import Float, Int
 
 from jounce.base.display import Displayed
-from jounce.base.shapes import Array
 from jounce.kinematics import Status
 from jounce.kinematics.families.labels import labeled_family
 from jounce.mechanism import Mechanism
@@ -46,9 +45,9 @@ class Batch(Displayed):
         Highest derivative of the outputs.
     """
 
-    time: Array[np.ndarray, " time"]
-    parameters: dict[str, Array[np.ndarray, " run"]]
-    outputs: dict[str, Array[np.ndarray, "run time derivative *component"]]
+    time: Float[np.ndarray, " time"]
+    parameters: dict[str, Float[np.ndarray, " run"]]
+    outputs: dict[str, Float[np.ndarray, "run time derivative *component"]]
     status: Int[np.ndarray, "run time"]
     steps: Int[np.ndarray, " run"]
     mechanism: Mechanism | Robot

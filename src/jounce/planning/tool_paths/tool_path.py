@@ -124,7 +124,7 @@ class ToolPath(Displayed):
         >>> import jounce as jn
         >>> t = np.linspace(0.0, 1.0, 41)
         >>> path = jn.planning.ToolPath.through(t, np.stack([t, t**2, 0 * t], axis=1), [1, 0, 0, 0])
-        >>> path.position([0.5], order=2)[0].round(6).tolist()
+        >>> (path.position([0.5], order=2)[0].round(6) + 0.0).tolist()
         [[0.5, 0.25, 0.0], [1.0, 1.0, 0.0], [0.0, 2.0, 0.0]]
         """
         times, positions_given = check_samples(times, positions)

@@ -15,7 +15,7 @@ import numpy as np
 from jaxtyping import Float
 from typing_extensions import TypeAliasType
 
-from jounce.base.shapes import Array, ArrayLike, Numbers
+from jounce.base.shapes import ArrayLike, Numbers
 from jounce.constraints import AbstractConstraint, Scalar, Vector
 from jounce.constraints.base import Wrenches
 from jounce.errors import MechanismError, RobotError
@@ -265,7 +265,7 @@ def size_of(robot: AbstractRobot) -> float:
 
 def closure_wrenches(
     robot: AbstractRobot, q: GivenCoordinates = None
-) -> dict[str, tuple[Array[np.ndarray, "wrench 6"], Array[np.ndarray, "redundant 6"]]]:
+) -> dict[str, tuple[Float[np.ndarray, "wrench 6"], Float[np.ndarray, "redundant 6"]]]:
     """Return what each closure of a robot bears, and what of it is redundant, as the joints of the tree bear it too.
 
     A mechanism of the robot has one equation for each wrench of the first kind. Those of the second kind hold by
