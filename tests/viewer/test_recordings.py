@@ -30,6 +30,15 @@ def test_bodies_are_where_the_law_puts_them(recording):
     assert not recording.position[:, 0].any()
 
 
+def test_the_first_point_that_has_arrows_moves():
+    recording = MechanismSubject(jn.load("examples/belt_drive.yaml")).solve({}, 2)
+    names = [point.name for point in recording.appearance.points]
+    first = recording.first_moving_point()
+    path = recording.motion(first)[:, 0]
+    assert names.index(first.name) > 0  # the arm turns about the first one
+    assert np.ptp(path, axis=0).max() > 0.1
+
+
 def test_arrows_are_scaled_derivatives(recording):
     expected = derivatives_of_the_rim(recording.time)
     drawn = Overlay.of(recording, DisplayOptions((TracedPoint(rim(recording), (1, 2)),), lengths={2: 2.5}))

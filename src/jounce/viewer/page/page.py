@@ -72,7 +72,7 @@ class Page:
         recording = self.session.recording
         traced = ()
         if recording.appearance.points and recording.order >= 1:
-            traced = (TracedPoint(recording.appearance.points[0], tuple(range(1, min(recording.order, 2) + 1))),)
+            traced = (TracedPoint(recording.first_moving_point(), tuple(range(1, min(recording.order, 2) + 1))),)
         self.player = Player(float(recording.time[0]), float(recording.time[-1]), self._played)
         self._pictures = 0
         self.scene.set_stage(recording)

@@ -198,6 +198,11 @@ class Recording(abc.ABC):
         low, high = self.box
         return float(np.linalg.norm(high - low)) or 1.0
 
+    def first_moving_point(self) -> BodyPoint:
+        """Return the first of the points that moves by more than rounding, or the first where none does."""
+        points, least = self.appearance.points, 1e-9 * self.size
+        return next((point for point in points if np.ptp(self.motion(point)[:, 0], axis=0).max() > least), points[0])
+
 
 def poses(motion: Motion) -> tuple[Positions, Quaternions]:
     """Return origins and quaternions of all bodies, the ground first."""
