@@ -75,6 +75,7 @@ def test_a_planetary_gear_loads_its_pins_and_bearings_as_its_free_bodies_say():
             assert (np.abs(force - expected) <= 1e-10 * size).all(), (name, force, expected)
 
 
+@pytest.mark.slow
 def test_where_the_load_passes_zero_rates_of_what_the_teeth_press_apart_are_not_told():
     motion = jn.solve(planetary("-7 + 20*t"), [0.0, 0.35, 0.7], ORDER)
     reaction = jn.joint_reaction(motion, "S", "sun").force

@@ -53,6 +53,7 @@ def rates(function, t, count):
 
 
 @pytest.mark.parametrize("sign", [1, pytest.param(-1, marks=pytest.mark.slow)])
+@pytest.mark.slow
 def test_a_tooth_loads_bearing_and_guide_along_the_rack_and_apart(sign):
     """Over ten turns, with rates to the fourth: the rack takes its inertia and the load from the pitch point."""
     time = [0.0, 0.7, 3.3]
@@ -109,6 +110,7 @@ def test_travel_by_the_pitch_radius_counts_all_turns():
     )
 
 
+@pytest.mark.slow
 def test_what_does_not_mesh_is_refused():
     along, above, _ = TILT.T.tolist()
     line = (PLACE + RADIUS * TILT[:, 1]).tolist()

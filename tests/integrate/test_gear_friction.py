@@ -45,6 +45,7 @@ def wheels_on_and_off(t, push=1.0):
     return found
 
 
+@pytest.mark.slow
 def test_a_load_that_reverses_is_passed_on_by_either_efficiency():
     simulated = jn.simulate(pair(torque="push*cos(3*t)"), TIME)
     wanted = [wheels_on_and_off(t) for t in TIME]
@@ -60,6 +61,7 @@ def test_a_batch_has_the_speeds_of_its_motors():
         np.testing.assert_allclose(found.outputs["first"][k, :, 1], wanted, rtol=0, atol=1e-11)
 
 
+@pytest.mark.slow
 def test_gears_that_lock_themselves_hold_a_load_but_for_a_creep():
     onward, back = 1 / 0.5 - 1, 1.3
     simulated = jn.simulate(pair(0.5, -0.3, speed=0.05, load="3", begun=0.0), TIME)
@@ -69,6 +71,7 @@ def test_gears_that_lock_themselves_hold_a_load_but_for_a_creep():
     assert simulated.outputs["first"][-1, 1] == pytest.approx(-creep, rel=1e-9)
 
 
+@pytest.mark.slow
 def test_gears_that_lock_themselves_slow_down_under_the_load_that_pushes_them():
     # (J + I) a = load - back |p| and J a = load - |p| at the first gear, of I = 1
     def found(inertia):

@@ -31,6 +31,7 @@ def sled(law, motion="1.0"):
     )
 
 
+@pytest.mark.slow
 def test_a_relay_over_ten_periods():
     time = np.linspace(0.0, 40 * QUARTER, 82)[:-1]
     for instants in (time, -time):  # it is even in time

@@ -37,6 +37,7 @@ def test_a_mass_on_a_spring_in_both_modes():
     assert float(last) == pytest.approx(expected[-1, 0], abs=1e-13)
 
 
+@pytest.mark.slow
 def test_beside_an_equilibrium_the_change_moves_though_the_motion_does_not():
     hanging = cart([0, 0, 1])
 

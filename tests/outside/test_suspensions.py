@@ -71,6 +71,7 @@ def corner(tmp_path_factory):
     return jn.load(path)
 
 
+@pytest.mark.slow
 def test_toe_and_camber_over_travel_and_steering_are_those_of_suspension_explorer(corner):
     swept = corner.with_parameters(height=0.04, bump=0.08, steering=0.04)
     motion = jn.solve(swept, list(PUBLISHED), order=0)

@@ -46,6 +46,7 @@ def robot(*, smooth=False, followers=True):
 
 
 @pytest.mark.parametrize("followers", [True, False])
+@pytest.mark.slow
 def test_torques_move_it_as_they_were_computed_for(followers):
     one = robot(followers=followers)
     q = np.random.default_rng(1).normal(size=(3, 5, len(one.joint_names))) * 0.5
@@ -60,6 +61,7 @@ def test_torques_move_it_as_they_were_computed_for(followers):
     np.testing.assert_allclose(energy[:, 0], np.einsum("si,sij,sj->s", q[:, 1], mass[:, 0], q[:, 1]) / 2, atol=1e-12)
 
 
+@pytest.mark.slow
 def test_energy_stays_where_nothing_is_lost():
     one = robot(smooth=True)
     state = np.full((2, len(one.joint_names)), 0.3)

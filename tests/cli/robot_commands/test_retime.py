@@ -94,6 +94,7 @@ def test_a_duration_is_written_in_whole_periods(run, cart, tmp_path):
     assert not (tmp_path / "odd.csv").exists()
 
 
+@pytest.mark.slow
 def test_from_a_running_trajectory(run, cart, tmp_path):
     running = tmp_path / "running.yaml"
     running.write_text("joints: {slide: 0.4*t}\ntime: {start: 0, stop: 2, count: 21}\n")

@@ -164,6 +164,7 @@ def screw_jack(mu, law, lead=0.005, radius=0.01):
 @pytest.mark.parametrize(
     "mu", [pytest.param(0.05, marks=pytest.mark.slow), 0.12]
 )  # below and above the slope of the thread, 0.0796
+@pytest.mark.slow
 def test_a_screw_lifts_and_lowers_by_the_formulas_of_the_square_thread(mu):
     rise, angle = np.arctan(0.005 / (2 * np.pi * 0.01)), np.arctan(mu)
     lift = jn.solve(screw_jack(mu, "-2*t"), [0.0, 0.7], order=1).outputs["torque"]

@@ -273,6 +273,7 @@ def test_a_worm_drives_and_is_held_by_the_formulas_of_its_thread(coefficient, pr
 
 
 @pytest.mark.parametrize("coefficient", [0.05, 0.12])
+@pytest.mark.slow
 def test_a_wheel_drives_its_worm_or_locks(coefficient):
     mechanism = worm("2*t", "-0.5", friction_of_worm(coefficient), drives="wheel")
     if coefficient > 0.1:  # the slope of the thread

@@ -101,6 +101,7 @@ def test_a_wedge_that_friction_locks_one_way_moves_the_other_way():
 
 
 @pytest.mark.parametrize("mu", [0.05, 0.12])
+@pytest.mark.slow
 def test_a_screw_jack_holds_its_load_by_itself_where_friction_exceeds_the_lead(mu):
     rise, angle = np.arctan(0.005 / (2 * np.pi * 0.01)), np.arctan(mu)
     found = held(screw_jack(mu, "2*t"), "turn")  # lifts where it turns backward
@@ -352,6 +353,7 @@ def test_friction_of_two_directions_that_a_motion_joins():
     np.testing.assert_allclose(found, np.sin(line) * down + mu * normal * np.array([-1, 0, 1]), rtol=1e-10)
 
 
+@pytest.mark.slow
 def test_what_has_no_range_is_refused_by_name():
     parts = {"space": "planar", "gravity": [0, -10], "parameters": {"mu": 0.3}, "bodies": sled().bodies}
     alone = jn.Mechanism(**parts, joints=sled().joints)

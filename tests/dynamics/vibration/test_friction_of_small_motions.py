@@ -38,6 +38,7 @@ def test_a_sled_swings_with_the_friction_of_its_guide_over_the_speed(turned):
     assert not np.any(jn.linearize(sled(turned, mu=0.0)).damping)
 
 
+@pytest.mark.slow
 def test_what_a_sled_does_in_small_motions_a_simulation_does():
     """From a tenth of a thousandth of the speed of friction: the first half swing, by its closed form."""
     free = dataclasses.replace(sled(), initial={"go": jn.drivers.SlideDriver(

@@ -182,6 +182,7 @@ closures:
 """
 
 
+@pytest.mark.slow
 def test_a_file_beside_it_closes_loops_and_gives_springs_and_rotors(tmp_path):
     beside = tmp_path / "more.yaml"
     beside.write_text(FILE)

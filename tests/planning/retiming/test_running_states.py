@@ -42,6 +42,7 @@ def test_a_state_on_the_path_is_gone_on_with():
     assert found.report.hand_over
 
 
+@pytest.mark.slow
 def test_from_a_running_motion_onto_a_new_path():
     running = jn.JointTrajectory({"x": "1.2*t", "y": "0.3*sin(2*t)"}, 0.0, 2.0)
     state = running.derivatives([0.5], 2)[0]

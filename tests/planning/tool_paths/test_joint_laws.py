@@ -62,6 +62,7 @@ def test_a_spike_between_instants_is_followed(order):
     np.testing.assert_allclose(laws.derivatives(times, 0), path.position(times, 0), rtol=0, atol=1e-8)
 
 
+@pytest.mark.slow
 def test_a_spike_too_narrow_to_be_followed_is_told_with_its_instant():
     with pytest.raises(TrajectoryError, match=r"too narrow to be followed, at t = 0\.9871"):
         along("0.5*t + 0.3*exp(-((t - 0.9871)/0.0000005)**2)", "t", 0.0)
