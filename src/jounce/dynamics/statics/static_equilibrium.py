@@ -307,7 +307,8 @@ def at_rest_from(
 ) -> OperatingPoint:
     """Return the mechanism at rest in an assembled position; raise an error if something is not valid."""
     check_mechanism(mechanism)
-    check_holonomic(mechanism, "an equilibrium")
+    about_motion = "simulate the motion; jn.linearize and jounce modes --moving have small motions about it"
+    check_holonomic(mechanism, "an equilibrium", about_motion)
     check_choice("method", method, METHODS, MechanismError)
     if isinstance(without, str):
         without = (without,)

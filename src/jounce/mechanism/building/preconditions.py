@@ -75,13 +75,13 @@ def concrete_or(
     return partial(concrete, traced=traced)
 
 
-def check_holonomic(mechanism: Any, what: str) -> None:
+def check_holonomic(mechanism: Any, what: str, instead: str = "simulate the motion") -> None:
     """Raise UnsupportedError, by name, for a joint that holds velocities where positions are asked for."""
     for name, joint in mechanism.joints.items():
         if getattr(joint, "nonholonomic", False):
             message = (
                 f"{what} follows from positions, and a {joint.type_name} that rolls restricts velocities alone, so "
-                "that where it is depends on the way there: simulate the motion"
+                f"that where it is depends on the way there: {instead}"
             )
             raise UnsupportedError(message, name=f"joints.{name}")
 
