@@ -179,9 +179,8 @@ def test_mechanisms_along_their_motions(name, tmp_path):
         assert_same_in_c(code, compiled(jn.equations(mechanism, format="c", order=6), tmp_path), motion_equations)
 
 
-@pytest.mark.slow
-def test_a_worm_on_crossed_axes():
-    """Angles about axes are counted as along a motion, or from where the bodies are assembled."""
+def worm():
+    """Return a worm and its wheel on crossed axes, whose angles are counted as along a motion, or as assembled."""
     bodies = {"worm": jn.Body([0, 0, 0]), "wheel": jn.Body([0, 0, 0.1])}
     joints = {
         "a": jn.spatial.Revolute(("ground", "worm"), [0, 0, 0], [0, 0, 0], [1, 0, 0], [1, 0, 0]),
@@ -189,7 +188,12 @@ def test_a_worm_on_crossed_axes():
         "mesh": jn.spatial.Gear(("worm", "wheel", "ground"), [1, 0, 0], [0, 1, 0], ratio="-1/40"),
     }
     motor = jn.drivers.RotationDriver(("ground", "worm"), [1, 0, 0], motion="100*t + 300*t**2")
-    mechanism = jn.Mechanism(space="spatial", bodies=bodies, joints=joints, drivers={"motor": motor})
+    return jn.Mechanism(space="spatial", bodies=bodies, joints=joints, drivers={"motor": motor})
+
+
+@pytest.mark.slow
+def test_a_worm_on_crossed_axes():
+    mechanism = worm()
     motion = jn.solve(mechanism, np.linspace(0, 0.5, 4), order=6)
     equations = jn.constraint_equations(motion)
     for given in (motion, mechanism):

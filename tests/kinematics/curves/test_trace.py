@@ -145,7 +145,7 @@ def test_halved_steps_give_the_same_curve(monkeypatch):
     curve = jn.trace(mechanism)
     monkeypatch.setattr(path, "TAIL", path.TAIL * 2.0**-path.ORDER)
     finer = jn.trace(mechanism)
-    assert len(finer._places) > 1.7 * len(curve._places)
+    assert len(finer._track) > 1.7 * len(curve._track)
     np.testing.assert_allclose(finer.length, curve.length, rtol=1e-13)
     np.testing.assert_allclose([x.value for x in finer.limits], [x.value for x in curve.limits], atol=1e-13)
     np.testing.assert_allclose(finer.outputs["C"], curve.outputs["C"], atol=1e-10)
