@@ -1,5 +1,6 @@
 """Equations as expressions of SymPy, turned into numbers and differentiated by SymPy."""
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
@@ -97,6 +98,20 @@ class Steps(jn.joints.AbstractConstraint):
     def residual(self, body_i, body_j, time):
         d = body_j.position - body_i.position
         return d[1] - jn.jet.Jet.constant(jnp.round(d[0].coefficients[0]), d.order)
+
+
+class Sawtooth(jn.joints.AbstractConstraint):
+    def residual(self, body_i, body_j, time):
+        d = body_j.position - body_i.position
+        return d[1] - jn.jet.Jet.constant(jax.lax.rem(d[0].coefficients[0], 0.7), d.order)
+
+
+@pytest.mark.parametrize("x", [-1.5, -0.2, 0.0, 0.5, 2.5])
+def test_remainders_have_the_sign_of_what_is_divided(x):
+    code = run(jn.equations(between_free_bodies(Sawtooth(("one", "two")), "planar"), format="sympy", order=1))
+    q = np.array([0.0, 0, 0, x, 0, 0])
+    for found in (numbers(code, "residual", 0.0, q)[0, 0], code["residual"](0.0, q.tolist())[0]):
+        assert float(found) == pytest.approx(-np.fmod(x, 0.7), abs=1e-15)
 
 
 @pytest.mark.parametrize("x", [-2.5, -1.5, -0.5, -0.2, 0.0, 0.5, 1.2, 1.5, 2.5])

@@ -22,11 +22,17 @@ _CALLED = {
     "pow": "sp.Pow", "is_finite": "is_finite", "hypot": "hypot",
 }  # fmt: skip
 _HELPERS = {
-    "rem": ("x, y", "return sp.sign(x) * sp.Mod(sp.Abs(x), sp.Abs(y))"),
+    # sp.Mod, where it is evaluated, seeks common divisors, which takes minutes in long expressions
+    "rem": (
+        "x, y",
+        "size, divisor = sp.Abs(x), sp.Abs(y)",
+        "known = not (size.free_symbols or divisor.free_symbols)",
+        "return sp.sign(x) * sp.Mod(size, divisor, evaluate=known)",
+    ),
     "rounded": (  # halves to the even number
         "x",
         "low, high = sp.ceiling(x - sp.Rational(1, 2)), sp.floor(x + sp.Rational(1, 2))",
-        "return low + sp.Mod(low, 2) * (high - low)",
+        "return low + (1 - (-1) ** low) / 2 * (high - low)",
     ),
     "hypot": ("x, y", "return sp.sqrt(x**2 + y**2)"),
     "expm1": ("x", "return sp.exp(x) - 1"),
