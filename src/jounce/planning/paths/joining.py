@@ -2,7 +2,7 @@
 
 import dataclasses
 from collections.abc import Sequence
-from math import perm
+from math import factorial, perm
 
 import numpy as np
 from jaxtyping import Float
@@ -12,7 +12,7 @@ from jounce.errors import TrajectoryError
 from jounce.planning.paths.path import Path
 from jounce.planning.pieces import JoinedPieces
 from jounce.robot.model.links_and_joints import Limits
-from jounce.trajectory import ExpressionMotion, FollowingMotion, PiecewiseMotion
+from jounce.trajectory import AbstractMotion, ExpressionMotion, FollowingMotion, PiecewiseMotion, SplineMotion
 
 FIELDS = ("velocity", "acceleration", "jerk")
 MET = 4  # positions to jerk of the path, where it is joined
@@ -21,6 +21,7 @@ ROUNDING = 1e-6  # of a limit, or of a rate: rounding of a state
 ALONG = 1e-5  # of a state: a smaller deviation from a path is on it
 STILL = 1e-9  # of a limit: a smaller speed stands still
 LOOKS = 401
+NEAR = 1e-12  # of a path: what is nearer is the same place
 STEADY = "at + rate*(t - begin)"
 
 State = Float[np.ndarray, "_ joint"]  # position, velocity, ...
@@ -41,7 +42,7 @@ def clean_state(given: ArrayLike, names: Sequence[str], limits: dict[str, Limits
     Raises
     ------
     TrajectoryError
-        If it is no such state, exceeds a limit by more than a millionth, or has accelerations at rest.
+        If it is no such state, or has accelerations at rest.
     """
     message = f"must hold positions, velocities and perhaps accelerations and jerks of {len(names)} joints"
     state = real_numbers("state", given, TrajectoryError, message).copy()
@@ -54,9 +55,6 @@ def clean_state(given: ArrayLike, names: Sequence[str], limits: dict[str, Limits
             limit, value = getattr(limits[name], field), abs(float(state[level, joint]))
             if limit is None:
                 continue
-            if value > limit * (1 + ROUNDING):
-                message = f"the {field} of {name} is above its limit of {limit:g} where the motion is to begin"
-                raise TrajectoryError(message, name="state", value=float(state[level, joint]))
             if value < STILL * limit:
                 state[level, joint] = 0.0
             elif value > limit * (1 - 2 * ROUNDING):  # a search needs a little to spare
@@ -92,49 +90,78 @@ def _following(p: np.ndarray, rates: Sequence[float], level: int) -> Float[np.nd
     return 0 * p[1]
 
 
-def joined(path: Path, state: State, share: float) -> Path:
-    """Return the path that begins with a state at a rate of 1, and goes on as another one from a share of that.
+def joined_from_rest(path: Path, start: Float[np.ndarray, " joint"], at: float) -> Path:
+    """Return the path that begins straight toward a place of another one, and goes on as that from there.
 
     Parameters
     ----------
     path : Path
         The path to join.
-    state : array of shape (derivative, joint)
-        Positions, velocities, ...; at rest the path begins straight toward the point at which it joins the other.
-    share : float
-        Part of the parameter of the path that is left out.
+    start : array of shape (joint,)
+        Positions.
+    at : float
+        Parameter of the path where it is joined.
     """
-    at = path.start + share * (path.stop - path.start)
     p = path.derivatives(np.array([at]), MET - 1)[0]
-    way = p[0] - state[0]
-    speed = float(np.linalg.norm(state[1]))
-    begins = state if speed else np.stack([state[0], way])
-    speed = speed or float(np.linalg.norm(way))
-    rate = speed / float(np.linalg.norm(p[1]))
-    duration = max(float(np.linalg.norm(way)), np.finfo(float).tiny) / speed
-    ends = p * rate ** np.arange(MET)[:, None]
-    powers = _between(begins, ends, duration)
-    stop = duration + (path.stop - at) / rate
-    leader = ExpressionMotion(STEADY, {"at": at, "rate": rate, "begin": duration})
-    laws = {
-        name: PiecewiseMotion(
-            [JoinedPieces(np.zeros(1), powers[:, [k]], duration), FollowingMotion(law, leader)], [duration, stop]
-        )
-        for k, (name, law) in enumerate(path.laws.items())
-    }
-    whole = Path(dict(laws), 0.0, stop)
-    own = whole.derivatives(np.linspace(0.0, duration, LOOKS), 0)[:, 0]
+    way = p[0] - start
+    length = max(float(np.linalg.norm(way)), np.finfo(float).tiny)
+    rate = length / float(np.linalg.norm(p[1]))
+    powers = _between(np.stack([start, way]), p * rate ** np.arange(MET)[:, None])
+    return gone_on(path, at, rate, [JoinedPieces(np.zeros(1), x[:, None], 1.0) for x in powers.T], 1.0)
+
+
+def gone_on(path: Path, at: float, rate: float, laws: Sequence[SplineMotion], until: float) -> Path:
+    """Return the path of some laws over s from 0 on, that goes on as another one at a steady rate.
+
+    Parameters
+    ----------
+    path : Path
+        The path to join.
+    at, rate : float
+        Where it is joined, and how fast its parameter grows with s.
+    laws : sequence of SplineMotion
+        Of its joints.
+    until : float
+        The s at which it is joined.
+    """
+    stop = until + (path.stop - at) / rate
+    named = zip(laws, path.laws.items(), strict=True)
+    whole = Path({name: _spliced(own, law, at, rate, until, stop) for own, (name, law) in named}, 0.0, stop)
+    own = whole.derivatives(np.linspace(0.0, until, LOOKS), 0)[:, 0]
     there = path.derivatives(np.linspace(path.start, path.stop, LOOKS), 0)[:, 0]
     away = float(np.sqrt(((own[:, None] - there) ** 2).sum(axis=2)).min(axis=1).max())
     words = f"from the running state onto the path, joined at s = {at:.6g}, at most {away:.2g} rad or m away from it"
-    return dataclasses.replace(whole, deviation=path.deviation, allowed=path.allowed, words=words)
+    return dataclasses.replace(whole, deviation=path.deviation, allowed=path.allowed, words=words, joined=until)
 
 
-def _between(begins: State, ends: State, duration: float) -> Float[np.ndarray, "power joint"]:
-    """Return the coefficients, lowest power first, of a polynomial with some derivatives at its two ends."""
+def _spliced(
+    own: SplineMotion, law: AbstractMotion, at: float, rate: float, until: float, stop: float
+) -> AbstractMotion:
+    """Return a law that is its own until a value of s, and then another one at a steady rate.
+
+    Of two splines it is one, all of whose numbers are arrays: what is compiled for it does for the next one too.
+    """
+    if not isinstance(law, SplineMotion):
+        leader = ExpressionMotion(STEADY, {"at": at, "rate": rate, "begin": until})
+        return PiecewiseMotion([own, FollowingMotion(law, leader)], [until, stop])
+    begins, powers = np.asarray(law.breakpoints), np.asarray(law.coefficients)
+    last = at + rate * (stop - until)
+    kept = np.flatnonzero((begins > at + NEAR * (last - at)) & (begins < last - NEAR * (last - at)))
+    first = kept[0] - 1 if len(kept) else int(np.clip(np.searchsorted(begins, at, side="right") - 1, 0, None))
+    first = max(first, 0)
+    derived = [np.polynomial.polynomial.polyder(powers[:, first], k) for k in range(len(powers))]
+    moved = [np.polynomial.polynomial.polyval(at - begins[first], x) / factorial(k) for k, x in enumerate(derived)]
+    after = np.column_stack([moved, powers[:, kept]]) * rate ** np.arange(len(powers))[:, None]
+    before = np.asarray(own.coefficients)
+    count = max(len(before), len(after))
+    every = [np.pad(x, ((0, count - len(x)), (0, 0))) for x in (before, after)]
+    places = np.concatenate([np.asarray(own.breakpoints), [until], until + (begins[kept] - at) / rate])
+    return JoinedPieces(places, np.concatenate(every, axis=1), np.float64(stop))
+
+
+def _between(begins: State, ends: State) -> Float[np.ndarray, "power joint"]:
+    """Return the coefficients, lowest power first, of a polynomial with some derivatives at 0 and at 1."""
     count = len(begins) + len(ends)
     conditions = [(0.0, level) for level in range(len(begins))] + [(1.0, level) for level in range(len(ends))]
     rows = [[perm(k, level) * at ** max(k - level, 0) for k in range(count)] for at, level in conditions]
-    scale = duration ** np.arange(count)
-    right = np.concatenate([begins * scale[: len(begins), None], ends * scale[: len(ends), None]])
-    return np.linalg.solve(np.array(rows), right) / scale[:, None]
+    return np.linalg.solve(np.array(rows), np.concatenate([begins, ends]))

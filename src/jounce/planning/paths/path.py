@@ -38,6 +38,8 @@ class Path:
         Values of s, and the instants of the trajectory, or what else its points count, there.
     points : Lines, optional
         The waypoints that it goes through.
+    joined : float, optional
+        The s at which it comes onto the path that was given, from the state of a running robot.
     """
 
     laws: Mapping[str, AbstractMotion]
@@ -49,6 +51,7 @@ class Path:
     instants: tuple[Float[np.ndarray, " place"], Float[np.ndarray, " place"]] | None = None
     passed: tuple[Float[np.ndarray, " place"], Float[np.ndarray, " place"]] | None = None
     points: Any = None
+    joined: float | None = None
 
     @property
     def names(self) -> tuple[str, ...]:

@@ -12,9 +12,17 @@ COARSE_ROUNDS = {2: 1, 3: 2}  # by the level of limits: those to the second are 
 
 
 def fastest(
-    source: Source, labels: Labels, start: float, stop: float, conditions: Conditions, cells: int
+    source: Source,
+    labels: Labels,
+    start: float,
+    stop: float,
+    conditions: Conditions,
+    cells: int,
+    until: float | None = None,
 ) -> tuple[RateLaw, Search]:
     """Return the fastest law from a start to a stop of s, and the search that found it.
+
+    With `until`, a rate of 1 keeps the limits from the start up to there: the search begins with that.
 
     Raises
     ------
@@ -24,6 +32,8 @@ def fastest(
         If no law keeps the limits.
     """
     check_possible(source, labels, start, stop)
+    if until is not None:
+        return _faster(source, labels, (start, until, stop), conditions, cells)
     share = np.linspace(0.0, 1.0, 201)
     slopes = [0.0 if rate == 0 else 1.0 for rate in conditions.rates]  # of a cubic, where it does not rest
     s = share**2 * (3 - 2 * share) + slopes[0] * share * (1 - share) ** 2 - slopes[1] * share**2 * (1 - share)
@@ -44,6 +54,27 @@ def fastest(
     parameter = Parametrization(share, s, conditions.rests)
     search = Search(source, labels, parameter, basis, conditions)
     return search.fastest_law(np.full(basis.count, 1 / duration**2)), search
+
+
+def _faster(
+    source: Source, labels: Labels, parts: tuple[float, float, float], conditions: Conditions, cells: int
+) -> tuple[RateLaw, Search]:
+    """Return the fastest law, from one whose rate is 1 on the first part, and falls to rest on the second one."""
+    start, until, stop = parts
+    times = np.linspace(0.0, until - start + 2 * (stop - until), 401)
+    slowing = np.clip(times - (until - start), 0.0, None)
+    s = start + times - slowing**2 / (4 * (stop - until))
+    share, duration = times / times[-1], float(times[-1])
+    fine = RateBasis(cells, max(conditions.order + 1, 2))
+    for basis, rounds in ((RateBasis(COARSE, 3), 2), (RateBasis(COARSE, 3), 2), (fine, 0)):
+        parameter = Parametrization(share, s, conditions.rests)
+        search = Search(source, labels, parameter, basis, conditions, 3 if rounds else 4)
+        even = np.full(basis.count, 1 / duration**2)
+        if not rounds:
+            return search.fastest_law(even), search
+        law = search.run(even, rounds)
+        (share, s), duration = progress(law), law.duration
+    raise AssertionError
 
 
 def slowed_only(

@@ -101,18 +101,23 @@ def _place(value: float, load: CarriedLoad, path: Path, timed: bool) -> float:
     return float(s)
 
 
+def instant_at(progress: FollowingMotion, duration: float, s: float) -> float:
+    """Return when a parameter of a path reaches a value, s."""
+    low, high = 0.0, duration
+    while True:
+        looks = np.linspace(low, high, LOOKS)
+        after = int(np.searchsorted(np.asarray(law_derivatives([progress], jnp.asarray(looks), 0))[0, 0], s))
+        near = float(looks[max(after - 1, 0)]), float(looks[min(after, LOOKS - 1)])
+        if near == (low, high) or near[1] - near[0] <= np.spacing(duration):
+            return near[1]
+        low, high = near
+
+
 def in_time(loads: Sequence[CarriedLoad], progress: FollowingMotion, duration: float) -> tuple[CarriedLoad, ...]:
     """Return loads by time, of those by the parameter of a path, which is known over time."""
 
     def instant(s: float) -> float:
-        low, high = 0.0, duration
-        while True:
-            looks = np.linspace(low, high, LOOKS)
-            after = int(np.searchsorted(np.asarray(law_derivatives([progress], jnp.asarray(looks), 0))[0, 0], s))
-            near = float(looks[max(after - 1, 0)]), float(looks[min(after, LOOKS - 1)])
-            if near == (low, high) or near[1] - near[0] <= np.spacing(duration):
-                return near[1]
-            low, high = near
+        return instant_at(progress, duration, s)
 
     return tuple(
         dataclasses.replace(

@@ -2,21 +2,20 @@
 
 import dataclasses
 import functools
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
 from jounce.base.shapes import ArrayLike
 from jounce.dynamics.limits.trajectories import FollowedTrajectory, warn_of_degrees
-from jounce.errors import JounceError, SolveError, TrajectoryError, flag, whole_number
+from jounce.errors import SolveError, TrajectoryError, flag, whole_number
 from jounce.mechanism import Mechanism
-from jounce.planning.paths.joining import SHARES, clean_state, joined, rates_along
 from jounce.planning.paths.path import Path
 from jounce.planning.paths.paths import Between, GivenPath, cells_needed, checked, path_of
 from jounce.planning.paths.sampled_paths import path_of_samples
 from jounce.planning.retiming.fastest import fastest, slowed_only
-from jounce.planning.retiming.loads import along_path, in_time, with_stops
+from jounce.planning.retiming.loads import along_path, in_time, instant_at, with_stops
 from jounce.planning.retiming.mechanism import retime_mechanism
 from jounce.planning.retiming.quantities.limits import GivenLimits, MotionLimits, limits_of
 from jounce.planning.retiming.quantities.motion_limits_check import check_motion
@@ -25,6 +24,7 @@ from jounce.planning.retiming.quantities.robot_quantities import RobotQuantities
 from jounce.planning.retiming.rates.rate_law import Conditions, RateLaw
 from jounce.planning.retiming.rates.rate_motion import RateMotion
 from jounce.planning.retiming.retimed import RetimedTrajectory, active_limits
+from jounce.planning.retiming.running_states import retimed_from
 from jounce.planning.retiming.search import Search
 from jounce.planning.solver import require_solver
 from jounce.robot.algorithms.carried_loads import CarriedLoad
@@ -113,9 +113,9 @@ def retime(
         rates are given at the ends one that is as slow as it may be everywhere.
     state : array_like of shape (derivatives, joints), optional
         Of a robot that runs already: positions and velocities, and if known accelerations and jerks, with which the
-        motion begins, of the joints of the path in its order. If it is not on the path, a polynomial leads onto it, and
-        joins it where a motion is found that keeps the limits, the sooner the better. What exceeds a limit by less than
-        a millionth is taken for rounding.
+        motion begins, of the joints of the path in its order, at their limits too. If it is not on the path, a curve
+        leads onto it, on which the robot may brake and turn, and joins it at the first of some places from which a
+        motion is found that keeps the limits. What exceeds a limit by less than a millionth is taken for rounding.
     loads : sequence of CarriedLoad, optional
         What links carry on parts of the path, as from the second waypoint to the fourth: limits of torques and of their
         rates hold on both sides of each change. The motion stops there, unless the load is said to be ``moving``; a
@@ -176,26 +176,31 @@ def retime(
     conditions = Conditions(chosen, _rates(rates))
     chosen_path, path_loads = with_stops(chosen_path, along_path(_check_loads(loads, state), chosen_path), chosen)
 
-    def fastest_along(along: Path, conditions: Conditions) -> _Fastest:
-        source = RobotQuantities(robot, along, limits, drives=drives, loads=path_loads)
-        checked(along, chosen)
+    quantities = functools.partial(_quantities, robot, limits=limits, drives=drives, loads=path_loads)
+
+    def planned(along: Path, conditions: Conditions, until: float | None) -> RetimedTrajectory:
+        source = quantities(along)
+        if until is None:  # a curve that was joined to a path is known to be smooth
+            checked(along, chosen)
         source.check_range()
         own_cells = cells or cells_needed(along, chosen)
-        return source, *fastest(source, source.labels, along.start, along.stop, conditions, own_cells)
+        law, search = fastest(source, source.labels, along.start, along.stop, conditions, own_cells, until)
+        certified = functools.partial(
+            _certified, robot, along, search=search, source=source, drives=drives, hand_over=any(conditions.rates)
+        )
+        if duration is None:
+            return certified(law)
+        if duration < NEAR_LEAST * law.duration:
+            check_duration(duration, certified(law).stop)
+        return certified(search.lasting(law, duration))
 
-    if state is None:
-        source, law, search = fastest_along(chosen_path, conditions)
-    else:
-        chosen_path, (source, law, search) = _from_state(robot, chosen_path, state, limits, conditions, fastest_along)
-        conditions = search.conditions
-    certified = functools.partial(
-        _certified, robot, chosen_path, search=search, source=source, drives=drives, hand_over=any(conditions.rates)
-    )
-    if duration is None:
-        return certified(law)
-    if duration < NEAR_LEAST * law.duration:
-        check_duration(duration, certified(law).stop)
-    return certified(search.lasting(law, duration))
+    return retimed_from(chosen_path, state, conditions, quantities, planned)
+
+
+def _quantities(
+    robot: Robot, path: Path, *, limits: GivenLimits | None, drives: bool, loads: Sequence[CarriedLoad]
+) -> RobotQuantities:
+    return RobotQuantities(robot, path, limits, drives=drives, loads=loads)
 
 
 def _check_of_robots(given: Mapping[str, bool], between: Between) -> None:
@@ -216,56 +221,12 @@ def _check_not_repaired(**given: Any) -> None:
             raise TrajectoryError(message, name=name, value=value)
 
 
-_Fastest = tuple[RobotQuantities, RateLaw, Search]
-
-
 def _check_loads(loads: Sequence[CarriedLoad], state: ArrayLike | None) -> tuple[CarriedLoad, ...]:
     """Raise TrajectoryError if loads change on the way from a running state."""
     if state is not None and loads:
         message = "what is carried is not known to change on the way from a running state; leave one of both out"
         raise TrajectoryError(message, name="loads")
     return tuple(loads)
-
-
-def _from_state(
-    robot: Robot,
-    path: Path,
-    given: ArrayLike,
-    limits: GivenLimits | None,
-    conditions: Conditions,
-    fastest_along: Callable[[Path, Conditions], _Fastest],
-) -> tuple[Path, _Fastest]:
-    """Return the path that begins with a running state, and the fastest law along it.
-
-    Raises
-    ------
-    TrajectoryError, SolveError
-        If no path that begins in this state and keeps the limits is found; the message says why the last one failed.
-    """
-    if any(conditions.rates[:1]):
-        message = "the state determines the initial rate; leave the first rate at 0"
-        raise TrajectoryError(message, name="rates", value=list(conditions.rates))
-    state = clean_state(given, path.names, dict(limits_of(robot, limits).joints))
-    if along := rates_along(path, state):
-        own = dataclasses.replace(conditions, rates=(along[0], conditions.rates[1]), further=along[1:])
-        return path, fastest_along(path, own)
-    own = conditions
-    if state[1].any():
-        further = tuple(0.0 for _ in state[2:])
-        own = dataclasses.replace(conditions, rates=(1.0, conditions.rates[1]), further=further)
-    reason: JounceError | None = None
-    for share in SHARES:
-        onto = joined(path, state, share)
-        try:
-            return onto, fastest_along(onto, own)
-        except (SolveError, TrajectoryError) as error:
-            reason = error
-    assert reason is not None
-    message = (
-        "no way from this state onto the path was found that turns toward it without stopping and keeps the limits; "
-        f"brake first, and plan from where the robot will rest; of the last way tried: {reason}"
-    )
-    raise SolveError(message, name="state")
 
 
 def check_duration(duration: float, least: float) -> None:
@@ -361,6 +322,9 @@ def _certified(
         over = (report.worst.ratio or 0.0) - 1 if report.worst else 0.0
         if over <= LIMIT_TOLERANCE:
             active = active_limits(search, law, motion)
+            if path.joined is not None:
+                until = instant_at(progress, motion.duration, path.joined)
+                path = dataclasses.replace(path, words=f"{path.words} for {until:.3g} s")
             return RetimedTrajectory(laws, bare.stop, path, progress, report, active, loads)
         if attempt == ATTEMPTS - 1 or not np.isfinite(over):
             note = "" if report.worst is None else f" of the {report.worst.quantity} of {report.worst.joint}"

@@ -76,7 +76,10 @@ class RobotQuantities:
 
     def __call__(self, s: _Points) -> PathQuantities:
         """Return the quantities at values of s."""
-        q = self.coordinates(s)
+        return self.at(self.coordinates(s), s)
+
+    def at(self, q: Float[np.ndarray, "point 5 joint"], s: _Points) -> PathQuantities:
+        """Return the quantities for coordinates and their derivatives by s, at values of s."""
         first, bounds = self._first(q)
         of_second = self._second(q, s)
         vectors, vector_bounds = self._vectors(q)
@@ -87,10 +90,14 @@ class RobotQuantities:
 
     def coordinates(self, s: _Points) -> Float[np.ndarray, "point 5 joint"]:
         """Return the positions of all joints and their derivatives by s."""
-        q = np.zeros((len(s), ORDER + 1, len(self.robot.joint_names)))
+        return self.whole(self.path.derivatives(s, ORDER))
+
+    def whole(self, motion: Float[np.ndarray, "point 5 own"]) -> Float[np.ndarray, "point 5 joint"]:
+        """Return positions and derivatives of all joints, of those of the joints of the path."""
+        q = np.zeros((len(motion), ORDER + 1, len(self.robot.joint_names)))
         for name, value in self.resting_joints.items():
             q[:, 0, self.robot.joint_names.index(name)] = value
-        q[:, :, self.columns] = self.path.derivatives(s, ORDER)
+        q[:, :, self.columns] = motion
         return q
 
     def location(self, s: float) -> str:
@@ -148,6 +155,13 @@ class RobotQuantities:
         m1 = rates[3] - rates[0] - 2 * c - d
         return np.stack([m, c, d, g, m1, c1, d1, g1], axis=-1)
 
+    def masses(self, q: Float[np.ndarray, "point 5 joint"], s: _Points) -> Float[np.ndarray, "point joint joint"]:
+        """Return what each acceleration, last, adds to each torque."""
+        motions = _one_by_one(q, 2)
+        rest = motions[:1] * np.array([1.0, 0.0, 0.0])[:, None]
+        torques = self.loaded.torques(np.concatenate([rest, motions]), s, self.drives)[:, :, 0]
+        return np.moveaxis(torques[1:] - torques[0], 0, -1)
+
     def _vectors(self, q: np.ndarray) -> tuple[np.ndarray, _Table]:
         chosen = [point for point in self.limits.points if point.acceleration is not None]
         if not chosen:
@@ -158,6 +172,12 @@ class RobotQuantities:
     def point(self, q: np.ndarray, point: object) -> Float[np.ndarray, "point 3 3"]:
         """Return the position, velocity and acceleration of a point for coordinates with derivatives."""
         return np.asarray(forward_kinematics(self.robot, q[:, :3], point.link, point.point).position)  # type: ignore[attr-defined]
+
+    def point_jacobian(self, q: np.ndarray, point: object) -> Float[np.ndarray, "point 3 joint"]:
+        """Return what the velocity of each joint, last, adds to the velocity of a point."""
+        motions = _one_by_one(q, 1)
+        moved = self.point(motions.reshape(-1, *motions.shape[2:]), point)[:, 1]
+        return np.moveaxis(moved.reshape(*motions.shape[:2], 3), 0, -1)
 
     def _has(self, name: str, *fields: str) -> bool:
         """Whether a joint has one of some limits."""
@@ -244,3 +264,12 @@ class RobotQuantities:
                         f"{word} {bound:g}; no time law changes that; choose another path"
                     )
                     raise TrajectoryError(message, name=name)
+
+
+def _one_by_one(q: np.ndarray, level: int) -> Float[np.ndarray, "joint point 3 joint"]:
+    """Return motions at rest but for a derivative of one joint, which is 1, one joint after the other."""
+    count = q.shape[2]
+    motions = np.broadcast_to(q[:, :3], (count, len(q), 3, count)).copy()
+    motions[:, :, 1:] = 0.0
+    motions[np.arange(count), :, level, np.arange(count)] = 1.0
+    return motions

@@ -1,0 +1,317 @@
+"""The curve by which a running robot comes onto a path: a spline over time that keeps all limits from its state on.
+
+At each instant what is limited depends on the derivative of its own order above all: velocities, accelerations and
+jerks of joints are these, torques and their rates change with accelerations and jerks by the mass matrix, and those of
+points by a Jacobian matrix. With the matrices of the last curve each program is a convex one, and what a curve really
+needs decides whether it is taken.
+"""
+
+import dataclasses
+import importlib
+from typing import Any
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+from jounce.planning.retiming.quantities.path_quantities import C, Curves, D, G, PathQuantities, Quantity
+from jounce.planning.retiming.quantities.robot_quantities import ORDER, RobotQuantities
+
+INTERVALS = 20
+GROWTH = 1.1  # of intervals, from one to the next: the state is at limits, the path is not
+IN_INTERVAL, FIRST, IN_FIRST = 3, 3, 8  # instants, at which limits hold, and in how many first intervals how many
+DEGREE = 5  # of the splines, or more where more derivatives are to be met
+SPARE = 0.01  # of a limit, left between the instants
+SOON = 0.2  # of the duration, from which on that much is left of what the state may need as a whole
+HELD = 1e-5  # of a limit: what is exceeded by less is kept
+PENALTY = 1e4  # of what is exceeded, as a share of the limit, beside the jerk of the curve
+PROGRAMS = 6
+NEAR = 0.7  # of a limit: where the last curve leaves more, it is left out
+SETTLED = 0.3  # of what is exceeded: if a program leaves more, the next ones do not help
+EVEN = np.array([[1.0], [0.0], [0.0], [0.0]])  # a rate of 1 in time
+
+_Points = Float[np.ndarray, " _"]  # of any length
+_Motion = Float[np.ndarray, "_ joint"]
+_Coefficients = Float[np.ndarray, "_ joint"]
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class TimeSplines:
+    """B-splines over time.
+
+    Parameters
+    ----------
+    knots : array of shape (count + degree + 1,)
+        From 0 on, those at the ends repeated.
+    degree : int
+        Of the splines.
+    """
+
+    knots: _Points
+    degree: int
+
+    @property
+    def count(self) -> int:
+        """Number of splines."""
+        return len(self.knots) - self.degree - 1
+
+    @property
+    def ends(self) -> Float[np.ndarray, " edge"]:
+        """Ends of the intervals, s."""
+        return self.knots[self.degree : len(self.knots) - self.degree]
+
+    def matrices(self, at: _Points, order: int) -> Float[np.ndarray, "derivative point spline"]:
+        """Return the values of the splines at instants, and of their derivatives."""
+        from scipy.interpolate import BSpline
+
+        own = BSpline(self.knots, np.eye(self.count), self.degree)
+        return np.stack([own(at, nu=k) for k in range(order + 1)])
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class JoiningCurve:
+    """The motion of joints over time, and what it exceeds.
+
+    Parameters
+    ----------
+    splines : TimeSplines
+        What it is made of.
+    coefficients : array of shape (spline, joint)
+        Of the joints.
+    over : float
+        By what share of a limit it is exceeded at most; 0 where all are kept.
+    worst : Quantity
+        What is nearest to its limit, or exceeds it most.
+    """
+
+    splines: TimeSplines
+    coefficients: _Coefficients
+    over: float
+    worst: Quantity
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class _Rows:
+    """Bounds: slopes of a derivative at each instant, and how much of the bound is left to a change of it.
+
+    Parameters
+    ----------
+    level : int
+        Which derivative.
+    slopes : array of shape (point, joint)
+        Share of the limit, for each unit of the derivative of each joint.
+    left : array of shape (point,)
+        Share of the limit.
+    used : array of shape (point,)
+        Whether there is a limit.
+    label : Quantity
+        What is limited.
+    """
+
+    level: int
+    slopes: Float[np.ndarray, "point joint"]
+    left: _Points
+    used: Bool[np.ndarray, " point"]
+    label: Quantity
+
+
+def joining_curve(source: RobotQuantities, begins: _Motion, ends: _Motion, duration: float) -> JoiningCurve:
+    """Return the curve of least jerk from one state to another, or the one that exceeds limits by as little as it can.
+
+    Parameters
+    ----------
+    source : RobotQuantities
+        Of the path that is joined.
+    begins, ends : array of shape (derivatives, joints)
+        Positions and derivatives by time.
+    duration : float
+        From one to the other, s.
+    """
+    splines = _graded(duration, max(DEGREE, len(ends)))
+    counts = np.where(np.arange(INTERVALS) < FIRST, IN_FIRST, IN_INTERVAL)
+    parts = zip(splines.ends[:-1], splines.ends[1:], counts, strict=True)
+    at = np.append(np.concatenate([np.linspace(*part, endpoint=False) for part in parts]), duration)
+    matrices = splines.matrices(at, ORDER)
+    coefficients, free = _pinned(splines, begins, ends)
+    growth, given = np.minimum(at / (SOON * duration), 1.0), len(begins)  # as fast as what is not given can make it
+    left = [1 - SPARE * growth ** max(given - level, 0) for level in range(ORDER + 1)]
+    over, slack, worst = np.inf, np.inf, source.labels.every[0]
+    named = worst
+    for program in range(PROGRAMS):
+        q = source.whole(np.einsum("dps,sj->pdj", matrices, coefficients))
+        quantities = source.at(q, at)
+        if program:
+            last, (over, worst) = over, _exceeded(source, quantities)
+            over, worst = (slack, named) if slack > over else (over, worst)
+            if over <= HELD:
+                return JoiningCurve(splines, coefficients, 0.0, worst)
+            if program > 2 and over > SETTLED * last:
+                break
+        rows = [*_range_rows(source, q), *_joint_rows(source, quantities, q, left)]
+        rows += _dynamic_rows(source, quantities, q, at, left) if program else []
+        rows = [dataclasses.replace(row, used=row.used & (row.left < NEAR)) for row in rows] if program else rows
+        change, slack, named = _least_change(rows, source.columns, matrices, free, coefficients, duration)
+        coefficients = coefficients.copy()
+        coefficients[free] += change
+        if slack > HELD and not program:  # no torques make it possible
+            return JoiningCurve(splines, coefficients, slack, named)
+    return JoiningCurve(splines, coefficients, over, worst)
+
+
+def _graded(duration: float, degree: int) -> TimeSplines:
+    """Return splines on intervals that grow from the beginning on."""
+    ends = np.append(0.0, np.cumsum(GROWTH ** np.arange(INTERVALS)))
+    ends *= duration / ends[-1]
+    ends[-1] = duration
+    return TimeSplines(np.concatenate([np.zeros(degree), ends, np.full(degree, duration)]), degree)
+
+
+def _pinned(splines: TimeSplines, begins: _Motion, ends: _Motion) -> tuple[_Coefficients, slice]:
+    """Return coefficients that meet both ends, and which of them are free."""
+    first, last = len(begins), len(ends)
+    at = splines.matrices(splines.ends[[0, -1]], max(first, last) - 1)
+    left = np.linalg.solve(at[:first, 0, :first], begins)
+    right = np.linalg.solve(at[:last, 1, splines.count - last :], ends)
+    inner = splines.count - first - last
+    share = (np.arange(1, inner + 1) / (inner + 1))[:, None]
+    between = left[-1] * (1 - share) + right[0] * share
+    return np.concatenate([left, between, right]), slice(first, splines.count - last)
+
+
+def _exceeded(source: RobotQuantities, quantities: PathQuantities) -> tuple[float, Quantity]:
+    """Return by what share of a limit the worst of all quantities of a curve exceeds it, and which it is."""
+    count = len(quantities.first)
+    shape = np.zeros((5, count))
+    shape[1] = 1.0
+    ratios = Curves(quantities, shape).ratios(EVEN * np.ones(count))
+    _, k = np.unravel_index(int(np.argmax(ratios)), ratios.shape)
+    return max(float(ratios.max()) - 1, 0.0), source.labels.every[k]
+
+
+def _both_sides(
+    level: int, slopes: np.ndarray, values: np.ndarray, lower: np.ndarray, upper: np.ndarray, left: list, labels: Any
+) -> list[_Rows]:
+    """Return the rows of quantities with values (point, quantity) and slopes (point, quantity, joint)."""
+    rows = []
+    for k, label in enumerate(labels):
+        for sign, bound in ((1.0, upper[:, k]), (-1.0, -lower[:, k])):
+            used = np.isfinite(bound) & (bound > 0)
+            size = np.where(used, bound, 1.0)
+            rows.append(
+                _Rows(level, sign * slopes[:, k] / size[:, None], left[level] - sign * values[:, k] / size, used, label)
+            )
+    return rows
+
+
+def _range_rows(source: RobotQuantities, q: np.ndarray) -> list[_Rows]:
+    rows, one = [], np.eye(q.shape[2])
+    for name, k in zip(source.path.names, source.columns, strict=True):
+        limits = source.limits.joints[name]
+        size = limits.upper - limits.lower if limits.upper is not None and limits.lower is not None else 1.0
+        for sign, bound in ((1.0, limits.upper), (-1.0, limits.lower)):
+            if bound is not None:
+                slopes = np.broadcast_to(sign * one[k] / size, (len(q), len(one)))
+                label = Quantity(name, "position", "")
+                rows.append(_Rows(0, slopes, sign * (bound - q[:, 0, k]) / size, np.ones(len(q), bool), label))
+    return rows
+
+
+def _joint_rows(source: RobotQuantities, quantities: PathQuantities, q: np.ndarray, left: list) -> list[_Rows]:
+    one, labels = np.broadcast_to(np.eye(q.shape[2]), (len(q), q.shape[2], q.shape[2])), source.labels
+    chosen, count = source.with_velocity, len(source.with_velocity)
+    bounds = quantities.first_bounds[:, :count]
+    rows = _both_sides(1, one[:, chosen], q[:, 1, chosen], -bounds, bounds, left, labels.first[:count])
+    chosen, count = source.with_acceleration, len(source.with_acceleration)
+    for level, low, high, names in (
+        (2, quantities.lower, quantities.upper, labels.second),
+        (3, quantities.rate_lower, quantities.rate_upper, labels.rates),
+    ):
+        rows += _both_sides(
+            level, one[:, chosen], q[:, level, chosen], low[:, :count], high[:, :count], left, names[:count]
+        )
+    chosen, bounds = source.with_jounce, quantities.fourth_bounds
+    return rows + _both_sides(4, one[:, chosen], q[:, 4, chosen], -bounds, bounds, left, labels.fourth)
+
+
+def _dynamic_rows(
+    source: RobotQuantities, quantities: PathQuantities, q: np.ndarray, at: _Points, left: list
+) -> list[_Rows]:
+    """Return the rows of torques, of their rates, and of points of links."""
+    rows, labels, count = [], source.labels, len(source.with_acceleration)
+    if source.with_effort:
+        masses, parts = source.masses(q, at)[:, source.with_effort], quantities.second[:, count:]
+        values, rates = (parts[..., [C + k, D + k, G + k]].sum(axis=-1) for k in (0, 4))
+        for level, own, low, high, names in (
+            (2, values, quantities.lower, quantities.upper, labels.second),
+            (3, rates, quantities.rate_lower, quantities.rate_upper, labels.rates),
+        ):
+            rows += _both_sides(level, masses, own, low[:, count:], high[:, count:], left, names[count:])
+    fast = [point for point in source.limits.points if point.speed is not None]
+    forced = [point for point in source.limits.points if point.acceleration is not None]
+    sets = (
+        (1, fast, labels.first[len(labels.first) - len(fast) :], "speed"),
+        (2, forced, labels.vectors, "acceleration"),
+    )
+    for level, points, names, field in sets:
+        for point, label in zip(points, names, strict=True):
+            vector = source.point(q, point)[:, level]
+            size = np.linalg.norm(vector, axis=1)
+            along = vector / np.maximum(size, np.finfo(float).tiny)[:, None]
+            slopes = np.einsum("pk,pkj->pj", along, source.point_jacobian(q, point)) / getattr(point, field)
+            rows.append(_Rows(level, slopes, left[level] - size / getattr(point, field), size > 0, label))
+    return rows
+
+
+def _least_change(
+    rows: list[_Rows],
+    columns: Any,
+    matrices: np.ndarray,
+    free: slice,
+    coefficients: _Coefficients,
+    duration: float,
+) -> tuple[_Coefficients, float, Quantity]:
+    """Return the change of free coefficients that exceeds bounds least, and then has the least jerk.
+
+    Returns
+    -------
+    change : array of shape (free spline, joint)
+    over : float
+        Share of a limit by which it is exceeded.
+    worst : Quantity
+        What prevents it most.
+    """
+    from scipy import sparse
+
+    clarabel: Any = importlib.import_module("clarabel")  # its names are those of a compiled module
+    own = matrices[:, :, free]
+    joints = coefficients.shape[1]
+    size = own.shape[2] * joints
+    blocks, sides, which = [], [], []
+    for index, row in enumerate(rows):
+        slopes = row.slopes[:, columns]
+        used = row.used & (np.abs(own[row.level]).max(axis=1) > 0) & (np.abs(slopes).max(axis=1) > 0)
+        product = own[row.level][used][:, :, None] * slopes[used][:, None, :]
+        blocks.append(sparse.csr_matrix(product.reshape(len(product), size)))
+        sides.append(row.left[used])
+        which.append(np.full(len(product), index))
+    jerk = matrices[3][:, free]
+    unit = duration**3 / max(float(np.ptp(coefficients, axis=0).max()), np.finfo(float).tiny)
+    before = np.einsum("ps,sj->pj", matrices[3], coefficients) * unit
+    weight = 1 / (len(jerk) + float((before**2).sum()))
+    square = sparse.kron(sparse.csr_matrix(jerk.T @ jerk * unit**2 * weight), sparse.identity(joints))
+    quadratic = sparse.triu(sparse.block_diag([square, sparse.csc_matrix((1, 1))])).tocsc()
+    linear = np.append((jerk.T @ before * unit * weight).reshape(-1), PENALTY)
+    bounds: Any = sparse.vstack(blocks)
+    elastic = sparse.hstack([bounds, sparse.csr_matrix(-np.ones((bounds.shape[0], 1)))])
+    positive = sparse.csr_matrix(([-1.0], ([0], [size])), shape=(1, size + 1))
+    right = np.append(np.concatenate(sides), 0.0)
+    settings = clarabel.DefaultSettings()
+    settings.verbose, settings.max_threads = False, 1
+    cones = [clarabel.NonnegativeConeT(len(right))]
+    matrix = sparse.vstack([elastic, positive], format="csc")
+    solution = clarabel.DefaultSolver(quadratic, linear, matrix, right, cones, settings).solve()
+    x = np.array(solution.x)
+    if str(solution.status) not in ("Solved", "AlmostSolved") or not np.isfinite(x).all():
+        return np.zeros((own.shape[2], joints)), np.inf, rows[0].label
+    prices = np.array(solution.z)[:-1]
+    worst = rows[int(np.concatenate(which)[int(np.argmax(prices))])].label
+    return x[:-1].reshape(-1, joints), max(float(x[-1]), 0.0), worst

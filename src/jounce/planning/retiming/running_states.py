@@ -1,0 +1,212 @@
+"""The fastest motion from the state of a running robot: along a path, or along a curve onto it first."""
+
+import dataclasses
+from collections.abc import Callable
+
+import numpy as np
+from jaxtyping import Float
+
+from jounce.base.shapes import ArrayLike
+from jounce.errors import RobotError, SolveError, TrajectoryError
+from jounce.planning.paths.joining import (
+    MET,
+    ROUNDING,
+    SHARES,
+    State,
+    clean_state,
+    gone_on,
+    joined_from_rest,
+    rates_along,
+)
+from jounce.planning.paths.path import Path
+from jounce.planning.pieces import SmoothPieces
+from jounce.planning.retiming.joining_curve import EVEN, JoiningCurve, joining_curve
+from jounce.planning.retiming.quantities.feasibility import check_possible
+from jounce.planning.retiming.quantities.path_quantities import Curves
+from jounce.planning.retiming.quantities.robot_quantities import ORDER, RobotQuantities
+from jounce.planning.retiming.rates.rate_law import Conditions
+from jounce.planning.retiming.retimed import RetimedTrajectory
+
+SHORTEST = 1e-3  # of the time that the path takes from there at that rate
+USED = 0.5  # of a limit, at a steady rate where a path is joined
+DURATIONS = 10  # that are tried, each longer than the last
+LONGER = (1.1, 2.5)  # by what factor: at least, at most
+SHORTENED = 4  # times at most, between one that was too short and one that was not
+CLOSE = 1.1  # times one that was too short: a duration that is short enough
+
+Planned = Callable[[Path, Conditions, float | None], RetimedTrajectory]
+"""Gives the motion along a path, which may keep a rate of 1 up to a value of s."""
+
+
+def retimed_from(
+    path: Path,
+    given: ArrayLike | None,
+    conditions: Conditions,
+    quantities: Callable[[Path], RobotQuantities],
+    planned: Planned,
+) -> RetimedTrajectory:
+    """Return the motion along a path that begins with a state.
+
+    Parameters
+    ----------
+    path : Path
+        The path that is to be followed.
+    given : array_like of shape (derivatives, joints), or None
+        The state of a running robot; None for one that is where the path begins, with the rate that the conditions say.
+    conditions : Conditions
+        Of the law along the path.
+    quantities : callable
+        Gives what is limited along a path.
+    planned : callable
+        Gives the motion along a path.
+
+    Raises
+    ------
+    TrajectoryError, SolveError
+        If the state breaks limits, or no motion that begins in it and keeps them is found: the message says which limit
+        is in the way.
+    """
+    if given is None:
+        return planned(path, conditions, None)
+    if any(conditions.rates[:1]):
+        message = "the state determines the initial rate; leave the first rate at 0"
+        raise TrajectoryError(message, name="rates", value=list(conditions.rates))
+    source = quantities(path)
+    state = clean_state(given, path.names, dict(source.limits.joints))
+    check_state(source, np.asarray(given, float))
+    if along := rates_along(path, state):
+        own = dataclasses.replace(conditions, rates=(along[0], conditions.rates[1]), further=along[1:])
+        try:
+            return planned(path, own, None)
+        except SolveError:
+            pass  # the path bends too sharply for this state: it is left and joined again
+    check_possible(source, source.labels, path.start, path.stop)
+    moving = bool(state[1].any())
+    own = conditions
+    if moving:
+        own = dataclasses.replace(conditions, rates=(1.0, conditions.rates[1]), further=(0.0,) * (len(state) - 2))
+    reasons: list[str] = []
+    for share in SHARES:
+        at = path.start + share * (path.stop - path.start)
+        try:
+            if moving:
+                onto, until = joined(source, state, at, conditions.order)
+            else:
+                onto, until = joined_from_rest(path, state[0], at), None
+            return planned(onto, own, until)
+        except (SolveError, TrajectoryError, RobotError) as error:
+            if error.name == "duration":
+                raise
+            reasons.append(f"joined at s = {at:.6g}, {error.message.removesuffix('; choose smaller rates')}")
+    message = (
+        "no motion from this state onto the path was found that keeps the limits; choose another path, or leave more "
+        f"of the limits to the motion before: {'; '.join(dict.fromkeys(reasons))}"
+    )
+    raise SolveError(message, name="state")
+
+
+def check_state(source: RobotQuantities, state: Float[np.ndarray, "derivative joint"]) -> None:
+    """Raise TrajectoryError if a state breaks a limit: the message has its name, and the value."""
+    path = source.path
+    for name, value in zip(path.names, state[0].tolist(), strict=True):
+        limits = source.limits.joints[name]
+        for bound, sign, word in ((limits.upper, 1, "above"), (limits.lower, -1, "below")):
+            if bound is not None and sign * (value - bound) > ROUNDING * max(1.0, abs(bound)):
+                message = f"the position of {name} is {word} the end of its range, {bound:g}, where the motion begins"
+                raise TrajectoryError(message, name="state", value=value)
+    motion = np.zeros((1, ORDER + 1, state.shape[1]))
+    motion[0, : len(state)] = state
+    shape = np.array([[path.start], [1.0], [0.0], [0.0], [0.0]])
+    curves = Curves(source.at(source.whole(motion), shape[0]), shape)
+    labels = source.labels
+    known = (1, 2, 3, 2, 4)  # the derivatives that values in the order of the labels need
+    counts = [len(x) for x in (labels.first, labels.second, labels.rates, labels.vectors, labels.fourth)]
+    ratios = np.where(np.repeat(known, counts) < len(state), curves.ratios(EVEN)[0], 0.0)
+    worst = int(np.argmax(ratios)) if len(ratios) else 0
+    if len(ratios) and ratios[worst] > 1 + ROUNDING:
+        label, value = labels.every[worst], float(np.concatenate(curves.values(EVEN), axis=1)[0, worst])
+        message = (
+            f"the {label.word} of {label.owner} is above its limit of {abs(value) / ratios[worst]:.6g} {label.unit} "
+            "where the motion is to begin"
+        )
+        raise TrajectoryError(message, name="state", value=value)
+
+
+def joined(source: RobotQuantities, state: State, at: float, order: int) -> tuple[Path, float]:
+    """Return the path that begins with a state at a rate of 1 and joins another one, and the s at which it does.
+
+    Raises
+    ------
+    SolveError
+        If no curve from the state keeps the limits: the message says which is in the way.
+    """
+    path, count = source.path, max(MET, order + 1)
+    p = path.derivatives(np.array([at]), count - 1)[0]
+    rate = steady_rate(source, at)
+    ends = p * rate ** np.arange(count)[:, None]
+    duration = max(first_duration(source, state, ends), SHORTEST * (path.stop - at) / rate)
+    found, too_short = joining_curve(source, state, ends, duration), 0.0
+    for _ in range(DURATIONS):
+        if not found.over:
+            break
+        too_short, duration = duration, duration * float(np.clip(1 + found.over, *LONGER))
+        found = joining_curve(source, state, ends, duration)
+    else:
+        message = (
+            f"the {found.worst.word} of {found.worst.owner} would exceed its limit by {100 * found.over:.2g} % within "
+            f"{duration:.3g} s"
+        )
+        raise SolveError(message, name="state")
+    for _ in range(SHORTENED):
+        if duration < CLOSE * too_short or not too_short:
+            break
+        middle = float(np.sqrt(too_short * duration))
+        shorter = joining_curve(source, state, ends, middle)
+        if shorter.over:
+            too_short = middle
+        else:
+            found, duration = shorter, middle
+    return _path_of(path, at, rate, found), duration
+
+
+def steady_rate(source: RobotQuantities, at: float) -> float:
+    """Return the rate with which a part of all limits is used at a place."""
+    shape = np.array([[at], [1.0], [0.0], [0.0], [0.0]])
+    curves = Curves(source(shape[0]), shape)
+
+    def used(z: float) -> float:
+        return float(curves.ratios(z * EVEN).max())
+
+    z, rest = 1.0, used(0.0)
+    most = max(USED, (1 + rest) / 2)
+    while used(z) > most and z > 1e-12:
+        z /= 1.5
+    while used(1.2 * z) <= most and z < 1e12:
+        z *= 1.2
+    return float(np.sqrt(z))
+
+
+def first_duration(source: RobotQuantities, state: State, ends: Float[np.ndarray, "derivative joint"]) -> float:
+    """Return a time in which the way from a state to another one is made at the limits of velocity or acceleration."""
+    limits = [source.limits.joints[name] for name in source.path.names]
+
+    def bounds(field: str) -> np.ndarray:
+        return np.array([getattr(x, field) or np.inf for x in limits])
+
+    way, turn = np.abs(ends[0] - state[0]), np.abs(ends[1] - state[1])
+    speed = max(float(np.linalg.norm(state[1])), float(np.linalg.norm(ends[1])))
+    least = max(float((way / bounds("velocity")).max()), float((turn / bounds("acceleration")).max()))
+    return least or float(np.linalg.norm(way)) / speed
+
+
+def _path_of(path: Path, at: float, rate: float, curve: JoiningCurve) -> Path:
+    from scipy.interpolate import BSpline
+
+    from jounce.trajectory.splines import local_powers
+
+    splines = curve.splines
+    begins, until = splines.ends[:-1], float(splines.ends[-1])
+    powers = local_powers(BSpline(splines.knots, curve.coefficients, splines.degree), begins, splines.degree)
+    return gone_on(
+        path, at, rate, [SmoothPieces(begins, powers[:, :, k], until) for k in range(powers.shape[2])], until
+    )
