@@ -141,22 +141,23 @@ def _spliced(
 
     Of two splines it is one, all of whose numbers are arrays: what is compiled for it does for the next one too.
     """
-    if not isinstance(law, SplineMotion):
+    last = at + rate * (stop - until)
+    near = NEAR * (last - at)
+    if not isinstance(law, SplineMotion) or at < law.breakpoints[0] - near or last > law.stop + near:
         leader = ExpressionMotion(STEADY, {"at": at, "rate": rate, "begin": until})
         return PiecewiseMotion([own, FollowingMotion(law, leader)], [until, stop])
     begins, powers = np.asarray(law.breakpoints), np.asarray(law.coefficients)
-    last = at + rate * (stop - until)
-    kept = np.flatnonzero((begins > at + NEAR * (last - at)) & (begins < last - NEAR * (last - at)))
-    first = kept[0] - 1 if len(kept) else int(np.clip(np.searchsorted(begins, at, side="right") - 1, 0, None))
+    remaining = np.flatnonzero((begins > at + near) & (begins < last - near))
+    first = remaining[0] - 1 if len(remaining) else int(np.clip(np.searchsorted(begins, at, side="right") - 1, 0, None))
     first = max(first, 0)
     derived = [np.polynomial.polynomial.polyder(powers[:, first], k) for k in range(len(powers))]
     moved = [np.polynomial.polynomial.polyval(at - begins[first], x) / factorial(k) for k, x in enumerate(derived)]
-    after = np.column_stack([moved, powers[:, kept]]) * rate ** np.arange(len(powers))[:, None]
+    after = np.column_stack([moved, powers[:, remaining]]) * rate ** np.arange(len(powers))[:, None]
     before = np.asarray(own.coefficients)
     count = max(len(before), len(after))
     every = [np.pad(x, ((0, count - len(x)), (0, 0))) for x in (before, after)]
-    places = np.concatenate([np.asarray(own.breakpoints), [until], until + (begins[kept] - at) / rate])
-    return JoinedPieces(places, np.concatenate(every, axis=1), np.float64(stop))
+    breakpoints = np.concatenate([np.asarray(own.breakpoints), [until], until + (begins[remaining] - at) / rate])
+    return JoinedPieces(breakpoints, np.concatenate(every, axis=1), np.float64(stop))
 
 
 def _between(begins: State, ends: State) -> Float[np.ndarray, "power joint"]:

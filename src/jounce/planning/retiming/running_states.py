@@ -145,16 +145,16 @@ def joined(source: RobotQuantities, state: State, at: float, order: int) -> tupl
     rate = steady_rate(source, at)
     ends = p * rate ** np.arange(count)[:, None]
     duration = max(first_duration(source, state, ends), SHORTEST * (path.stop - at) / rate)
-    found, too_short = joining_curve(source, state, ends, duration), 0.0
+    curve, too_short = joining_curve(source, state, ends, duration), 0.0
     for _ in range(DURATIONS):
-        if not found.over:
+        if not curve.over:
             break
-        too_short, duration = duration, duration * float(np.clip(1 + found.over, *LONGER))
-        found = joining_curve(source, state, ends, duration)
+        too_short, duration = duration, duration * float(np.clip(1 + curve.over, *LONGER))
+        curve = joining_curve(source, state, ends, duration)
     else:
+        amount = f" by {100 * curve.over:.2g} %" if np.isfinite(curve.over) else ""
         message = (
-            f"the {found.worst.word} of {found.worst.owner} would exceed its limit by {100 * found.over:.2g} % within "
-            f"{duration:.3g} s"
+            f"the {curve.worst.word} of {curve.worst.owner} would exceed its limit{amount} within {duration:.3g} s"
         )
         raise SolveError(message, name="state")
     for _ in range(SHORTENED):
@@ -165,8 +165,8 @@ def joined(source: RobotQuantities, state: State, at: float, order: int) -> tupl
         if shorter.over:
             too_short = middle
         else:
-            found, duration = shorter, middle
-    return _path_of(path, at, rate, found), duration
+            curve, duration = shorter, middle
+    return _path_of(path, at, rate, curve), duration
 
 
 def steady_rate(source: RobotQuantities, at: float) -> float:
