@@ -102,6 +102,15 @@ def test_rotors_of_drake_seen_through_their_gears(tmp_path):
     np.testing.assert_allclose(torque, [[(0.01 + 0.1**2 + 0.0001321 * 160**2) * 2.0]], rtol=1e-12)
 
 
+def test_a_mass_without_moments_is_a_point_mass(tmp_path):
+    """As in Pinocchio and Drake: 1 kg at 0.1 m from a joint about y, at rest and accelerated."""
+    text = arm().replace(BODY[BODY.index("<inertia ") :], "</inertial>").replace('axis xyz="0 0 1"', 'axis xyz="0 1 0"')
+    with pytest.warns(jn.errors.RobotWarning, match=r"mass without <inertia>, .* point mass: a \(line 1\)"):
+        robot = read(tmp_path, text)
+    torque = np.asarray(jn.inverse_dynamics(robot, np.array([[0.5], [0.0], [2.0]])))
+    np.testing.assert_allclose(torque, [[-9.81 * 0.1 * np.cos(0.5) + 0.1**2 * 2.0]], rtol=1e-13)
+
+
 def test_links_out_of_gravity(tmp_path):
     off = "<gazebo reference='a'><turnGravityOff>true</turnGravityOff></gazebo>"
     upright = arm(more=off).replace('axis xyz="0 0 1"', 'axis xyz="0 1 0"')
@@ -130,6 +139,16 @@ def test_a_joint_that_gazebo_adds_closes_a_loop(tmp_path, kind, made):
     np.testing.assert_allclose(closure.points, [[0.1, 0, 0], [0.2, 0, 0]], atol=1e-15)
     if kind != "ball":
         np.testing.assert_allclose(closure.axis, [np.cos(0.2), 0, -np.sin(0.2)], atol=1e-15)
+
+
+def test_a_closure_that_has_the_name_of_a_joint_gets_another(tmp_path):
+    """As in the PR2: its gripper is a joint of the file and, between other links, a joint that Gazebo adds."""
+    loop = GAZEBO_LOOP.format("ball", ENDS, "").replace("'tip'", "'k'")
+    with pytest.warns(jn.errors.RobotWarning, match=r"are called NAME_closure: k \(line 1\)"):
+        robot = read(tmp_path, five_bar(loop))
+    assert robot.closures["k_closure"].links == ("b", "a")
+    with pytest.raises(jn.errors.RobotFileError, match=r"closures\.k: a joint has the name of this closure, which is"):
+        read(tmp_path, five_bar(loop), strict=True)
 
 
 @pytest.mark.parametrize(

@@ -1,5 +1,7 @@
 """What Drake adds to SDF files: joints that follow others and rotors are read, constraints and bushings are told of."""
 
+import mujoco
+import numpy as np
 import pytest
 
 import jounce as jn
@@ -91,3 +93,53 @@ def test_what_cannot_be_is_refused(tmp_path, settings, name, says):
         read(tmp_path, **settings)
     assert caught.value.name == name
     assert caught.value.line in (3, 4)
+
+
+CHAIN = (  # type, place, axis, damping, stiffness, reference, inertia of the rotor, gear ratio
+    ("revolute", "0.1 0 0.2", "0 0.6 0.8", 0.3, 5.0, 0.2, 2e-5, 120.0),
+    ("prismatic", "0.3 -0.1 0", "1 0 0", 1.5, 40.0, -0.1, 1e-4, 60.0),
+    ("revolute", "0 0.2 0.1", "-0.8 0 0.6", 0.7, 0.0, 0.0, 4e-5, 80.0),
+)
+
+
+def drake_words(k, kind, place, axis, damping, stiffness, reference, rotor, ratio):
+    """Return a link and its joint as Drake reads them."""
+    spring = f"<spring_stiffness>{stiffness}</spring_stiffness><spring_reference>{reference}</spring_reference>"
+    end, pose = ("world", "__model__") if k == 0 else (f"l{k - 1}", f"l{k - 1}")
+    body = BODY.replace("<mass>", "<pose>.1 .02 -.05 0 0 0</pose><mass>")
+    return f"""<link name="l{k}"><pose relative_to="j{k}"/>{body}</link>
+<joint name="j{k}" type="{kind}"><pose relative_to="{pose}">{place} 0 0 0</pose><parent>{end}</parent>
+<child>l{k}</child><axis><xyz>{axis}</xyz><dynamics><damping>{damping}</damping>{spring}</dynamics></axis>
+<drake:rotor_inertia>{rotor}</drake:rotor_inertia><drake:gear_ratio>{ratio}</drake:gear_ratio></joint>"""
+
+
+def mujoco_words(k, kind, place, axis, damping, stiffness, reference, rotor, ratio):
+    """Return the same as MuJoCo reads it, without the end of the body."""
+    named = {"revolute": "hinge", "prismatic": "slide"}[kind]
+    spring = f'stiffness="{stiffness}" springref="{reference}" armature="{rotor * ratio**2!r}"'
+    return f"""<body name="l{k}" pos="{place}"><joint name="j{k}" type="{named}" axis="{axis}" damping="{damping}"
+{spring}/><inertial pos=".1 .02 -.05" mass="2" diaginertia=".1 .2 .25"/>"""
+
+
+def test_springs_and_rotors_need_the_torques_of_mujoco(tmp_path):
+    path = tmp_path / "robot.sdf"
+    path.write_text(
+        '<sdf version="1.9" xmlns:drake="d"><model name="m">'
+        + "".join(drake_words(k, *values) for k, values in enumerate(CHAIN))
+        + "</model></sdf>"
+    )
+    robot = jn.load_robot(path, strict=True)
+    bodies = "".join(mujoco_words(k, *values) for k, values in enumerate(CHAIN))
+    compiler = '<compiler angle="radian"/>'
+    model = mujoco.MjModel.from_xml_string(
+        f"<mujoco>{compiler}<worldbody>{bodies}{'</body>' * len(CHAIN)}</worldbody></mujoco>"
+    )
+    data, expected = mujoco.MjData(model), []
+    states = np.random.default_rng(4).uniform(-1, 1, (9, 3, len(CHAIN)))
+    for state in states:
+        data.qpos[:], data.qvel[:], data.qacc[:] = state
+        mujoco.mj_inverse(model, data)
+        expected.append(data.qfrc_inverse.copy())
+    assert robot.joint_names == ("j0", "j1", "j2")
+    torques = np.asarray(jn.inverse_dynamics(robot, states))[:, 0]
+    np.testing.assert_allclose(torques, expected, rtol=0, atol=1e-12 * np.abs(expected).max())

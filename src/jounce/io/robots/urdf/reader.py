@@ -16,19 +16,21 @@ from jounce.io.robots.elements.faults import (
     FOLLOWS_NONE,
     IDLE,
     MASSLESS,
+    NO_MOMENTS,
     ONE_END,
     REVERSED,
+    SAME_NAME,
     Faults,
     left_out,
 )
 from jounce.io.robots.elements.followers import with_room
 from jounce.io.robots.elements.named_elements import NamedElements
 from jounce.io.robots.elements.xml_elements import Element
-from jounce.io.robots.urdf.extensions import joint_springs, shares_of_gravity, urdf_closures
+from jounce.io.robots.urdf.extensions import Loop, joint_springs, shares_of_gravity, urdf_closures
 from jounce.io.robots.urdf.left_out import check_version, note_left_out, rotors
 from jounce.rigid.inertia import Inertia
 from jounce.robot.model.floating_base import floating_joints
-from jounce.robot.model.links_and_joints import Joint, Limits, Link, Mimic, leaders
+from jounce.robot.model.links_and_joints import Closure, Joint, Limits, Link, Mimic, leaders
 from jounce.robot.model.tree import axes_with_z_along, ordered
 from jounce.robot.robot import Robot
 
@@ -49,14 +51,14 @@ def read_urdf(root: Element, faults: Faults, massless: bool = False) -> Robot:
 
     Revolute, continuous, prismatic and fixed joints are taken as they are. A floating joint becomes three slides and
     three turns, a planar one two slides and a turn, a spherical one (of MuJoCo and Bullet) three turns, all massless
-    between; what the file says of their limits, damping
-    and friction is left out, since it does not say to which of the coordinates it belongs; of damping and friction
-    there is a warning. An ``<inertial>`` of zero mass and zero inertia is a frame. Limits that are zero are not given,
-    nor is a range from zero to zero. A joint that follows one which itself follows another follows that one.
-    Rotors that Drake reads from transmissions are armature: ``drake:rotor_inertia`` times the square of
-    ``drake:gear_ratio``. Loops (``loop_joint``, ``drake:ball_constraint``) become closures, ``springStiffness`` and
-    ``springReference`` of Gazebo are springs, and links may be out of gravity. Of other elements by which simulators
-    change motions or forces there is a warning.
+    between; what the file says of their limits, damping and friction is left out, since it does not say to which of the
+    coordinates it belongs; of damping and friction there is a warning. An ``<inertial>`` of zero mass and zero inertia
+    is a frame; one that has a mass alone is a point mass, with a warning. Limits that are zero are not given, nor is a
+    range from zero to zero. A joint that follows one which itself follows another follows that one. Rotors that Drake
+    reads from transmissions are armature: ``drake:rotor_inertia`` times the square of ``drake:gear_ratio``. Loops
+    (``loop_joint``, ``drake:ball_constraint``) become closures, ``springStiffness`` and ``springReference`` of Gazebo
+    are springs, and links may be out of gravity. Of other elements by which simulators change motions or forces there
+    is a warning.
 
     Parameters
     ----------
@@ -106,10 +108,10 @@ def read_urdf(root: Element, faults: Faults, massless: bool = False) -> Robot:
                 lines.add(element, "joints", part.name)
         ordered(_distinct("links", made, root), _distinct("joints", parts, root))
         parts = with_room(parts, faults, lines.located)
-        loops = urdf_closures(root, [link.name for link in made])
-        for loop in loops:
-            lines.add(loop.element, "closures", loop.closure.name)
-        closures = [loop.closure for loop in loops]
+        closures = []
+        for loop in urdf_closures(root, [link.name for link in made]):
+            closures.append(_closure(loop, {part.name for part in parts}, faults))
+            lines.add(loop.element, "closures", closures[-1].name)
         robot = Robot(root.attributes.get("name", "robot"), made, parts, closures=closures, strict=False)
         _check_masses(robot, joints, links, faults, massless)
         note_left_out(root, robot, named, faults)
@@ -118,6 +120,19 @@ def read_urdf(root: Element, faults: Faults, massless: bool = False) -> Robot:
         raise
     except RobotError as error:
         raise lines.located(error) from None
+
+
+def _closure(loop: Loop, joints: Collection[str], faults: Faults) -> Closure:
+    """Return the closure of a loop, under a name that no joint has."""
+    name = loop.closure.name
+    if name not in joints:
+        return loop.closure
+    new = f"{name}_closure"
+    while new in joints:
+        new += "_"
+    message = f"a joint has the name of this closure, which is called {new}; give it another"
+    faults.add(SAME_NAME, name, loop.element.error(message, "closures", name))
+    return dataclasses.replace(loop.closure, name=new)
 
 
 def _add_joint(lines: NamedElements, element: Element, name: str) -> None:
@@ -159,16 +174,19 @@ def _link(name: str, element: Element, faults: Faults, gravity: float) -> Link:
     inertial.check_children(INERTIAL_PARTS, *where, "inertial")
     pose = _pose(inertial, *where, "inertial")
     weight = _part(inertial, "mass", "; give it, or leave out <inertial>", *where, "inertial")
-    moments = _part(inertial, "inertia", "; six zeros are a point mass", *where, "inertial")
     mass = weight.number("value", *where, "mass")
-    xx, xy, xz, yy, yz, zz = (moments.number(key, *where, "inertia", key) for key in TENSOR)
+    moments = inertial.first("inertia")
+    if moments is None:
+        message = "has no <inertia>; six zeros are a point mass"
+        faults.add(NO_MOMENTS, name, inertial.error(message, *where, "inertial"))
+    xx, xy, xz, yy, yz, zz = (0.0 if moments is None else moments.number(key, *where, "inertia", key) for key in TENSOR)
     if mass < 0:
         raise weight.error("must be greater than zero", *where, "mass", value=mass)
     tensor = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
     if mass == 0 and not tensor.any():
         return Link(name)
     inertia = Inertia(mass, tensor=tensor, strict=False)
-    faults.check(inertia, name, (weight if mass == 0 else moments).line)
+    faults.check(inertia, name, (weight if mass == 0 or moments is None else moments).line)
     return Link(name, inertia.moved(*pose), gravity)
 
 
