@@ -75,9 +75,10 @@ def load_robot(
     RobotWarning
         Links are as those of no real robot: negative moments of inertia, one that exceeds the sum of the other two by
         more than rounding, moments without mass, links that move and have no mass, a mass without moments of inertia,
-        links of SDF without a mass and all moments. All is computed with the numbers of the file. Or the file has what is left out: springs that are
-        not linear, fluids, what tendons between points add, elements that their format does not have;
-        or ranges of joints that leave the joint that they follow no room. One warning names links, joints and parts.
+        links of SDF without a mass and all moments. All is computed with the numbers of the file. Or the file has what
+        is left out: springs that are not linear, fluids, what tendons between points add, elements that their format
+        does not have; or ranges of joints that leave the joint that they follow no room. One warning names links,
+        joints and parts.
 
     Examples
     --------
