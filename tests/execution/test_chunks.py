@@ -25,3 +25,15 @@ def test_instants_may_stand_along_any_axis(count, axis):
     found = in_chunks(lambda lanes: np.moveaxis(np.ones((4, 5, 1)) * lanes, -1, axis), count, (8,), axis)
     np.testing.assert_array_equal(np.moveaxis(found, axis, -1), np.ones((4, 5, 1)) * np.arange(count))
     found[:] = 0.0  # an array of the caller's own
+
+
+@pytest.mark.parametrize(("count", "lengths"), [(1, [1]), (5, [5]), (8, [8]), (20, [8, 8, 4])])
+def test_the_last_chunk_may_be_shorter(count, lengths):
+    asked = []
+
+    def squares(lanes):
+        asked.append(len(lanes))
+        return lanes**2
+
+    np.testing.assert_array_equal(in_chunks(squares, count, (8,), filled=False), np.arange(count) ** 2)
+    assert sorted(asked, reverse=True) == lengths

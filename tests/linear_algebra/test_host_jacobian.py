@@ -65,6 +65,18 @@ def test_without_rows_everything_is_free(monkeypatch):
     np.testing.assert_allclose(projector(jacobian.free_directions.T), np.eye(60), atol=1e-12)
 
 
+@pytest.mark.parametrize("size", [3, 6, 18])
+@pytest.mark.parametrize("smallest", [1.0, 1e-4, 1e-5, 2e-6, 0.5e-6, 1e-8, 2e-9, 0.5e-9, 0.0])
+def test_small_singular_values_are_counted_beside_every_tolerance(size, smallest):
+    rng, values = np.random.default_rng(size), np.ones(size)
+    values[-1] = smallest
+    left, right = (np.linalg.qr(rng.standard_normal((size, size)))[0] for _ in range(2))
+    blocks = (left * values @ right).reshape(size, size // 3, 3)
+    jacobian = HostJacobian(np.tile(np.arange(size // 3), (size, 1)), blocks, size // 3)
+    assert jacobian.rank == size - (smallest <= RANK_TOLERANCE)
+    assert len(jacobian.smallest[1]) == (smallest <= host_jacobian.SMALL)
+
+
 def test_only_what_is_large_and_regular_is_called_so():
     size = 2 * host_jacobian.MOST_DENSE
     assert is_clearly_regular(np.eye(size), 1e-12)

@@ -7,13 +7,22 @@ A model is built of modules that were checked already, and of each several copie
 import dataclasses
 from collections.abc import Iterable, Mapping
 from functools import lru_cache
-from typing import Any, TypeVar
+from typing import Any, TypeVar, dataclass_transform
 
 import equinox as eqx
 
+_ModuleType: Any = type(eqx.Module)
 
-class Module(eqx.Module):
-    """A module whose attributes are looked up as those of any object.
+
+@dataclass_transform(field_specifiers=(dataclasses.field, eqx.field))
+class _OrdinaryType(_ModuleType):
+    """The class of classes of which no others are registered as virtual: `isinstance` need not look for such."""
+
+    __instancecheck__ = type.__instancecheck__
+
+
+class Module(eqx.Module, metaclass=_OrdinaryType):
+    """A module whose attributes and classes are looked up as those of any object.
 
     Equinox looks at every attribute for bound methods, of which it makes modules, so that JAX takes them as arguments:
     a tenth of the time of a short solution, for what no function here is given.
@@ -30,11 +39,11 @@ class Untraced:
     derived: Any = dataclasses.field(default=None, compare=False)
 
 
-M = TypeVar("M", bound=eqx.Module)
+M = TypeVar("M")
 
 
 def with_fields(module: M, **values: Any) -> M:
-    """Return a module with other values in some of its fields; neither converters nor checks are called.
+    """Return a module, or a dataclass, with other values in some fields; neither converters nor checks are called.
 
     Examples
     --------
@@ -76,7 +85,7 @@ def is_ours(thing: Any) -> bool:
     (True, False)
     """
     module = getattr(thing, "__module__", None)
-    return isinstance(module, str) and (module.startswith("jounce.") or module == "jounce")
+    return type(module) is str and (module.startswith("jounce.") or module == "jounce")
 
 
 def changes_parts(kind: type, general: tuple[type, ...], known: Iterable[str] = ()) -> bool:

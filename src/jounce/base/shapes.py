@@ -122,6 +122,8 @@ class _NoNumbersError(Exception):
 
 def _numbers(values: Any, timed: bool) -> np.ndarray:
     """Return values as an array of double precision; entries of lists and of arrays of objects one by one."""
+    if type(values) is np.ndarray and values.dtype.kind in "fiu":
+        return np.asarray(values, float)
     if isinstance(values, list | tuple):
         if set(map(type, values)) <= _PLAIN:
             return np.array(values, float)

@@ -28,7 +28,8 @@ class ByKey:
     """Programs by their cache keys: the first thread that asks for one makes it, and others wait for it."""
 
     def __init__(self) -> None:
-        self._made: dict[Any, Future[Any]] = {}
+        self._made: dict[Any, Future[Any]] = {}  # those under way included
+        self._programs: dict[Any, Any] = {}
         self._lock = threading.Lock()
 
     def __len__(self) -> int:
@@ -38,25 +39,27 @@ class ByKey:
     def clear(self) -> None:
         """Forget them."""
         self._made.clear()
+        self._programs.clear()
 
     def values(self) -> list[Any]:
         """Return those that are there."""
-        return [future.result() for future in list(self._made.values()) if future.done()]
+        return list(self._programs.values())
 
     def get(self, key: Any, make: Callable[[], Any]) -> Any:
         """Return the program of a key, which is made unless another thread has it or is about to."""
-        future = self._made.get(key)
-        if future is None:
-            with self._lock:
-                first = key not in self._made
-                future = self._made.setdefault(key, Future())
-            if first:
-                try:
-                    future.set_result(make())
-                except BaseException as error:
-                    del self._made[key]
-                    future.set_exception(error)
-                    raise
+        if (program := self._programs.get(key, self)) is not self:
+            return program
+        with self._lock:
+            first = key not in self._made
+            future = self._made.setdefault(key, Future())
+        if first:
+            try:
+                self._programs[key] = result = make()
+            except BaseException as error:
+                del self._made[key]
+                future.set_exception(error)
+                raise
+            future.set_result(result)
         while not future.done() and _took_up_next():
             pass
         if future.exception() is not None:  # of a thread whose program nobody may want any more

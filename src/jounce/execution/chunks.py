@@ -19,6 +19,8 @@ def in_chunks(
     count: int,
     widths: tuple[int, ...] = WIDTHS,
     axis: int = -1,
+    *,
+    filled: bool = True,
 ) -> Result:
     """Return what a function of indices of instants gives, for all of them; few lengths of chunks are compiled.
 
@@ -31,17 +33,22 @@ def in_chunks(
     count : int
         How many instants there are, at least one.
     widths : tuple of int
-        Lengths of chunks, increasing: the first that holds all instants, or else the last. The last chunk is filled up.
+        Lengths of chunks, increasing: the first that holds all instants, or else the last.
     axis : int, default -1
         Of the instants in the results.
+    filled : bool, default True
+        Whether the last chunk is filled up; what a `Mapped` makes needs none of that, and returns arrays of its own.
     """
     width = next((width for width in widths if count <= width), widths[-1])
 
     def computed(first: int) -> Any:
-        return jax.tree.map(np.asarray, function(np.minimum(np.arange(first, first + width), count - 1)))
+        last = first + width if filled else min(first + width, count)
+        return jax.tree.map(np.asarray, function(np.minimum(np.arange(first, last), count - 1)))
 
     with Threads(thread_count()) as threads:
         parts = list(threads.map(computed, range(0, count, width)))
+    if not filled and len(parts) == 1:
+        return parts[0]
 
     def whole(*arrays: np.ndarray) -> np.ndarray:
         joined = np.concatenate(arrays, axis)

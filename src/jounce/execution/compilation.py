@@ -172,9 +172,11 @@ class Compiled:
         """Call the compiled function."""
         check_process()
         arguments, keywords, static, leaves, tree = self._parts(arguments, keywords)
-        traced = [leaf for leaf in leaves if isinstance(leaf, Tracer)]
-        if not traced and (code := self._code(arguments, keywords, static, leaves, tree)) is not None:
-            return code(list(map(shaped, leaves)))
+        traced = [leaf for leaf in leaves if type(leaf) is not np.ndarray and isinstance(leaf, Tracer)]
+        if not traced:
+            arrays = list(map(shaped, leaves))
+            if (code := self._code(arguments, keywords, static, arrays, tree)) is not None:
+                return code(arrays)
         static |= self._otherwise
         if traced:
             whole = self.jitted if all(map(runs_at_once, traced)) else self._within
@@ -190,7 +192,7 @@ class Compiled:
         Where `jax.jit` does everything, it compiles when it is called.
         """
         arguments, keywords, static, leaves, tree = self._parts(arguments, keywords)
-        if self._code(arguments, keywords, static, leaves, tree) is None:
+        if self._code(arguments, keywords, static, list(map(shaped, leaves)), tree) is None:
             self._by_xla(arguments, keywords, static | self._otherwise, leaves, tree)
 
     def _parts(self, arguments: tuple[Any, ...], keywords: dict[str, Any]) -> tuple[Any, Any, dict[str, Any], Any, Any]:
@@ -200,13 +202,13 @@ class Compiled:
         static = {name: keywords.pop(name) for name in self.static if name in keywords}
         return arguments, keywords, static, *jax.tree.flatten((arguments, keywords))
 
-    def _code(self, arguments: Any, keywords: Any, static: Mapping[str, Any], leaves: list[Any], tree: Any) -> Any:
+    def _code(self, arguments: Any, keywords: Any, static: Mapping[str, Any], arrays: list[Any], tree: Any) -> Any:
         """Return machine code for arguments, None where there is none, or it does not suit them."""
         suits = self._suits_single
         if not (suits if isinstance(suits, bool) else suits(*arguments, **keywords, **static)):
             return None
-        given, hasty = (list(map(shaped, leaves)), tree), is_wanted_soon()
-        return self.machine_code.program(given, ((), _NOTHING), static, large=LARGE, hasty=hasty)
+        nothing = (), _NOTHING
+        return self.machine_code.program((arrays, tree), nothing, static, large=LARGE, hasty=is_wanted_soon())
 
     def _by_xla(
         self, arguments: Any, keywords: Any, static: Mapping[str, Any], leaves: list[Any], tree: Any

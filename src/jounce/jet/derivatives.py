@@ -1,6 +1,7 @@
 """Plain derivatives from Taylor coefficients and back, of whole arrays, the order first."""
 
 import math
+from functools import lru_cache
 
 import numpy as np
 from jaxtyping import Float
@@ -18,6 +19,10 @@ def plain_derivatives(
     coefficients: Float[Numbers, "order *shape"], out: Float[np.ndarray, "order *shape"] | None = None
 ) -> Float[Numbers, "order *shape"]:
     """Return plain derivatives from Taylor coefficients along the leading axis, in a given array or a new one."""
-    scale = np.array([float(math.factorial(k)) for k in range(coefficients.shape[0])])
-    scale = scale.reshape(-1, *[1] * (coefficients.ndim - 1))
+    scale = _factorials(coefficients.shape[0]).reshape(-1, *[1] * (coefficients.ndim - 1))
     return coefficients * scale if out is None else np.multiply(coefficients, scale, out=out)
+
+
+@lru_cache(maxsize=64)
+def _factorials(count: int) -> Float[np.ndarray, " order"]:
+    return np.array([float(math.factorial(k)) for k in range(count)])

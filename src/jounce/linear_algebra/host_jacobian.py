@@ -73,7 +73,7 @@ class HostJacobian:
 
     def scaled(self, scale: Float[np.ndarray, " row"]) -> "HostJacobian":
         """Return the Jacobian with its rows multiplied by a scale."""
-        return dataclasses.replace(self, blocks=scale[:, None, None] * self.blocks)
+        return HostJacobian(self.bodies, scale[:, None, None] * self.blocks, self.body_count, self.tolerance)
 
     def take(self, rows: Bool[np.ndarray, " row"]) -> "HostJacobian":
         """Return the Jacobian of some rows."""
@@ -111,6 +111,8 @@ class HostJacobian:
     @cached_property
     def rank(self) -> int:
         """Number of rows that depend on no others."""
+        if self._is_regular:
+            return len(self.blocks)
         if self.is_large:
             return min(self.shape) - int(np.sum(self.smallest[1] <= self.tolerance * self.largest))
         return int(np.sum(self._sizes > self.tolerance * self.largest))
@@ -128,6 +130,8 @@ class HostJacobian:
     def smallest(self) -> tuple[Any, Any, Any]:
         """Singular values at most `SMALL` times the largest: vectors of rows in columns, values, vectors of columns."""
         rows, columns = self.shape
+        if self._is_regular:
+            return np.zeros((rows, 0)), np.zeros(0), np.zeros((columns, 0))
         if not self.is_large:
             few = self._sizes <= SMALL * self.largest
             if not few.any():
@@ -157,6 +161,20 @@ class HostJacobian:
             return self._singular[2][self.rank :]
         _rows, columns = self.shape
         return _null_space(self.sparse(), columns - self.rank).T
+
+    @cached_property
+    def _is_regular(self) -> bool:
+        """Whether a small square one has no small singular values by far; an inverse takes a tenth of their time."""
+        if self.is_large or self.shape[0] != self.shape[1]:
+            return False
+        matrix = self.dense()
+        try:
+            condition = np.linalg.norm(matrix) * np.linalg.norm(
+                np.linalg.inv(matrix)
+            )  # no less than that of the values
+        except np.linalg.LinAlgError:
+            return False
+        return bool(10 * max(SMALL, self.tolerance) * condition < 1)
 
     @cached_property
     def _sizes(self) -> Float[np.ndarray, " k"]:

@@ -108,7 +108,7 @@ def instants_of(time: TimeLike | None, parameters: Mapping[str, Any]) -> Instant
     if not np.isfinite(instants).all():
         first = int(np.flatnonzero(~np.isfinite(instants))[0])
         raise MechanismError("instants must be finite", name=f"time[{first}]", value=float(instants[first]))
-    if (np.diff(instants) <= 0).any():
+    if (instants[1:] <= instants[:-1]).any():
         first = int(np.flatnonzero(np.diff(instants) <= 0)[0]) + 1
         message = f"instants must increase strictly; this one does not come after {instants[first - 1]:g}"
         raise MechanismError(message, name=f"time[{first}]", value=float(instants[first]))

@@ -113,8 +113,9 @@ def users_class(kind: type) -> type:
 
 def _read_methods(kind: type) -> tuple[str, ...]:
     """Return the names of the methods of a class that a user may have written, or that call such."""
-    known = {name: method for name in _methods_of(kind) if (method := getattr(kind, name, None)) is not None}
-    if changes_parts(kind, tuple(_METHODS), known):
+    names = _methods_of(kind)
+    known = {name: method for name in names if (method := getattr(kind, name, None)) is not None} if names else {}
+    if known and changes_parts(kind, tuple(_METHODS), known):
         return tuple(known)
     return tuple([name for name, method in known.items() if not is_ours(method)])
 

@@ -42,6 +42,7 @@ class Layout:
             ends = first + dtype.itemsize * np.cumsum([0, *sizes])
             self.offsets[members], self.end = ends[:-1], int(ends[-1])
             self._groups.append((members, slice(first, self.end), dtype))
+        self._places = list(zip(self._kinds, self.offsets.tolist(), strict=True))
 
     def put(self, memory: np.ndarray, arrays: Sequence[np.ndarray]) -> None:
         """Copy arrays of these shapes and types to their places in a memory of bytes."""
@@ -50,7 +51,7 @@ class Layout:
 
     def views(self, memory: np.ndarray) -> list[np.ndarray]:
         """Return the arrays in a memory of bytes."""
-        return [np.ndarray(*kind, memory, index) for kind, index in zip(self._kinds, self.offsets, strict=True)]
+        return [np.ndarray(*kind, memory, index) for kind, index in self._places]
 
 
 class Single:

@@ -277,7 +277,8 @@ def motion_at(
         return tuple(part[steps].T for part in dense.angles), polynomial, now - dense.start[steps], now
 
     program, _ = expansion_program(equations, outputs, dense, order)
-    values = in_chunks(lambda lanes: program(lanes_of(lanes)), len(instants), (FEW_INSTANTS, *WIDTHS))
+    widths = FEW_INSTANTS, *WIDTHS
+    values = in_chunks(lambda lanes: program(lanes_of(lanes)), len(instants), widths, filled=False)
     return values, program.backend
 
 

@@ -303,7 +303,7 @@ def _squared_lengths(model: Model, instant: float) -> dict[str, float]:
 def redundancy_of(model: Model, attempt: AssemblyAttempt, instant: float) -> tuple[Model, Redundancy]:
     """Return a model that was assembled with its rows scaled, and which of them follow from others."""
     system = resident(with_fields(model.system, row_scale=attempt.scale[:, None], rank=None))
-    model = dataclasses.replace(model, system=system)
+    model = with_fields(model, system=system)
     redundant = redundancy(model, attempt.coordinates, attempt.jacobian, Displacements(model, instant))
     if redundant.count:
         model = dataclasses.replace(model, system=with_fields(system, rank=redundant.rank))

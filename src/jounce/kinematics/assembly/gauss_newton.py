@@ -149,7 +149,8 @@ class Displacements:
     ) -> tuple[Displaced, Float[np.ndarray, " row"], bool]:
         settings = self._instant, np.int64(steps), np.float64(tolerance)
         result = _moved(self._system, coordinates, increment, *settings, self._model.pose_type)
-        to, residual, entries, *ending = jax.tree.map(np.asarray, result)
+        to = {name: np.asarray(x) for name, x in result[0].items()}
+        residual, entries, *ending = map(np.asarray, result[1:])
         begun, closed = ending or (residual, False)
         system = self._model.system
         jacobian = HostJacobian.of(system.pattern, entries).scaled(np.asarray(system.row_scale)[:, 0])

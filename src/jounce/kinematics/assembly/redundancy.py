@@ -132,6 +132,8 @@ def _next_to_singular(coordinates: Coordinates, jacobian: HostJacobian, displace
     position is singular, and its residual differs from that of this one by ``s^2 / 2 c``.
     """
     rows, sizes, columns = jacobian.smallest
+    if not sizes.size:
+        return jacobian
     zero = 0.0
     for k in np.flatnonzero(sizes > jacobian.tolerance * jacobian.largest):
         size, velocity = sizes[k], columns[:, k]

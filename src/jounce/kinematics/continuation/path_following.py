@@ -25,7 +25,8 @@ from jounce.kinematics.continuation.step_control import ExpansionPoint, StopReas
 from jounce.kinematics.status import Status
 from jounce.mechanism.transmissions.axis_angles import AttitudeHistory
 
-PASSABLE = (Status.OK, Status.UNDEFINED)
+OK = Status.OK
+PASSABLE = (OK, Status.UNDEFINED)
 SMALLEST_STEP = 1e-10  # of the span
 PASSAGE_ORDER = 4  # of the series that leads through: rounding spoils higher derivatives near a singular position
 PASSAGE_DEVIATION = 1e-8  # from that series, as a part of the way: two branches a gap of g apart deviate by (g / way)^2
@@ -101,11 +102,12 @@ class ChangePoint:
 class FollowedPath:
     """Anchors in order of time, the change points passed, and where and why following the motion ended, if it did.
 
-    Instants of a grid that the steps have solved are stored by index, with their states, and the back ends used.
+    Instants of a grid that the steps have solved are stored by index, with the leaves of their states; and the back
+    ends used.
     """
 
     anchors: list[Anchor]
-    solved_instants: list[tuple[Int[np.ndarray, " lane"], SolvedState]] = dataclasses.field(default_factory=list)
+    solved_instants: list[tuple[Int[np.ndarray, " lane"], list[np.ndarray]]] = dataclasses.field(default_factory=list)
     change_points: list[ChangePoint] = dataclasses.field(default_factory=list)
     status: Status = Status.OK
     ended_at: float = np.inf
@@ -124,11 +126,12 @@ class FollowedPath:
         states = zip(*(x[steps, ..., :1] for x in leaves), strict=True)
         values = zip(*(np.asarray(x)[steps].tolist() for x in (*records.expansion_point, status[:, 0])), strict=True)
         for state, (instant, safe_step, radius, det_rate, outcome) in zip(states, values, strict=True):
-            self.anchors.append(Anchor(instant, state, structure, safe_step, radius, det_rate, Status(outcome)))
-        solved = (lane >= 0) & (status == Status.OK)
-        if solved.any():
-            solutions = [np.moveaxis(x, 0, -2)[..., solved] for x in leaves]
-            self.solved_instants.append((first + lane[solved], jax.tree.unflatten(structure, solutions)))
+            outcome = OK if outcome == OK else Status(outcome)
+            self.anchors.append(Anchor(instant, state, structure, safe_step, radius, det_rate, outcome))
+        batch, column = ((lane >= 0) & (status == OK)).nonzero()
+        if batch.size:
+            last = [x.transpose(*range(1, x.ndim - 1), 0, -1) for x in leaves]
+            self.solved_instants.append((first + lane[batch, column], [x[..., batch, column] for x in last]))
 
     def anchors_around(self, first: float, last: float) -> list[Anchor]:
         """Return the anchors between two instants, with one before them and one after, where there are some."""
@@ -228,7 +231,7 @@ def follow(
     while not path.anchors or path.anchors[-1].instant < stop:
         done = solver.take_steps(run, grid[first:], stop, SMALLEST_STEP * span)
         path.add(done, first)
-        run = jax.tree.map(np.asarray, done.run)
+        run = done.run
         if not path.anchors:
             arrival = jax.tree.map(np.asarray, done.last)
             return path.ended(Status(int(arrival.status[0])), float(run.instant[0]), solver.fault(arrival, 0))

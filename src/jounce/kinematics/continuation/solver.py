@@ -65,13 +65,13 @@ class Solver:
             arrival = self.program((needed, step, instant, None, np.zeros(step.shape, bool)))
         return jax.tree.map(lambda x: np.asarray(x)[..., :lanes], arrival)
 
-    def still(self, coordinates: Mapping[str, Any]) -> SolvedState:
-        """Return the state of an unsolved instant: its position, with zero derivatives."""
+    def still(self, coordinates: Mapping[str, Any], lanes: int | None = None) -> SolvedState:
+        """Return the state of an unsolved instant: its position, with zero derivatives; or that of many alike."""
         levels, system = self.order + 1, self.model.system
-        still = {name: np.zeros((levels, *np.shape(x))) for name, x in coordinates.items()}
+        lanes = np.shape(coordinates["position"])[-1] if lanes is None else lanes
+        still = {name: np.zeros((levels, *np.shape(x)[:-1], lanes)) for name, x in coordinates.items()}
         for name, x in coordinates.items():
             still[name][0] = x
-        lanes = np.shape(coordinates["position"])[-1]
         outputs = tuple(np.zeros((levels, 1, group.instances, lanes)) for group in system.outputs)
         return still, outputs, np.zeros(lanes)
 
@@ -116,7 +116,7 @@ class Solver:
 
     def prepare(self) -> None:
         """Compile the program of runs, unless it exists; nothing is solved."""
-        run = self.beginning(self.still(self.model.guess), 0.0)
+        run = self.beginning(self.model.guess, 0.0)
         self._take_steps(run, NO_GRID, _limits(0.0, 0.0), 0, search=True, only_made=True)
 
     def run_from(
@@ -126,9 +126,9 @@ class Solver:
         known = jax.tree.map(lambda x: _filled(x, SMALL_BATCH), self.needed(solved))
         return _run_from(known, expansion_point, largest=largest, crawled=crawled)
 
-    def beginning(self, guess: SolvedState, instant: float) -> StepState:
+    def beginning(self, coordinates: Mapping[str, Any], instant: float) -> StepState:
         """Return the run that begins with solving an instant, from a position assembled there."""
-        known = jax.tree.map(lambda x: _filled(x, SMALL_BATCH), self.needed(guess))
+        known = self.needed(self.still(coordinates, SMALL_BATCH))
         return _run_from(known, (instant, 0.0, 0.0, 0.0), instant=np.full(SMALL_BATCH, instant))
 
     @property
@@ -260,11 +260,11 @@ def _limits(stop: float, smallest: float) -> StepLimits:
     return StepLimits(np.asarray(stop), np.asarray(smallest))
 
 
-def _filled(x: Shaped[np.ndarray, "*rest batch"], width: int, length: int = 0) -> Shaped[np.ndarray, "*rest room"]:
-    """Repeat the last lane up to a width; what lies beyond it, where there is more room, is not looked at."""
-    lanes, length = x.shape[-1], max(width, length)
-    if lanes == length:
+def _filled(x: Shaped[np.ndarray, "*rest batch"], width: int) -> Shaped[np.ndarray, "*rest room"]:
+    """Repeat the last lane up to a width."""
+    lanes = x.shape[-1]
+    if lanes == width:
         return x
-    filled = np.empty((*x.shape[:-1], length), x.dtype)
-    filled[..., :lanes], filled[..., lanes:width] = x, x[..., -1:]
+    filled = np.empty((*x.shape[:-1], width), x.dtype)
+    filled[..., :lanes], filled[..., lanes:] = x, x[..., -1:]
     return filled

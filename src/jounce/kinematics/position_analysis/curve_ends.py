@@ -3,7 +3,6 @@
 import dataclasses
 from collections.abc import Mapping
 
-import jax
 import numpy as np
 from jaxtyping import Float
 
@@ -103,8 +102,8 @@ def cut_at_ends(path: FollowedPath, model: Model, grid: Float[np.ndarray, " time
         path.anchors = [anchor for anchor in path.anchors if anchor.instant <= instant] or path.anchors[:1]
         path.change_points = [point for point in path.change_points if point.instant <= instant]
         path.solved_instants = [
-            (lanes[inside], jax.tree.map(lambda x, inside=inside: x[..., inside], state))
-            for lanes, state in path.solved_instants
+            (lanes[inside], [x[..., inside] for x in leaves])
+            for lanes, leaves in path.solved_instants
             for inside in [grid[lanes] < instant]
         ]
         path.ended(Status.END_OF_CURVE, instant, ends.words(beyond_high))

@@ -7,7 +7,7 @@ grid that were not solved on the way. Between two anchors lies no singular posit
 tells an instant on another branch.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 import jax
@@ -19,6 +19,7 @@ from jounce.jet.derivatives import plain_derivatives
 from jounce.kinematics.continuation.change_points import LARGEST_DISAGREEMENT, bridged, half_width, spoiled_width
 from jounce.kinematics.continuation.correct_and_differentiate import SolvedState, StepResult
 from jounce.kinematics.continuation.path_following import (
+    OK,
     PASSABLE,
     ChangePoint,
     FollowedPath,
@@ -55,15 +56,19 @@ class GridSolver:
         self._anchors = path.anchors_around(time[0], time[-1])
         self._instants = np.concatenate([time, [anchor.instant for anchor in self._anchors]])
         self._reached = time < path.ended_at
-        self._store = empty_state(self._anchors[0].state, len(self._instants))
+        like = self._anchors[0]
+        self._leaves = [np.empty((*x.shape[:-1], len(self._instants))) for x in like.leaves]
+        self._store: SolvedState = jax.tree.unflatten(like.structure, self._leaves)
         for lanes, _ in path.solved_instants:
-            self.status[lanes] = Status.OK
+            self.status[lanes] = OK
 
     @property
     def state(self) -> tuple[dict[str, Any], tuple[Any, ...]]:
         """Jets of the coordinates, and derivatives of the outputs, time last."""
-        coordinates, outputs, _ = jax.tree.map(lambda x: x[..., : len(self.time)], self._store)
-        return coordinates, tuple(map(plain_derivatives, outputs))
+        coordinates, outputs, _ = self._store
+        count = len(self.time)
+        solved = {name: x[..., :count] for name, x in coordinates.items()}
+        return solved, tuple([plain_derivatives(x[..., :count]) for x in outputs])
 
     def solve(self, progress: Callable[[int, int], None] | None, threads: int, *, explain: bool) -> None:
         """Solve the instants; one that its neighbor cannot predict is followed to from an anchor.
@@ -72,9 +77,9 @@ class GridSolver:
         first instant that was not reached why.
         """
         count = len(self.time)
-        left = self._reached & (self.status != Status.OK)
-        stride = stride_of(self.solver, int(np.count_nonzero(left)), count, len(self._anchors))
-        done = count - int(np.count_nonzero(left))
+        left = self._reached & (self.status != OK)
+        remaining = int(np.count_nonzero(left))
+        stride, done = stride_of(self.solver, remaining, count, len(self._anchors)), count - remaining
 
         def report(solved: int) -> None:
             nonlocal done
@@ -85,12 +90,12 @@ class GridSolver:
         with Threads(threads, compiled=self.solver.is_compiled) as pool:
             if count > LONG_GRID:
                 left = self._in_blocks(left, stride, pool, report)
-            for lanes, state in self.path.solved_instants:
-                self._store_lanes(lanes, state)
+            for lanes, leaves in self.path.solved_instants:
+                self._store_lanes(lanes, leaves)
             if left.any() or not self._reached.all():
                 self._insert_anchors()
-            size = self.solver.together if count > LONG_GRID else SMALL_BATCH
             for lanes in _levels(left, stride):
+                size = self.solver.together if count > LONG_GRID else SMALL_BATCH
                 source = self._sources(lanes, stride)
                 batches = [(lanes[k : k + size], source[k : k + size]) for k in range(0, len(lanes), size)]
                 for (batch, _), arrival in zip(batches, pool.map(self._solve_batch, batches), strict=True):
@@ -115,13 +120,13 @@ class GridSolver:
         count = int(np.count_nonzero(left))  # a long grid is reached up to some instant, and nothing is solved yet
 
         def put(lanes: slice, state: SolvedState, status: Indices) -> None:
-            self._store_lanes(lanes, state)
+            self._store_lanes(lanes, jax.tree.leaves(state))
             self.status[lanes] = status
 
         blocks = blocks_for(self.solver, 0, count, stride)
         for solved in solve_blocks(self.solver, self.path, self.time, blocks, put, pool.map):
             report(solved)
-        failed = left & (self.status != Status.OK)
+        failed = left & (self.status != OK)
         if failed.any():
             for lanes in _levels(left, stride):
                 neighbor, known = neighbors(lanes, stride)
@@ -131,7 +136,7 @@ class GridSolver:
     def _sources(self, lanes: Indices, stride: int) -> Indices:
         """Return from where each instant is predicted: its neighbor, where that is known, or its nearest anchor."""
         neighbor, known = neighbors(lanes, stride)
-        known &= self.status[neighbor] == Status.OK
+        known &= self.status[neighbor] == OK
         time = self.time[lanes]
         nearest = len(self.time) + nearest_instants(self._instants[len(self.time) :], time)
         nearer = np.abs(time - self._instants[neighbor]) <= np.abs(time - self._instants[nearest])
@@ -142,13 +147,13 @@ class GridSolver:
         lanes, source = batch
         known = jax.tree.map(lambda x: x[..., source], self.solver.needed(self._store))
         arrival = self.solver(known, self.time[lanes] - self._instants[source], self.time[lanes])
-        self._store_lanes(lanes, arrival.state(slice(None)))
+        self._store_lanes(lanes, jax.tree.leaves((arrival.coordinates, arrival.outputs, arrival.sign)))
         return arrival
 
     def _finish_batch(self, lanes: Indices, arrival: StepResult) -> None:
         """Store the outcome of a batch, and follow the motion to the instants that failed."""
         self.status[lanes] = arrival.status
-        for k in np.flatnonzero(arrival.status != Status.OK).tolist():
+        for k in np.flatnonzero(arrival.status != OK).tolist():
             self.faults[int(lanes[k])] = self.solver.fault(arrival, k)
             if arrival.status[k] not in PASSABLE:
                 self._rescue(int(lanes[k]))
@@ -156,15 +161,13 @@ class GridSolver:
     def _insert_anchors(self) -> None:
         """Put the anchors behind the instants, from which others start, and zeros where none is reached."""
         count, reached = len(self.time), int(np.count_nonzero(self._reached))
-        for whole, *parts in zip(jax.tree.leaves(self._store), *(x.leaves for x in self._anchors), strict=True):
+        for whole, *parts in zip(self._leaves, *(x.leaves for x in self._anchors), strict=True):
             whole[..., reached:count] = 0
             whole[..., count:] = np.concatenate(parts, axis=-1)
 
-    def _store_lanes(self, lanes: slice | Indices, state: SolvedState) -> None:
-        def put(whole: np.ndarray, part: np.ndarray) -> None:
+    def _store_lanes(self, lanes: slice | Indices, leaves: Sequence[np.ndarray]) -> None:
+        for whole, part in zip(self._leaves, leaves, strict=True):
             whole[..., lanes] = part
-
-        jax.tree.map(put, self._store, state)
 
     def _rescue(self, lane: int) -> None:
         """Follow the motion to one instant from the anchor before it."""
@@ -172,12 +175,12 @@ class GridSolver:
         before = int(np.searchsorted([a.instant for a in anchors], instant, side="right")) - 1
         start = anchors[before]
         local = follow(self.solver, start, instant, self.span, (instant - start.instant) / 2)
-        if local.status != Status.OK:
+        if local.status != OK:
             self.status[lane], self.faults[lane] = local.status, local.fault
         elif len(local.anchors) > 1:
             self.status[lane] = local.anchors[-1].status
             self.faults.pop(lane)
-            self._store_lanes(slice(lane, lane + 1), local.anchors[-1].state)
+            self._store_lanes(slice(lane, lane + 1), local.anchors[-1].leaves)
 
     def _bridge(self, point: ChangePoint) -> None:
         """Replace the instants next to a change point, and the one at it, by what the motion on both sides gives."""
@@ -189,19 +192,19 @@ class GridSolver:
         if state is None:
             self._refuse(away < spoiled_width(point, self.solver.order))
             return
-        solved = self.status[lanes] == Status.OK
+        solved = self.status[lanes] == OK
         names = self.solver.model.pose_type.predictor
         deviations = [np.abs(state[0][name][0] - self._store[0][name][0][..., lanes])[..., solved] for name in names]
         if max(np.max(x, initial=0.0) for x in deviations) > LARGEST_DISAGREEMENT:
             self._refuse(away < spoiled_width(point, self.solver.order))
             return
-        self.status[lanes] = Status.OK
+        self.status[lanes] = OK
         for lane in lanes.tolist():
             self.faults.pop(lane, None)
-        self._store_lanes(lanes, (*state, self._store[2][lanes]))
+        self._store_lanes(lanes, jax.tree.leaves((*state, self._store[2][lanes])))
 
     def _refuse(self, lanes: Bool[np.ndarray, " time"]) -> None:
-        self.status[lanes & (self.status == Status.OK)] = Status.SINGULAR
+        self.status[lanes & (self.status == OK)] = Status.SINGULAR
 
     def _explain_end(self, lost: int) -> None:
         """Say at the first instant that was not reached why the motion could not be followed to it."""
@@ -213,14 +216,9 @@ class GridSolver:
             self.status[lost], self.faults[lost] = Status.INADMISSIBLE, self.solver.fault(arrival, 0)
 
 
-def empty_state(state: Any, lanes: int) -> Any:
-    """Return arrays for the states of so many instants and anchors; the threads that solve them first touch them."""
-    return jax.tree.map(lambda x: np.empty((*x.shape[:-1], lanes)), state)
-
-
 def _levels(left: Bool[np.ndarray, " time"], stride: int) -> Iterator[Indices]:
     """Yield instants in groups, each after what it starts from: the number of ones in an index says how far down."""
     lanes = np.flatnonzero(left)
     depth = np.bitwise_count(lanes & (stride - 1))
-    for level in np.unique(depth).tolist():
+    for level in np.unique(depth).tolist() if lanes.size else ():
         yield lanes[depth == level]

@@ -4,6 +4,7 @@ import itertools
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
+import jax
 import numpy as np
 from jaxtyping import Float, Int
 
@@ -13,7 +14,7 @@ from jounce.kinematics.continuation.change_points import half_width, spoiled_wid
 from jounce.kinematics.continuation.correct_and_differentiate import SolvedState
 from jounce.kinematics.continuation.path_following import FollowedPath
 from jounce.kinematics.continuation.solver import Solver
-from jounce.kinematics.position_analysis.grid import GridSolver, empty_state
+from jounce.kinematics.position_analysis.grid import GridSolver
 from jounce.kinematics.position_analysis.grid_blocks import LONG_GRID, blocks_for, solve_blocks, stride_of
 from jounce.kinematics.status import Status
 from jounce.mechanism.time import Instants
@@ -140,7 +141,8 @@ class _Store:
     """Arrays for the states of all instants of a grid of several chunks: of outputs and, if kept, of coordinates."""
 
     def __init__(self, like: SolvedState, count: int, *, keeps_series: bool):
-        self.state: Any = empty_state((like[0] if keeps_series else {}, like[1]), count)
+        kept = like[0] if keeps_series else {}, like[1]  # threads that solve instants first touch their memory
+        self.state: Any = jax.tree.map(lambda x: np.empty((*x.shape[:-1], count)), kept)
 
     def put(
         self, lanes: slice, coordinates: Mapping[str, Any], outputs: Sequence[Any], *, series: bool = False

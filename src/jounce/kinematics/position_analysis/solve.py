@@ -1,6 +1,5 @@
 """From a mechanism and a time grid to its motion."""
 
-import dataclasses
 import numbers
 from collections.abc import Callable, Mapping
 from functools import partial
@@ -243,9 +242,9 @@ def _followed(
     check_laws(mechanism, np.array([first, last]), order + lost, forces=of_forces)
     guessed = build(chosen(with_output_drivers(mechanism), first))
     expect(len(instants))
-    solver = Solver(guessed, max(order + lost, LOWEST_ORDER), float(tolerance), refine, order, is_wanted_soon())
+    settings = max(order + lost, LOWEST_ORDER), float(tolerance), refine, order, is_wanted_soon()
     if not guessed.system.rank_is_open:  # else its program depends on the assembled bodies
-        prepare_later(solver.prepare, "take_steps", guessed.system, solver.order)
+        prepare_later(Solver(guessed, *settings).prepare, "take_steps", guessed.system, settings[0])
     try:
         model, coordinates = assemble(guessed, first, tolerance)
     except (AssemblyError, MobilityError) as error:
@@ -256,9 +255,9 @@ def _followed(
         message = f"t = {first:g} s, {beyond}: end of curve: {Status.END_OF_CURVE.advice}"
         raise SolveError(message, status=Status.END_OF_CURVE)
     check_turns(mechanism, model, coordinates, first)
+    solver = Solver(model, *settings)
     prepare_outputs(mechanism, model, solver.order)
-    solver = dataclasses.replace(solver, model=model)
-    start = solver.beginning(solver.still(coordinates), first)
+    start = solver.beginning(coordinates, first)
     solved_instants = np.asarray(instants) if len(instants) <= LONG_GRID else NO_GRID
     path = follow(solver, start, last, last - first, grid=solved_instants)
     if path.anchors:
@@ -290,7 +289,7 @@ def _backend(solver: Solver, path: FollowedPath, instants: Instants) -> str:
 
 def raise_for_status(motion: Any) -> None:
     """Raise SolveError, with the first instant that failed and what to do, unless all were solved."""
-    failed = np.flatnonzero(motion.status != Status.OK)
+    failed = np.flatnonzero(motion.status)  # OK is zero
     if not failed.size:
         return
     first = int(failed[0])

@@ -14,6 +14,7 @@ from jounce.base.modules import unchecked, with_fields
 from jounce.base.shapes import Numbers
 from jounce.constraints.cams import Cam
 from jounce.constraints.facts import facts_of, field_kinds, value_fields
+from jounce.execution.compilation import compiled
 from jounce.jet import Jet
 from jounce.linear_algebra.fronts import Fronts, elimination
 from jounce.linear_algebra.pattern import Pattern
@@ -260,13 +261,13 @@ def with_reference(
     """
     system = model.system
     if not any(map(measures_angle, (*system.groups, *system.forces, *system.outputs))):
-        return dataclasses.replace(model, reference=coordinates, prescribed=prescribed), 0.0
+        return with_fields(model, reference=coordinates, prescribed=prescribed), 0.0
     groups = with_datums(system.groups, coordinates, keep=keep)
     prescribed = (*prescribed_by_drivers(groups, coordinates, instant), *prescribed)
     forces, outputs = (with_datums(part, coordinates, prescribed) for part in (system.forces, system.outputs))
     system = with_fields(system, groups=groups, forces=forces, outputs=outputs)
     away = departure(model.system.groups, groups)
-    return dataclasses.replace(model, system=system, reference=coordinates, prescribed=prescribed), away
+    return with_fields(model, system=system, reference=coordinates, prescribed=prescribed), away
 
 
 def counted_as_in(groups: tuple[Group, ...], model: Model) -> tuple[Group, ...]:
@@ -290,7 +291,7 @@ def prescribed_by_drivers(
     return prescribed_angles(groups, coordinates, values)
 
 
-@jax.jit
+@compiled(narrow=True, brief=True, single=True)
 def _law_values(motions: list[AbstractMotion], instant: Float[Numbers, "1 1"]) -> list[Numbers]:
     return [motion(Jet([instant])).coefficients[0] for motion in motions]
 

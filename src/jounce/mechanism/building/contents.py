@@ -58,24 +58,26 @@ def contents_of(mechanism: Mechanism, *more: Any) -> Contents | None:
             values += (..., value.dtype.str, value.shape, value.tobytes())
         elif kind is Expression:
             values += (..., "expression", value.text)
-        elif is_ours(kind) and hasattr(kind, "__dataclass_fields__"):
-            own, names = vars(value), _given_fields(kind)
-            if not own.keys() >= names:  # some are elsewhere than usual
-                return None
+        elif (names := _given_fields(kind)) is None or not (own := vars(value)).keys() >= names:
+            return None  # of a user, or with values elsewhere than usual
+        else:
             values += (..., "fields", len(kinds))
             kinds.append(kind)
             pending += map(own.__getitem__, names)
-        else:
-            return None
-    own = dict.fromkeys(kinds)
-    if not own.keys().isdisjoint(CHECKED) or any(map(has_own_methods, own)):
+    different = set(kinds)
+    if not different.isdisjoint(CHECKED) or any(map(has_own_methods, different)):
         return None
     return tuple(kinds), marshal.dumps(values, 2)  # in later versions, bytes depend on who else has a value
 
 
 @lru_cache(maxsize=1000)
-def _given_fields(kind: type) -> Set[str]:
-    """Return the names of the fields of a class that are given, in their order; the others are found later."""
+def _given_fields(kind: type) -> Set[str] | None:
+    """Return the names of the fields of a class that are given, in their order; None for a class of a user.
+
+    The other fields are found later.
+    """
+    if not is_ours(kind) or not dataclasses.is_dataclass(kind):
+        return None
     return {field.name: None for field in dataclasses.fields(kind) if field.init}.keys()
 
 

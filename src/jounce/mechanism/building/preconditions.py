@@ -10,6 +10,7 @@ from typing import Any, ParamSpec, TypeVar
 import numpy as np
 from jax.core import Tracer, eval_context
 
+from jounce.base.jax_internals import core
 from jounce.errors import UnsupportedError
 from jounce.settings import check_process
 from jounce.trajectory import Expression
@@ -88,7 +89,7 @@ def check_holonomic(mechanism: Any, what: str, instead: str = "simulate the moti
 
 def _traced(given: Mapping[str, Any]) -> str | None:
     """Return the dotted name of the first value that JAX traces, None if there is none."""
-    if not holds_tracer(given):  # nearly always, and before names are assembled
+    if core.trace_state_clean() or not holds_tracer(given):  # nearly always: within no transformation
         return None
     pending: list[tuple[tuple[str | int, ...], Any]] = [((), given)]
     while pending:
