@@ -179,8 +179,10 @@ def nearest_instants(
     order = np.argsort(known, kind="stable")
     rising = known[order]
     if len(known) < len(instants) and np.all(instants[:-1] <= instants[1:]):
-        ends = np.searchsorted(instants, rising[:-1] + 0.5 * np.diff(rising), side="right")
-        return np.repeat(order, np.diff(ends, prepend=0, append=len(instants)))
+        ends = np.searchsorted(instants, rising[:-1] + 0.5 * (rising[1:] - rising[:-1]), side="right")
+        counts = np.append(ends, len(instants))
+        counts[1:] -= ends
+        return np.repeat(order, counts)
     after = np.clip(np.searchsorted(rising, instants), 1, max(len(known) - 1, 1))
     before, after = after - 1, np.minimum(after, len(known) - 1)
     return order[np.where(instants - rising[before] <= rising[after] - instants, before, after)]

@@ -11,6 +11,7 @@ from jounce.dynamics.forward.accelerations import Equations
 from jounce.dynamics.forward.initial_state import at_rest, equations_of
 from jounce.dynamics.masses import gravity_of, required_masses
 from jounce.execution.background import prepare_later
+from jounce.execution.threads import thread_count
 from jounce.integrate.marching.marching import IntegratorState, march, room_for_steps, steps_between_looks, unexpanded
 from jounce.integrate.marching.user_methods import integrator
 from jounce.integrate.results.simulation import derivatives_of_motion, expansion_program
@@ -63,7 +64,7 @@ def prepare_run(
     watched : bool
         Whether events are looked for.
     """
-    if model.system.rank_is_open and not mechanism.initial:
+    if (model.system.rank_is_open and not mechanism.initial) or thread_count() < 2:
         return
     motion_order, length = derivatives_of_motion(mechanism, order), method.expansion_order(limits[0])
 

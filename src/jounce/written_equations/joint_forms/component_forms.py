@@ -7,8 +7,6 @@ from jounce.written_equations.joint_forms.polynomials import Atom, Monomial, Pol
 from jounce.written_equations.joint_forms.symbolic_joint import SymbolicJoint
 from jounce.written_equations.joint_forms.vector_forms import of_body, turning
 
-_TURNED = {(1, 2): 0, (2, 0): 1, (0, 1): 2}  # entries below the diagonal of a skew matrix, and above it
-
 
 def in_coordinates(joint: SymbolicJoint, row: Polynomial) -> Polynomial:
     """Return a polynomial without derivatives of attitudes: by angles, or by angular velocities."""
