@@ -27,7 +27,7 @@ def test_instants_may_stand_along_any_axis(count, axis):
     found[:] = 0.0  # an array of the caller's own
 
 
-@pytest.mark.parametrize(("count", "lengths"), [(1, [1]), (5, [5]), (8, [8]), (20, [8, 8, 4])])
+@pytest.mark.parametrize("count, lengths", [(1, [1]), (5, [5]), (8, [8]), (20, [8, 8, 4])])
 def test_the_last_chunk_may_be_shorter(count, lengths):
     asked = []
 

@@ -1,29 +1,34 @@
 """From names to indices, once: the numeric model of a mechanism and where each of its rows comes from."""
 
 import dataclasses
-from functools import lru_cache, partial
+from functools import lru_cache
 from typing import Any
 
 import jax
-import jax.numpy as jnp
 import numpy as np
 from jax.core import Tracer
 from jaxtyping import Float
 
 from jounce.base.modules import unchecked, with_fields
 from jounce.base.shapes import Numbers
-from jounce.constraints.cams import Cam
-from jounce.constraints.facts import facts_of, field_kinds, value_fields
+from jounce.constraints.facts import facts_of, field_kinds
 from jounce.execution.compilation import compiled
 from jounce.jet import Jet
 from jounce.linear_algebra.fronts import Fronts, elimination
 from jounce.linear_algebra.pattern import Pattern
 from jounce.mechanism.building.contents import contents_of, holds_numbers_only, made_or_known, owned_arrays
+from jounce.mechanism.building.derived_values import (
+    counts_turns,
+    with_derived_of,
+    with_offsets,
+    with_sense,
+    with_turn_unit,
+)
 from jounce.mechanism.building.starting_guess import pose_at, starting_guess
 from jounce.mechanism.carriages import ENDING
 from jounce.mechanism.mechanism import Mechanism
 from jounce.mechanism.outputs.base import AbstractMotionOutput
-from jounce.mechanism.system import POSITION_COMPONENTS, Group, System, holding, law_left_out
+from jounce.mechanism.system import POSITION_COMPONENTS, Group, System, law_left_out
 from jounce.mechanism.transmissions.axis_angles import (
     AttitudeHistory,
     PrescribedAngle,
@@ -31,7 +36,6 @@ from jounce.mechanism.transmissions.axis_angles import (
     measures_angle,
     prescribed_angles,
     with_angles,
-    with_datum_of,
     with_datums,
 )
 from jounce.mechanism.transmissions.gear_frames import Grouped, grouped_with_frames
@@ -143,7 +147,7 @@ def _built(mechanism: Mechanism, like: Model | None, *, initial: bool) -> Model:
     (groups, names), (forces, force_names), (outputs, output_names) = grouped_elements(mechanism, initial=initial)
     if like is not None:
         parts = {"groups": groups, "forces": forces, "outputs": outputs}
-        known = {name: tuple(map(_with_derived_of, part, getattr(like.system, name))) for name, part in parts.items()}
+        known = {name: tuple(map(with_derived_of, part, getattr(like.system, name))) for name, part in parts.items()}
         return dataclasses.replace(like, system=with_fields(like.system, **known))
 
     pose_type = PlanarPose if components == 2 else SpatialPose
@@ -332,60 +336,6 @@ def _row_count_of(
     leaves = tuple(jax.ShapeDtypeStruct(shape, np.float64) for shape in shapes)
     guess = {name: jax.ShapeDtypeStruct(shape, np.float64) for name, shape in poses}
     return jax.eval_shape(residual, leaves, guess, np.zeros((1, 1))).shape[0]
-
-
-def with_offsets(group: Group, pose_type: type[Pose], guess: dict[str, Any]) -> Group:
-    """Fill in the offsets that were not given: those with which the starting guess fulfills the joint."""
-    fields = value_fields(type(group.element))
-    if "offset" not in fields or group.element.offset is not None:
-        return group
-    offset = _fulfilling_offset(group, guess, pose_type)
-    return holding(group, "offset", offset if isinstance(offset, Tracer) else np.asarray(offset))
-
-
-@partial(jax.jit, static_argnames="pose_type")
-def _fulfilling_offset(group: Group, guess: dict[str, Any], pose_type: type[Pose]) -> Float[Numbers, "instance 1"]:
-    def residual(offset: Any) -> Any:
-        trial = holding(group, "offset", offset)
-        return trial.residual(pose_at(guess, pose_type), Jet([jnp.zeros((1, 1))])).coefficients[0]
-
-    zero = jnp.zeros((group.instances, 1))
-    value, slope = jax.jvp(residual, (zero,), (jnp.ones_like(zero),))
-    return -jnp.sum(value * slope, axis=0)  # the slope is -1 in the row that holds the offset, else 0
-
-
-def with_sense(group: Group, pose_type: type[Pose], guess: dict[str, Any]) -> Group:
-    """Fill in with which sign of the Euler parameters an attitude is compared: that of the starting guess."""
-    if not hasattr(group.element, "sense"):
-        return group
-    pose = pose_at(guess, pose_type)
-    sense = group.element.sense_at(*(pose.take(indices) for indices in group.bodies))
-    return holding(group, "sense", sense if sense is None or isinstance(sense, Tracer) else np.asarray(sense))
-
-
-def counts_turns(group: Group) -> bool:
-    """Return whether carriages count the turns of the leaders of a group of cams."""
-    return isinstance(group.element, Cam) and bool(group.element.hidden)
-
-
-def with_turn_unit(group: Group, length: Any) -> Group:
-    """Return a group whose carriages move by the size of the mechanism, m, with a rad of the leaders of cams."""
-    if not counts_turns(group):
-        return group
-    return holding(group, "unit", length * np.ones((group.instances, 1)))
-
-
-def _with_derived_of(group: Group, known: Group) -> Group:
-    """Return a group with offsets and signs that another one has derived from a position."""
-    if measures_angle(group):
-        return with_datum_of(group, known)
-    if hasattr(group.element, "sense"):
-        return holding(group, "sense", known.element.sense)
-    if counts_turns(group):
-        return holding(group, "unit", known.element.unit)
-    if "offset" not in value_fields(type(group.element)) or group.element.offset is not None:
-        return group
-    return holding(group, "offset", known.element.offset)
 
 
 def _size(groups: tuple[Group, ...], positions: Float[Numbers, "component body 1"]) -> float:

@@ -19,14 +19,8 @@ from jounce.constraints.base import value_fields
 from jounce.constraints.planar import length_of
 from jounce.errors import UnsupportedError
 from jounce.jet.turns import brought_near
-from jounce.mechanism.building.builder import (
-    Model,
-    grouped_elements,
-    model_of,
-    with_offsets,
-    with_sense,
-    with_turn_unit,
-)
+from jounce.mechanism.building.builder import Model, grouped_elements, model_of
+from jounce.mechanism.building.derived_values import with_offsets, with_sense, with_turn_unit
 from jounce.mechanism.building.preconditions import PLAIN
 from jounce.mechanism.building.starting_guess import pose_at, starting_guess
 from jounce.mechanism.mechanism import Mechanism

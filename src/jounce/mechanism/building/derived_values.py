@@ -1,0 +1,73 @@
+"""Values of joints that follow from the starting guess: offsets, signs of attitudes, and units of turns."""
+
+from functools import partial
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax.core import Tracer
+from jaxtyping import Float
+
+from jounce.base.shapes import Numbers
+from jounce.constraints.cams import Cam
+from jounce.constraints.facts import value_fields
+from jounce.jet import Jet
+from jounce.mechanism.building.starting_guess import pose_at
+from jounce.mechanism.system import Group, holding
+from jounce.mechanism.transmissions.axis_angles import measures_angle, with_datum_of
+from jounce.rigid.pose import Pose
+
+
+def with_offsets(group: Group, pose_type: type[Pose], guess: dict[str, Any]) -> Group:
+    """Fill in the offsets that were not given: those with which the starting guess fulfills the joint."""
+    fields = value_fields(type(group.element))
+    if "offset" not in fields or group.element.offset is not None:
+        return group
+    offset = _fulfilling_offset(group, guess, pose_type)
+    return holding(group, "offset", offset if isinstance(offset, Tracer) else np.asarray(offset))
+
+
+@partial(jax.jit, static_argnames="pose_type")
+def _fulfilling_offset(group: Group, guess: dict[str, Any], pose_type: type[Pose]) -> Float[Numbers, "instance 1"]:
+    def residual(offset: Any) -> Any:
+        trial = holding(group, "offset", offset)
+        return trial.residual(pose_at(guess, pose_type), Jet([jnp.zeros((1, 1))])).coefficients[0]
+
+    zero = jnp.zeros((group.instances, 1))
+    value, slope = jax.jvp(residual, (zero,), (jnp.ones_like(zero),))
+    return -jnp.sum(value * slope, axis=0)  # the slope is -1 in the row that holds the offset, else 0
+
+
+def with_sense(group: Group, pose_type: type[Pose], guess: dict[str, Any]) -> Group:
+    """Fill in with which sign of the Euler parameters an attitude is compared: that of the starting guess."""
+    if not hasattr(group.element, "sense"):
+        return group
+    pose = pose_at(guess, pose_type)
+    sense = group.element.sense_at(*(pose.take(indices) for indices in group.bodies))
+    return holding(group, "sense", sense if sense is None or isinstance(sense, Tracer) else np.asarray(sense))
+
+
+def counts_turns(group: Group) -> bool:
+    """Return whether carriages count the turns of the leaders of a group of cams."""
+    return isinstance(group.element, Cam) and bool(group.element.hidden)
+
+
+def with_turn_unit(group: Group, length: Any) -> Group:
+    """Return a group whose carriages move by the size of the mechanism, m, with a rad of the leaders of cams."""
+    if not counts_turns(group):
+        return group
+    return holding(group, "unit", length * np.ones((group.instances, 1)))
+
+
+def with_derived_of(group: Group, known: Group) -> Group:
+    """Return a group with offsets and signs that another one has derived from a position."""
+    if measures_angle(group):
+        return with_datum_of(group, known)
+    if hasattr(group.element, "sense"):
+        return holding(group, "sense", known.element.sense)
+    if counts_turns(group):
+        return holding(group, "unit", known.element.unit)
+    if "offset" not in value_fields(type(group.element)) or group.element.offset is not None:
+        return group
+    return holding(group, "offset", known.element.offset)
