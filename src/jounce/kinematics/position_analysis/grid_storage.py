@@ -141,8 +141,8 @@ class _Store:
     """Arrays for the states of all instants of a grid of several chunks: of outputs and, if kept, of coordinates."""
 
     def __init__(self, like: SolvedState, count: int, *, keeps_series: bool):
-        kept = like[0] if keeps_series else {}, like[1]  # threads that solve instants first touch their memory
-        self.state: Any = jax.tree.map(lambda x: np.empty((*x.shape[:-1], count)), kept)
+        state = like[0] if keeps_series else {}, like[1]  # threads that solve instants first touch their memory
+        self.state: Any = jax.tree.map(lambda x: np.empty((*x.shape[:-1], count)), state)
 
     def put(
         self, lanes: slice, coordinates: Mapping[str, Any], outputs: Sequence[Any], *, series: bool = False
