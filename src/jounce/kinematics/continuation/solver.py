@@ -68,12 +68,12 @@ class Solver:
     def still(self, coordinates: Mapping[str, Any], lanes: int | None = None) -> SolvedState:
         """Return the state of an unsolved instant: its position, with zero derivatives; or that of many alike."""
         levels, system = self.order + 1, self.model.system
-        lanes = np.shape(coordinates["position"])[-1] if lanes is None else lanes
-        still = {name: np.zeros((levels, *np.shape(x)[:-1], lanes)) for name, x in coordinates.items()}
+        count: int = np.shape(coordinates["position"])[-1] if lanes is None else lanes
+        still = {name: np.zeros((levels, *np.shape(x)[:-1], count)) for name, x in coordinates.items()}
         for name, x in coordinates.items():
             still[name][0] = x
-        outputs = tuple(np.zeros((levels, 1, group.instances, lanes)) for group in system.outputs)
-        return still, outputs, np.zeros(lanes)
+        outputs = tuple(np.zeros((levels, 1, group.instances, count)) for group in system.outputs)
+        return still, outputs, np.zeros(count)
 
     def needed(self, known: SolvedState) -> SolvedState:
         """Return the data of solved instants that predictions need, see `predictor`."""
