@@ -184,3 +184,40 @@ def test_states_of_the_panda_keep_torques_and_rates_by_pinocchio():
     effort = np.array([limits[n].effort for n in names])
     assert np.abs(torques / effort).max() <= 1 + 1e-6
     assert np.abs(np.diff(torques, axis=0) / step).max() <= 1000.0 * (1 + 1e-3)
+
+
+@pytest.mark.slow
+def test_a_state_at_the_limits_of_a_point_and_by_direction():
+    limits = jn.planning.MotionLimits(
+        LIMITS,
+        points=(jn.planning.PointLimits("across", speed=1.5, acceleration=6.0),),
+        backward={"x": jn.Limits(velocity=0.8)},
+    )
+    state = np.array([[0.0, 0.0], [0.9, 1.2], [-0.8, 0.6]])  # a speed of 1.5 m/s along the vector (3, 4) / 5
+    found = jn.retime(table(), [[-0.2, 0.5], [-1.0, 1.0], [-1.5, 0.0]], limits, state=state)
+    _, v, a, j = stopped(found)
+    assert np.linalg.norm(v, axis=1).max() <= 1.5 * (1 + 1e-5)
+    assert np.linalg.norm(a, axis=1).max() <= 6.0 * (1 + 1e-3)
+    assert v[:, 0].min() >= -0.8 * (1 + 1e-5)
+    assert np.abs(j).max() <= 100.0 * (1 + 1e-3)
+    np.testing.assert_allclose(found.derivatives([0.0], 2)[0], state, atol=1e-5)
+    state[1] *= 1.001
+    with pytest.raises(TrajectoryError, match=r"speed of the point of across is above its limit of 1.5 m/s .* got 1.5"):
+        jn.retime(table(), [[-0.2, 0.5], [-1.0, 1.0], [-1.5, 0.0]], limits, state=state)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("share", [1 - 1e-9, 1 + 5e-7])
+def test_a_state_at_the_limit_of_a_force_that_bears_weight(share):
+    slide = jn.Joint("slide", "base", "lift", "prismatic", axis=[0, 0, 1])
+    lift = jn.Robot("lift", [jn.Link("base"), jn.Link("lift", jn.Inertia(1.0))], [slide])
+    limits = {"slide": jn.Limits(velocity=1.0, effort=15.0, effort_rate=200.0)}
+    gravity = 9.81
+    state = np.array([[0.3], [-0.8], [15.0 * share - gravity]])  # it slows down as fast as it can
+    found = jn.retime(lift, [[0.5], [1.5]], limits, state=state)
+    _, v, a, j = stopped(found)
+    assert np.abs(v).max() <= 1.0 * (1 + 1e-6)
+    assert np.abs(a + gravity).max() <= 15.0 * (1 + 1e-4)
+    assert np.abs(j).max() <= 200.0 * (1 + 1e-3)
+    np.testing.assert_allclose(found.derivatives([0.0], 2)[0], state, atol=3e-5)
+    assert found.report.kept

@@ -15,6 +15,8 @@ from jaxtyping import Bool, Float
 
 from jounce.planning.retiming.quantities.path_quantities import C, Curves, D, G, PathQuantities, Quantity
 from jounce.planning.retiming.quantities.robot_quantities import ORDER, RobotQuantities
+from jounce.robot.algorithms.equations_of_motion import mass_matrix
+from jounce.robot.algorithms.jacobian import point_slope
 
 INTERVALS = 20
 GROWTH = 1.1  # of intervals, from one to the next: the state is at limits, the path is not
@@ -147,7 +149,7 @@ def joining_curve(source: RobotQuantities, begins: _Motion, ends: _Motion, durat
             if program > 2 and over > SETTLED * last:
                 break
         rows = [*_range_rows(source, q), *_joint_rows(source, quantities, q, left)]
-        rows += _dynamic_rows(source, quantities, q, at, left) if program else []
+        rows += _dynamic_rows(source, quantities, q, left) if program else []
         rows = [dataclasses.replace(row, used=row.used & (row.left < NEAR)) for row in rows] if program else rows
         change, slack, named = _least_change(rows, source.columns, matrices, free, coefficients, duration)
         coefficients = coefficients.copy()
@@ -218,8 +220,8 @@ def _range_rows(source: RobotQuantities, q: np.ndarray) -> list[_Rows]:
 def _joint_rows(source: RobotQuantities, quantities: PathQuantities, q: np.ndarray, left: list) -> list[_Rows]:
     one, labels = np.broadcast_to(np.eye(q.shape[2]), (len(q), q.shape[2], q.shape[2])), source.labels
     chosen, count = source.with_velocity, len(source.with_velocity)
-    bounds = quantities.first_bounds[:, :count]
-    rows = _both_sides(1, one[:, chosen], q[:, 1, chosen], -bounds, bounds, left, labels.first[:count])
+    forward, backward = source.both_ways("velocity", chosen, q)
+    rows = _both_sides(1, one[:, chosen], q[:, 1, chosen], -backward, forward, left, labels.first[:count])
     chosen, count = source.with_acceleration, len(source.with_acceleration)
     for level, low, high, names in (
         (2, quantities.lower, quantities.upper, labels.second),
@@ -232,13 +234,12 @@ def _joint_rows(source: RobotQuantities, quantities: PathQuantities, q: np.ndarr
     return rows + _both_sides(4, one[:, chosen], q[:, 4, chosen], -bounds, bounds, left, labels.fourth)
 
 
-def _dynamic_rows(
-    source: RobotQuantities, quantities: PathQuantities, q: np.ndarray, at: _Points, left: list
-) -> list[_Rows]:
+def _dynamic_rows(source: RobotQuantities, quantities: PathQuantities, q: np.ndarray, left: list) -> list[_Rows]:
     """Return the rows of torques, of their rates, and of points of links."""
     rows, labels, count = [], source.labels, len(source.with_acceleration)
     if source.with_effort:
-        masses, parts = source.masses(q, at)[:, source.with_effort], quantities.second[:, count:]
+        masses = np.asarray(mass_matrix(source.robot, q[:, 0], drives=source.drives))[:, source.with_effort]
+        parts = quantities.second[:, count:]
         values, rates = (parts[..., [C + k, D + k, G + k]].sum(axis=-1) for k in (0, 4))
         for level, own, low, high, names in (
             (2, values, quantities.lower, quantities.upper, labels.second),
@@ -256,7 +257,8 @@ def _dynamic_rows(
             vector = source.point(q, point)[:, level]
             size = np.linalg.norm(vector, axis=1)
             along = vector / np.maximum(size, np.finfo(float).tiny)[:, None]
-            slopes = np.einsum("pk,pkj->pj", along, source.point_jacobian(q, point)) / getattr(point, field)
+            slopes = point_slope(source.robot, q[:, :1], point.link, point.point)
+            slopes = np.einsum("pk,pkj->pj", along, slopes) / getattr(point, field)
             rows.append(_Rows(level, slopes, left[level] - size / getattr(point, field), size > 0, label))
     return rows
 

@@ -22,11 +22,13 @@ from jounce.planning.paths.path import Path
 from jounce.planning.pieces import SmoothPieces
 from jounce.planning.retiming.joining_curve import EVEN, JoiningCurve, joining_curve
 from jounce.planning.retiming.quantities.feasibility import check_possible
-from jounce.planning.retiming.quantities.path_quantities import Curves
+from jounce.planning.retiming.quantities.path_quantities import Curves, Quantity
 from jounce.planning.retiming.quantities.robot_quantities import ORDER, RobotQuantities
 from jounce.planning.retiming.rates.rate_law import Conditions
 from jounce.planning.retiming.retimed import RetimedTrajectory
+from jounce.robot.algorithms.equations_of_motion import mass_matrix
 
+SPARE = 2e-8  # of a limit, which a search needs
 SHORTEST = 1e-3  # of the time that the path takes from there at that rate
 USED = 0.5  # of a limit, at a steady rate where a path is joined
 DURATIONS = 10  # that are tried, each longer than the last
@@ -73,14 +75,17 @@ def retimed_from(
         raise TrajectoryError(message, name="rates", value=list(conditions.rates))
     source = quantities(path)
     state = clean_state(given, path.names, dict(source.limits.joints))
-    check_state(source, np.asarray(given, float))
+    check_possible(source, source.labels, path.start, path.stop)
+    check_state(source, np.asarray(given, float), ROUNDING)
+    if largest_ratio(source, state)[0] > 1 - SPARE:  # of points, or of torques
+        state = relieved(source, state * (1 - 2 * ROUNDING) ** np.arange(len(state))[:, None])
+        check_state(source, state, -SPARE)
     if along := rates_along(path, state):
         own = dataclasses.replace(conditions, rates=(along[0], conditions.rates[1]), further=along[1:])
         try:
             return planned(path, own, None)
         except SolveError:
             pass  # the path bends too sharply for this state: it is left and joined again
-    check_possible(source, source.labels, path.start, path.stop)
     moving = bool(state[1].any())
     own = conditions
     if moving:
@@ -105,31 +110,58 @@ def retimed_from(
     raise SolveError(message, name="state")
 
 
-def check_state(source: RobotQuantities, state: Float[np.ndarray, "derivative joint"]) -> None:
-    """Raise TrajectoryError if a state breaks a limit: the message has its name, and the value."""
-    path = source.path
-    for name, value in zip(path.names, state[0].tolist(), strict=True):
+def check_state(source: RobotQuantities, state: Float[np.ndarray, "derivative joint"], allowed: float) -> None:
+    """Raise TrajectoryError if a state breaks a limit by more than a share of it: the message has name and value."""
+    for name, value in zip(source.path.names, state[0].tolist(), strict=True):
         limits = source.limits.joints[name]
         for bound, sign, word in ((limits.upper, 1, "above"), (limits.lower, -1, "below")):
             if bound is not None and sign * (value - bound) > ROUNDING * max(1.0, abs(bound)):
                 message = f"the position of {name} is {word} the end of its range, {bound:g}, where the motion begins"
                 raise TrajectoryError(message, name="state", value=value)
-    motion = np.zeros((1, ORDER + 1, state.shape[1]))
-    motion[0, : len(state)] = state
-    shape = np.array([[path.start], [1.0], [0.0], [0.0], [0.0]])
-    curves = Curves(source.at(source.whole(motion), shape[0]), shape)
-    labels = source.labels
+    ratio, value, label = largest_ratio(source, state)
+    if ratio > 1 + allowed:
+        where = "above" if ratio > 1 + ROUNDING else "to rounding at"
+        message = (
+            f"the {label.word} of {label.owner} is {where} its limit of {abs(value) / ratio:.6g} {label.unit} where "
+            "the motion is to begin"
+        )
+        raise TrajectoryError(message, name="state", value=value)
+
+
+def largest_ratio(
+    source: RobotQuantities, state: Float[np.ndarray, "derivative joint"]
+) -> tuple[float, float, Quantity]:
+    """Return the share of its limit that a state uses most of, the value there, and what it is."""
+    curves, labels = _curves(source, state)[0], source.labels
     known = (1, 2, 3, 2, 4)  # the derivatives that values in the order of the labels need
     counts = [len(x) for x in (labels.first, labels.second, labels.rates, labels.vectors, labels.fourth)]
     ratios = np.where(np.repeat(known, counts) < len(state), curves.ratios(EVEN)[0], 0.0)
-    worst = int(np.argmax(ratios)) if len(ratios) else 0
-    if len(ratios) and ratios[worst] > 1 + ROUNDING:
-        label, value = labels.every[worst], float(np.concatenate(curves.values(EVEN), axis=1)[0, worst])
-        message = (
-            f"the {label.word} of {label.owner} is above its limit of {abs(value) / ratios[worst]:.6g} {label.unit} "
-            "where the motion is to begin"
-        )
-        raise TrajectoryError(message, name="state", value=value)
+    worst = int(np.argmax(ratios))
+    values = np.concatenate(curves.values(EVEN), axis=1)[0]
+    return float(ratios[worst]), float(values[worst]), labels.every[worst]
+
+
+def relieved(source: RobotQuantities, state: Float[np.ndarray, "derivative joint"]) -> State:
+    """Return a state whose accelerations are changed so that torques at their limits are below them by rounding."""
+    if len(state) <= 2 or not source.with_effort:
+        return state
+    curves, q = _curves(source, state)
+    first = len(source.with_acceleration)
+    torques = curves.values(EVEN)[1][0, first:]
+    low, high = (bounds[0, first:] * (1 - 2 * SPARE) for bounds in (curves.quantities.lower, curves.quantities.upper))
+    excess = np.zeros(q.shape[2])
+    excess[source.with_effort] = torques - np.clip(torques, low, high)
+    masses = np.asarray(mass_matrix(source.robot, q[0, 0], drives=source.drives))
+    relief = np.linalg.solve(masses[np.ix_(source.columns, source.columns)], excess[source.columns])
+    return np.concatenate([state[:2], state[2:3] - relief, state[3:]])
+
+
+def _curves(source: RobotQuantities, state: Float[np.ndarray, "derivative joint"]) -> tuple[Curves, np.ndarray]:
+    """Return the limited quantities of a state that is passed at a rate of 1, and its coordinates."""
+    motion = np.zeros((1, ORDER + 1, state.shape[1]))
+    motion[0, : len(state)] = state
+    shape, q = np.array([[source.path.start], [1.0], [0.0], [0.0], [0.0]]), source.whole(motion)
+    return Curves(source.at(q, shape[0]), shape), q
 
 
 def joined(source: RobotQuantities, state: State, at: float, order: int) -> tuple[Path, float]:

@@ -107,7 +107,7 @@ class RobotQuantities:
 
     def _first(self, q: np.ndarray) -> tuple[_Table, _Table]:
         values = [q[:, 1, self.with_velocity]]
-        forward, backward = self._both("velocity", self.with_velocity, q)
+        forward, backward = self.both_ways("velocity", self.with_velocity, q)
         bounds = [np.where(values[0] < 0, backward, forward)]
         for point in self.limits.points:
             if point.speed is not None:
@@ -123,18 +123,18 @@ class RobotQuantities:
         parts = (motion[:, 1], motion[:, 2], nothing, nothing, motion[:, 2], motion[:, 3], nothing, nothing)
         at_rest = np.abs(motion[:, 1]) <= REST * np.abs(motion[:, 1]).max(axis=0, initial=0.0)
         ahead, sides = motion[:, 1] > 0, []
-        pairs = zip(self._both("acceleration", chosen, q), self._both("deceleration", chosen, q), strict=True)
+        pairs = zip(self.both_ways("acceleration", chosen, q), self.both_ways("deceleration", chosen, q), strict=True)
         for (faster, slower), along in zip(pairs, (ahead, ~ahead), strict=True):
             slowing = np.where(np.isfinite(slower), slower, faster)
             speeding = np.where(
                 at_rest & (s == self.path.stop)[:, None], slowing, faster
             )  # what arrives has slowed down
             sides.append(np.where(at_rest | along, speeding, slowing))
-        jerk, jerk_back = self._both("jerk", chosen, q)
+        jerk, jerk_back = self.both_ways("jerk", chosen, q)
         tables = [(np.stack(parts, axis=-1), -sides[1], sides[0], -jerk_back, jerk)]
         if self.with_effort:
-            effort, effort_back = self._both("effort", self.with_effort, q)
-            rate, rate_back = self._both("effort_rate", self.with_effort, q)
+            effort, effort_back = self.both_ways("effort", self.with_effort, q)
+            rate, rate_back = self.both_ways("effort_rate", self.with_effort, q)
             tables.append((self._torques(q, s)[:, self.with_effort], -effort_back, effort, -rate_back, rate))
         second, *bounds = (np.concatenate(x, axis=1) for x in zip(*tables, strict=True))
         lower, upper, rate_lower, rate_upper = bounds
@@ -155,13 +155,6 @@ class RobotQuantities:
         m1 = rates[3] - rates[0] - 2 * c - d
         return np.stack([m, c, d, g, m1, c1, d1, g1], axis=-1)
 
-    def masses(self, q: Float[np.ndarray, "point 5 joint"], s: _Points) -> Float[np.ndarray, "point joint joint"]:
-        """Return what each acceleration, last, adds to each torque."""
-        motions = _one_by_one(q, 2)
-        rest = motions[:1] * np.array([1.0, 0.0, 0.0])[:, None]
-        torques = self.loaded.torques(np.concatenate([rest, motions]), s, self.drives)[:, :, 0]
-        return np.moveaxis(torques[1:] - torques[0], 0, -1)
-
     def _vectors(self, q: np.ndarray) -> tuple[np.ndarray, _Table]:
         chosen = [point for point in self.limits.points if point.acceleration is not None]
         if not chosen:
@@ -172,12 +165,6 @@ class RobotQuantities:
     def point(self, q: np.ndarray, point: object) -> Float[np.ndarray, "point 3 3"]:
         """Return the position, velocity and acceleration of a point for coordinates with derivatives."""
         return np.asarray(forward_kinematics(self.robot, q[:, :3], point.link, point.point).position)  # type: ignore[attr-defined]
-
-    def point_jacobian(self, q: np.ndarray, point: object) -> Float[np.ndarray, "point 3 joint"]:
-        """Return what the velocity of each joint, last, adds to the velocity of a point."""
-        motions = _one_by_one(q, 1)
-        moved = self.point(motions.reshape(-1, *motions.shape[2:]), point)[:, 1]
-        return np.moveaxis(moved.reshape(*motions.shape[:2], 3), 0, -1)
 
     def _has(self, name: str, *fields: str) -> bool:
         """Whether a joint has one of some limits."""
@@ -193,7 +180,7 @@ class RobotQuantities:
     def _limited(self, *fields: str) -> list[int]:
         return [k for k in self.moved if self._has(self.robot.joint_names[k], *fields)]
 
-    def _both(self, field: str, chosen: list[int], q: np.ndarray) -> tuple[_Table, _Table]:
+    def both_ways(self, field: str, chosen: list[int], q: np.ndarray) -> tuple[_Table, _Table]:
         """Return the limits of some joints at points, above zero and below it."""
         forward = self._bounds(field, chosen, q)
         backward = forward.copy()
@@ -264,12 +251,3 @@ class RobotQuantities:
                         f"{word} {bound:g}; no time law changes that; choose another path"
                     )
                     raise TrajectoryError(message, name=name)
-
-
-def _one_by_one(q: np.ndarray, level: int) -> Float[np.ndarray, "joint point 3 joint"]:
-    """Return motions at rest but for a derivative of one joint, which is 1, one joint after the other."""
-    count = q.shape[2]
-    motions = np.broadcast_to(q[:, :3], (count, len(q), 3, count)).copy()
-    motions[:, :, 1:] = 0.0
-    motions[np.arange(count), :, level, np.arange(count)] = 1.0
-    return motions
