@@ -13,12 +13,14 @@ from jounce.base.display import Displayed
 from jounce.base.shapes import Array, ArrayLike, seconds
 from jounce.errors import JounceError, MechanismError, SampleWarning, TrajectoryError, check_name
 from jounce.jet import Jet
+from jounce.trajectory.beyond import check_within
 from jounce.trajectory.checks import check_samples, finite, finite_numbers, finite_row, positive, whole_number
 from jounce.trajectory.laws.profiles import motion_profile
 from jounce.trajectory.laws.stacking import evaluate_laws, law_derivatives
 from jounce.trajectory.laws.trapezoid import LIMITS
 from jounce.trajectory.motion import AbstractMotion, ExpressionMotion, SplineMotion
 from jounce.trajectory.sample_errors import TOLERANCE, unsupported_derivative, unsupported_words
+from jounce.trajectory.sampled.deferred import Laws, SampledLaw, law_through
 from jounce.trajectory.splines import HIGHEST_DEGREE
 from jounce.units.expression import Expression
 
@@ -65,11 +67,15 @@ class JointTrajectory(Displayed):
     ):
         if not isinstance(laws, Mapping) or not laws:
             raise TrajectoryError("a trajectory needs a law for at least one joint", name="laws", value=laws)
-        self.laws: Mapping[str, AbstractMotion] = MappingProxyType({name: _law(name, x) for name, x in laws.items()})
+        given = laws.given() if isinstance(laws, Laws) else laws
+        self.laws = Laws({name: _law(name, x) for name, x in given.items()})
         self.start, self.stop = _bounds(start, stop)
-        for name, law in self.laws.items():
+        for name, law in self.laws.given().items():
             try:
-                law.check_instants(self.start, self.stop)
+                if isinstance(law, SampledLaw):
+                    check_within(self.start, self.stop, float(law.times[0]), float(law.times[-1]), "samples")
+                else:
+                    law.check_instants(self.start, self.stop)
             except JounceError as error:
                 raise TrajectoryError(error.message, name=f"laws.{name}", value=error.value) from None
         instants = (
@@ -94,7 +100,8 @@ class JointTrajectory(Displayed):
         >>> jn.JointTrajectory({"a": "t", "b": "t**2"}, 0.0, 1.0).part(["b"]).names
         ('b',)
         """
-        laws = {name: self.laws[name] for name in names}
+        given = self.laws.given()
+        laws = {name: given[name] for name in names}
         measures = {name: measure for name, measure in self.measures.items() if name in laws}
         return JointTrajectory(laws, self.start, self.stop, self.times, measures)
 
@@ -141,7 +148,7 @@ class JointTrajectory(Displayed):
             message = f"positions of {len(names)} joints have the shape (samples, {len(names)})"
             raise TrajectoryError(message, name="positions", value=f"shape {positions.shape}")
         try:
-            laws = {name: SplineMotion(times, column, degree) for name, column in zip(names, positions.T, strict=True)}
+            laws = {name: law_through(times, column, degree) for name, column in zip(names, positions.T, strict=True)}
         except MechanismError as error:
             raise TrajectoryError(error.message, name=error.name, value=error.value) from None
         return cls(laws, times[0], times[-1], times)
@@ -218,7 +225,7 @@ class JointTrajectory(Displayed):
         return tuple(self.laws)
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return type(self), (dict(self.laws), self.start, self.stop, self.times, dict(self.measures))
+        return type(self), (self.laws.given(), self.start, self.stop, self.times, dict(self.measures))
 
     def __repr__(self) -> str:
         return f"JointTrajectory({', '.join(self.names)}; {self.start:g} to {self.stop:g} s)"
@@ -375,10 +382,10 @@ def check_odd(degree: object) -> None:
         raise TrajectoryError(f"{message}; even ones carry errors along undamped", name="degree", value=degree)
 
 
-def _law(name: Any, law: Any) -> AbstractMotion:
+def _law(name: Any, law: Any) -> AbstractMotion | SampledLaw:
     if not isinstance(name, str) or not name:
         raise TrajectoryError("the name of a joint must be text", name="laws", value=name)
-    if isinstance(law, AbstractMotion):
+    if isinstance(law, AbstractMotion | SampledLaw):
         return law
     if isinstance(law, bool) or not isinstance(law, str | int | float | np.integer | np.floating | Expression):
         raise TrajectoryError("a law is a motion, an expression of t, or a number", name=f"laws.{name}", value=law)

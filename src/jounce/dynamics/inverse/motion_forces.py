@@ -261,6 +261,7 @@ class MotionForces:
         The forces on all bodies, the ground included, have no resultant. The force on the ground is therefore the
         opposite of the sum of those on the moving bodies, also for residuals that depend on more than relative poses,
         such as a coordinate of one body or a ratio of angles, because these are measured in the frame of the ground.
+        What turns a rotor that stands for inertia of a coordinate alone is left out: the ground does not feel it.
 
         Parameters
         ----------
@@ -277,11 +278,12 @@ class MotionForces:
             Taylor coefficients.
         """
         whole = self._bodies_of(name)  # the carriage of a joint, which has a hidden coordinate, is no body
-        joined = enumerate(whole[: len(whole) - bool(getattr(self._member(name)[0].element, "hidden", ()))])
+        element = self._member(name)[0].element
+        joined = enumerate(whole[: len(whole) - bool(getattr(element, "hidden", ()))])
         if body:
             work = total(self._wrench(name, slot) for slot, its in joined if its == body)
             return self._expressed(work, body, frame, point)
-        moving = {slot: its for slot, its in joined if its}
+        moving = {slot: its for slot, its in joined if its and slot not in getattr(element, "unfelt", ())}
         works = [self._wrench(name, slot) for slot in moving]
 
         def chunk(lanes: np.ndarray) -> Any:

@@ -14,7 +14,8 @@ CONTRADICTS, DOUBTFUL = 0.2, 0.05
 """Of the change over a stretch: from there on a column is refused, or mentioned."""
 WINDOWS = 50  # of a recording, over which changes are compared
 NOISES = 6.0  # times the deviation of what noise makes of a change: a smaller difference says nothing
-FEWEST = 12  # samples, of which one may be an outlier
+FEWEST = 12  # samples, of which some may be outliers
+MOST = 3  # outliers in a row
 PARTS = 5
 OUTLYING = 0.05  # of the range of a derivative: a smaller distance is none of an outlier
 BLOCK = 20_000  # samples that noise is estimated from
@@ -37,8 +38,8 @@ def check_agreement(recording: Recording) -> list[str]:
     Raises
     ------
     TrajectoryError
-        If they differ by more than a fifth, or a single sample of a derivative is an outlier: the message names the
-        joint and the line.
+        If they differ by more than a fifth, or up to three samples of a derivative in a row are outliers: the message
+        names the joint and the line.
     """
     doubts = []
     for level in range(1, recording.values.shape[1]):
@@ -47,14 +48,15 @@ def check_agreement(recording: Recording) -> list[str]:
             if len(rows) < 4:
                 continue
             below, rate = recording.values[rows, level - 1, k], recording.values[rows, level, k]
-            if (outlier := _outlier(recording.times[rows], below, rate)) is not None:
-                row, expected = outlier
-                instant = recording.times[rows[row]]
-                message = (
-                    f"{LEVELS[level]} have an outlier at t = {instant:.6g} s: {rate[row]:.6g}, where the samples "
-                    f"beside it and {LEVELS[level - 1]} say {expected:.6g}; correct it, or leave the row out"
+            if (outliers := _outliers(recording.times[rows], below, rate)) is not None:
+                first, last, expected = outliers
+                words, line = _outlier_words(recording, rows[first : last + 1], level, k), int(rows[first])
+                advice = (
+                    "correct it, or leave the row out" if first == last else "correct them, or leave these rows out"
                 )
-                raise recording.error(message, int(rows[row]), name=name)
+                beside = f"the samples beside {'it' if first == last else 'them'} and {LEVELS[level - 1]}"
+                message = f"{words}, where {beside} say {expected:.6g}; {advice}"
+                raise recording.error(message, line, name=name)
             worst = _difference(recording.times[rows], below, rate)
             if worst is None or worst.share < DOUBTFUL:
                 continue
@@ -70,33 +72,61 @@ def check_agreement(recording: Recording) -> list[str]:
     return doubts
 
 
-def _outlier(times: np.ndarray, below: np.ndarray, rate: np.ndarray) -> tuple[int, float] | None:
-    """Return the sample of a rate that is far from what the level below says, and from its neighbors, and that value.
+def _outlier_words(recording: Recording, rows: np.ndarray, level: int, joint: int) -> str:
+    """Return where outliers are, and what they are."""
+    values = ", ".join(f"{x:.6g}" for x in recording.values[rows, level, joint])
+    first, last = recording.times[rows[[0, -1]]]
+    if len(rows) == 1:
+        return f"{LEVELS[level]} have an outlier at t = {first:.6g} s: {values}"
+    lines = f", to line {int(recording.lines[rows[-1]])}" if len(recording.lines) else ""
+    return f"{LEVELS[level]} have {len(rows)} outliers in a row from t = {first:.6g} s to {last:.6g} s{lines}: {values}"
 
-    It is farther from both than noise makes it, and than the rate itself changes over the samples about it: neither a
-    jump of the rate nor a knock, which positions show too, is an outlier.
+
+def _outliers(times: np.ndarray, below: np.ndarray, rate: np.ndarray) -> tuple[int, int, float] | None:
+    """Return the samples of a rate, in a row, that are far from what the level below says, and from their neighbors.
+
+    Each is farther from both than noise makes it, and than the rate itself changes about them: neither a jump of the
+    rate nor a knock, which positions show too, is an outlier. First and last of them, and the value of the first.
     """
     if len(times) < FEWEST:
         return None
-    before, after = np.diff(times)[1:-2], np.diff(times)[2:-1]  # about all but the two first and the two last
-    falls, rises = np.diff(below)[1:-2] / before, np.diff(below)[2:-1] / after
-    middle = (falls * after + rises * before) / (before + after)  # of the parabola through three samples
-    own = rate[2:-2]
-    change = np.abs(rate[3:-1] - rate[1:-3]) + np.abs(rate[4:] - rate[:-4]) + np.abs(rises - falls)
-    between = rate[1:-3] + (rate[3:-1] - rate[1:-3]) * before / (before + after)
+    steps = np.diff(times)
+    slopes = np.diff(below) / steps
+    before, after = steps[:-1], steps[1:]
+    middle = (slopes[:-1] * after + slopes[1:] * before) / (before + after)  # of the parabola through three samples
     sigmas = [float(np.median([noise(times[b], x[b]) for b in _blocks(len(times))])) for x in (below, rate)]
     by_noise = NOISES * (sigmas[1] + 2 * sigmas[0] / np.minimum(before, after))
-    far = np.minimum(np.abs(own - middle), np.abs(own - between)) - by_noise - change
-    worst = int(np.argmax(far))
-    if far[worst] <= OUTLYING * float(np.ptp(np.delete(rate, worst + 2))):
+    away = np.abs(rate[1:-1] - middle) - by_noise  # of all but the first and the last
+    best = None
+    for count in range(1, MOST + 1):
+        places = len(times) - count - 3  # of groups that have two neighbors on each side
+        left, right = slice(1, places + 1), slice(count + 2, count + 2 + places)
+        turn = rate[right] - rate[left]
+        seen = np.stack([slopes[k : k + places] for k in range(1, count + 2)])
+        change = np.abs(turn) + np.abs(rate[count + 3 :] - rate[:places]) + np.ptp(seen, axis=0)
+        far = np.full(places, np.inf)
+        for k in range(2, count + 2):
+            own = slice(k, k + places)
+            share = (times[own] - times[left]) / (times[right] - times[left])
+            noisy = by_noise[k - 1 : k - 1 + places]
+            beside = np.abs(rate[own] - rate[left] - share * turn) - noisy
+            far = np.minimum(far, np.minimum(away[k - 1 : k - 1 + places], beside))
+        far -= change
+        worst = int(np.argmax(far))
+        if best is None or far[worst] > best[0]:
+            best = far[worst], worst + 2, worst + count + 1
+    assert best is not None
+    excess, first, last = best
+    if excess <= OUTLYING * float(np.ptp(np.delete(rate, slice(first, last + 1)))):
         return None
-    return worst + 2, float(middle[worst])
+    return first, last, float(middle[first - 1])
 
 
 def _blocks(count: int) -> list[slice]:
     """Return parts of samples over which noise is estimated, since an outlier raises the estimate of its own part."""
     length = max(count // PARTS, FEWEST)
-    return [slice(first, first + length) for first in range(0, max(count - length, 0) + 1, length)][:PARTS]
+    own = min(length, BLOCK)
+    return [slice(first, first + own) for first in range(0, max(count - length, 0) + 1, length)][:PARTS]
 
 
 def _difference(times: np.ndarray, below: np.ndarray, rate: np.ndarray) -> _Difference | None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import warnings
+from typing import Any
 
 import numpy as np
 from jaxtyping import Bool, Float
@@ -15,9 +16,10 @@ from jounce.trajectory import (
     HermiteMotion,
     HermiteSplineMotion,
     JointTrajectory,
-    SplineMotion,
 )  # fmt: skip
+from jounce.trajectory.checks import check_samples
 from jounce.trajectory.joint_trajectory import check_odd
+from jounce.trajectory.sampled.deferred import SampledLaw, law_through
 
 
 def trajectory_of(
@@ -64,7 +66,7 @@ def trajectory_of(
             name: _as_points(recording, k) if pointed else _as_samples(recording, k, 1 if samples else degree)
             for k, name in enumerate(recording.names)
         }
-        bounds = [(float(np.asarray(law.breakpoints)[0]), float(law.stop)) for law in laws.values()]
+        bounds = [_ends(law) for law in laws.values()]
         start, stop = max(first for first, _ in bounds), min(last for _, last in bounds)
         inside = (recording.times >= start) & (recording.times <= stop)
         times = recording.times[inside]
@@ -91,15 +93,20 @@ def _trimmed(table: Float[np.ndarray, "row level"]) -> Float[np.ndarray, "row kn
     return table[:, : int(np.argmin(np.append(both, False)))]
 
 
-def _as_samples(recording: Recording, joint: int, degree: int) -> AbstractMotion:
+def _ends(law: Any) -> tuple[float, float]:
+    """Return the first and the last instant of a law."""
+    if isinstance(law, SampledLaw):
+        return float(law.times[0]), float(law.times[-1])
+    return float(np.asarray(law.breakpoints)[0]), float(law.stop)
+
+
+def _as_samples(recording: Recording, joint: int, degree: int) -> AbstractMotion | SampledLaw:
     table = recording.values[:, :, joint]
     rows = ~np.isnan(table[:, 0])
     times, table = recording.times[rows], table[rows]
-    if degree == 1:
-        return HermiteMotion(times, table[:, :1])
     levels = complete_levels(~np.isnan(table))
-    if levels == 1:
-        return SplineMotion(times, table[:, 0], degree)
+    if degree == 1 or levels == 1:
+        return law_through(*check_samples(times, np.ascontiguousarray(table[:, 0])), degree)
     return HermiteSplineMotion(times, table[:, :levels])
 
 

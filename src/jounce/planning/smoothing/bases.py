@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from bisect import bisect_left, bisect_right
 from collections.abc import Iterator
 from typing import Any
 
@@ -13,6 +14,40 @@ DEGREE, PENALIZED = 7, 4
 PART = 50_000
 """Samples or cells whose splines are evaluated at once."""
 _Knots = Float[np.ndarray, " knot"]
+
+
+class Samples:
+    """Samples of a joint in units of the knots, from the first one on, made as they are looked at: logs are long.
+
+    Parameters
+    ----------
+    times, values : array of shape (sample,)
+        s, rad or m.
+    knots : array of shape (cell + 1,)
+        s.
+    """
+
+    def __init__(self, times: np.ndarray, values: np.ndarray, knots: np.ndarray):
+        self.scale = float(np.median(np.diff(knots)))
+        self.knots = (knots - knots[0]) / self.scale
+        self.middle = float(values.mean())
+        self._times, self._values, self._first = times, values, knots[0]
+
+    def __len__(self) -> int:
+        return len(self._times)
+
+    def times(self, which: Any) -> Float[np.ndarray, " some"]:
+        """Return some instants."""
+        return np.clip((self._times[which] - self._first) / self.scale, 0.0, self.knots[-1])
+
+    def values(self, which: Any) -> Float[np.ndarray, " some"]:
+        """Return some values, from their mean."""
+        return self._values[which] - self.middle
+
+    def place(self, instant: float, side: str = "left") -> int:
+        """Return where an instant belongs among those of the samples."""
+        bisect = bisect_left if side == "left" else bisect_right
+        return bisect(range(len(self)), instant, key=lambda k: self.times([k])[0])
 
 
 def whole(knots: _Knots) -> Float[np.ndarray, " repeated"]:
@@ -61,33 +96,27 @@ def parts_of(count: int) -> Iterator[slice]:
         yield slice(first, min(first + PART, count))
 
 
-def cost(
-    times: Float[np.ndarray, " sample"],
-    values: Float[np.ndarray, " sample"],
-    knots: _Knots,
-    weights: Float[np.ndarray, " cell"],
-) -> tuple[Any, Float[np.ndarray, " spline"]]:
+def cost(samples: Samples, weights: Float[np.ndarray, " cell"]) -> tuple[Any, Float[np.ndarray, " spline"]]:
     """Return the symmetric sparse matrix, and the vector, of the sum of squares of distances and of jounce.
 
     Parameters
     ----------
-    times, values : array of shape (sample,)
-        As of the knots; rad or m.
-    knots : array of shape (cell + 1,)
-        Increasing.
+    samples : Samples
+        With the knots.
     weights : array of shape (cell,)
         Of the square of the jounce in each cell.
     """
     from scipy import sparse
 
+    knots = samples.knots
     count = len(knots) + DEGREE - 1
     bands, right = np.zeros((DEGREE + 1, count)), np.zeros(count)
-    for some in parts_of(len(times)):
-        matrix = values_at(times[some], knots)
+    for some in parts_of(len(samples)):
+        matrix = values_at(samples.times(some), knots)
         own = slice(int(matrix.indices.min()), int(matrix.indices.max()) + 1)
         matrix = matrix[:, own]
         bands[:, own] += banded(matrix.T @ matrix)
-        right[own] += matrix.T @ values[some]
+        right[own] += matrix.T @ samples.values(some)
     repeated = whole(knots)
     for some in parts_of(len(weights)):
         root = penalty_root(repeated[some.start : some.stop + 2 * DEGREE + 1], weights[some])

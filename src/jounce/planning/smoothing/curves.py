@@ -12,7 +12,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from jounce.errors import SolveError
-from jounce.planning.smoothing.bases import DEGREE, banded, cost, parts_of, values_at, whole
+from jounce.planning.smoothing.bases import DEGREE, Samples, banded, cost, parts_of, values_at, whole
 from jounce.planning.smoothing.dwells import Dwell
 from jounce.planning.smoothing.weights import IntervalEstimate
 
@@ -89,7 +89,7 @@ def laid_knots(
     ends = np.unique(ends)
     at = np.array([(s.start + s.stop) / 2 for s in estimates])
     logarithms = np.log(CELL / np.array([s.cutoff for s in estimates]))
-    shortest = float(np.median(np.diff(times)))
+    shortest = float(np.median(np.diff(times), overwrite_input=True))
     least = min(s.stop - s.start for s in estimates) / LOOKS
     still = {(float(times[d.first]), float(times[d.last])) for d in dwells}
     parts = []
@@ -114,7 +114,7 @@ def _halved(
     near = np.zeros(len(knots) - 1, bool)
     for offset in range(-HALVED, HALVED + 1):
         near[np.clip(cells + offset, 0, len(near) - 1)] = True
-    near &= np.diff(knots) > np.median(np.diff(times)) / 2
+    near &= np.diff(knots) > np.median(np.diff(times), overwrite_input=True) / 2
     return np.sort(np.append(knots, ((knots[:-1] + knots[1:]) / 2)[near]))
 
 
@@ -126,24 +126,21 @@ def _on_knots(
     estimates: Sequence[IntervalEstimate],
     dwells: Sequence[Dwell],
 ) -> Curve:
-    scale = float(np.median(np.diff(knots)))
-    local = (knots - knots[0]) / scale
-    instants = np.clip((times - knots[0]) / scale, 0.0, local[-1])
+    samples = Samples(times, values, knots)
     middles = (knots[:-1] + knots[1:]) / 2
     at = np.array([(s.start + s.stop) / 2 for s in estimates])
-    weights = np.exp(np.interp(middles, at, np.log([s.weight for s in estimates]))) / scale**DEGREE
-    middle = float(values.mean())
-    system, right = cost(instants, values - middle, local, weights)
+    weights = np.exp(np.interp(middles, at, np.log([s.weight for s in estimates]))) / samples.scale**DEGREE
+    system, right = cost(samples, weights)
     coefficients, free = np.zeros(len(right)), np.ones(len(right), bool)
     for dwell in dwells:
         first = int(np.searchsorted(knots, times[dwell.first]))
         last = int(np.searchsorted(knots, times[dwell.last]))
         own = slice(first, last + DEGREE)
-        coefficients[own], free[own] = dwell.position - middle, False
+        coefficients[own], free[own] = dwell.position - samples.middle, False
     for run in _runs(free):
         coefficients[run] = _solved(system, right, coefficients, run)
-    problem = _Problem(instants, values - middle, local, system, right, deviation)
-    return Curve(knots, problem.within(coefficients, free) + middle, problem.away)
+    problem = _Problem(samples, system, right, deviation)
+    return Curve(knots, problem.within(coefficients, free) + samples.middle, problem.away)
 
 
 def _runs(chosen: Bool[np.ndarray, " spline"]) -> list[slice]:
@@ -168,9 +165,7 @@ def _solved(system: Any, right: np.ndarray, coefficients: np.ndarray, run: slice
 class _Problem:
     """The problem of the least cost within a deviation of the samples, solved only where the spline exceeds it."""
 
-    times: np.ndarray
-    values: np.ndarray
-    knots: np.ndarray
+    samples: Samples
     system: Any
     right: np.ndarray
     deviation: float
@@ -195,15 +190,16 @@ class _Problem:
 
     def _cells(self, samples: Int[np.ndarray, " some"]) -> Int[np.ndarray, " some"]:
         """Return the cells of samples, which are also the first splines that are not zero there."""
-        return np.clip(np.searchsorted(self.knots, self.times[samples], side="right") - 1, 0, len(self.knots) - 2)
+        knots = self.samples.knots
+        return np.clip(np.searchsorted(knots, self.samples.times(samples), side="right") - 1, 0, len(knots) - 2)
 
     def _far(self, coefficients: np.ndarray) -> Int[np.ndarray, " far"]:
         """Return the samples that are farther away than the deviation, and store the largest distance."""
         from scipy.interpolate import BSpline
 
-        spline, far, self.away = BSpline(whole(self.knots), coefficients, DEGREE), [np.zeros(0, int)], 0.0
-        for some in parts_of(len(self.times)):
-            distances = np.abs(spline(self.times[some]) - self.values[some])
+        spline, far, self.away = BSpline(whole(self.samples.knots), coefficients, DEGREE), [np.zeros(0, int)], 0.0
+        for some in parts_of(len(self.samples)):
+            distances = np.abs(spline(self.samples.times(some)) - self.samples.values(some))
             self.away = max(self.away, float(distances.max()))
             far.append(some.start + np.flatnonzero(distances > self.deviation))
         return np.concatenate(far)
@@ -211,14 +207,15 @@ class _Problem:
     def _move(self, coefficients: np.ndarray, run: slice) -> None:
         """Solve for a run of coefficients such that all samples that they affect are within the deviation."""
         clarabel, sparse = _solver()
-        ends = self.knots[[max(run.start - DEGREE, 0), min(run.stop, len(self.knots) - 1)]]
-        last = "right" if run.stop >= len(self.knots) - 1 else "left"
-        rows = np.arange(np.searchsorted(self.times, ends[0]), np.searchsorted(self.times, ends[1], side=last))
-        matrix = values_at(self.times[rows], self.knots)
+        knots = self.samples.knots
+        ends = knots[[max(run.start - DEGREE, 0), min(run.stop, len(knots) - 1)]]
+        last = "right" if run.stop >= len(knots) - 1 else "left"
+        rows = np.arange(self.samples.place(ends[0]), self.samples.place(ends[1], last))
+        matrix = values_at(self.samples.times(rows), knots)
         fixed = coefficients.copy()
         fixed[run] = 0.0
         own = matrix[:, run]
-        rest = self.values[rows] - matrix @ fixed
+        rest = self.samples.values(rows) - matrix @ fixed
         target = self.right[run] - self.system[run] @ fixed
         size = self.deviation
         bound = np.concatenate([rest / size + INSIDE, INSIDE - rest / size])

@@ -126,8 +126,8 @@ def _joined(dwells: list[Dwell], values: np.ndarray, sigma: float) -> list[Dwell
 
 def _of_equal(values: np.ndarray) -> list[Dwell]:
     """Return runs of equal samples that are much longer than neighboring runs: others are steps of a slow motion."""
-    begins = np.flatnonzero(np.append(True, np.diff(values) != 0))
-    lengths = np.diff(np.append(begins, len(values)))
+    begins = np.flatnonzero(np.append(True, values[1:] != values[:-1]))
+    lengths = np.diff(begins, append=len(values))
     runs = []
     for k in np.flatnonzero(lengths >= EQUAL).tolist():
         neighbor = max((int(lengths[j]) for j in (k - 1, k + 1) if 0 <= j < len(lengths)), default=0)

@@ -16,6 +16,7 @@ from jounce.planning.smoothing.dwells import Dwell, dwells, noise_of, without_ma
 from jounce.planning.smoothing.weights import IntervalEstimate, interval_estimates
 from jounce.trajectory import AbstractMotion, HermiteMotion, HermiteSplineMotion, JointTrajectory, SplineMotion
 from jounce.trajectory.checks import positive
+from jounce.trajectory.sampled.deferred import SampledLaw
 from jounce.trajectory.splines import local_powers
 
 FEWEST = 12  # samples
@@ -59,7 +60,7 @@ class SmoothedTrajectory(JointTrajectory):
 
     def __init__(
         self,
-        laws: Mapping[str, AbstractMotion],
+        laws: Mapping[str, object],
         start: float,
         stop: float,
         times: Float[np.ndarray, " sample"],
@@ -71,7 +72,7 @@ class SmoothedTrajectory(JointTrajectory):
         self.deviation, self.joints = deviation, dict(joints)
 
     def __reduce__(self) -> tuple[object, ...]:
-        own = (dict(self.laws), self.start, self.stop, self.times, dict(self.measures), self.deviation, self.joints)
+        own = (self.laws.given(), self.start, self.stop, self.times, dict(self.measures), self.deviation, self.joints)
         return type(self), own
 
 
@@ -114,19 +115,27 @@ def smooth(trajectory: JointTrajectory, deviation: float) -> SmoothedTrajectory:
     True
     """
     deviation = positive("deviation", deviation)
-    samples = {name: own for name, law in trajectory.laws.items() if (own := sampled(law)) is not None}
+    samples = {name: own for name in trajectory.names if (own := samples_of(trajectory, name)) is not None}
     if not samples:
         message = "no joint goes through samples; there is nothing to be smoothed"
         raise TrajectoryError(message, name="trajectory", value=list(trajectory.names))
-    laws, joints = dict(trajectory.laws), {}
+    laws, joints = trajectory.laws.given(), {}
     for name, (times, values) in samples.items():
         try:
-            laws[name], joints[name] = smoothed_samples(times, values, deviation)
+            laws[name], joints[name] = smoothed_samples(times, np.ascontiguousarray(values), deviation)
         except (SolveError, TrajectoryError) as error:
             raise TrajectoryError(error.message, name=name, value=error.value) from None
     return SmoothedTrajectory(
         laws, trajectory.start, trajectory.stop, trajectory.times, trajectory.measures, deviation, joints
     )
+
+
+def samples_of(
+    trajectory: JointTrajectory, name: str
+) -> tuple[Float[np.ndarray, " sample"], Float[np.ndarray, " sample"]] | None:
+    """Return the times and values of the samples of a joint; None where its law does not come from samples."""
+    law = trajectory.laws.given()[name]
+    return (law.times, law.values) if isinstance(law, SampledLaw) else sampled(law)
 
 
 def sampled(law: AbstractMotion) -> tuple[Float[np.ndarray, " sample"], Float[np.ndarray, " sample"]] | None:

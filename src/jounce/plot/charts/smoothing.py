@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from jounce.planning.smoothing.smooth import SmoothedTrajectory, sampled
+from jounce.planning.smoothing.smooth import SmoothedTrajectory, samples_of
 from jounce.plot.instants import evenly_chosen
 from jounce.plot.style import GRAY, LINE_COLORS, PALE_GRAY, blank_figure, set_ticks, shown_name, style
 from jounce.trajectory import JointTrajectory
@@ -69,7 +69,7 @@ def draw_smoothing(given: JointTrajectory, motion: SmoothedTrajectory, title: st
 
 
 def _samples(given: JointTrajectory, name: str) -> tuple[np.ndarray, np.ndarray]:
-    own = sampled(given.laws[name])
+    own = samples_of(given, name)
     assert own is not None
     chosen = evenly_chosen(np.arange(len(own[0])), DRAWN)
     return own[0][chosen], own[1][chosen]

@@ -16,9 +16,11 @@ from jounce.jet import Jet, wrap
 from jounce.jet.turns import WHOLE_TURN
 from jounce.mechanism import AbstractOutput
 from jounce.rigid import PlanarPose, SpatialPose
+from jounce.rigid.body_arrays import each_jet
 
 KINDS = ("turn-turn", "turn-slide", "slide-turn", "slide-slide")
 ROLES = "ijmn"
+AT_REST = "0"
 NO_PERIOD = 1e300  # which no equation goes through
 LARGEST_DENOMINATOR = 1000  # of ratios that are taken for those of whole numbers
 
@@ -60,15 +62,27 @@ def coordinate(
     return slide(body_i, body_j, point, jnp.zeros_like(point), axis)
 
 
+def at_rest(like: SpatialPose) -> SpatialPose:
+    """Return the pose of space itself, with the shape and the order of another."""
+    zero = jnp.zeros_like(like.position.coefficients[0])
+    still = SpatialPose.at(zero, jnp.concatenate([jnp.ones_like(zero[:1]), zero]))
+    return each_jet(lambda jet: Jet.constant(jet.coefficients[0], like.order), still)
+
+
 class CoupledJoints(AbstractConstraint, type="coupled", space="spatial"):
     """A joint follows another one: ``weight_2 q_2 - weight_1 q_1 = offset``, up to whole periods.
 
     The angles of turning joints are known up to whole turns. Unless given, the period is one turn
     where both turn by whole weights, and otherwise that of the joint that turns, so that a continuous motion never
     loses count over many turns.
+
+    The role 0 of the parent of the second joint is that of space itself, on which nothing acts: so turn the rotors that
+    stand for inertia against the rate of a coordinate alone.
     """
 
-    roles: str = eqx.field(static=True)  # parent and child of each joint among the bodies i, j, m, n, such as ijim
+    roles: str = eqx.field(
+        static=True
+    )  # parent and child of each joint among the bodies i, j, m, n, such as ijim; ij0m
     kinds: str = eqx.field(static=True)  # of each joint, turn or slide, such as turn-slide
     point_1: Vector
     axis_1: Vector
@@ -95,13 +109,17 @@ class CoupledJoints(AbstractConstraint, type="coupled", space="spatial"):
         check_choice("kinds", self.kinds, KINDS, MechanismError)
         roles = ROLES[: len(self.bodies)]
         pairs = {self.roles[:2], self.roles[2:]}
-        if len(self.roles) != 4 or set(self.roles) != set(roles) or any(len({*pair}) != 2 for pair in pairs):
-            message = f"must name two bodies of each joint by {', '.join(roles)}, such as ijim"
+        named = {*self.roles[:2], *self.roles[2:].removeprefix(AT_REST)}
+        if len(self.roles) != 4 or named != set(roles) or any(len({*pair}) != 2 for pair in pairs):
+            message = (
+                f"must name two bodies of each joint by {', '.join(roles)}, such as ijim, or 0 for the third at rest"
+            )
             raise MechanismError(message, name="roles", value=self.roles)
 
     def residual(self, *bodies_and_time: Any) -> Jet:
         """Return what the second joint lacks of following the first."""
-        bodies = [bodies_and_time[ROLES.index(role)] for role in self.roles]
+        given = dict(zip(ROLES, bodies_and_time, strict=False)) | {AT_REST: at_rest(bodies_and_time[0])}
+        bodies = [given[role] for role in self.roles]
         turning = [kind == "turn" for kind in self.kinds.split("-")]
         first = (self.point_1, self.axis_1, self.vector_1, self.opposite_1)
         second = (self.point_2, self.axis_2, self.vector_2, self.opposite_2)
@@ -109,6 +127,11 @@ class CoupledJoints(AbstractConstraint, type="coupled", space="spatial"):
         follower = coordinate(bodies[2], bodies[3], turning[1], second)
         excess = self.weight_2 * follower - self.weight_1 * leader - self.offset
         return wrap(excess, self._period(*turning)) if any(turning) or self.period is not None else excess
+
+    @property
+    def unfelt(self) -> tuple[int, ...]:
+        """Places of the bodies of which the ground does not feel what turns them."""
+        return (ROLES.index(self.roles[3]),) if self.roles[2] == AT_REST else ()
 
     def _period(self, leader_turns: bool, follower_turns: bool) -> Any:
         """Return by what the equation changes where a turning joint makes a whole turn."""
@@ -121,13 +144,18 @@ class CoupledJoints(AbstractConstraint, type="coupled", space="spatial"):
         return jnp.where(weight == 0, NO_PERIOD, WHOLE_TURN * weight)
 
 
-def coupled(leader: JointPlacement, follower: JointPlacement, multiplier: float, offset: float) -> CoupledJoints:
+def coupled(
+    leader: JointPlacement, follower: JointPlacement, multiplier: float, offset: float, *, in_space: bool = False
+) -> CoupledJoints:
     """Return the constraint that makes a joint follow another: ``q_2 = multiplier q_1 + offset``.
+
+    In space, the follower turns from where its axes are drawn in the ground, and nothing acts on that.
 
     A turning joint whose multiplier is no ratio of whole numbers below a thousand is followed for half a turn either
     side of zero only; beyond it the motion cannot be followed.
     """
-    bodies = list(dict.fromkeys([*leader.bodies, *follower.bodies]))
+    bodies = list(dict.fromkeys([*leader.bodies, *follower.bodies[in_space:]]))
+    carried = [AT_REST if in_space and k == 0 else ROLES[bodies.index(x)] for k, x in enumerate(follower.bodies)]
     weights = (multiplier, 1.0)
     if leader.turning and follower.turning:
         ratio = Fraction(multiplier).limit_denominator(LARGEST_DENOMINATOR)
@@ -135,7 +163,7 @@ def coupled(leader: JointPlacement, follower: JointPlacement, multiplier: float,
             weights = (float(ratio.numerator), float(ratio.denominator))
     return CoupledJoints(
         tuple(bodies),
-        "".join(ROLES[bodies.index(body)] for body in (*leader.bodies, *follower.bodies)),
+        "".join([*(ROLES[bodies.index(body)] for body in leader.bodies), *carried]),
         "-".join("turn" if joint.turning else "slide" for joint in (leader, follower)),
         *(leader.point, leader.axis_i, leader.vector_i, leader.vector_j),
         *(follower.point, follower.axis_i, follower.vector_i, follower.vector_j),

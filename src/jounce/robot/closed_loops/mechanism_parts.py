@@ -153,7 +153,9 @@ class RobotParts:
         for name, rotor in self.rotors.items():
             turning = JointPlacement((GROUND, rotor), True, origin, z, z, x, x)
             joints[self._unique_name(name + ROTOR, joints)] = spatial.Revolute(turning.bodies, origin, origin, z, z)
-            joints[self._unique_name(name + GEAR, joints)] = coupled(self._named(name), turning, 1.0, 0.0)
+            joints[self._unique_name(name + GEAR, joints)] = coupled(
+                self._named(name), turning, 1.0, 0.0, in_space=True
+            )
         return joints
 
     def _unique_name(self, name: str, taken: Any) -> str:
@@ -227,7 +229,8 @@ class RobotParts:
         """Return the moving bodies with their masses, at the pose that the coordinates give.
 
         Armature is inertia against the rate of a coordinate alone, of which the links know nothing: it is that of a
-        rotor on the ground, without mass, that turns by as many radians as the coordinate has radians or meters.
+        rotor on the ground, without mass, that turns by as many radians as the coordinate has radians or meters. What
+        turns it acts on the joint alone: the ground does not feel it.
         """
         robot, tree = self.robot, self.robot.opened()
         masses: dict[str, list[Inertia]] = {name: [] for name in self.links}
