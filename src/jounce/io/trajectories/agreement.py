@@ -54,8 +54,8 @@ def check_agreement(recording: Recording) -> list[str]:
                 advice = (
                     "correct it, or leave the row out" if first == last else "correct them, or leave these rows out"
                 )
-                beside = f"the samples beside {'it' if first == last else 'them'} and {LEVELS[level - 1]}"
-                message = f"{words}, where {beside} say {expected:.6g}; {advice}"
+                neighbors = f"the samples beside {'it' if first == last else 'them'} and {LEVELS[level - 1]}"
+                message = f"{words}, where {neighbors} say {expected:.6g}; {advice}"
                 raise recording.error(message, line, name=name)
             worst = _difference(recording.times[rows], below, rate)
             if worst is None or worst.share < DOUBTFUL:
@@ -99,18 +99,18 @@ def _outliers(times: np.ndarray, below: np.ndarray, rate: np.ndarray) -> tuple[i
     away = np.abs(rate[1:-1] - middle) - by_noise  # of all but the first and the last
     best = None
     for count in range(1, MOST + 1):
-        places = len(times) - count - 3  # of groups that have two neighbors on each side
-        left, right = slice(1, places + 1), slice(count + 2, count + 2 + places)
+        groups = len(times) - count - 3  # how many have two neighbors on each side
+        left, right = slice(1, groups + 1), slice(count + 2, count + 2 + groups)
         turn = rate[right] - rate[left]
-        seen = np.stack([slopes[k : k + places] for k in range(1, count + 2)])
-        change = np.abs(turn) + np.abs(rate[count + 3 :] - rate[:places]) + np.ptp(seen, axis=0)
-        far = np.full(places, np.inf)
+        seen = np.stack([slopes[k : k + groups] for k in range(1, count + 2)])
+        change = np.abs(turn) + np.abs(rate[count + 3 :] - rate[:groups]) + np.ptp(seen, axis=0)
+        far = np.full(groups, np.inf)
         for k in range(2, count + 2):
-            own = slice(k, k + places)
+            own = slice(k, k + groups)
             share = (times[own] - times[left]) / (times[right] - times[left])
-            noisy = by_noise[k - 1 : k - 1 + places]
-            beside = np.abs(rate[own] - rate[left] - share * turn) - noisy
-            far = np.minimum(far, np.minimum(away[k - 1 : k - 1 + places], beside))
+            noisy = by_noise[k - 1 : k - 1 + groups]
+            by_neighbors = np.abs(rate[own] - rate[left] - share * turn) - noisy
+            far = np.minimum(far, np.minimum(away[k - 1 : k - 1 + groups], by_neighbors))
         far -= change
         worst = int(np.argmax(far))
         if best is None or far[worst] > best[0]:

@@ -155,7 +155,7 @@ def coupled(
     side of zero only; beyond it the motion cannot be followed.
     """
     bodies = list(dict.fromkeys([*leader.bodies, *follower.bodies[in_space:]]))
-    carried = [AT_REST if in_space and k == 0 else ROLES[bodies.index(x)] for k, x in enumerate(follower.bodies)]
+    follower_roles = [AT_REST if in_space and k == 0 else ROLES[bodies.index(x)] for k, x in enumerate(follower.bodies)]
     weights = (multiplier, 1.0)
     if leader.turning and follower.turning:
         ratio = Fraction(multiplier).limit_denominator(LARGEST_DENOMINATOR)
@@ -163,7 +163,7 @@ def coupled(
             weights = (float(ratio.numerator), float(ratio.denominator))
     return CoupledJoints(
         tuple(bodies),
-        "".join([*(ROLES[bodies.index(body)] for body in leader.bodies), *carried]),
+        "".join([*(ROLES[bodies.index(body)] for body in leader.bodies), *follower_roles]),
         "-".join("turn" if joint.turning else "slide" for joint in (leader, follower)),
         *(leader.point, leader.axis_i, leader.vector_i, leader.vector_j),
         *(follower.point, follower.axis_i, follower.vector_i, follower.vector_j),
