@@ -6,7 +6,7 @@ from typing import Any
 
 from jounce.dynamics.limits.limit_report import LimitReport
 
-STILL = 1e-9  # m/s: slower stands still
+STILL = 1e-6  # m/s: slower stands still; instants and rows of files have so many digits
 
 
 def load_words(report: LimitReport) -> list[str]:

@@ -33,6 +33,49 @@ def test_a_trajectory_that_breaks_limits_comes_back_as_one_that_passes_check(run
     assert run("check", PANDA, out, "--limits", LIMITS)[0] == 0
 
 
+@pytest.mark.slow
+def test_a_load_is_carried_from_retiming_to_the_file_of_a_controller(run, tmp_path):
+    pinocchio = pytest.importorskip("pinocchio")
+    fast, exported = tmp_path / "fast.csv", tmp_path / "franka.csv"
+    asked = ("--limits", LIMITS, "--out", fast, "--payload", "panda_hand=2 kg@30 %:70 %", "--json")
+    status, told, _ = run("retime", PANDA, TOO_FAST, *asked)
+    assert status == 0
+    loads = json.loads(told)["loads"]
+    assert [x["masses"] for x in loads] == [{"panda_hand": 2.0}, {"panda_hand": -2.0}]
+    carried = ("--payload", f"panda_hand=2 kg@{loads[0]['time']:.12g} s:{loads[1]['time']:.12g} s")
+    status, told, _ = run("check", PANDA, fast, "--limits", LIMITS, *carried, "--json")
+    result = json.loads(told)
+    assert status == 0
+    assert [x["time"] for x in result["loads"]] == pytest.approx([x["time"] for x in loads], rel=1e-9)
+    rounded = ("--payload", f"panda_hand=2 kg@{loads[0]['time']:.6g} s:{loads[1]['time']:.6g} s")  # as it is printed
+    told = run("check", PANDA, fast, "--limits", LIMITS, *rounded)[1]
+    assert told.count("at rest; torques step there") == 2
+    assert run("torques", PANDA, fast, *carried, "--out", tmp_path / "torques.csv")[0] == 0
+    assert run("export", PANDA, fast, "--format", "franka", "--torques", *carried, "--out", exported)[0] == 0
+    rows = np.genfromtxt(exported, delimiter=",", names=True)
+    torques = io.read(tmp_path / "torques.csv")
+    whole = np.stack([torques[f"panda_joint{k + 1}"].values[:, 0] for k in range(7)])
+    model = pinocchio.buildModelFromUrdf(PANDA)
+    loaded = pinocchio.buildModelFromUrdf(PANDA)
+    hand = model.frames[model.getFrameId("panda_hand")]
+    point = pinocchio.Inertia(2.0, np.zeros(3), np.zeros((3, 3)))
+    loaded.appendBodyToJoint(hand.parentJoint, point, hand.placement)
+    steps = 0
+    for row in rows:
+        holds = loads[0]["time"] <= row["time"] < loads[1]["time"]
+        steps += holds
+        own = loaded if holds else model
+        state = np.zeros((3, own.nq))
+        state[:, :7] = [[row[f"{q}_{k}"] for k in range(7)] for q in ("q_d", "dq_d", "ddq_d")]
+        expected = pinocchio.rnea(own, own.createData(), *state)[:7]
+        weight = pinocchio.computeGeneralizedGravity(own, own.createData(), state[0])[:7]
+        told = [row[f"tau_J_d_{k}"] for k in range(7)]  # without gravity, for which the controller provides
+        np.testing.assert_allclose(told, expected - weight, atol=1e-6)
+        damped = expected + model.damping[:7] * state[1, :7]
+        np.testing.assert_allclose(whole[:, round(1000 * row["time"])], damped, atol=1e-6)
+    assert steps == pytest.approx(1000 * (loads[1]["time"] - loads[0]["time"]), abs=1)
+
+
 def test_bad_input_is_told(run, tmp_path):
     for given, message in (
         ((PANDA,), "a robot needs a path"),
