@@ -93,6 +93,30 @@ def test_gears_resist_by_the_mean_of_what_they_lose_forward_and_backward(load):
     np.testing.assert_allclose(small.stiffness, 40.0, rtol=1e-11)
 
 
+@pytest.mark.parametrize("load", [12.0, -7.0])
+def test_teeth_press_pins_that_resist(load):
+    """Both pins bear the tooth force, a third of the load on a radius of 0.1 m over the cosine of the pressure angle."""
+    pin = jn.joints.Friction(coefficient=0.3, radius=0.02, speed=0.4)
+    gears = jn.Mechanism(
+        space="planar",
+        gravity=[0, 0],
+        bodies={"pinion": jn.Body([0, 0], inertia=0.01, mass=1.0), "wheel": jn.Body([0.4, 0], inertia=0.3, mass=1.0)},
+        joints={
+            "A": jn.planar.Revolute(("ground", "pinion"), [0, 0], [0, 0], friction=pin),
+            "B": jn.planar.Revolute(("ground", "wheel"), [0.4, 0], [0, 0], friction=pin),
+            "mesh": jn.planar.Gear(("pinion", "wheel"), None, None, [0, 0], [0, 0], 0.1, 0.3, pressure_angle=0.5),
+        },
+        forces={
+            "spring": jn.forces.TorsionalSpring(("ground", "pinion"), 40.0, 0.0),
+            "load": jn.forces.Moment("wheel", f"{load}"),
+        },
+    )
+    small = jn.linearize(gears, coordinates=["pinion.angle"])
+    bearing = abs(load) / 0.3 / np.cos(0.5)
+    np.testing.assert_allclose(small.damping, 0.3 * bearing * 0.02**2 / 0.4 * (1 + 1 / 9), rtol=1e-11)
+    np.testing.assert_allclose(small.stiffness, 40.0, rtol=1e-10)
+
+
 def test_small_motions_about_a_motion_are_refused_by_name():
     driver = jn.drivers.SlideDriver(("ground", "sled"), [0, 0], [0, 0], [np.cos(0.4), np.sin(0.4)], "0.3*t")
     motion = jn.simulate(dataclasses.replace(sled(), initial={"go": driver}), [0.0])

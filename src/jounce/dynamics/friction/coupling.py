@@ -46,6 +46,16 @@ def rubs(group: Group) -> bool:
     return getattr(group.element, "friction", None) is not None
 
 
+def has_flanks(group: Group) -> bool:
+    """Return whether the elements of a group are teeth with a pressure angle."""
+    return hasattr(group.element, "flank") and group.element.pressure_angle is not None
+
+
+def pressing_teeth(system: System) -> list[Group]:
+    """Return the groups of teeth with a pressure angle where joints have friction, which tooth forces press."""
+    return [group for group in system.groups if has_flanks(group)] if any(map(rubs, system.groups)) else []
+
+
 def loses_torque(element: Any) -> bool:
     """Tell whether the friction of joints follows the torque that they pass on, as that of gears does."""
     return isinstance(getattr(element, "friction", None), GearFriction)

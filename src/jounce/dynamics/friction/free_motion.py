@@ -1,4 +1,9 @@
-"""Friction where a motion follows from forces: what it adds to the equations of motion, and their solution with it."""
+"""Friction where a motion follows from forces: what it adds to the equations of motion, and their solution with it.
+
+Teeth press bearings, too. What a tooth force adds to the torque that the residual of gears exerts moves nothing: a part
+in proportion to the multiplier of the gears, and one in proportion to its absolute value. Both count as normal forces:
+in the place of ``N = |R(lambda)|`` they are ``N = lambda`` and ``N = |lambda|``.
+"""
 
 from collections.abc import Callable
 from functools import cached_property
@@ -10,9 +15,18 @@ from jaxtyping import Float
 
 from jounce.base.shapes import Numbers
 from jounce.constraints.friction import displacements
-from jounce.dynamics.friction.coupling import Coupling, loses_torque, pressed, resisting, rubs, torque_lost
+from jounce.dynamics.friction.coupling import (
+    Coupling,
+    has_flanks,
+    loses_torque,
+    pressed,
+    pressing_teeth,
+    resisting,
+    rubs,
+    torque_lost,
+)
 from jounce.jet import Jet
-from jounce.mechanism.system import Group, System, movable, with_rows
+from jounce.mechanism.system import Group, System, holding, movable, with_rows
 from jounce.rigid.pose import Pose
 
 Rows = Float[Numbers, "row batch"]
@@ -34,25 +48,35 @@ class FreeFriction:
     def __init__(self, system: System, pose: Pose, time: Jet):
         self.system, self.pose, self.time = system, pose, time
         self.groups = [group for group in system.groups if rubs(group)]
+        self.meshes = pressing_teeth(system)
+
+    @property
+    def count(self) -> int:
+        """How many normal forces there are, of joints and of teeth."""
+        return sum(group.instances for group in self.groups) + 2 * sum(group.instances for group in self.meshes)
 
     @cached_property
     def _at_rest(self) -> Pose:
         return movable(self.pose.truncate(0))
 
     def normal_forces(self, multipliers: Rows) -> Float[Numbers, "joint batch"]:
-        """Return what presses the surfaces of all joints with friction together, from multipliers of scaled rows."""
-        unscaled, normals, first = multipliers * self.system.row_scale, [], 0
+        """Return what presses the surfaces of all joints with friction together, and teeth, from multipliers of scaled
+        rows.
+        """
+        unscaled, normals, teeth, first = multipliers * self.system.row_scale, [], [], 0
         for group in self.system.groups:
             bodies = tuple(self._at_rest.take(indices) for indices in group.bodies)
             shape = jax.eval_shape(lambda g=group: g.residual(self.pose.truncate(0), self.time).coefficients[0]).shape
             count = shape[0] * shape[1]
+            own = unscaled[first : first + count].reshape(shape[0], shape[1], -1)
+            if self.meshes and has_flanks(group):
+                teeth += [own[0], jnp.abs(own[0])]
             if rubs(group):
-                own = unscaled[first : first + count].reshape(shape[0], shape[1], -1)
                 normals.append(
                     self._lost(group, own) if loses_torque(group.element) else self._pressed(group, bodies, own)
                 )
             first += count
-        return jnp.concatenate(normals)
+        return jnp.concatenate(normals + teeth)
 
     def _lost(self, group: Group, own: Any) -> Any:
         return torque_lost(group.element, Jet([own]), self._resisting(group)).coefficients[0]
@@ -72,12 +96,23 @@ class FreeFriction:
         return pressed(group.element, bodies, Jet([force])).coefficients[0]
 
     def slips(self, change: Pose) -> list[Any]:
-        """Return by how much the surfaces of each group slip on each other as all bodies are displaced by a change."""
+        """Return by how much the surfaces of each group slip on each other as all bodies are displaced by a change.
+
+        For teeth, return how far those part that do not turn.
+        """
         slips = []
         for group in self.groups:
             bodies, changes = ([p.take(its) for its in group.bodies] for p in (self._at_rest, change))
             slips.append(group.element.slip(tuple(bodies), displacements(bodies, changes)).coefficients[0])
-        return slips
+        return slips + [self._parted(group, change) for group in self.meshes]
+
+    def _parted(self, group: Group, change: Pose) -> Any:
+        """Return what a tooth force acts along besides the residual of gears, as the multiplier and as its size."""
+        of_residual, one, other = (
+            each.variation(self._at_rest, change, self.time).coefficients[0]
+            for each in (group, holding(group, "flank", 1.0), holding(group, "flank", -1.0))
+        )
+        return jnp.concatenate([(one + other) / 2.0 - of_residual, (one - other) / 2.0])
 
     def resisting(self, normal: Float[Numbers, "joint batch"]) -> list[Any]:
         """Return what resists the slip of each group, conjugate to `slips`, for normal forces of all joints."""
@@ -86,6 +121,9 @@ class FreeFriction:
             factor = self._resisting(group).coefficients[0]
             forces.append(factor * normal[first : first + group.instances][None])
             first += group.instances
+        for group in self.meshes:
+            forces.append(normal[first : first + 2 * group.instances].reshape(2, group.instances, -1))
+            first += 2 * group.instances
         return forces
 
 
@@ -109,8 +147,8 @@ def with_friction(
         Returns what bodies feel of normal forces, as `Equations.balance` has forces.
     """
     acceleration, multipliers = free
-    joints, lanes = sum(group.instances for group in friction.groups), multipliers.shape[-1]
-    unit = jnp.broadcast_to(jnp.eye(joints)[..., None], (joints, joints, lanes))
+    count, lanes = friction.count, multipliers.shape[-1]
+    unit = jnp.broadcast_to(jnp.eye(count)[..., None], (count, count, lanes))
     moved, held = jax.vmap(lambda forces: unknowns(felt(forces), jnp.zeros_like(multipliers)))(unit)
     coupling, multipliers, normal = Coupling.of(friction.normal_forces, multipliers, -held)
     acceleration = acceleration + _along(moved, normal)

@@ -15,6 +15,7 @@ import numpy as np
 from jaxtyping import Float
 
 from jounce.base.shapes import Numbers
+from jounce.dynamics.friction.coupling import has_flanks
 from jounce.errors import MechanismError
 from jounce.execution.compilation import compiled
 from jounce.jet import Jet
@@ -32,11 +33,6 @@ SLOWEST = 1e-3  # 1/s: lower bound of the rate of motions in scales of rates
 MOST_CHANGES = 8  # of flanks, where the multipliers of redundant constraints depend on them
 MOST_LISTED = 4  # instants
 OFF_PITCH = 1e-6  # of the pitch radius: further from the pitch line, a wheel does not mesh
-
-
-def has_flanks(group: Group) -> bool:
-    """Return whether the elements of a group are teeth with a pressure angle."""
-    return hasattr(group.element, "flank") and group.element.pressure_angle is not None
 
 
 def either_flank(groups: Sequence[Group], count: int) -> dict[int, Any]:

@@ -8,7 +8,8 @@ import numpy as np
 from jaxtyping import Float
 
 from jounce.dynamics.forward.accelerations import Equations
-from jounce.dynamics.statics.variations import loads_at, masses_at, output_variations, variations
+from jounce.dynamics.friction.coupling import pressing_teeth
+from jounce.dynamics.statics.variations import borne_at, loads_at, masses_at, output_variations, variations
 from jounce.linear_algebra.host_jacobian import RANK_TOLERANCE
 from jounce.mechanism import Mechanism, Model
 
@@ -64,7 +65,16 @@ class OperatingPoint:
     def multipliers(self) -> Float[np.ndarray, " row"]:
         """Of the scaled rows: the shortest ones that balance the loads."""
         load = self.loads.sum(axis=0)
-        return -np.linalg.lstsq(self.jacobian.T, load, rcond=RANK_TOLERANCE)[0] if len(self.jacobian) else np.zeros(0)
+        if not len(self.jacobian):
+            return np.zeros(0)
+        first = self._balancing(load)
+        if not pressing_teeth(self.equations.system):
+            return first
+        borne = np.asarray(borne_at(self.equations, self.coordinates, self.clock, first[:, None]))
+        return first + self._balancing(load + self.as_columns(borne[..., None])[:, 0])  # those of teeth are the same
+
+    def _balancing(self, load: Float[np.ndarray, " column"]) -> Float[np.ndarray, " row"]:
+        return -np.linalg.lstsq(self.jacobian.T, load, rcond=RANK_TOLERANCE)[0]
 
     @cached_property
     def free(self) -> Float[np.ndarray, "column direction"]:

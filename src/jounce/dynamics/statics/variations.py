@@ -84,22 +84,20 @@ def variations(
         Taylor coefficients of the variation of the scaled residuals.
     """
     pose, time = _moving(equations, coordinates), Jet(tuple(clock))
-    system, now = equations.system, time.truncate(0)
 
     def evaluated(moved: Pose) -> tuple[Any, Any]:
-        friction = FreeFriction(system, moved.truncate(1), now)
-
-        def loosened(change: Any) -> Any:
-            return [system.variation(moved.truncate(0), change, now).coefficients[0], *friction.slips(change)]
-
-        weights = [multipliers]
-        if friction.groups:
-            weights += friction.resisting(friction.normal_forces(multipliers))
-        joints = conjugate(loosened, moved.truncate(0), weights)
-        forces = jnp.stack([*_loads(equations, moved, time), joints])
-        return forces[:, :, 1:, 0], stacked(system.residual(moved, time))[..., 0]
+        forces = jnp.stack([*_loads(equations, moved, time), _borne(equations, moved, time, multipliers)])
+        return forces[:, :, 1:, 0], stacked(equations.system.residual(moved, time))[..., 0]
 
     return jax.vmap(lambda change: jax.jvp(evaluated, (pose,), (_tangent(pose, change),))[1], -1, -1)(changes)
+
+
+@compiled()
+def borne_at(
+    equations: Equations, coordinates: Coordinates, clock: Clock, multipliers: Float[Numbers, "row 1"]
+) -> Float[Numbers, "coordinate moving"]:
+    """Return ``Phi_q^T lambda`` with the friction of joints and the tooth forces that press them, of moving bodies."""
+    return _borne(equations, _moving(equations, coordinates), Jet(tuple(clock)), multipliers)[:, 1:, 0]
 
 
 @compiled("pose_type")
@@ -211,6 +209,20 @@ def _loads(equations: Equations, pose: Pose, time: Jet) -> tuple[Any, Any]:
     inertia = jnp.concatenate([f.coefficients[0] for f in inertia_forces(pose, equations.masses, equations.gravity)])
     applied = equations.system.applied_forces(pose.truncate(1), time.truncate(1)).coefficients[0]
     return inertia, -applied
+
+
+def _borne(equations: Equations, pose: Pose, time: Jet, multipliers: Float[Numbers, "row 1"]) -> Any:
+    """Return what joints exert on all bodies, with the minus sign of forces."""
+    system, now = equations.system, time.truncate(0)
+    friction = FreeFriction(system, pose.truncate(1), now)
+
+    def loosened(change: Any) -> Any:
+        return [system.variation(pose.truncate(0), change, now).coefficients[0], *friction.slips(change)]
+
+    weights = [multipliers]
+    if friction.groups:
+        weights += friction.resisting(friction.normal_forces(multipliers))
+    return conjugate(loosened, pose.truncate(0), weights)
 
 
 def _tangent(pose: Pose, change: Float[Numbers, "level coordinate body"]) -> Any:
