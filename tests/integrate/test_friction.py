@@ -129,7 +129,7 @@ def test_the_solvers_of_diffrax_have_friction():
 
 
 @pytest.mark.parametrize("load", [10.0, -30.0])
-def test_teeth_press_the_bearings_of_gears(load, pressure_angle=0.6):
+def test_teeth_press_the_bearings_of_gears(load):
     """Both bearings bear the tooth force F / cos(alpha), whichever flank it is on; in closed form."""
     pin = jn.joints.Friction(coefficient=0.2, radius=0.05, speed=1e-3)
     gears = jn.Mechanism(
@@ -140,7 +140,7 @@ def test_teeth_press_the_bearings_of_gears(load, pressure_angle=0.6):
             "A": jn.planar.Revolute(("ground", "a"), [0, 0], [0, 0], friction=pin),
             "B": jn.planar.Revolute(("ground", "b"), [0.3, 0], [0, 0], friction=pin),
             "mesh": jn.planar.Gear(
-                ("a", "b"), None, None, [0, 0], [0, 0], radius_i=0.1, radius_j=0.2, pressure_angle=pressure_angle
+                ("a", "b"), None, None, [0, 0], [0, 0], radius_i=0.1, radius_j=0.2, pressure_angle=0.6
             ),
         },
         forces={"motor": jn.forces.Torque(("ground", "a"), 6.0), "load": jn.forces.Torque(("ground", "b"), load)},
@@ -148,9 +148,9 @@ def test_teeth_press_the_bearings_of_gears(load, pressure_angle=0.6):
     )
     run = jn.simulate(gears, [0.0, 0.01], order=3)
     # 0.01 a = 6 - 0.1 F - m |F|, and of b, which turns the other way, 0.04 a / 2 = 0.2 F - load - m |F|
-    sign, moment = np.sign(load), 0.2 * 0.05 / math.cos(pressure_angle)
+    sign, moment = np.sign(load), 0.2 * 0.05 / math.cos(0.6)
     force, acceleration = np.linalg.solve([[0.1 + sign * moment, 0.01], [-(0.2 - sign * moment), 0.02]], [6.0, -load])
     assert np.sign(force) == sign
     np.testing.assert_allclose(run.angle("a").values[:, 2], acceleration, rtol=1e-11)
     bearing = jn.joint_reaction(run, "B", "b").force.values[:, 0]
-    np.testing.assert_allclose(np.hypot(*bearing.T), abs(force) / math.cos(pressure_angle), rtol=1e-11)
+    np.testing.assert_allclose(np.hypot(*bearing.T), abs(force) / math.cos(0.6), rtol=1e-11)

@@ -95,7 +95,7 @@ def test_gears_resist_by_the_mean_of_what_they_lose_forward_and_backward(load):
 
 @pytest.mark.parametrize("load", [12.0, -7.0])
 def test_teeth_press_pins_that_resist(load):
-    """Both pins bear the tooth force, a third of the load on a radius of 0.1 m over the cosine of the pressure angle."""
+    """Both pins bear the tooth force: a third of the load at 0.1 m, over the cosine of the pressure angle."""
     pin = jn.joints.Friction(coefficient=0.3, radius=0.02, speed=0.4)
     gears = jn.Mechanism(
         space="planar",
