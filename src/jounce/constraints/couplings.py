@@ -1,16 +1,20 @@
-"""Couplings in space: of shafts, by constant velocity, tripod and Oldham; of a pinion and its rack."""
+"""Couplings in space: of shafts, by constant velocity, tripod, Oldham and gears; of a pinion and its rack."""
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import equinox as eqx
 import jax.numpy as jnp
 
-from jounce.constraints.angles import Vectors, coaxial, parallel_rows, relative_angle
+from jounce.constraints.angles import Datum, Vectors, coaxial, parallel_rows, relative_angle
 from jounce.constraints.base import AbstractConstraint, Nested, Scalar, Vector, rows
-from jounce.constraints.friction import Velocities, check_friction, relative_turn
+from jounce.constraints.friction import Velocities, check_friction, displacements, relative_turn, velocity_at, where
 from jounce.constraints.planar import length_of, slide
+from jounce.constraints.wheels import unit
+from jounce.errors import MechanismError
 from jounce.jet import Jet, cross, dot, wrap
 from jounce.rigid import SpatialPose
+
+ROLLING = 1e-6  # of the speed of a pitch point: less sliding is that of written numbers that are rounded
 
 
 class ConstantVelocity(AbstractConstraint, type="constant_velocity", space="spatial"):
@@ -135,6 +139,144 @@ class Rolling(AbstractConstraint, type="rolling", space="spatial"):
     def passed_on(self, multiplier: Jet) -> Jet:
         """Return the torque that the pinion passes on to the rack, N m."""
         return multiplier * -self.radius
+
+
+class Gear(AbstractConstraint, type="gear", space="spatial"):
+    """Shafts i and j turn in a ratio, each about its axis, relative to the frame m that carries them.
+
+    The axes may lie as they like, crossed as of a worm and its wheel, cut each other as of bevel gears, or be parallel
+    as of a belt, and the frame may move. Each is the axis of a joint, which holds its direction in the frame.
+
+    Turns are read from the attitudes, and the remainder of the ratio after whole turns of both shafts must vanish: a
+    continuous motion never loses count if the ratio is one of whole numbers, as those of all teeth are.
+
+    With `points` and a pressure angle, bearings bear the force of a tooth. It acts at the pitch point, along the normal
+    of the flanks. On crossed axes these slide along the teeth, which shows how the teeth lie; on axes that are parallel
+    or cut each other the helix angle of gear i says so, positive for right-handed teeth.
+    """
+
+    axis_i: Vector  # in the frame of each body
+    axis_j: Vector
+    ratio: Scalar  # turns of j about its axis to those of i about its own
+    offset: Scalar = None  # rad
+    friction: Nested = None
+    point_i: Vector = None  # m, on the axis of each shaft, in its frame
+    point_j: Vector = None
+    point_m: Vector = None  # m, the pitch point, in the frame m
+    pressure_angle: Scalar = None  # rad, between the normal of a flank and the plane that both gears touch
+    helix_angle: Scalar = None  # rad, between the teeth of gear i and the axis, or the generator of the pitch cone
+    held_i: Datum | None = eqx.field(default=None, init=False)  # that lays each axis on the one that it is in the frame
+    held_j: Datum | None = eqx.field(default=None, init=False)
+    whole: Any = eqx.field(default=None, init=False)  # the smallest whole number whose product with the ratio is whole
+
+    flank: Any = eqx.field(default=None, init=False)  # 1 or -1, the sign of the multiplier; zero for neither
+
+    body_count = 3
+    dimensions = {"ratio": "ratio", "offset": "angle", "pressure_angle": "angle", "helix_angle": "angle"}
+    signs = {"ratio": "not zero", "pressure_angle": "pressure angle", "helix_angle": "helix angle"}
+    symbol = "gear"
+
+    def __check_init__(self):
+        teeth = ("point_i", "point_j", "point_m", "pressure_angle")
+        given = [name for name in teeth if getattr(self, name) is not None]
+        if (given and len(given) < len(teeth)) or (self.helix_angle is not None and not given):
+            message = (
+                "the force of teeth needs a point on the axis of each shaft, the pitch point in the frame, and a "
+                "pressure angle"
+            )
+            raise MechanismError(message, name=next(name for name in teeth if name not in given))
+        check_friction(self)
+
+    def residual(self, body_i: SpatialPose, body_j: SpatialPose, body_m: SpatialPose, time: Jet) -> Jet:
+        turn_i, turn_j = (
+            -relative_angle(body, body_m, axis, datum=held)
+            for body, axis, held in ((body_i, self.axis_i, self.held_i), (body_j, self.axis_j, self.held_j))
+        )
+        excess = turn_j - self.ratio * turn_i - self.offset
+        return excess if self.whole is None else wrap(excess, 2 * jnp.pi / self.whole)
+
+    def variation(self, bodies: tuple[Any, ...], changes: tuple[Any, ...], time: Jet) -> Jet:
+        """Return how the residual varies, and with a flank how far teeth part but by turning, which they never do."""
+        turned = super().variation(bodies, changes, time)
+        if self.flank is None or self.pressure_angle is None:
+            return turned
+        moving, (place, along, axes, arms) = displacements(bodies, changes), self._mesh(bodies)
+        parted = [
+            velocity_at(body, its, place) - arm * axis.dot(its[1] - moving[2][1])
+            for body, its, axis, arm in zip(bodies[:2], moving, axes, arms, strict=False)
+        ]
+        return turned + along.dot(parted[1] - parted[0])
+
+    def _mesh(self, bodies: tuple[Any, ...]) -> tuple[Jet, Jet, list[Jet], list[Jet]]:
+        """Return the pitch point, the tooth force of a multiplier, the axes, and how gears move by their turns."""
+        mesh = PitchPoint.of(self, bodies)
+        normal = mesh.across_teeth(self.helix_angle)
+        moved = normal.dot(mesh.arms[1])
+        slope = -self.flank * jnp.tan(self.pressure_angle) * jnp.sign(moved.coefficients[0])
+        return mesh.place, (normal + mesh.apart * slope) / moved, mesh.axes, mesh.arms
+
+    def slip(self, bodies: tuple[Any, ...], moving: Velocities) -> Jet:
+        """Return how fast shaft i turns about its axis relative to the frame, rad/s."""
+        turning = bodies[0].direction(self.axis_i).dot(moving[0][1] - moving[2][1])
+        return rows(turning / length_of(self.axis_i))
+
+    def passed_on(self, multiplier: Jet) -> Jet:
+        """Return the torque that shaft i passes on to shaft j, as seen at shaft i, N m."""
+        return multiplier * -self.ratio
+
+
+class PitchPoint(NamedTuple):
+    """Where gears in space touch, in the ground frame.
+
+    Attributes
+    ----------
+    place : Jet
+        Of the pitch point.
+    axes : list of Jet
+        Unit vectors along both.
+    arms : list of Jet
+        How the points of the gears there move as each turns by one about its axis.
+    sliding : Jet
+        How fast the gears slide on each other there, as gear i turns by one.
+    rolls : array of bool
+        Whether they do not, as on axes that are parallel or cut each other.
+    apart : Jet
+        Normal of the plane that both touch, from gear i to gear j.
+    """
+
+    place: Jet
+    axes: list[Jet]
+    arms: list[Jet]
+    sliding: Jet
+    rolls: Any
+    apart: Jet
+
+    @classmethod
+    def of(cls, gear: Gear, bodies: tuple[Any, ...]) -> "PitchPoint":
+        """Return that of gears whose bodies are at some poses."""
+        place = bodies[2].point(gear.point_m)
+        axes = [unit(b.direction(axis)) for b, axis in zip(bodies[:2], (gear.axis_i, gear.axis_j), strict=True)]
+        points = [b.point(point) for b, point in zip(bodies[:2], (gear.point_i, gear.point_j), strict=True)]
+        arms = [cross(axis, place - point) for axis, point in zip(axes, points, strict=True)]
+        sliding = arms[0] - arms[1] * gear.ratio
+        square, least = (x.dot(x).coefficients[0] for x in (sliding, arms[0]))
+        rolls = square <= ROLLING**2 * least
+        # the plane has the line on which gears roll, or the speeds of both gears where they slide
+        other = where(rolls, axes[0] - axes[1] * gear.ratio, arms[1])
+        normal = unit(cross(arms[0], other))
+        radial = [cross(arm, axis) for arm, axis in zip(arms, axes, strict=True)]
+        curvatures = [normal.dot(r).coefficients[0] / r.dot(r).coefficients[0] for r in radial]
+        # of gear i more convex than gear j, also where one of them is a ring
+        return cls(place, axes, arms, sliding, rolls, normal * jnp.where(curvatures[0] > curvatures[1], 1.0, -1.0))
+
+    def across_teeth(self, helix_angle: Any) -> Jet:
+        """Return a vector in the plane that both gears touch, across their teeth."""
+        around = unit(self.arms[0])
+        along = cross(self.apart, around)
+        along = along * jnp.where(along.dot(self.axes[0]).coefficients[0] < 0, -1.0, 1.0)
+        angle = 0.0 if helix_angle is None else helix_angle
+        rolling = around * jnp.cos(angle) - along * jnp.sin(angle)
+        return where(self.rolls, rolling, unit(cross(self.apart, where(self.rolls, around, self.sliding))))
 
 
 def _frame_of(axis: Vectors, normal: Vectors) -> tuple[Any, Any]:

@@ -60,6 +60,7 @@ SIGNS: Mapping[str, str] = MappingProxyType(
         "not negative": "must not be negative",
         "not zero": "must not be zero",
         "pressure angle": "must be from 0 to 45 deg; a number without a unit is in rad",
+        "helix angle": "must be between -90 and 90 deg; a number without a unit is in rad",
         "efficiency": "must be above 0 and at most 1",
         "at most 1": "must be at most 1; zero or less means self-locking",
         "lead angle": "must be above 0 and below 90 deg; a number without a unit is in rad",
@@ -272,6 +273,8 @@ def has_other_sign(sign: str, least: Any, largest: Any) -> Any:
             return least < 0 or largest > math.pi / 4
         case "lead angle":
             return least <= 0 or largest >= math.pi / 2
+        case "helix angle":
+            return largest >= math.pi / 2
         case "efficiency":
             return least <= 0 or largest > 1
         case "at most 1":

@@ -191,12 +191,12 @@ def friction_class(kind: type[Any]) -> type[Any]:
 def _tanh_of_root(square: Jet) -> Jet:
     """Return ``tanh(x) / x`` from the square of x, smooth at zero, where the root is not."""
     near = square.coefficients[0] < NEAR
-    small, large = (_where(condition, square, 1e-2) for condition in (near, ~near))
+    small, large = (where(condition, square, 1e-2) for condition in (near, ~near))
     series = small * 0.0
     for term in _terms()[::-1]:
         series = series * small + term
     root = sqrt(large)
-    return _where(near, series, _tanh(root) / root)
+    return where(near, series, _tanh(root) / root)
 
 
 def _tanh(x: Jet) -> Jet:
@@ -217,7 +217,7 @@ def _terms() -> list[float]:
     return coefficients
 
 
-def _where(condition: Any, jet: Jet, other: Any) -> Jet:
+def where(condition: Any, jet: Jet, other: Any) -> Jet:
     """Return one jet where a condition holds, and elsewhere another one or a constant."""
     others = other if isinstance(other, Jet) else Jet.constant(jnp.full_like(jet.coefficients[0], other), jet.order)
     pairs = zip(jet.dense().coefficients, others.dense().coefficients, strict=True)
@@ -299,18 +299,19 @@ def relative_turn(moving: Velocities) -> Jet:
 def relative_velocity(bodies: Sequence[Pose], moving: Velocities, point_j: Any) -> Jet:
     """Return the velocity of a point of the second body relative to the first, global."""
     place = bodies[1].point(point_j)
-    return _at(bodies[1], moving[1], place) - _at(bodies[0], moving[0], place)
+    return velocity_at(bodies[1], moving[1], place) - velocity_at(bodies[0], moving[0], place)
 
 
 def line_turn(bodies: Sequence[Pose], moving: Velocities, point_i: Any, point_j: Any) -> Jet:
     """Return the angular velocity of the line from a point of the first planar body to one of the second."""
     points = [body.point(point) for body, point in zip(bodies, (point_i, point_j), strict=False)]
-    first, second = (_at(body, its, place) for body, its, place in zip(bodies, moving, points, strict=False))
+    first, second = (velocity_at(body, its, place) for body, its, place in zip(bodies, moving, points, strict=False))
     line = points[1] - points[0]
     return cross(line, second - first) / line.dot(line)
 
 
-def _at(body: Pose, moving: tuple[Jet, Jet], place: Jet) -> Jet:
+def velocity_at(body: Pose, moving: tuple[Jet, Jet], place: Jet) -> Jet:
+    """Return the velocity of the point of a body that is at a place, global."""
     velocity, turning = moving
     lever = place - body.position
     if isinstance(body, PlanarPose):
@@ -357,4 +358,4 @@ def normal_force(joint: Any, bodies: Sequence[Pose], force: Float[Jet, "componen
     pressing = pressing_force(joint, bodies, force)
     square = pressing.dot(pressing)
     none = square.coefficients[0] == 0
-    return _where(~none, sqrt(_where(~none, square, 1.0)), 0.0)
+    return where(~none, sqrt(where(~none, square, 1.0)), 0.0)

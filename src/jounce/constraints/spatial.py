@@ -5,11 +5,9 @@ In each, ``d = r_j^P - r_i^P`` leads from the joint's point on body i to that on
 
 from typing import Any
 
-import equinox as eqx
 import jax.numpy as jnp
 
 from jounce.constraints.angles import (
-    Datum,
     Vectors,
     coaxial,
     parallel_rows,
@@ -20,6 +18,7 @@ from jounce.constraints.angles import (
 from jounce.constraints.base import AbstractConstraint, Curve, Nested, Scalar, Vector, rows
 from jounce.constraints.couplings import (
     ConstantVelocity as ConstantVelocity,
+    Gear as Gear,
     Oldham as Oldham,
     Rolling as Rolling,
     Tripod as Tripod,
@@ -322,51 +321,6 @@ class Screw(AbstractConstraint, type="screw", space="spatial"):
         rise = self.lead / (2 * jnp.pi * self.friction.radius)
         cosine = 1 / sqrt(1 + rise * rise)
         return cosine, rise * cosine
-
-
-class Gear(AbstractConstraint, type="gear", space="spatial"):
-    """Shafts i and j turn in a ratio, each about its axis, relative to the frame m that carries them.
-
-    The axes may lie as they like, crossed as of a worm and its wheel, cut each other as of bevel gears, or be parallel
-    as of a belt, and the frame may move. Each is the axis of a joint, which holds its direction in the frame.
-
-    Turns are read from the attitudes, and the remainder of the ratio after whole turns of both shafts must vanish: a
-    continuous motion never loses count if the ratio is one of whole numbers, as those of all teeth are.
-    """
-
-    axis_i: Vector  # in the frame of each body
-    axis_j: Vector
-    ratio: Scalar  # turns of j about its axis to those of i about its own
-    offset: Scalar = None  # rad
-    friction: Nested = None
-    held_i: Datum | None = eqx.field(default=None, init=False)  # that lays each axis on the one that it is in the frame
-    held_j: Datum | None = eqx.field(default=None, init=False)
-    whole: Any = eqx.field(default=None, init=False)  # the smallest whole number whose product with the ratio is whole
-
-    body_count = 3
-    dimensions = {"ratio": "ratio", "offset": "angle"}
-    signs = {"ratio": "not zero"}
-    symbol = "gear"
-
-    def __check_init__(self):
-        check_friction(self)
-
-    def residual(self, body_i: SpatialPose, body_j: SpatialPose, body_m: SpatialPose, time: Jet) -> Jet:
-        turn_i, turn_j = (
-            -relative_angle(body, body_m, axis, datum=held)
-            for body, axis, held in ((body_i, self.axis_i, self.held_i), (body_j, self.axis_j, self.held_j))
-        )
-        excess = turn_j - self.ratio * turn_i - self.offset
-        return excess if self.whole is None else wrap(excess, 2 * jnp.pi / self.whole)
-
-    def slip(self, bodies: tuple[Any, ...], moving: Velocities) -> Jet:
-        """Return how fast shaft i turns about its axis relative to the frame, rad/s."""
-        turning = bodies[0].direction(self.axis_i).dot(moving[0][1] - moving[2][1])
-        return rows(turning / length_of(self.axis_i))
-
-    def passed_on(self, multiplier: Jet) -> Jet:
-        """Return the torque that shaft i passes on to shaft j, as seen at shaft i, N m."""
-        return multiplier * -self.ratio
 
 
 def _turning(bodies: tuple[Any, ...], moving: Velocities, axis_i: Vectors) -> Jet:

@@ -70,7 +70,7 @@ class Wheel(AbstractConstraint, type="wheel", space="spatial"):
         normal = body_i.direction(self.normal_i / length_of(self.normal_i)[None])
         axis = body_j.direction(self.axis_j / length_of(self.axis_j)[None])
         down = axis * axis.dot(normal) - normal
-        return body_j.point(self.point_j) + _unit(down) * self.radius, normal, axis
+        return body_j.point(self.point_j) + unit(down) * self.radius, normal, axis
 
     def _slip(self, body_i: SpatialPose, body_j: SpatialPose, moving: Sequence[tuple[Jet, Jet]]) -> tuple[Jet, Jet]:
         """Return how fast the wheel slips along itself, and across.
@@ -87,11 +87,11 @@ class Wheel(AbstractConstraint, type="wheel", space="spatial"):
             velocity + cross(turning, touching - body.position)
             for body, (velocity, turning) in zip((body_i, body_j), moving, strict=True)
         )
-        along = _unit(cross(axis, normal))
+        along = unit(cross(axis, normal))
         slip = wheel - plane
         return slip.dot(along), slip.dot(cross(normal, along))
 
 
-def _unit(vector: Jet) -> Jet:
+def unit(vector: Jet) -> Jet:
     """Return the unit vector along a vector."""
     return vector / sqrt(vector.dot(vector))

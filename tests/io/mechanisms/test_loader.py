@@ -118,7 +118,7 @@ KEYS = {  # the table of the documentation
     ("spatial", "joint", "oldham"): "points axes vectors",
     ("spatial", "joint", "curve"): "curve point start?",
     ("spatial", "joint", "surface"): "surface point start_u? start_v?",
-    ("spatial", "joint", "gear"): "axes ratio offset? friction?",
+    ("spatial", "joint", "gear"): "axes ratio offset? friction? points? pressure_angle? helix_angle?",
     ("spatial", "joint", "rolling"): "points vector axes radius offset? pressure_angle? friction?",
     ("spatial", "joint", "wheel"): "point axis radius plane",
     ("spatial", "joint", "rope"): "points length",

@@ -15,6 +15,7 @@ from jounce.dynamics.inverse import force_programs as programs, idle_torques, to
 from jounce.dynamics.inverse.finite_forces import check_finite_forces, check_finite_values
 from jounce.dynamics.inverse.joint_friction import JointFriction
 from jounce.dynamics.inverse.locked_friction import check_not_locked, friction_left_out, without_open_rates
+from jounce.dynamics.inverse.meshing import check_meshing
 from jounce.dynamics.inverse.redundant_forces import OPEN, OpenMultipliers
 from jounce.dynamics.masses import check_loads, gravity_of, masses_of
 from jounce.dynamics.motion_values import along_motion, part_of
@@ -105,7 +106,8 @@ class MotionForces:
         """Multipliers that balance the loads, followed by self-balanced ones if these are needed."""
         if not self.flanks:
             return self._balanced({})
-        teeth.check_pitch(self.motion, self._joined.groups, lambda k: self._poses(k, np.arange(len(self.motion.time))))
+        every = np.arange(len(self.motion.time))
+        check_meshing(self.motion, self._joined.groups, lambda slot: self.coordinates_at(slot, every, 2))
         multipliers, known, self._reversals = teeth.settled(self._balanced, self.flanks, self.model, self.motion)
         if self._looks_for_open:  # what is open presses on no flank that is known: any others tell what depends on it
             multipliers = np.stack([multipliers[0], self._balanced(teeth.by_chance(known))[1]])

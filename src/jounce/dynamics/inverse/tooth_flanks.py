@@ -16,10 +16,6 @@ from jaxtyping import Float
 
 from jounce.base.shapes import Numbers
 from jounce.dynamics.friction.coupling import has_flanks
-from jounce.errors import MechanismError
-from jounce.execution.compilation import compiled
-from jounce.jet import Jet
-from jounce.jet.algebra import stacked
 from jounce.kinematics import Motion, Status
 from jounce.mechanism import Model
 from jounce.mechanism.building.builder import group_rows
@@ -32,7 +28,6 @@ NONE = 1e-11  # of the largest multiplier, or of its largest scaled rate: less i
 SLOWEST = 1e-3  # 1/s: lower bound of the rate of motions in scales of rates
 MOST_CHANGES = 8  # of flanks, where the multipliers of redundant constraints depend on them
 MOST_LISTED = 4  # instants
-OFF_PITCH = 1e-6  # of the pitch radius: further from the pitch line, a wheel does not mesh
 
 
 def either_flank(groups: Sequence[Group], count: int) -> dict[int, Any]:
@@ -159,50 +154,3 @@ def _reversal_words(name: str, forces: Numbers, motion: Motion) -> str:
 def listed(times: Float[np.ndarray, " time"]) -> str:
     """List the first of some instants."""
     return ", ".join(f"{t:.4g} s" for t in times[:MOST_LISTED]) + (", ..." if len(times) > MOST_LISTED else "")
-
-
-@compiled("pose_type", brief=True)
-def _parted(element: Any, poses: Any, instants: Any, pose_type: Any) -> Any:
-    """Return the difference of a residual with and without a flank."""
-    built = [pose_type.from_coordinates({name: Jet([c[0]]) for name, c in pose.items()}) for pose in poses]
-    group = Group(element, ())
-    time = Jet([instants[None]])
-
-    def residual(flank: float) -> Any:
-        return stacked(holding(group, "flank", flank).element.residual(*built, time))[0]
-
-    return residual(1.0) - residual(0.0)
-
-
-def check_pitch(motion: Motion, groups: Sequence[Group], poses: Callable[[int], Any]) -> None:
-    """Raise MechanismError where wheels with a pressure angle are not at their pitch radius from the line they roll on.
-
-    Parameters
-    ----------
-    motion : Motion
-        The motion to check.
-    groups : sequence of Group
-        Groups of joints and drivers.
-    poses : callable
-        Returns the coordinates of the bodies of a group at all instants.
-    """
-    if motion.traced:
-        return
-    solved = motion.status == Status.OK
-    for index, (group, rows) in enumerate(zip(groups, group_rows(motion.model), strict=True)):
-        if not has_flanks(group) or not hasattr(group.element, "radius"):
-            continue
-        slope = np.tan(np.asarray(group.element.pressure_angle))
-        away = np.asarray(_parted(group.element, poses(index), motion.time, motion.poses[0]))
-        away = np.where(slope > 0, away / np.where(slope > 0, slope, 1.0), 0.0)
-        radius = np.asarray(group.element.radius)
-        bad = (np.abs(away) > OFF_PITCH * radius) & solved
-        if bad.any():
-            instance, lane = np.argwhere(bad)[0]
-            size = radius[instance, 0]
-            message = (
-                f"at t = {motion.time[lane]:g} s the center is {away[instance, lane] - size:.6g} m to the left of the "
-                f"line, and must be {-size:.6g} m, the radius to its right: move the line or the center, reverse the "
-                "line, or guide the rack so that it keeps its distance"
-            )
-            raise MechanismError(message, name=f"{motion.model.rows[rows][instance]}.points")

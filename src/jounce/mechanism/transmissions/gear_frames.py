@@ -220,6 +220,7 @@ def _with_carriers(
     if shares_points(elements[members[0]]):
         return holding(group, "slots", distinct(elements[members[0]].bodies)[1])
     if isinstance(group.element, spatial.Gear):
+        _check_points_on_axes({name: elements[name] for name in members}, mechanism)
         return _on_frames(group, [elements[name] for name in members], mechanism)
     if isinstance(group.element, Cam):
         return _on_hinges(group, [elements[name] for name in members], mechanism)
@@ -247,6 +248,39 @@ def _on_frames(group: Group, gears: Sequence[spatial.Gear], mechanism: Mechanism
             axis, there = (along_instances(*vectors) for vectors in zip(*data, strict=True))
             group = holding(group, field, _coaxial(axis, there))
     return holding(group, "whole", _whole_multiples(group.element.ratio))
+
+
+def _check_points_on_axes(gears: Mapping[str, spatial.Gear], mechanism: Mechanism) -> None:
+    """Raise MechanismError where a point on the axis of a gear is on that of no hinge of its body."""
+    parameters = mechanism.parameter_values
+    hinges = [x for x in mechanism.joints.values() if isinstance(x, spatial.Revolute | spatial.Cylindrical)]
+    for name, gear in gears.items():
+        if gear.point_m is None:
+            continue
+        for slot, ending in enumerate(("_i", "_j")):
+            body, given = gear.bodies[slot], [getattr(gear, field + ending) for field in ("axis", "point")]
+            lines = [
+                [getattr(hinge, field + ("_i", "_j")[hinge.bodies.index(body)]) for field in ("axis", "point")]
+                for hinge in hinges
+                if body in hinge.bodies
+            ]
+            values = [[body_vector(body, vector, parameters).value for vector in line] for line in (given, *lines)]
+            if any(isinstance(x, Tracer) for line in values for vector in line for x in vector):
+                continue
+            (axis, point), *others = np.asarray(values, float)
+            axis = axis / np.linalg.norm(axis)
+            offsets = [
+                there - point
+                for other, there in others
+                if np.linalg.norm(np.cross(axis, other)) <= ACROSS * np.linalg.norm(other)
+            ]
+            sizes = [np.linalg.norm(x) + np.linalg.norm(point) for x in offsets]
+            away = [np.linalg.norm(np.cross(axis, x)) for x in offsets]
+            if away and all(a > LARGEST_GAP * size for a, size in zip(away, sizes, strict=True)):
+                message = (
+                    f"this point of '{body}' is {min(away):.6g} m from the axis of its hinge: give one that is on it"
+                )
+                raise MechanismError(message, name=f"{name}.points", value=point.tolist())
 
 
 def _check_racks(racks: Mapping[str, spatial.Rolling], mechanism: Mechanism) -> None:

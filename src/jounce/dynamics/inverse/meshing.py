@@ -1,0 +1,152 @@
+"""Whether teeth with a pressure angle mesh where the bodies are: racks at pitch radii, gears in space at a point."""
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import jax.numpy as jnp
+import numpy as np
+
+from jounce.constraints import spatial
+from jounce.constraints.couplings import ROLLING, PitchPoint
+from jounce.constraints.friction import velocities, velocity_at
+from jounce.dynamics.friction.coupling import has_flanks
+from jounce.dynamics.motion_values import pose_of
+from jounce.errors import MechanismError
+from jounce.execution.compilation import compiled
+from jounce.jet import Jet, cross
+from jounce.jet.algebra import stacked
+from jounce.kinematics import Motion, Status
+from jounce.mechanism.building.builder import group_rows
+from jounce.mechanism.system import Group, holding, movable
+
+OFF_PITCH = 1e-6  # of the pitch radius: further from the pitch line, a wheel does not mesh
+
+
+def check_meshing(motion: Motion, groups: Sequence[Group], coordinates: Callable[[Any], Any]) -> None:
+    """Raise MechanismError where teeth with a pressure angle do not mesh.
+
+    Parameters
+    ----------
+    motion : Motion
+        The motion to check.
+    groups : sequence of Group
+        Groups of joints and drivers.
+    coordinates : callable
+        Returns the coordinates of the bodies in a slot of a group at all instants, with their velocities.
+    """
+    if motion.traced:
+        return
+    for group, rows in zip(groups, group_rows(motion.model), strict=True):
+        if not has_flanks(group):
+            continue
+        poses, names = [coordinates(slot) for slot in group.bodies], motion.model.rows[rows]
+        if isinstance(group.element, spatial.Gear):
+            _check_pitch_points(motion, group.element, poses, names)
+        elif hasattr(group.element, "radius"):
+            _check_pitch_line(motion, group.element, poses, names)
+
+
+def _check_pitch_line(motion: Motion, element: Any, poses: Sequence[Any], names: Sequence[str]) -> None:
+    """Raise MechanismError where wheels are not at their pitch radius from the line they roll on."""
+    slope = np.tan(np.asarray(element.pressure_angle))
+    away = np.asarray(_parted(element, poses, motion.time, motion.poses[0]))
+    away = np.where(slope > 0, away / np.where(slope > 0, slope, 1.0), 0.0)
+    radius = np.asarray(element.radius)
+    bad = (np.abs(away) > OFF_PITCH * radius) & (motion.status == Status.OK)
+    if bad.any():
+        instance, lane = np.argwhere(bad)[0]
+        size = radius[instance, 0]
+        message = (
+            f"at t = {motion.time[lane]:g} s the center is {away[instance, lane] - size:.6g} m to the left of the "
+            f"line, and must be {-size:.6g} m, the radius to its right: move the line or the center, reverse the "
+            "line, or guide the rack so that it keeps its distance"
+        )
+        raise MechanismError(message, name=f"{names[instance]}.points")
+
+
+def _check_pitch_points(motion: Motion, gears: Any, poses: Sequence[Any], names: Sequence[str]) -> None:
+    """Raise MechanismError where gears in space do not touch at their pitch point as their ratio says."""
+    its = {name: np.asarray(value) for name, value in _meshing(gears, poses, motion.time, motion.poses[0]).items()}
+    (first, second), drift, speed = its["radii"], its["drift"], its["speed"]
+    helix = 0.0 if gears.helix_angle is None else np.asarray(gears.helix_angle)
+    rolls = its["sliding"] <= ROLLING * first
+    skew = (its["distance"] > ROLLING * (first + second)) & (its["angle"] > ROLLING)
+    on_axis = (
+        "the third point, the pitch point, lies on the axis of the {} gear, and must be where the teeth of both touch"
+    )
+    moves = "at t = {{time:g}} s the {} point moves in the frame, the third body: give one on the axis of the gear"
+    faults = (
+        (first <= ROLLING * second, on_axis.format("first"), "points"),
+        (second <= ROLLING * first, on_axis.format("second"), "points"),
+        (drift[0] > OFF_PITCH * speed[0] * first, moves.format("first"), "points"),
+        (drift[1] > OFF_PITCH * speed[1] * second, moves.format("second"), "points"),
+        (
+            ~skew & ~rolls,
+            "at the third point the pitch radii are {first:.9g} m and {second:.9g} m, and the gears slide by "
+            "{sliding:.3g} m per rad: on axes that are parallel or cut each other they roll, so move that point, or "
+            "change the ratio or its sign",
+            "points",
+        ),
+        (
+            skew & (its["plane"] <= ROLLING * first * second),
+            "at the third point both gears move along one line, so that they touch in no plane: give a point on the "
+            "common perpendicular of the axes, or near it",
+            "points",
+        ),
+        (
+            skew & (helix != 0),
+            "teeth of gears on crossed axes lie along the sliding velocity, which follows from the pitch point and the "
+            "ratio: leave the helix angle out",
+            "helix_angle",
+        ),
+        (
+            rolls & (its["cone"] <= ROLLING) & (helix != 0),
+            "the first gear is a crown wheel, whose teeth have no hand about its axis: give the other gear first",
+            "helix_angle",
+        ),
+    )
+    for bad, words, where in faults:
+        if (odd := np.argwhere(bad & (motion.status == Status.OK))).size:
+            at = tuple(odd[0])
+            numbers = {"first": first[at], "second": second[at], "sliding": its["sliding"][at]}
+            message = words.format(time=motion.time[at[1]], **numbers)
+            raise MechanismError(message, name=f"{names[at[0]]}.{where}")
+
+
+@compiled("pose_type", brief=True)
+def _meshing(gears: Any, poses: Sequence[Any], instants: Any, pose_type: Any) -> Mapping[str, Any]:  # noqa: ARG001
+    """Return how gears in space touch, (instances, time): lengths in m, for turns of gear i by one rad."""
+    moving = [pose_of(pose, pose_type, 1) for pose in poses]
+    bodies, rates = [movable(pose.truncate(0)) for pose in moving], velocities([movable(pose) for pose in moving])
+    mesh = PitchPoint.of(gears, tuple(bodies))
+    points = [b.point(point) for b, point in zip(bodies[:2], (gears.point_i, gears.point_j), strict=True)]
+    drift = [velocity_at(body, its, point) - velocity_at(bodies[2], rates[2], point)
+             for body, its, point in zip(bodies[:2], rates, points, strict=False)]  # fmt: skip
+    across = cross(*mesh.axes)
+    return {
+        "radii": jnp.stack([_size(arm) for arm in mesh.arms]),
+        "sliding": _size(mesh.sliding),
+        "drift": jnp.stack([_size(x) for x in drift]),
+        "speed": jnp.stack([_size(its[1] - rates[2][1]) for its in rates[:2]]),
+        "angle": _size(across),
+        "distance": jnp.abs((points[1] - points[0]).dot(across).coefficients[0]) / jnp.maximum(_size(across), 1e-300),
+        "plane": _size(cross(*mesh.arms)),
+        "cone": jnp.abs(cross(mesh.apart, mesh.arms[0]).dot(mesh.axes[0]).coefficients[0]) / _size(mesh.arms[0]),
+    }
+
+
+def _size(vector: Jet) -> Any:
+    return jnp.linalg.norm(vector.coefficients[0], axis=0)
+
+
+@compiled("pose_type", brief=True)
+def _parted(element: Any, poses: Any, instants: Any, pose_type: Any) -> Any:
+    """Return the difference of a residual with and without a flank."""
+    built = [pose_type.from_coordinates({name: Jet([c[0]]) for name, c in pose.items()}) for pose in poses]
+    group = Group(element, ())
+    time = Jet([instants[None]])
+
+    def residual(flank: float) -> Any:
+        return stacked(holding(group, "flank", flank).element.residual(*built, time))[0]
+
+    return residual(1.0) - residual(0.0)
