@@ -310,7 +310,9 @@ def shafts():
             "C": spatial.Revolute(("ground", "cage"), [0, 1, 0], ZERO, Z, Z),
             "S": spatial.Revolute(("cage", "sun"), [0, 0.5, 0.2], ZERO, Z, Z),
             "P": spatial.Revolute(("cage", "planet"), [0.5, 0.2, 0.1], ZERO, across, across),
-            "mesh": spatial.Gear(("sun", "planet", "cage"), Z, [0.6, 2.0, -0.4], -3 / 7, friction=LOSING),
+            "mesh": spatial.Gear(
+                ("sun", "planet", "cage"), Z, [0.6, 2.0, -0.4], -3 / 7, None, LOSING, ZERO, ZERO, [0.3, 0.35, 0.1], 0.3
+            ),
             "guide": spatial.Prismatic(("cage", "rack"), line.tolist(), ZERO, along, along, x, x),
             "teeth": spatial.Rolling(("rack", "sun"), [0.42, 0.16, 0.2], ZERO, along, Z, Z, 0.3, None, 0.35, LOSING),
         },

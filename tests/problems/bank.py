@@ -83,8 +83,6 @@ class Case:
             return BELTS[self.word]
         if self.word in GEARS:
             return GEARS[self.word]
-        if self.kind in (jn.planar.Rolling, jn.spatial.Rolling) and self.optional:
-            return {"pressure_angle": 0.35}
         return {"coordinate": self.word} if self.word else {}
 
 

@@ -7,6 +7,7 @@ from typing import Any
 import jax.numpy as jnp
 import numpy as np
 
+from jounce.base.shapes import Numbers
 from jounce.constraints.facts import facts_of, field_kinds, value_fields
 from jounce.constraints.friction import Friction, GearFriction, friction_class
 from jounce.errors import MechanismError
@@ -89,7 +90,7 @@ class Samples:
         if kind == "flag":
             return True
         if kind == "scalar":
-            return float(random.uniform(0.5, 1.5))
+            return float(random.uniform(0.5, 1.5)) * (0.5 if facts.signs[name] == "pressure angle" else 1.0)
         if name == "friction" and friction_class(self.kind) is GearFriction:
             return GearFriction(random.uniform(0.1, 0.2), random.uniform(0.6, 0.9), random.uniform(-0.2, 0.5))
         if name == "friction":
@@ -140,7 +141,7 @@ def random_motion(
     return motion
 
 
-def pose_of(motion: Motion) -> Any:
+def pose_of(motion: Mapping[str, Numbers]) -> Any:
     """Return the pose with the given coefficients of position and angle, or position and quaternion."""
     position = Jet(map(jnp.asarray, motion["position"]))
     if "angle" in motion:

@@ -140,6 +140,11 @@ def shaft_wheels(mechanism: Mechanism, gear: Any) -> tuple[list[Center], list[fl
         axis = np.asarray(resolve(given, parameters), float)
         points.append(points_at(frames[body], _on_axis(mechanism, body, axis))[0])
         axes.append(frames[body][0, :, 1:] @ axis / np.linalg.norm(axis))
+    if gear.point_m is not None:
+        place = points_at(frames[gear.bodies[2]], np.asarray(resolve(gear.point_m, parameters), float))[0]
+        centers = [point + (place - point) @ axis * axis for point, axis in zip(points, axes, strict=True)]
+        radii = [float(np.linalg.norm(place - center)) for center in centers]
+        return [within(frames[b], c[None])[0] for b, c in zip(gear.bodies, centers, strict=False)], radii
     offset, normal = points[1] - points[0], np.cross(*axes)
     sine = float(np.linalg.norm(normal))
     if sine < 1e-9:
