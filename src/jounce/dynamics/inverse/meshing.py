@@ -22,7 +22,7 @@ from jounce.mechanism.system import Group, holding, movable
 OFF_PITCH = 1e-6  # of the pitch radius: further from the pitch line, a wheel does not mesh
 
 
-def check_meshing(motion: Motion, groups: Sequence[Group], coordinates: Callable[[Any], Any]) -> None:
+def check_meshing(motion: Motion, groups: Sequence[Group], coordinates: Callable[..., Any]) -> None:
     """Raise MechanismError where teeth with a pressure angle do not mesh.
 
     Parameters
@@ -32,14 +32,15 @@ def check_meshing(motion: Motion, groups: Sequence[Group], coordinates: Callable
     groups : sequence of Group
         Groups of joints and drivers.
     coordinates : callable
-        Returns the coordinates of the bodies in a slot of a group at all instants, with their velocities.
+        Returns the coordinates of bodies, given by their indices, at some instants, to a number of coefficients.
     """
     if motion.traced:
         return
     for group, rows in zip(groups, group_rows(motion.model), strict=True):
         if not has_flanks(group):
             continue
-        poses, names = [coordinates(slot) for slot in group.bodies], motion.model.rows[rows]
+        poses = [coordinates(slot, np.arange(len(motion.time)), 2) for slot in group.bodies]
+        names = motion.model.rows[rows]
         if isinstance(group.element, spatial.Gear):
             _check_pitch_points(motion, group.element, poses, names)
         elif hasattr(group.element, "radius"):

@@ -106,8 +106,7 @@ class MotionForces:
         """Multipliers that balance the loads, followed by self-balanced ones if these are needed."""
         if not self.flanks:
             return self._balanced({})
-        every = np.arange(len(self.motion.time))
-        check_meshing(self.motion, self._joined.groups, lambda slot: self.coordinates_at(slot, every, 2))
+        check_meshing(self.motion, self._joined.groups, self.coordinates_at)
         multipliers, known, self._reversals = teeth.settled(self._balanced, self.flanks, self.model, self.motion)
         if self._looks_for_open:  # what is open presses on no flank that is known: any others tell what depends on it
             multipliers = np.stack([multipliers[0], self._balanced(teeth.by_chance(known))[1]])
@@ -403,8 +402,7 @@ class MotionForces:
 
     def coordinates_at(self, bodies: tuple[int, ...] | None, lanes: np.ndarray, levels: int) -> dict[str, Any]:
         """Return coordinates at some instants, for the bodies and the number of coefficients of `part_of`."""
-        coordinates = part_of(self.coordinates, bodies, levels)
-        return {name: values[..., lanes] for name, values in coordinates.items()}
+        return {name: values[..., lanes] for name, values in part_of(self.coordinates, bodies, levels).items()}
 
     def _poses(self, index: int, lanes: np.ndarray) -> tuple[dict[str, Any], ...]:
         return tuple(self.coordinates_at(slot, lanes, self.levels) for slot in self.model.system.groups[index].bodies)
