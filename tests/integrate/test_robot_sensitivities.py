@@ -38,6 +38,53 @@ def test_a_mass_on_a_spring_in_both_modes():
 
 
 @pytest.mark.slow
+def test_a_mass_on_a_spring_by_its_state_at_the_start_in_both_modes():
+    """Positions x cos(w t) + v sin(w t) / w, of which the derivatives by x and v are those of the closed form."""
+    track = cart([1, 0, 0])
+
+    def positions(state):
+        return jn.simulate(track, TIME, 3, state=state).q[:, :2, 0]
+
+    w = np.sqrt(STIFFNESS / MASS)
+    c, s = np.cos(w * TIME), np.sin(w * TIME)
+    expected = np.stack([np.stack([c, s / w], axis=1), np.stack([-w * s, c], axis=1)], axis=1)  # of time, level, state
+    with jax.enable_x64(True):
+        np.testing.assert_allclose(
+            jax.jacfwd(positions)(jnp.array([[1.0], [0.5]]))[..., 0], expected, rtol=0, atol=1e-13
+        )
+        by_state = jax.grad(lambda state: positions(state)[-1, 0])(jnp.array([[1.0], [0.5]]))
+        by_name = jax.grad(lambda x: positions({"x": x})[-1, 1])(1.0)
+    np.testing.assert_allclose(by_state[:, 0], expected[-1, 0], rtol=0, atol=1e-13)
+    assert float(by_name) == pytest.approx(expected[-1, 1, 0], abs=1e-13)
+
+
+@pytest.mark.slow
+def test_runs_of_a_batch_by_what_they_differ_in_in_both_modes():
+    """By each position at the start and each mass; a run does not change with those of another."""
+    track, mass = cart([1, 0, 0]), np.array([2.0, 3.0])
+    start, rate = np.array([1.0, 0.4]), np.array([0.5, -0.3])
+
+    def positions(x, v, m):
+        parameters = {"x": x, "x.rate": v, "a.mass": m}
+        return jn.simulate_batch(track, parameters, TIME, 2).outputs["x"][..., 0]
+
+    w = np.sqrt(STIFFNESS / mass)[:, None]
+    c, s = np.cos(w * TIME), np.sin(w * TIME)
+    x, v = start[:, None], rate[:, None]
+    by_mass = (-x * TIME * s + v * (TIME * c / w - s / w**2)) * (-w / (2 * mass[:, None]))
+    given = (jnp.asarray(start), jnp.asarray(rate), jnp.asarray(mass))
+    with jax.enable_x64(True):
+        given = tuple(map(jnp.asarray, (start, rate, mass)))
+        found = jax.jacfwd(positions, argnums=(0, 1, 2))(*given)
+        total = jax.grad(lambda *runs: positions(*runs)[:, -1].sum(), argnums=(0, 1, 2))(*given)
+    for slope, by_all, expected in zip(found, total, (c, s / w, by_mass), strict=True):
+        whole = np.zeros((2, len(TIME), 2))
+        whole[[0, 1], :, [0, 1]] = expected
+        np.testing.assert_allclose(slope, whole, rtol=0, atol=1e-13)
+        np.testing.assert_allclose(by_all, expected[:, -1], rtol=0, atol=1e-13)
+
+
+@pytest.mark.slow
 def test_beside_an_equilibrium_the_change_moves_though_the_motion_does_not():
     hanging = cart([0, 0, 1])
 

@@ -5,11 +5,13 @@ from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
+import jax.numpy as jnp
 import numpy as np
 
-from jounce.base.shapes import real_numbers
+from jounce.base.shapes import is_traced, real_numbers
 from jounce.errors import JounceError, RobotError, no_such
 from jounce.execution.threads import in_callers_context
+from jounce.integrate.results.robot_sensitivities import of_traced_robots
 from jounce.integrate.results.robot_simulation import RobotSimulation
 from jounce.integrate.simulate_robot import simulate_robot
 from jounce.robot.model.arguments import checked_state
@@ -20,8 +22,10 @@ RATE, MASS = ".rate", ".mass"
 
 def simulate_robots(
     robot: Robot, parameters: Mapping[str, Any], instants: np.ndarray, order: int, **options: Any
-) -> tuple[dict[str, np.ndarray], list[RobotSimulation]]:
+) -> tuple[dict[str, Any], list[Any]]:
     """Return what runs differ in, by name, and each run; see `jounce.simulate_batch`.
+
+    Runs of which JAX traces something are motions that have derivatives.
 
     Raises
     ------
@@ -31,17 +35,24 @@ def simulate_robots(
     if options.get("base") is not None:
         message = "a batch has no free base by quaternions; give the robot one by robot.with_floating_base()"
         raise RobotError(message, name="base")
+    state = options.pop("state", None)
+    traced = is_traced((dict(parameters), robot.tree, state))
     values = _checked(robot, parameters)
-    start = _nominal(robot, options.pop("state", None))
+    start = _nominal(robot, state)
 
-    def begun(k: int) -> tuple[Robot, np.ndarray]:
+    def begun(k: int) -> tuple[Robot, Any]:
         state, changed = start.copy(), robot
         for name, given in values.items():
             joint, level = (name.removesuffix(RATE), 1) if name not in robot.joint_names else (name, 0)
             if joint in robot.joint_names:
-                state[level, robot.joint_names.index(joint)] = given[k]
+                column = robot.joint_names.index(joint)
+                if traced:
+                    state = jnp.asarray(state).at[level, column].set(given[k])
+                else:
+                    state[level, column] = given[k]
             else:
-                changed = changed.with_inertia(name.removesuffix(MASS), mass=float(given[k]))
+                mass = given[k] if traced else float(given[k])
+                changed = changed.with_inertia(name.removesuffix(MASS), mass=mass)
         return changed, state
 
     starts = []
@@ -52,6 +63,10 @@ def simulate_robots(
             error.name = f"runs.{k}" if error.name is None else f"runs.{k}.{error.name}"
             raise
 
+    if traced:  # one after another, as JAX traces in one thread; what fails has no derivatives, and raises
+        follow = of_traced_robots(simulate_robot)
+        return values, [follow(own, instants, order, state=state, **options) for own, state in starts]
+
     def run(at: tuple[Robot, np.ndarray]) -> RobotSimulation:
         return simulate_robot(at[0], instants, order, state=at[1], strict=False, **options)
 
@@ -60,11 +75,15 @@ def simulate_robots(
         return values, [first, *pool.map(in_callers_context(run), starts[1:])]
 
 
-def _nominal(robot: Robot, state: Any) -> np.ndarray:
+def _nominal(robot: Robot, state: Any) -> Any:
     """Return the coordinates and rates that all runs begin with unless they differ in them, (2, n)."""
     n = len(robot.joint_names)
     if state is None:
         return np.zeros((2, n))
+    if is_traced(state):
+        if isinstance(state, Mapping):
+            state = [[state.get(name, 0.0) for name in robot.joint_names], [0.0] * n]
+        return checked_state(robot, jnp.stack([jnp.stack([jnp.asarray(x, float) for x in row]) for row in state]))
     if isinstance(state, Mapping):
         return np.array([robot.coordinates(**state), np.zeros(n)])
     levels = np.array(checked_state(robot, np.asarray(state, float)))
@@ -73,19 +92,22 @@ def _nominal(robot: Robot, state: Any) -> np.ndarray:
     return levels
 
 
-def _checked(robot: Robot, parameters: Mapping[str, Any]) -> dict[str, np.ndarray]:
+def _checked(robot: Robot, parameters: Mapping[str, Any]) -> dict[str, Any]:
     """Return what runs differ in, by name, each of shape (runs,)."""
     if not parameters:
         raise RobotError("a batch differs in at least one value", name="parameters", value=dict(parameters))
     massive = [name for name, link in robot.links.items() if link.inertia is not None]
     valid = [*robot.joint_names, *(x + RATE for x in robot.joint_names), *(x + MASS for x in massive)]
-    values: dict[str, np.ndarray] = {}
+    values: dict[str, Any] = {}
     for name, given in parameters.items():
         if name not in valid:
             message = no_such("joint, JOINT.rate or LINK.mass", name, valid)
             raise RobotError(message, name="parameters", value=name)
-        array = real_numbers(f"parameters.{name}", given, RobotError, "finite numbers, one for each run")
-        if array.ndim != 1 or not array.size or not np.isfinite(array).all():
+        if traced := is_traced(given):
+            array = jnp.asarray(given, float)
+        else:
+            array = real_numbers(f"parameters.{name}", given, RobotError, "finite numbers, one for each run")
+        if array.ndim != 1 or not array.size or not (traced or np.isfinite(array).all()):
             raise RobotError("must be finite numbers, one for each run", name=f"parameters.{name}", value=given)
         if values and array.size != (count := len(next(iter(values.values())))):
             message = f"must have one value for each run, {count} as those before"

@@ -1,14 +1,17 @@
 """Many simulations of one mechanism side by side: initial conditions, masses, forces and lengths by parameters."""
 
+import functools
+import inspect
 import os
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
-from typing import Any, Unpack
+from typing import Any, ParamSpec, TypeVar, Unpack
 
 import jax
+import jax.numpy as jnp
 import numpy as np
 
-from jounce.base.shapes import ArrayLike
+from jounce.base.shapes import ArrayLike, is_traced
 from jounce.dynamics.forward.accelerations import Equations, State
 from jounce.dynamics.forward.initial_state import consistent_start, initial_as_drivers
 from jounce.errors import MechanismError
@@ -17,6 +20,7 @@ from jounce.integrate.marching.marching import DenseOutput, IntegratorState, Out
 from jounce.integrate.marching.user_methods import integrator
 from jounce.integrate.mechanisms.batch_equations import BatchStart, ParametricMechanism, Turns
 from jounce.integrate.results.batch import Batch
+from jounce.integrate.results.robot_sensitivities import TracedRobotBatch
 from jounce.integrate.results.robot_simulation import RobotSimulation
 from jounce.integrate.results.simulation import expanded
 from jounce.integrate.robot_batch import simulate_robots
@@ -39,10 +43,52 @@ from jounce.mechanism.transmissions.axis_angles import measures_angle, raw_angle
 from jounce.mechanism.transmissions.turn_counting import counted_along
 from jounce.robot.robot import Robot
 
+P = ParamSpec("P")
+R = TypeVar("R")
+
 LANES = 64  # runs marched together: more fall out of the cache
 STEPS = 16  # tried before runs that have ended make room for others
 
 
+def _of_traced_robots(guarded: Callable[P, R]) -> Callable[P, R]:
+    """Return what simulates batches, also of robots of which JAX traces something; their joints are outputs."""
+    signature = inspect.signature(guarded)
+
+    @functools.wraps(guarded)
+    def door(*arguments: P.args, **keywords: P.kwargs) -> R:
+        robot: Any = arguments[0] if arguments else keywords.get("mechanism")
+        if not isinstance(robot, Robot) or robot.closures or not is_traced((robot.tree, arguments[1:], keywords)):
+            return guarded(*arguments, **keywords)
+        bound = signature.bind(*arguments, **keywords)
+        bound.apply_defaults()
+        given = dict(bound.arguments)
+        options = given.pop("robot")
+        values, motions = _robot_runs(*given.values(), **options)
+        q = jnp.stack([motion.q for motion in motions])
+        outputs = {name: q[..., k] for k, name in enumerate(robot.joint_names)}
+        batch: Any = TracedRobotBatch(robot, motions[0].time, motions[0].order, values, outputs)
+        return batch
+
+    return door
+
+
+def _robot_runs(
+    robot: Robot,
+    parameters: Mapping[str, Any],
+    time: ArrayLike | TimeGrid | None,
+    order: int,
+    method: AbstractMethod | None,
+    tolerance: float,
+    longest_step: float,
+    **options: Any,
+) -> tuple[dict[str, Any], list[Any]]:
+    """Return in what the runs of a robot differ, and each of them."""
+    order, method = checked_options(order, method, tolerance, longest_step)
+    limits = {"method": method, "tolerance": float(tolerance), "longest_step": float(longest_step)}
+    return simulate_robots(robot, parameters, instants_of(time, {}), order, **limits, **options)
+
+
+@_of_traced_robots
 @concrete
 def simulate_batch(
     mechanism: Mechanism | Robot,
@@ -76,7 +122,8 @@ def simulate_batch(
     Returns
     -------
     Batch
-        A run that fails does not stop the others: `status` says so.
+        A run that fails does not stop the others: `status` says so. Of a robot of which JAX traces parameters, the
+        ``state`` or inertias, the ``time``, ``order``, ``parameters`` and ``outputs`` alone; a run that fails raises.
 
     Raises
     ------
@@ -99,11 +146,8 @@ def simulate_batch(
     (3, 2, 5)
     """
     if isinstance(mechanism, Robot):
-        order, method = checked_options(order, method, tolerance, longest_step)
-        options: dict[str, Any] = {"method": method, "tolerance": float(tolerance), **robot}
-        instants = instants_of(time, {})
-        options["longest_step"] = float(longest_step)
-        return _of_robot(mechanism, *simulate_robots(mechanism, parameters, instants, order, **options))
+        limits = (method, tolerance, longest_step)
+        return _of_robot(mechanism, *_robot_runs(mechanism, parameters, time, order, *limits, **robot))
     for name in robot:
         message = "belongs to simulations of robots in joint coordinates; a mechanism has forces and `initial`"
         raise MechanismError(message, name=name)

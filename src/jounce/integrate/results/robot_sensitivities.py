@@ -1,4 +1,6 @@
-"""The motion of a simulated robot as a function of inertias that JAX traces: its steps once more, with lengths held.
+"""The motion of a simulated robot as a function of inertias and of the state at the start: its steps once more.
+
+Lengths of steps are held.
 
 How long steps are is taken from the simulation, and so are all numbers: the program here adds to them how they change.
 A change may move faster than the motion, as beside an equilibrium, where the motion has no series to speak of: steps
@@ -8,7 +10,7 @@ are divided until the series of every change of the state converges on them.
 import dataclasses
 import functools
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any, ParamSpec, TypeVar
 
 import jax
@@ -30,6 +32,7 @@ ORDER = 24  # of the series of a step
 CONVERGED = 1e-16  # of a change: the last terms of its series
 LAST = 4  # terms that are looked at, since every other one may vanish
 PARTS = 4096  # of one step at most
+PADDED = 16  # by so many the steps go up, so that motions of about as many share a program
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -37,7 +40,7 @@ R = TypeVar("R")
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class TracedRobotMotion:
-    """The motion of a simulated robot of which JAX traces inertias.
+    """The motion of a simulated robot of which JAX traces inertias or the state at the start.
 
     Attributes
     ----------
@@ -57,13 +60,38 @@ class TracedRobotMotion:
     q: Any
 
 
+@dataclasses.dataclass(frozen=True, eq=False)
+class TracedRobotBatch:
+    """Motions of a robot of which JAX traces something in which they differ, or the robot.
+
+    Attributes
+    ----------
+    robot : Robot
+        As it was given.
+    time : numpy.ndarray of shape (time,)
+        s.
+    order : int
+        Highest derivative.
+    parameters : dict of str to array of shape (runs,)
+        What runs differ in.
+    outputs : dict of str to jax.Array of shape (runs, time, order + 1)
+        Coordinates of the joints and their derivatives, rad or m by s.
+    """
+
+    robot: Robot
+    time: Float[np.ndarray, " time"]
+    order: int
+    parameters: Mapping[str, Any]
+    outputs: Mapping[str, Any]
+
+
 def of_traced_robots(simulate: Callable[P, R]) -> Callable[P, R]:
-    """Return what simulates, also robots of which JAX traces inertias."""
+    """Return what simulates, also robots of which JAX traces inertias or the state at the start."""
 
     @functools.wraps(simulate)
     def door(*arguments: P.args, **keywords: P.kwargs) -> R:
         robot = arguments[0] if arguments else keywords.get("mechanism")
-        if not isinstance(robot, Robot) or not is_traced(robot.tree):
+        if not isinstance(robot, Robot) or robot.closures or not is_traced((robot.tree, keywords.get("state"))):
             return simulate(*arguments, **keywords)
         others = {name: value for name, value in keywords.items() if name != "mechanism"}
         return _traced_motion(simulate, robot, arguments[1:], others)  # type: ignore[return-value]
@@ -74,7 +102,7 @@ def of_traced_robots(simulate: Callable[P, R]) -> Callable[P, R]:
 def _traced_motion(
     simulate: Callable[..., Any], robot: Robot, positional: tuple[Any, ...], options: dict[str, Any]
 ) -> TracedRobotMotion:
-    """Return the motion of a robot as a function of its inertias.
+    """Return the motion of a robot as a function of its inertias and of the state at the start.
 
     Raises
     ------
@@ -97,17 +125,34 @@ def _traced_motion(
     problem = with_fields(known, equations=with_fields(known.equations, tree=robot.tree))
     start, length = _divided(known, simulation)
     first = jax.tree.map(lambda x: jnp.asarray(x)[0, 0, :, None], simulation.steps.polynomial)
+    first = _begun(robot, problem, first, options.get("state"))
     direction = 1.0 if length[0] >= 0 else -1.0
     instants = simulation.time
     which = np.searchsorted(direction * start, direction * instants, side="right") - 1
     which = np.clip(which, 0, len(start) - 1)
     since = np.clip(direction * (instants - start[which]), 0.0, None) * direction
     levels = max(simulation.order - 2, 0)
-    series = _marched(problem, first, start, length, which, since, instants, levels=levels)
+    more = -len(start) % PADDED  # steps of no length
+    whole = np.append(start, np.full(more, start[-1] + length[-1])), np.append(length, np.zeros(more))
+    series = _marched(problem, first, *whole, which, since, instants, levels=levels)
     scale = np.array([float(math.factorial(k)) for k in range(len(series))])
     changing = jnp.moveaxis(series * scale[:, None, None], -1, 0)[:, : simulation.order + 1]
     q = simulation.q + (changing - jax.lax.stop_gradient(changing))
     return TracedRobotMotion(robot, instants, simulation.order, q)
+
+
+def _begun(robot: Robot, problem: RobotProblem, first: RobotState, state: Any) -> RobotState:
+    """Return the state at the start, with what JAX traces of it; driven joints are on their laws."""
+    if not is_traced(state):
+        return first
+    if isinstance(state, Mapping):
+        rows = [[state.get(name, 0.0) for name in robot.joint_names], [0.0] * len(robot.joint_names)]
+    else:
+        rows = state
+    q, rates = (jnp.stack([jnp.asarray(x, float) for x in row])[:, None] for row in rows)
+    held = jnp.asarray(problem.equations.driven)[:, None] > 0
+    coordinates, velocities = (jnp.where(held, a, b) for a, b in ((first.coordinates, q), (first.rates, rates)))
+    return first._replace(coordinates=coordinates, rates=velocities)
 
 
 def _recorded(
@@ -118,13 +163,17 @@ def _recorded(
     made: list[RobotSimulation] = []
 
     @jax.custom_jvp
-    def record(values: list[Any]) -> Any:
+    def record(values: tuple[Any, Any]) -> Any:
         if not any(isinstance(x, Tracer) for x in jax.tree.leaves(values)):
-            links = dict(robot.links)
-            for name, (mass, center, tensor) in zip(names, values, strict=True):
+            links, own = dict(robot.links), options
+            if isinstance(state := values[1], Mapping):
+                own = {**options, "state": {name: float(x) for name, x in state.items()}}
+            elif state is not None:
+                own = {**options, "state": jax.tree.map(np.asarray, state)}
+            for name, (mass, center, tensor) in zip(names, values[0], strict=True):
                 inertia = Inertia(float(mass), np.asarray(center), np.asarray(tensor), strict=robot.strict)
                 links[name] = dataclasses.replace(links[name], inertia=inertia)
-            made.append(simulate(robot.changed(links=list(links.values())), *positional, **options))
+            made.append(simulate(robot.changed(links=list(links.values())), *positional, **own))
         return jnp.zeros(())
 
     @record.defjvp
@@ -132,7 +181,7 @@ def _recorded(
         return record(*primals), jnp.zeros(())
 
     inertias = [robot.links[name].inertia for name in names]
-    record([(x.mass, x.center_of_mass, x.tensor) for x in inertias if x is not None])
+    record(([(x.mass, x.center_of_mass, x.tensor) for x in inertias if x is not None], options.get("state")))
     if not made:
         message = "a simulation of a robot decides by values: differentiate it outside of jax.jit and jax.vmap"
         raise UnsupportedError(message, name=robot.name)
@@ -143,7 +192,10 @@ def _divided(problem: RobotProblem, simulation: RobotSimulation) -> tuple[np.nda
     """Return the starts and lengths of the steps of a simulation, divided as changes of the state ask for."""
     steps = simulation.steps
     states = jax.tree.map(lambda c: np.moveaxis(np.asarray(c)[:, 0], 0, -1), steps.polynomial)
-    growth = np.asarray(_growth(problem, states, steps.start))  # of orders, steps
+    count = len(steps.start)
+    more = -count % PADDED
+    wide = jax.tree.map(lambda x: np.concatenate([x, np.repeat(x[..., -1:], more, axis=-1)], axis=-1), states)
+    growth = np.asarray(_growth(problem, wide, np.append(steps.start, np.repeat(steps.start[-1:], more))))[:, :count]
     orders = np.arange(ORDER + 2 - LAST, ORDER + 2)
     with np.errstate(divide="ignore"):
         reach = ((CONVERGED / growth[-LAST:]) ** (1 / orders[:, None])).min(axis=0)
