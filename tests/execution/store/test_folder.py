@@ -226,7 +226,7 @@ def test_a_second_process_traces_and_compiles_nothing(tmp_path):
     "before",
     [
         "jn.keep_programs(None)",
-        "from jounce.kinematics.continuation import continuation_steps as s; s.GROWTH = 2.0",
+        "from jounce.kinematics.continuation import step_control as s; s.GROWTH = 2.0",
         "jn.planar.Revolute.residual = lambda self, *given: 1 / 0",
     ],
 )
