@@ -32,6 +32,7 @@ PAPER = "#FFFFFF"
 DASHES = (4.0, 2.0)
 CORNERS = ((-1, -1), (1, -1), (1, 1), (-1, 1))  # of a square
 DASH_DOT = (7.0, 2.0, 1.5, 2.0)
+LARGE = 3.0  # units: a larger circle would be seen to have corners where it has as few points as a pin
 
 
 def unit_vector(vectors: Flat) -> Flat:
@@ -202,11 +203,12 @@ def cylinder(drawing: Drawing, center: Flat, axes: Axes, size: tuple[float, floa
         sine, cosine = np.sin(angle)[:, None], np.cos(angle)[:, None]
         return radius * (sine * across[:, None] + squeeze * cosine * along[:, None])
 
-    cap = around(np.linspace(-0.5 * np.pi, 0.5 * np.pi, 10))
+    count = 10 if size[1] < LARGE else 40
+    cap = around(np.linspace(-0.5 * np.pi, 0.5 * np.pi, count))
     outline = np.concatenate([(center + axis)[:, None] + cap, (center - axis)[:, None] - cap], axis=1)
     drawing.curve(outline, closed=True, **look)
     near = center + axis * np.where(depth >= 0, 1.0, -1.0)[:, None]
-    drawing.curve(near[:, None] + around(np.linspace(0.0, 2 * np.pi, 21)[:-1]), closed=True, **look)
+    drawing.curve(near[:, None] + around(np.linspace(0.0, 2 * np.pi, 2 * count + 1)[:-1]), closed=True, **look)
 
 
 def box(drawing: Drawing, center: Flat, axes: Axes, size: tuple[float, float, float], **look: Any) -> None:
