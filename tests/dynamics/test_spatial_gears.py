@@ -163,6 +163,15 @@ def test_forces_are_differentiated_by_the_pressure_angle():
         ("spur", {"point_m": ZERO}, "lies on the axis of the first gear"),
         ("spur", {"point_j": TURNED @ [0, 0.01, 0]}, "this point of 'j' is 0.01 m from the axis of its hinge"),
         ("worm", {"helix_angle": 0.1}, "mesh.helix_angle: teeth of gears on crossed axes"),
+        (
+            "worm",
+            {
+                "friction": jn.joints.GearFriction(
+                    1.0, coefficient=0.06, lead_angle=math.radians(5), pressure_angle=ALPHA
+                )
+            },
+            "mesh.friction.lead_angle: the lead angle of the first gear is 5.711 deg",
+        ),
         ("worm", {"point_m": TURNED @ [0, 0, 0.05]}, "lies on the axis of the first gear"),
     ],
 )

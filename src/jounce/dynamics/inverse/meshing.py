@@ -1,5 +1,6 @@
 """Whether teeth with a pressure angle mesh where the bodies are: racks at pitch radii, gears in space at a point."""
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
@@ -19,6 +20,7 @@ from jounce.kinematics import Motion, Status
 from jounce.mechanism.building.builder import group_rows
 from jounce.mechanism.system import Group, holding, movable
 
+LEAD = math.radians(0.5)  # by which a lead angle that is given to friction may be rounded
 OFF_PITCH = 1e-6  # of the pitch radius: further from the pitch line, a wheel does not mesh
 
 
@@ -72,6 +74,8 @@ def _check_pitch_points(motion: Motion, gears: Any, poses: Sequence[Any], names:
     helix = 0.0 if gears.helix_angle is None else np.asarray(gears.helix_angle)
     rolls = its["sliding"] <= ROLLING * first
     skew = (its["distance"] > ROLLING * (first + second)) & (its["angle"] > ROLLING)
+    friction = getattr(gears.friction, "lead_angle", None)
+    lead = its["lead"] if friction is None else np.asarray(friction)
     on_axis = (
         "the third point, the pitch point, lies on the axis of the {} gear, and must be where the teeth of both touch"
     )
@@ -101,6 +105,12 @@ def _check_pitch_points(motion: Motion, gears: Any, poses: Sequence[Any], names:
             "helix_angle",
         ),
         (
+            skew & (np.abs(its["lead"] - lead) > LEAD),
+            "the lead angle of the first gear is {lead:.4g} deg by the pitch point and the ratio: give that one to the "
+            "friction, or move the pitch point",
+            "friction.lead_angle",
+        ),
+        (
             rolls & (its["cone"] <= ROLLING) & (helix != 0),
             "the first gear is a crown wheel, whose teeth have no hand about its axis: give the other gear first",
             "helix_angle",
@@ -110,6 +120,7 @@ def _check_pitch_points(motion: Motion, gears: Any, poses: Sequence[Any], names:
         if (odd := np.argwhere(bad & (motion.status == Status.OK))).size:
             at = tuple(odd[0])
             numbers = {"first": first[at], "second": second[at], "sliding": its["sliding"][at]}
+            numbers["lead"] = np.degrees(its["lead"][at])
             message = words.format(time=motion.time[at[1]], **numbers)
             raise MechanismError(message, name=f"{names[at[0]]}.{where}")
 
@@ -123,14 +134,15 @@ def _meshing(gears: Any, poses: Sequence[Any], instants: Any, pose_type: Any) ->
     points = [b.point(point) for b, point in zip(bodies[:2], (gears.point_i, gears.point_j), strict=True)]
     drift = [velocity_at(body, its, point) - velocity_at(bodies[2], rates[2], point)
              for body, its, point in zip(bodies[:2], rates, points, strict=False)]  # fmt: skip
-    across = cross(*mesh.axes)
+    across, sliding = cross(*mesh.axes), _size(mesh.sliding)
     return {
         "radii": jnp.stack([_size(arm) for arm in mesh.arms]),
-        "sliding": _size(mesh.sliding),
+        "sliding": sliding,
         "drift": jnp.stack([_size(x) for x in drift]),
         "speed": jnp.stack([_size(its[1] - rates[2][1]) for its in rates[:2]]),
         "angle": _size(across),
         "distance": jnp.abs((points[1] - points[0]).dot(across).coefficients[0]) / jnp.maximum(_size(across), 1e-300),
+        "lead": jnp.arcsin(jnp.minimum(jnp.abs(mesh.sliding.dot(mesh.axes[0]).coefficients[0]) / sliding, 1.0)),
         "plane": _size(cross(*mesh.arms)),
         "cone": jnp.abs(cross(mesh.apart, mesh.arms[0]).dot(mesh.axes[0]).coefficients[0]) / _size(mesh.arms[0]),
     }
