@@ -305,7 +305,13 @@ def shafts():
     line = np.array([0, 0.5, 0.2]) - 0.3 * np.cross(along, Z) / np.linalg.norm(np.cross(along, Z))
     return in_space(
         9,
-        {"cage": [0, 1, 0], "sun": [0, 1.5, 0.2], "planet": [0.5, 1.2, 0.1], "rack": [0, 1.8, 0.2]},
+        {
+            "cage": [0, 1, 0],
+            "sun": [0, 1.5, 0.2],
+            "planet": [0.5, 1.2, 0.1],
+            "idler": [0.1, 1.3, -0.3],
+            "rack": [0, 1.8, 0.2],
+        },
         joints={
             "C": spatial.Revolute(("ground", "cage"), [0, 1, 0], ZERO, Z, Z),
             "S": spatial.Revolute(("cage", "sun"), [0, 0.5, 0.2], ZERO, Z, Z),
@@ -313,6 +319,8 @@ def shafts():
             "mesh": spatial.Gear(
                 ("sun", "planet", "cage"), Z, [0.6, 2.0, -0.4], -3 / 7, None, LOSING, ZERO, ZERO, [0.3, 0.35, 0.1], 0.3
             ),
+            "I": spatial.Revolute(("cage", "idler"), [0.1, 0.3, -0.3], ZERO, x, x),
+            "by_ratio": spatial.Gear(("sun", "idler", "cage"), Z, x, 2 / 5),
             "guide": spatial.Prismatic(("cage", "rack"), line.tolist(), ZERO, along, along, x, x),
             "teeth": spatial.Rolling(("rack", "sun"), [0.42, 0.16, 0.2], ZERO, along, Z, Z, 0.3, None, 0.35, LOSING),
         },

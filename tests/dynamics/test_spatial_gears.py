@@ -183,6 +183,7 @@ def test_gears_that_do_not_mesh_are_refused(name, changes, words):
         jn.joint_reaction(jn.solve(mechanism, [0.1], order=2), "A", "i")
 
 
+@pytest.mark.slow
 def test_a_crown_wheel_has_no_hand_of_its_own():
     slanted = [math.sqrt(15) / 4, 0, 1 / 4]
     crown = pair(([0, 0, 1], slanted), (ZERO, ZERO), [0.2, 0, 0], 4, helix_angle=0.1, turned=np.eye(3))

@@ -128,6 +128,7 @@ def test_the_solvers_of_diffrax_have_friction():
     np.testing.assert_allclose(found[:, 2, 0], -3 * np.tanh(velocity() / 0.05), rtol=0, atol=1e-7)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("load", [10.0, -30.0])
 def test_teeth_press_the_bearings_of_gears(load):
     """Both bearings bear the tooth force F / cos(alpha), whichever flank it is on; in closed form."""

@@ -7,7 +7,6 @@ needs decides whether it is taken.
 """
 
 import dataclasses
-import importlib
 from typing import Any
 
 import numpy as np
@@ -15,6 +14,7 @@ from jaxtyping import Bool, Float
 
 from jounce.planning.retiming.quantities.path_quantities import C, Curves, D, G, PathQuantities, Quantity
 from jounce.planning.retiming.quantities.robot_quantities import ORDER, RobotQuantities
+from jounce.planning.solver import cone_solver
 from jounce.robot.algorithms.equations_of_motion import mass_matrix
 from jounce.robot.algorithms.jacobian import point_slope
 
@@ -283,7 +283,7 @@ def _least_change(
     """
     from scipy import sparse
 
-    clarabel: Any = importlib.import_module("clarabel")  # its names are those of a compiled module
+    clarabel = cone_solver()
     own = matrices[:, :, free]
     joints = coefficients.shape[1]
     size = own.shape[2] * joints

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import importlib
 import itertools
 from collections.abc import Sequence
 from typing import Any
@@ -15,6 +14,7 @@ from jounce.errors import SolveError
 from jounce.planning.smoothing.bases import DEGREE, Samples, banded, cost, parts_of, values_at, whole
 from jounce.planning.smoothing.dwells import Dwell
 from jounce.planning.smoothing.weights import IntervalEstimate
+from jounce.planning.solver import cone_solver
 
 CELL = np.pi / 4  # length of a cell times the cutoff frequency
 GRADED = 1.6  # ratio of the lengths of neighboring cells
@@ -206,7 +206,9 @@ class _Problem:
 
     def _move(self, coefficients: np.ndarray, run: slice) -> None:
         """Solve for a run of coefficients such that all samples that they affect are within the deviation."""
-        clarabel, sparse = _solver()
+        from scipy import sparse
+
+        clarabel = cone_solver()
         knots = self.samples.knots
         ends = knots[[max(run.start - DEGREE, 0), min(run.stop, len(knots) - 1)]]
         last = "right" if run.stop >= len(knots) - 1 else "left"
@@ -245,12 +247,3 @@ def _parts(run: slice) -> list[slice]:
         return [run]
     firsts = range(run.start, run.stop - TOGETHER, TOGETHER)
     return [slice(k, min(k + TOGETHER + 4 * DEGREE, run.stop) if k != firsts[-1] else run.stop) for k in firsts]
-
-
-def _solver() -> tuple[Any, Any]:
-    from scipy import sparse
-
-    from jounce.planning.solver import require_solver
-
-    require_solver()
-    return importlib.import_module("clarabel"), sparse

@@ -1,11 +1,12 @@
 """The convex program of the fastest rate: least duration within linear bounds on z and its derivatives."""
 
 import dataclasses
-import importlib
 from typing import Any
 
 import numpy as np
 from jaxtyping import Float
+
+from jounce.planning.solver import cone_solver
 
 TOLERANCE = 1e-7
 
@@ -70,7 +71,7 @@ def solve_program(program: Program, *, elastic: bool = False) -> Solution:
     """Solve a program with Clarabel; with `elastic`, find by how little bounds must be exceeded instead."""
     from scipy import sparse
 
-    clarabel: Any = importlib.import_module("clarabel")  # its names are those of a compiled module
+    clarabel = cone_solver()
 
     wide = sparse.csc_matrix
     about = program.about if program.duration is None and not elastic else None
