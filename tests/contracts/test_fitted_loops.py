@@ -105,20 +105,23 @@ def test_every_number_of_a_drive_counts_in_proportion(loop):
         efforts(motion, laws),
         efforts(jn.solve(robot.mechanism(near, drivers=laws, drives=False), TIME, ORDER), laws),
     )
-    for joint in robot.moving_joints:
-        for field in ("armature", "damping", "friction", "stiffness"):
-            value = getattr(joint, field)
-            if not np.any(value):
-                continue
+    for field in ("armature", "damping", "friction", "stiffness"):
+        held = {joint.name: np.asarray(getattr(joint, field)) for joint in robot.moving_joints}
+        if not any(map(np.any, held.values())):
+            continue
 
-            def with_factor(factor, joint=joint, field=field, value=value):
-                given = factor * np.asarray(value)
-                joints = {**robot.joints, joint.name: dataclasses.replace(joint, **{field: given})}
-                return efforts(solved(robot.changed(joints=list(joints.values())), near, laws), laws)
+        def with_factor(factor, field=field, held=held):
+            joints = [
+                dataclasses.replace(joint, **{field: factor * held[name]})
+                if name in held and np.any(held[name])
+                else joint
+                for name, joint in robot.joints.items()
+            ]
+            return efforts(solved(robot.changed(joints=joints), near, laws), laws)
 
-            half, twice = with_factor(0.5), with_factor(2.0)
-            part = 2 * (whole - half)
-            assert np.abs(part).max() > 1e-4, (joint.name, field)
-            np.testing.assert_allclose(twice - whole, part, rtol=0, atol=1e-10 * np.abs(whole).max())
-            total = total + part
+        half, twice = with_factor(0.5), with_factor(2.0)
+        part = 2 * (whole - half)
+        assert np.abs(part).max() > 1e-4, field
+        np.testing.assert_allclose(twice - whole, part, rtol=0, atol=1e-10 * np.abs(whole).max())
+        total = total + part
     near_to(total, whole, 1e-10)

@@ -107,6 +107,22 @@ def test_results_are_not_taken_for_each_other(program):
     np.testing.assert_allclose(total, sums, rtol=1e-9)
 
 
+def test_programs_are_told_apart_by_arrays_that_their_code_does_not_read():
+    """Such as the forces of a mechanism in programs of its positions, in one order or another."""
+
+    def function(shared, lanes):
+        return shared[0] + lanes[0]
+
+    made = []
+    for sizes in ((3, 1), (1, 3)):
+        given = (np.zeros(()), *map(np.zeros, sizes)), [np.zeros((2, 1))]
+        binary, results = modules.object_file(function, *given, {})
+        made.append((binary, programs.Program(binary, given, results).name))
+    (first, name), (second, other) = made
+    assert first == second
+    assert name != other
+
+
 def test_what_is_not_published_and_calls_for_many_are_refused(program):
     def unknown(x):
         return jax.ffi.ffi_call("jounce_of_nobody", [jax.ShapeDtypeStruct(x.shape, x.dtype)])(x)

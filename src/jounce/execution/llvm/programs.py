@@ -98,7 +98,6 @@ class Program:
 
     def __init__(self, binary: bytes, given: tuple[Any, Any], results: Any, *, rows: bool = False):
         self._run = MachineCode(binary)
-        self.name = f"jounce_{hashlib.sha256(binary).hexdigest()[:32]}"
         shared, lanes = map(jax.tree.leaves, given)
         self._shared = [(x.shape, x.dtype) for x in shared]
         self._layout = Layout(self._shared)
@@ -106,6 +105,9 @@ class Program:
         leaves, self._structure = jax.tree.flatten(results)
         self._results = [(leaf.shape[:-1], leaf.dtype) for leaf in leaves]
         self.width, self._rows = vector_width(), rows
+        # code that does not read some arrays is the same for others in their place
+        read = repr((self._shared, self._lanes, self._results)).encode()
+        self.name = f"jounce_{hashlib.sha256(binary + read).hexdigest()[:32]}"
 
     def __call__(
         self, shared: Sequence[np.ndarray], lanes: Sequence[np.ndarray], parts: int = 1, each: Callable[..., Any] = map
