@@ -12,7 +12,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 import jounce as jn
-from tests.problems.closed_robots import random_loop
+from tests.problems.random_loops import random_loop
 
 BODY = '<inertial pos="0.1 0.02 -0.03" mass="1.3" fullinertia="0.02 0.03 0.04 0.001 -0.002 0.003"/>'
 HEAD = '<mujoco><compiler angle="radian"/><option gravity="0.3 -1 -9.7"/>'

@@ -11,7 +11,8 @@ from mpmath import mp
 
 import jounce as jn
 from jounce.robot.model.floating_base import floating_joints
-from tests.problems.closed_robots import FIVE_BAR, forward, in_contact, in_pinocchio, inverse, random_loop
+from tests.problems.closed_robots import FIVE_BAR, forward, in_contact, in_pinocchio, inverse
+from tests.problems.random_loops import random_loop
 
 TIME = np.linspace(0.1, 0.7, 4)
 ROD = jn.Inertia(1.0, center_of_mass=[0.5, 0, 0], tensor=[0.01, 1 / 12, 1 / 12])

@@ -199,7 +199,8 @@ def bound_alone(output: AbstractQuantity, mechanism: Any) -> AbstractQuantity:
 
 def form_of(output: AbstractQuantity) -> type[Any]:
     """Return the class by which an output was given, and is named in files."""
-    return getattr(type(output), "form", type(output))
+    form: Any = getattr(type(output), "form", type(output))
+    return form
 
 
 def _bind(
