@@ -30,6 +30,7 @@ SLOW_EXAMPLES = frozenset(
     jounce.planning.tool_paths.follow_tool_path.follow_tool_path
     jounce.plot.charts.bands.draw_bands
     jounce.plot.forces.draw_power
+    jounce.reporting.facts.holding_facts.holding_facts
     jounce.robot.closed_loops.closed_loop.mechanism
     jounce.sweeps.sweeping.sweep
     jounce.trajectory.laws.composed.OutputMotion

@@ -86,7 +86,8 @@ def subjects(space):
     return placed
 
 
-@pytest.mark.parametrize("space", ["planar", pytest.param("spatial", marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("space", ["planar", "spatial"])
 def test_what_is_exerted_has_no_resultant_and_the_power_of_what_it_works_on(space):
     """About the origin, from moments about random points of all bodies, the ground among them.
 

@@ -97,6 +97,7 @@ def pushed_wedge(mu):
     return jn.Mechanism(**parts, joints=free.joints, initial=start, forces=push)
 
 
+@pytest.mark.slow
 def test_a_simulation_near_locking_friction_goes_on():
     assert (jn.simulate(pushed_wedge(3.4), [0.0, 0.01]).status == 0).all()
 

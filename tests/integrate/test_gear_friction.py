@@ -82,6 +82,7 @@ def test_gears_that_lock_themselves_slow_down_under_the_load_that_pushes_them():
     assert found(4.0) == pytest.approx(1.5 - passed, rel=1e-9)
 
 
+@pytest.mark.slow
 def test_gears_that_jam_with_what_is_behind_them_are_told_with_the_instant():
     with pytest.raises(jn.errors.SolveError, match=r"friction locks at t = 0 s: joints\.mesh"):
         jn.simulate(pair(0.5, -2.3, load="-3"), TIME)

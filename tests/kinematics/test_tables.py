@@ -43,6 +43,7 @@ def test_a_data_frame_has_the_columns_of_a_csv_file_and_units(motion, tmp_path):
     np.testing.assert_array_equal(frame.index, motion.time)
 
 
+@pytest.mark.slow
 def test_a_batch_of_simulations_has_the_dataset_of_a_family():
     pendulum = jn.Mechanism(
         space="planar",

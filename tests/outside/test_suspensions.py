@@ -80,6 +80,7 @@ def test_toe_and_camber_over_travel_and_steering_are_those_of_suspension_explore
         np.testing.assert_allclose(found, published, rtol=0, atol=3e-6)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("given, by, published", [("bump", "center_z", BY_HEIGHT), ("steering", "bar_y", BY_RACK)])
 def test_bump_steer_is_that_of_suspension_explorer(corner, given, by, published):
     motion = jn.solve(corner.with_parameters(height=0.04, **{given: 0.1}), [0.0], order=1)

@@ -40,6 +40,7 @@ def test_driver_torque_and_rates_against_balances_by_hand(instant):
     np.testing.assert_array_less(np.abs(found - wanted) / scale, 1e-10)
 
 
+@pytest.mark.slow
 def test_reactions_show_friction_and_the_whole_is_in_equilibrium():
     instant, bodies = 0.033, ("crank", "rod", "piston")
     motion = jn.solve(slider_crank(0.1), [instant], order=4)
