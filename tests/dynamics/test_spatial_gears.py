@@ -172,6 +172,11 @@ def test_forces_are_differentiated_by_the_pressure_angle():
             },
             "mesh.friction.lead_angle: the lead angle of the first gear is 5.711 deg",
         ),
+        (
+            "worm",
+            {"point_m": TURNED @ [0, 0, 40.0]},
+            "from axes that are 0.05 m apart.*a number without a unit is in m",
+        ),
         ("worm", {"point_m": TURNED @ [0, 0, 0.05]}, "lies on the axis of the first gear"),
     ],
 )

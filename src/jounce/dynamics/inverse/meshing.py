@@ -20,6 +20,7 @@ from jounce.kinematics import Motion, Status
 from jounce.mechanism.building.builder import group_rows
 from jounce.mechanism.system import Group, holding, movable
 
+FAR = 300.0  # times the distance of crossed axes: no gears have such radii, but numbers in mm without their unit do
 LEAD = math.radians(0.5)  # by which a lead angle that is given to friction may be rounded
 OFF_PITCH = 1e-6  # of the pitch radius: further from the pitch line, a wheel does not mesh
 
@@ -99,6 +100,12 @@ def _check_pitch_points(motion: Motion, gears: Any, poses: Sequence[Any], names:
             "points",
         ),
         (
+            skew & (np.minimum(first, second) > FAR * its["distance"]),
+            "the third point is {first:.6g} m and {second:.6g} m from axes that are {distance:.6g} m apart: give where "
+            "the teeth touch; a number without a unit is in m",
+            "points",
+        ),
+        (
             skew & (helix != 0),
             "teeth of gears on crossed axes lie along the sliding velocity, which follows from the pitch point and the "
             "ratio: leave the helix angle out",
@@ -120,6 +127,7 @@ def _check_pitch_points(motion: Motion, gears: Any, poses: Sequence[Any], names:
         if (odd := np.argwhere(bad & (motion.status == Status.OK))).size:
             at = tuple(odd[0])
             numbers = {"first": first[at], "second": second[at], "sliding": its["sliding"][at]}
+            numbers["distance"] = its["distance"][at]
             numbers["lead"] = np.degrees(its["lead"][at])
             message = words.format(time=motion.time[at[1]], **numbers)
             raise MechanismError(message, name=f"{names[at[0]]}.{where}")
