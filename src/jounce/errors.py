@@ -365,7 +365,7 @@ class UnitWarning(_BoundedWarning):
 
 
 class AssemblyWarning(_BoundedWarning):
-    """Bodies were assembled with a part turned over in its joint, unlike in the starting guess."""
+    """Bodies were assembled with a part turned over in its joint, or on the other side than its joint means."""
 
 
 class IdleMotionWarning(_BoundedWarning):

@@ -370,23 +370,47 @@ def test_what_has_no_range_is_refused_by_name():
         jn.dynamics.holding_forces(jn.solve(held_twice, [0.0], order=0))
 
 
+def test_a_mechanism_without_friction_has_one_force():
+    alone = dataclasses.replace(sled().joints["guide"], friction=None)
+    found = held(jn.Mechanism(**{**vars_of(sled()), "joints": {"guide": alone}}), "push")
+    np.testing.assert_allclose(found, 20 * np.sin(0.4) * np.ones(3), rtol=1e-12)
+
+
 @pytest.mark.slow
-def test_teeth_that_press_on_either_flank_have_no_range_with_friction():
-    pin = jn.joints.Friction(0.1, 1e-3, 0.01)
-    gears = jn.Mechanism(
+@pytest.mark.parametrize("load", [10.0, -10.0])
+def test_flanks_do_not_change_what_gears_lose(load):
+    gears = toothed(friction=jn.joints.GearFriction(1e-3, 0.9, 0.8), load=load)
+    least, middle, most = held(gears, "turn")
+    np.testing.assert_allclose([least, middle, most], np.sort([load / 2 * 0.8, load / 2, load / 2 / 0.9]))
+
+
+def toothed(pin=None, friction=None, load=0.0):
+    """A pair of gears of 0.1 and 0.2 m with a pressure angle, which the first drives."""
+    return jn.Mechanism(
         space="planar",
         bodies={"a": jn.Body([0, 0], mass=1.0, inertia=0.1), "b": jn.Body([0.3, 0], mass=1.0, inertia=0.1)},
         joints={
             "A": jn.planar.Revolute(("ground", "a"), [0, 0], [0, 0], friction=pin),
             "B": jn.planar.Revolute(("ground", "b"), [0.3, 0], [0, 0]),
             "mesh": jn.planar.Gear(
-                ("a", "b"), point_i=[0, 0], point_j=[0, 0], radius_i=0.1, radius_j=0.2, pressure_angle=0.35
+                ("a", "b"),
+                point_i=[0, 0],
+                point_j=[0, 0],
+                radius_i=0.1,
+                radius_j=0.2,
+                pressure_angle=0.35,
+                friction=friction,
             ),
         },
         drivers={"turn": jn.drivers.CoordinateDriver(("ground", "a"), "angle", motion="t")},
+        forces={"load": jn.forces.Torque(("ground", "b"), load)},
     )
+
+
+@pytest.mark.slow
+def test_teeth_that_press_on_either_flank_have_no_range_with_friction():
     with pytest.raises(jn.errors.UnsupportedError, match=r"joints\.A\.friction: .* teeth press on either flank"):
-        jn.dynamics.holding_forces(jn.solve(gears, [0.0], order=0))
+        held(toothed(pin=jn.joints.Friction(0.1, 1e-3, 0.01)), "turn")
 
 
 def test_a_gradient_is_refused():

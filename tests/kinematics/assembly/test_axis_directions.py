@@ -109,6 +109,55 @@ def test_a_hinge_that_can_only_be_turned_over_is_named():
     assert (motion.status == 0).all()
 
 
+def disc(line, *, on=0.1, heading=0.4):
+    """A disc on a line that is tilted, with its center to the left of the line where `on` is above zero."""
+    c, s = np.cos(heading), np.sin(heading)
+    return jn.Mechanism(
+        space="planar",
+        bodies={"disc": jn.Body([-on * s, on * c])},
+        joints={
+            "on": jn.planar.Parallel2(("ground", "disc"), [-on * s, on * c], [0, 0], [c, s]),
+            "roll": jn.planar.Rolling(("ground", "disc"), [0, 0], [0, 0], [line * c, line * s], 0.1),
+        },
+        drivers={"go": jn.drivers.SlideDriver(("ground", "disc"), [0, 0], [0, 0], [c, s], "0.3*t")},
+        outputs={"turn": jn.outputs.AngleOutput("disc")},
+    )
+
+
+@pytest.mark.parametrize(("line", "on"), [(-2.0, 0.1), (1.0, -0.1)])
+def test_a_disc_above_its_line_turns_backwards_as_it_rolls_along(line, on):
+    turn = np.asarray(jn.solve(disc(line, on=on), [0.0, 1.0], order=1).outputs["turn"])
+    np.testing.assert_allclose(turn, np.sign(on) * np.array([[0, -3], [-3, -3]]), atol=1e-14)
+
+
+@pytest.mark.parametrize(("line", "on"), [(2.0, 0.1), (-1.0, -0.1)])
+def test_a_disc_on_the_other_side_of_its_line_is_told(line, on):
+    with pytest.warns(AssemblyWarning, match=r"joints\.roll: the center of the disc .* reverse the vector"):
+        jn.solve(disc(line, on=on), [0.0, 1.0], order=1)
+
+
+def test_a_pinion_on_the_other_side_of_its_rack_in_space_is_told():
+    def pinion(side):
+        return jn.Mechanism(
+            space="spatial",
+            bodies={"pinion": jn.Body([0, 0, side]), "rack": jn.Body([0, 0, 0])},
+            joints={
+                "hinge": jn.spatial.Revolute(("ground", "pinion"), [0, 0, side], [0, 0, 0], [1, 0, 0], [1, 0, 0]),
+                "guide": jn.spatial.Prismatic(
+                    ("ground", "rack"), [0, 0, 0], [0, 0, 0], [0, 1, 0], [0, 1, 0], [0, 0, 1], [0, 0, 1]
+                ),
+                "mesh": jn.spatial.Rolling(
+                    ("rack", "pinion"), [0, 0, 0], [0, 0, 0], [0, 3, 0], [1, 0, 0], [1, 0, 0], 0.02
+                ),
+            },
+            drivers={"push": jn.drivers.SpatialSlideDriver(("ground", "rack"), [0, 0, 0], [0, 0, 0], [0, 1, 0], "t")},
+        )
+
+    jn.solve(pinion(-0.02), [0.0], order=0)
+    with pytest.warns(AssemblyWarning, match=r"joints\.mesh: the center of the disc"):
+        jn.solve(pinion(0.02), [0.0], order=0)
+
+
 def test_axes_of_a_joint_of_ones_own_need_not_be_parallel():
     class Inclined(AbstractConstraint, type="inclined", space="spatial"):
         axis_i: Vector

@@ -8,6 +8,7 @@ from jaxtyping import Float
 
 from jounce.base.shapes import Numbers
 from jounce.constraints.spin_hold import SpinHold
+from jounce.dynamics.friction.coupling import loses_torque
 from jounce.dynamics.friction.extreme_friction import ExtremeFriction
 from jounce.dynamics.inverse.joint_friction import JointFriction
 from jounce.dynamics.inverse.motion_forces import MotionForces
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
 
 SMALLEST = 1e-12  # determinant: nearer to zero friction locks
 BOUNDS = ("least", "frictionless", "greatest")
+PROVEN = np.empty(0, int)  # instants at which a range is not
 
 
 def holding_forces(motion: Motion) -> "xarray.Dataset":
@@ -87,7 +89,7 @@ def holding_forces(motion: Motion) -> "xarray.Dataset":
     if joints:
         _check_determined(forces, f"joints.{joints[0]}.friction")
     plain = {name: forces.driver_force(name)[0, 0] for name in mechanism.drivers}
-    ranges = _ranges(forces, plain) if joints else {name: ([x, x, x], []) for name, x in plain.items()}
+    ranges = _ranges(forces, plain) if joints else {name: ([x, x, x], PROVEN) for name, x in plain.items()}
     failed = motion.status != Status.OK
     variables = {}
     for name, (bounds, unproven) in ranges.items():
@@ -129,8 +131,9 @@ def _check_determined(forces: MotionForces, name: str) -> None:
     model, reasons = forces.model, []
     if forces._joined.shape[0] != forces._joined.shape[1]:
         reasons.append("drivers do not hold all that can move: drive it, and look whether zero is within the range")
-    if forces.flanks:
-        reasons.append("teeth press on either flank: give gears without pressure_angle")
+    groups = forces._joined.groups
+    if forces.flanks and not all(loses_torque(groups[k].element) for k in forces.friction.first_rows):
+        reasons.append("teeth press on either flank, which loads joints with friction: give gears without pressure_angle")
     if any(isinstance(group.element, SpinHold) for group in model.system.groups):
         reasons.append("a body may spin about an axis of itself: hold it by a joint")
     if reasons:

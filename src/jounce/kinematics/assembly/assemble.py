@@ -15,6 +15,7 @@ from jounce.kinematics.assembly.axis_directions import (
     axis_signs,
     axis_signs_to_try,
     drawn_axis_signs,
+    mirrored_discs,
     pair_names,
     starts_with_axis_signs,
 )
@@ -159,7 +160,14 @@ def _assemble_near_guess(model: Model, instant: float, tolerance: float) -> tupl
 
 
 def warn_of_parts_turned_over(model: Model, attempt: AssemblyAttempt) -> None:
-    """Warn of joints whose parts are held the other way round than the starting guess means."""
+    """Warn of joints whose parts are the other way round than the starting guess or the joint means."""
+    if names := mirrored_discs(model, attempt.coordinates):
+        message = (
+            f"{', '.join(names)}: the center of the disc is one radius from the line, but on the other side than the "
+            "joint has it, so that the disc turns against the way in which it would roll there; reverse the vector "
+            "along the line (in the plane the center belongs on its right, in space on the side of vector x axis)"
+        )
+        warnings.warn(AssemblyWarning(message), stacklevel=3)
     there = axis_signs(model.system, attempt.coordinates)
     if there.all() or not (odd := there != drawn_axis_signs(model)).any():
         return

@@ -12,6 +12,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from jounce.base.modules import Module
+from jounce.constraints import planar, spatial
 from jounce.constraints.angles import perpendiculars
 from jounce.constraints.base import rows
 from jounce.constraints.facts import facts_of
@@ -26,6 +27,8 @@ from jounce.rigid.pose import Pose
 
 DRAWN_OPPOSITE = -0.9  # cosine: directions as far apart in the starting guess are meant to point opposite ways
 DRAWN_NEARLY = 0.8  # where all are within this, the guess leaves no doubt, and nothing is gained by another
+
+MIRRORED = 1e-6  # of the radius: a disc as near to where it touches its line from the other side is meant to
 
 AxisSigns = Bool[np.ndarray, " pair"]
 """Of each pair of directions that joints hold parallel, whether they point the same way."""
@@ -174,6 +177,38 @@ def _cosines(system: System, coordinates: Coordinates) -> Float[np.ndarray, " pa
         )
         cosines.append(np.sum(first * second, axis=0))
     return np.concatenate([*cosines, np.zeros(0)])
+
+
+def mirrored_discs(model: Model, coordinates: Coordinates) -> list[str]:
+    """Return the names of rolling joints whose disc touches its line from the wrong side.
+
+    There a disc that rolls turns the other way than the joint says.
+    """
+    names: list[str] = []
+    for group, rows in zip(model.system.groups, group_rows(model), strict=True):
+        rolling = group.element
+        if not isinstance(rolling, (planar.Rolling, spatial.Rolling)):
+            continue
+        slots = [np.array(slot) for slot in group.bodies]
+        line, center = (
+            np.asarray(coordinates["position"])[:, slot, 0]
+            + _globally(np.asarray(point)[..., 0], coordinates, slot)
+            for point, slot in zip((rolling.point_i, rolling.point_j), slots, strict=True)
+        )
+        side = _globally(_side(group), coordinates, slots[0])
+        radius = np.asarray(rolling.radius)[..., 0]
+        off = np.abs(np.sum(side * (center - line), axis=0) + radius)
+        names += [name for name, x in zip(model.rows[rows], off <= MIRRORED * radius, strict=False) if x]
+    return names
+
+
+def _side(group: Group) -> Float[np.ndarray, "component instance"]:
+    """Return unit vectors from the lines of rolling joints to the side of their discs, in the axes of body i."""
+    line = _unit(group, "vector_i")
+    if len(line) == 2:
+        return np.stack([line[1], -line[0]])
+    side = np.cross(line, _unit(group, "axis_i"), axis=0)
+    return side / np.linalg.norm(side, axis=0)
 
 
 def _globally(
