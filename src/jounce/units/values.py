@@ -25,6 +25,7 @@ _NUMBER_PATTERN = r"[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?"
 _ATOM = r"[A-Za-z_\u00b0\u00b5\u03bc][A-Za-z_0-9]*"
 _WHOLE = r"[-+]?[0-9]{1,2}"
 _POWER = rf"(?:\s*(?:\*\*|\^)\s*(?:{_WHOLE}|\(\s*{_WHOLE}\s*\))|\u207b?[\u00b9\u00b2\u00b3\u2074])?"
+_DOTS = "\u00b7\u22c5"
 _SIGN = r"(?:\s*[*/\u00b7\u22c5]\s*|\s+)"
 _TERM = rf"{_ATOM}{_POWER}"
 _GROUP = rf"\(\s*{_TERM}(?:{_SIGN}{_TERM})*\s*\)"
@@ -181,7 +182,8 @@ def _parse_text(
         raise ExpressionError(f"a value has at most {MAX_CHARACTERS} characters")
     if comma := _DECIMAL_COMMA.fullmatch(text.strip()):
         point = f"{comma[1]}.{comma[2]} {comma[3] or ''}".strip()
-        raise UnitError(f"a number has a decimal point and no thousands separator: write {point}")
+        whole = f" or {comma[1]}{comma[2]} {comma[3] or ''}".rstrip() if len(comma[2]) == 3 else ""
+        raise UnitError(f"a number has a decimal point and no thousands separator: write {point}{whole}")
     with_unit = _WITH_UNIT.fullmatch(text.strip())
     if with_unit and not _divided_by_a_name(with_unit[2], known):
         return _parse_with_unit(*with_unit.groups(), kind=kind, known=known, variables=variables)
@@ -228,23 +230,30 @@ def _divided_by_a_name(unit: str, known: Collection[str]) -> bool:
     return unit.startswith("/") and first is not None and (first.group() in known or first.group() == "pi")
 
 
+def _multiplied(sign: re.Match[str]) -> str:
+    """Return the sign between two factors, a * for a space."""
+    return sign[0].strip() or "*"
+
+
 def _parse_with_unit(
     number: str, unit: str, *, kind: str, known: Collection[str], variables: Mapping[str, Dimension | None]
 ) -> Value:
-    named = [atom for atom in re.findall(_ATOM, unit)[1:] if atom in variables]
+    first = re.match(_ATOM, unit)
+    named = next((found for found in re.finditer(_ATOM, unit) if found.start() and found[0] in variables), None)
     if named:  # in a law t is no tonne
-        first = re.match(_ATOM, unit)
-        given = f"{number} {first.group() if first else ''}".strip()
-        message = (
-            f"a number with a unit must stand alone, and '{named[0]}' would be a unit, too; give '{given}' as a "
-            f"parameter, such as c: {given}, and write c*{named[0]}"
-        )
-        raise UnitError(message)
+        before = unit[: named.start()].rstrip()
+        if set(re.findall(_ATOM, before)) <= {*known, *CONSTANTS}:
+            raise UnitError(f"a product needs its *, as in {number}*{re.sub(_SIGN, _multiplied, unit)}")
+        sign = "/" if before.endswith("/") else "*"
+        given = f"{number} {before.rstrip(f'*/ {_DOTS}')}"
+        message = f"a number with a unit must stand alone, and '{named[0]}' would be a unit, too; give "
+        if "(" in before:
+            raise UnitError(f"{message}it as a parameter, and write its name here")
+        raise UnitError(f"{message}'{given}' as a parameter, such as c: {given}, and write c{sign}{named[0]}")
     try:
         size, dimension = parse_unit(unit)
         check_dimension(dimension, kind, f"the unit of {show_value(f'{number} {unit}')}")
     except UnitError as error:
-        first = re.match(_ATOM, unit)
         if first and first.group() in {*known, "pi", *FUNCTIONS}:
             raise UnitError(f"{error.message}; a product needs its *, as in {number}*{unit}") from None
         raise

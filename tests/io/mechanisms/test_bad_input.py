@@ -145,14 +145,23 @@ def test_a_misspelled_key_is_named_rather_than_the_key_that_misses(tmp_path):
         load(path)
 
 
-@pytest.mark.parametrize("spaces, beside", [(3, 2), (1, 0)])
-def test_a_line_that_is_indented_otherwise_is_told_with_its_column(tmp_path, spaces, beside):
+@pytest.mark.parametrize(
+    "spaces, words",
+    [(3, "further than the entries beside it (3 spaces, not 2)"), (1, "less than those before it (1 space, not 2)")],
+)
+def test_a_line_that_is_indented_otherwise_is_told_with_its_column(tmp_path, spaces, words):
     path = tmp_path / "indent.yaml"
     path.write_text(f"space: planar\nbodies:\n  a: {{position: [0, 0]}}\n{' ' * spaces}b: {{position: [1, 0]}}\n")
     with pytest.raises(MechanismFileError, match="indented") as error:
         load(path)
-    assert "line 4: the YAML cannot be read: the line is indented further than the entries" in str(error.value)
-    assert f"({spaces} spaces, not {beside})" in str(error.value)
+    assert f"line 4: the YAML cannot be read: the line is indented {words}" in str(error.value)
+
+
+def test_a_colon_without_a_space_is_told(tmp_path):
+    path = tmp_path / "glued.yaml"
+    path.write_text("space: planar\nbodies: {a: {}}\njoints:\n  A: {type:revolute, bodies: [ground, a]}\n")
+    with pytest.raises(MechanismFileError, match=r"line 4, .* a colon must be followed by a space: write type: r"):
+        load(path)
 
 
 @pytest.mark.parametrize(

@@ -124,13 +124,13 @@ def disc(line, *, on=0.1, heading=0.4):
     )
 
 
-@pytest.mark.parametrize(("line", "on"), [(-2.0, 0.1), (1.0, -0.1)])
+@pytest.mark.parametrize("line, on", [(-2.0, 0.1), (1.0, -0.1)])
 def test_a_disc_above_its_line_turns_backwards_as_it_rolls_along(line, on):
     turn = np.asarray(jn.solve(disc(line, on=on), [0.0, 1.0], order=1).outputs["turn"])
     np.testing.assert_allclose(turn, np.sign(on) * np.array([[0, -3], [-3, -3]]), atol=1e-14)
 
 
-@pytest.mark.parametrize(("line", "on"), [(2.0, 0.1), (-1.0, -0.1)])
+@pytest.mark.parametrize("line, on", [(2.0, 0.1), (-1.0, -0.1)])
 def test_a_disc_on_the_other_side_of_its_line_is_told(line, on):
     with pytest.warns(AssemblyWarning, match=r"joints\.roll: the center of the disc .* reverse the vector"):
         jn.solve(disc(line, on=on), [0.0, 1.0], order=1)

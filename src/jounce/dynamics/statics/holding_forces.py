@@ -133,7 +133,9 @@ def _check_determined(forces: MotionForces, name: str) -> None:
         reasons.append("drivers do not hold all that can move: drive it, and look whether zero is within the range")
     groups = forces._joined.groups
     if forces.flanks and not all(loses_torque(groups[k].element) for k in forces.friction.first_rows):
-        reasons.append("teeth press on either flank, which loads joints with friction: give gears without pressure_angle")
+        reasons.append(
+            "teeth press on either flank, which loads joints with friction: give gears without pressure_angle"
+        )
     if any(isinstance(group.element, SpinHold) for group in model.system.groups):
         reasons.append("a body may spin about an axis of itself: hold it by a joint")
     if reasons:

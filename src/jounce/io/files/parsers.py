@@ -87,7 +87,7 @@ def read_yaml(path: str, text: str, *, many: bool = False) -> Source:
                 if documents > 1 and not many:
                     raise MechanismFileError("a second YAML document starts (---)", path=path, line=line)
     except YAMLError as error:
-        raise _yaml_error(path, error) from None
+        raise _yaml_error(path, error, text.splitlines()) from None
     except (RecursionError, ValueError, IndexError, OverflowError) as error:
         raise MechanismFileError(f"the YAML cannot be read: {error}", path=path) from None
     return builder.source
@@ -106,7 +106,7 @@ def _refuse_tag(builder: Builder, event: Any, line: int) -> None:
         raise builder.fail(f"the YAML tag {tag} is not allowed", line)
 
 
-def _yaml_error(path: str, error: Exception) -> MechanismFileError:
+def _yaml_error(path: str, error: Exception, lines: list[str]) -> MechanismFileError:
     """Word an error of the YAML scanner in one line."""
     start = getattr(error, "context_mark", None)
     mark = getattr(error, "problem_mark", None) or start
@@ -122,9 +122,13 @@ def _yaml_error(path: str, error: Exception) -> MechanismFileError:
         and mark is not None
         and mark.column > start.column
     ):
+        before = [len(x) - len(x.lstrip()) for x in lines[: mark.line] if x.strip() and x.strip()[0] != "#"]
+        words, usual = "further than the entries beside it", start.column
+        if before and mark.column < before[-1]:
+            words, usual = "less than those before it", before[-1]
         text = (
-            f"the line is indented further than the entries beside it ({mark.column} spaces, not "
-            f"{start.column}); entries of one mapping begin in one column"
+            f"the line is indented {words} ({mark.column} space{'s' * (mark.column != 1)}, not {usual}); entries of "
+            "one mapping begin in one column"
         )
     elif "mapping values are not allowed" in text:
         text += " (a second ':' in one line, or a line indented too far)"

@@ -185,20 +185,19 @@ def mirrored_discs(model: Model, coordinates: Coordinates) -> list[str]:
     There a disc that rolls turns the other way than the joint says.
     """
     names: list[str] = []
-    for group, rows in zip(model.system.groups, group_rows(model), strict=True):
+    for group, places in zip(model.system.groups, group_rows(model), strict=True):
         rolling = group.element
         if not isinstance(rolling, (planar.Rolling, spatial.Rolling)):
             continue
         slots = [np.array(slot) for slot in group.bodies]
         line, center = (
-            np.asarray(coordinates["position"])[:, slot, 0]
-            + _globally(np.asarray(point)[..., 0], coordinates, slot)
+            np.asarray(coordinates["position"])[:, slot, 0] + _globally(np.asarray(point)[..., 0], coordinates, slot)
             for point, slot in zip((rolling.point_i, rolling.point_j), slots, strict=True)
         )
         side = _globally(_side(group), coordinates, slots[0])
         radius = np.asarray(rolling.radius)[..., 0]
         off = np.abs(np.sum(side * (center - line), axis=0) + radius)
-        names += [name for name, x in zip(model.rows[rows], off <= MIRRORED * radius, strict=False) if x]
+        names += [name for name, x in zip(model.rows[places], off <= MIRRORED * radius, strict=False) if x]
     return names
 
 

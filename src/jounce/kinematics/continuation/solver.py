@@ -232,7 +232,8 @@ class Solver:
     def _contradicting(self, gaps: Float[np.ndarray, "2 row"]) -> str:
         """Name the joints and drivers that contradict each other, and by how much they are open."""
         size, over = gaps
-        names = dict.fromkeys(self.model.rows[k] for k in np.argsort(-over) if over[k] > 0.1 * over.max())
+        largest = [self.model.rows[k] for k in np.argsort(-over) if over[k] > 0.1 * over.max()]
+        names = dict.fromkeys(sorted(largest, key=lambda name: name not in self.model.drivers))  # drivers first
         wide = size.max()
         phrase = f"open by {wide:.2g} rad, or sizes of the mechanism" if wide > LARGEST_GAP else "in their rates"
         return f"{', '.join(list(names)[:4])} ({phrase})"

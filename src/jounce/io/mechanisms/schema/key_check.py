@@ -69,6 +69,11 @@ def unknown_type(
     """Return the error for a joint, driver or force whose type is missing, or is none of those that `types` returns."""
     role = ROLES[str(at[0])]
     valid = types(space, role)
+    glued = next((key for key in entry if str(key).startswith("type:")), None)
+    if "type" not in entry and glued is not None:
+        return source.error(
+            f"a colon must be followed by a space: write {str(glued).replace(':', ': ', 1)}", (*at, glued)
+        )
     if "type" not in entry:
         return source.error(f"is missing; valid: {', '.join(sorted(valid))}", (*at, "type"))
     name = entry["type"]
