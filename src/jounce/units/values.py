@@ -239,7 +239,7 @@ def _parse_with_unit(
     number: str, unit: str, *, kind: str, known: Collection[str], variables: Mapping[str, Dimension | None]
 ) -> Value:
     first = re.match(_ATOM, unit)
-    named = next((found for found in re.finditer(_ATOM, unit) if found.start() and found[0] in variables), None)
+    named = next((atom for atom in re.finditer(_ATOM, unit) if atom.start() and atom[0] in variables), None)
     if named:  # in a law t is no tonne
         before = unit[: named.start()].rstrip()
         if set(re.findall(_ATOM, before)) <= {*known, *CONSTANTS}:

@@ -185,7 +185,7 @@ def mirrored_discs(model: Model, coordinates: Coordinates) -> list[str]:
     There a disc that rolls turns the other way than the joint says.
     """
     names: list[str] = []
-    for group, places in zip(model.system.groups, group_rows(model), strict=True):
+    for group, its_rows in zip(model.system.groups, group_rows(model), strict=True):
         rolling = group.element
         if not isinstance(rolling, (planar.Rolling, spatial.Rolling)):
             continue
@@ -197,7 +197,7 @@ def mirrored_discs(model: Model, coordinates: Coordinates) -> list[str]:
         side = _globally(_side(group), coordinates, slots[0])
         radius = np.asarray(rolling.radius)[..., 0]
         off = np.abs(np.sum(side * (center - line), axis=0) + radius)
-        names += [name for name, x in zip(model.rows[places], off <= MIRRORED * radius, strict=False) if x]
+        names += [name for name, x in zip(model.rows[its_rows], off <= MIRRORED * radius, strict=False) if x]
     return names
 
 
