@@ -84,6 +84,29 @@ def test_power_goes_where_it_should(lift):
 
 
 @pytest.mark.slow
+def test_power_that_friction_takes():
+    """Of a block that is pushed along a level guide: the coefficient times the weight times the speed."""
+    block = jn.Mechanism(
+        space="planar",
+        gravity=[0, -10.0],
+        bodies={"block": jn.Body([0, 0], mass=2.0, inertia=1.0)},
+        joints={
+            "rail": jn.planar.Prismatic(
+                ("ground", "block"), [0, 0], [0, 0], [1, 0], [1, 0], friction=jn.joints.Friction(0.3, 1e-6)
+            )
+        },
+        drivers={"push": jn.drivers.SlideDriver(("ground", "block"), [0, 0], [0, 0], [1, 0], "t + t**2")},
+    )
+    figure = draw_power(jn.solve(block, TIME, order=3))
+    speed = 1 + 2 * TIME
+    taken, gained = 0.3 * 2 * 10 * speed, 2 * 2 * speed
+    for name, values in (("friction", -taken), ("kinetic", gained), ("drivers", taken + gained)):
+        np.testing.assert_allclose(lines(figure.axes[0])[name], values, rtol=0, atol=1e-9)
+    words = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert words == ["put in by drivers", "put in by friction", "gain of kinetic energy"]
+
+
+@pytest.mark.slow
 def test_what_has_no_forces_is_told(lift):
     bare = jn.solve(jn.load(ROOT / "examples" / "four_bar.yaml"), [0.0, 0.1], order=2)
     for figure in (draw_reactions, draw_energy, draw_power):

@@ -16,7 +16,7 @@ from jounce.kinematics import Motion
 from jounce.plot.drawings.geometry import skeleton
 from jounce.plot.figure import draw_columns, finish
 from jounce.plot.labels import scale_of, unit_label
-from jounce.plot.style import BLUE, GREEN, ORANGE, VERMILION, blank_figure, style
+from jounce.plot.style import BLUE, GREEN, ORANGE, PURPLE, VERMILION, blank_figure, style
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -30,6 +30,7 @@ LINES = {
     "springs": GREEN,
     "drivers": GREEN,
     "forces": ORANGE,
+    "friction": PURPLE,
     "total": "#000000",
 }
 WORDS = {"drivers": "put in by drivers", "forces": "put in by forces", "friction": "put in by friction",
