@@ -6,10 +6,10 @@ ends), the classical Runge-Kutta method (four accelerations, order 4 as well), a
 trapezoidal rule with jerk of both ends. Errors are the largest of all angles over the run.
 """
 
+import dataclasses
 from collections.abc import Callable
 from typing import Any
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -29,7 +29,7 @@ class RungeKutta(AbstractMethod):
     """The classical method of order 4, with steps of given length."""
 
     step: float
-    joined: jn.Obreshkov = eqx.field(default_factory=lambda: jn.Obreshkov(2))  # for values inside a step
+    joined: jn.Obreshkov = dataclasses.field(default_factory=lambda: jn.Obreshkov(2))  # for values inside a step
 
     def expansion_order(self, tolerance):
         return 1

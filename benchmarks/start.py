@@ -43,7 +43,6 @@ def cases(quick: bool) -> Cases:
         "first name after `import jounce`",
         [
             Contestant("jounce", fresh("-c", "import jounce; jounce.load")),
-            Contestant("`import jax, jax.numpy, equinox`", fresh("-c", "import jax, jax.numpy, equinox")),
             Contestant("`import jax, jax.numpy`", fresh("-c", "import jax, jax.numpy")),
         ],
     )

@@ -2,7 +2,6 @@
 
 import math
 
-import equinox as eqx
 import numpy as np
 import pytest
 
@@ -15,7 +14,7 @@ with taken_back():
     class Track(jn.joints.AbstractConstraint, type="test_track", space="planar"):
         """A bead on y = height f((x - at) / width)."""
 
-        shape: str = eqx.field(static=True)
+        shape: str
         height: jn.joints.Scalar
         at: jn.joints.Scalar
         width: jn.joints.Scalar

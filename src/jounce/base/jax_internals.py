@@ -1,7 +1,7 @@
-"""What this package uses of JAX, jaxlib and Equinox that is private to them: all of it is here, and nowhere else.
+"""What this package uses of JAX and jaxlib that is private to them: all of it is here, and nowhere else.
 
-Another release may have none of it, or something else by the same name. It was tried with JAX and jaxlib 0.10 and 0.11
-and with Equinox 0.13. Where a release is without something, that does not happen which it was for: a program is not
+Another release may have none of it, or something else by the same name. It was tried with JAX and jaxlib 0.10 and 0.11.
+Where a release is without something, that does not happen which it was for: a program is not
 kept, or is compiled within another one; what cannot be done without is imported here, so that a release without it is
 known at once.
 """
@@ -14,7 +14,6 @@ from jax._src import config as config, core as core
 from jax.core import Tracer
 
 TRIED = (0, 10), (0, 11)  # releases of JAX
-MISSING = "equinox._module._flatten._Missing"  # in a tree, the value of a field that has none
 
 
 def is_tried() -> bool:
@@ -42,12 +41,6 @@ def processes_started() -> bool:
     from jax._src import xla_bridge
 
     return getattr(xla_bridge, "backends_are_initialized", lambda: True)()
-
-
-def is_missing(value: Any) -> bool:
-    """Tell whether a static value of a tree stands for none."""
-    kind = type(value)
-    return f"{kind.__module__}.{kind.__qualname__}" == MISSING
 
 
 def runs_at_once(value: Tracer) -> bool:

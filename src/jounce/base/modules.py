@@ -1,34 +1,191 @@
 """Objects whose values JAX sees, and copies of them with other values, made without the checks of a construction.
 
 A model is built of modules that were checked already, and of each several copies are made for every solution:
-`dataclasses.replace` and `equinox.tree_at` take longer for one than Newton's method for a step.
+`dataclasses.replace` takes longer for one than Newton's method for a step.
 """
 
 import dataclasses
-from collections.abc import Iterable, Mapping
-from functools import lru_cache
-from typing import Any, TypeVar, dataclass_transform
+import inspect
+import operator
+from abc import ABCMeta
+from collections.abc import Callable, Iterable, Mapping
+from functools import lru_cache, partial, wraps
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar, dataclass_transform
 
-import equinox as eqx
+import jax
+import numpy as np
 
-_ModuleType: Any = type(eqx.Module)
-
-
-@dataclass_transform(field_specifiers=(dataclasses.field, eqx.field))
-class _OrdinaryType(_ModuleType):
-    """The class of classes of which no others are registered as virtual: `isinstance` need not look for such."""
-
-    __instancecheck__ = type.__instancecheck__
+_TRACED = object()  # in the place of an array
+_being_made: set[int] = set()  # the identities of modules whose `__init__` runs
 
 
-class Module(eqx.Module, metaclass=_OrdinaryType):
-    """A module whose attributes and classes are looked up as those of any object.
+def field(*, static: bool = False, converter: Callable[[Any], Any] | None = None, **options: Any) -> Any:
+    """Return a field of a module, as `dataclasses.field` does, whose metadata Equinox reads and writes, too.
 
-    Equinox looks at every attribute for bound methods, of which it makes modules, so that JAX takes them as arguments:
-    a tenth of the time of a short solution, for what no function here is given.
+    Parameters
+    ----------
+    static : bool, default False
+        Whether JAX sees no value but a constant: programs are compiled for each that is not equal to others.
+    converter : callable, optional
+        What makes the value of the one that is given.
+    **options
+        Those of `dataclasses.field`.
+    """
+    metadata = dict(options.pop("metadata", {}))
+    if static:
+        metadata["static"] = True
+    if converter is not None:
+        metadata["converter"] = converter
+    return dataclasses.field(metadata=metadata, **options)
+
+
+class _Layout(NamedTuple):
+    """What a class of modules has: fields by kind, and what is called once an object is made."""
+
+    own_init: bool  # whether `__init__` is not that of a dataclass
+    traced: tuple[str, ...]
+    static: tuple[str, ...]
+    converters: tuple[tuple[str, Callable[[Any], Any]], ...]
+    checks: tuple[Callable[[Any], None], ...]
+
+
+@dataclass_transform(field_specifiers=(dataclasses.field, field))
+class _ModuleType(ABCMeta):
+    """The class of classes whose objects are dataclasses and trees of JAX.
+
+    None is registered as the virtual base class of another: `isinstance` need not look for such.
     """
 
-    __getattribute__ = object.__getattribute__
+    __instancecheck__ = type.__instancecheck__
+    __layout__: _Layout
+
+    def __new__(mcs, name: str, bases: tuple[type, ...], namespace: dict[str, Any], /, **keywords: Any) -> Any:
+        kind: Any = super().__new__(mcs, name, bases, namespace, **keywords)
+        own_init = "__init__" in namespace or any(_has_own_init(base) for base in bases)
+        kind = dataclasses.dataclass(eq=False, repr=False, init=not own_init)(kind)
+        fields = dataclasses.fields(kind)
+        layout = kind.__layout__ = _Layout(
+            own_init,
+            traced=tuple(f.name for f in fields if not f.metadata.get("static", False)),
+            static=tuple(f.name for f in fields if f.metadata.get("static", False)),
+            converters=tuple((f.name, f.metadata["converter"]) for f in fields if f.metadata.get("converter")),
+            checks=tuple(vars(base)["__check_init__"] for base in kind.__mro__ if "__check_init__" in vars(base)),
+        )
+        for converted, _ in layout.converters:  # of any type: those who check types see the value that is given
+            if converted in kind.__init__.__annotations__:
+                kind.__init__.__annotations__[converted] = Any
+        _register(kind, layout)
+        return kind
+
+    def __call__(cls, *arguments: Any, **keywords: Any) -> Any:
+        module, layout = cls.__new__(cls, *arguments, **keywords), cls.__layout__
+        _being_made.add(id(module))
+        try:
+            cls.__init__(module, *arguments, **keywords)
+        finally:
+            _being_made.discard(id(module))
+        held = vars(module)
+        for name in (*layout.traced, *layout.static):
+            if name not in held and not hasattr(cls, name):
+                raise TypeError(f"{cls.__qualname__}: __init__ gives the field {name!r} no value")
+        for name, converter in layout.converters:
+            held[name] = converter(held[name])
+        for name in layout.static:
+            if isinstance(held.get(name), jax.Array):
+                raise TypeError(f"{cls.__qualname__}.{name}: a static field cannot hold an array of JAX")
+        for check in layout.checks:
+            check(module)
+        return module
+
+    @property
+    def __signature__(cls) -> inspect.Signature:
+        """The signature for `help`, which would be that of `__call__` otherwise."""
+        signature = inspect.signature(cls.__init__)
+        return signature.replace(parameters=list(signature.parameters.values())[1:])
+
+
+def _has_own_init(base: type) -> bool:
+    return base.__layout__.own_init if isinstance(base, _ModuleType) else base.__init__ is not object.__init__
+
+
+def _register(kind: type, layout: _Layout) -> None:
+    """Register a class of modules as a tree of JAX whose leaves are in the fields that are not static."""
+    traced, static = _getter(layout.traced), _getter(layout.static)
+    keys, names = tuple(map(jax.tree_util.GetAttrKey, layout.traced)), (*layout.traced, *layout.static)
+
+    def flatten(module: Any) -> tuple[Any, Any]:
+        return traced(module), static(module)
+
+    def flatten_with_keys(module: Any) -> tuple[Any, Any]:
+        return tuple(zip(keys, traced(module), strict=True)), static(module)
+
+    def unflatten(constants: Any, values: Any) -> Any:
+        module = object.__new__(kind)
+        vars(module).update(zip(names, (*values, *constants), strict=True))
+        return module
+
+    jax.tree_util.register_pytree_with_keys(kind, flatten_with_keys, unflatten, flatten)
+
+
+def _getter(names: tuple[str, ...]) -> Callable[[Any], tuple[Any, ...]]:
+    """Return a function that takes the values of several attributes."""
+    if len(names) > 1:
+        return operator.attrgetter(*names)
+    return lambda module: tuple(getattr(module, name) for name in names)
+
+
+class Module(metaclass=_ModuleType):
+    """A dataclass that JAX sees as a tree, whose fields keep their values once it has been made.
+
+    Subclasses declare fields, as dataclasses do, with `field(static=True)` for those that JAX is not to see. Once an
+    object is made, converters run, and then `__check_init__` of its class and of each of its bases.
+    """
+
+    if not TYPE_CHECKING:
+
+        def __setattr__(self, name, value):
+            if id(self) in _being_made and name in field_names(type(self)):
+                object.__setattr__(self, name, value)
+                return
+            kind = type(self).__qualname__
+            if id(self) in _being_made:
+                words = f"{kind} has no field {name!r}: declare it in the class, as in `{name}: float`"
+            else:
+                words = f"cannot assign to field {name!r} of {kind}: make a copy by dataclasses.replace"
+            raise dataclasses.FrozenInstanceError(words)
+
+        def __delattr__(self, name):
+            raise dataclasses.FrozenInstanceError(f"cannot delete field {name!r} of {type(self).__qualname__}")
+
+    def __repr__(self) -> str:
+        shown = (f.name for f in dataclasses.fields(self) if f.repr)  # pyright: ignore[reportArgumentType]
+        return f"{type(self).__qualname__}({', '.join(f'{name}={_shown(getattr(self, name))}' for name in shown)})"
+
+    def __hash__(self) -> int:
+        return hash((type(self), *(getattr(self, name) for name in field_names(type(self)))))
+
+    def __eq__(self, other: object) -> bool:
+        if type(self) is not type(other):
+            return False
+        (a, structure), (b, other_structure) = jax.tree.flatten(self), jax.tree.flatten(other)
+        return structure == other_structure and all(map(_is_same, a, b))
+
+
+def _shown(value: Any) -> str:
+    """Return the text of a value, an array of more than a few numbers by its type and shape."""
+    if isinstance(value, np.ndarray | jax.Array) and value.size > 12:
+        return f"{value.dtype}{list(value.shape)}"
+    return repr(value)
+
+
+def _is_same(a: Any, b: Any) -> bool:
+    """Tell whether leaves are of one type and equal, arrays in all numbers."""
+    if a is b:
+        return True
+    if isinstance(a, np.ndarray | np.generic | jax.Array):
+        alike = type(a) is type(b) and a.shape == b.shape and a.dtype == b.dtype
+        return alike and bool((np.asarray(a) == np.asarray(b)).all())
+    return type(a) is type(b) and bool(a == b)
 
 
 @dataclasses.dataclass(unsafe_hash=True)
@@ -47,9 +204,8 @@ def with_fields(module: M, **values: Any) -> M:
 
     Examples
     --------
-    >>> import equinox as eqx
-    >>> from jounce.base.modules import with_fields
-    >>> class Spring(eqx.Module):
+    >>> from jounce.base.modules import Module, with_fields
+    >>> class Spring(Module):
     ...     stiffness: float
     ...     length: float
     >>> with_fields(Spring(3.0, 0.1), length=0.2)
@@ -73,6 +229,25 @@ def unchecked(kind: type[M], values: Mapping[str, Any]) -> M:
 def field_names(kind: type[Any]) -> tuple[str, ...]:
     """Return the names of the fields of a dataclass."""
     return tuple(field.name for field in dataclasses.fields(kind))
+
+
+def jit_over_arrays(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Return a function that `jax.jit` compiles, with arrays in its arguments traced, and all else constants."""
+
+    @partial(jax.jit, static_argnums=0)
+    def compiled(constants: Any, arrays: list[Any]) -> Any:
+        structure, others = constants
+        remaining = iter(arrays)
+        return function(*structure.unflatten(next(remaining) if x is _TRACED else x for x in others))
+
+    @wraps(function)
+    def called(*arguments: Any) -> Any:
+        leaves, structure = jax.tree.flatten(arguments)
+        traced = [isinstance(leaf, np.ndarray | np.generic | jax.Array) for leaf in leaves]
+        others = tuple(_TRACED if is_traced else x for x, is_traced in zip(leaves, traced, strict=True))
+        return compiled((structure, others), [x for x, is_traced in zip(leaves, traced, strict=True) if is_traced])
+
+    return called
 
 
 def is_ours(thing: Any) -> bool:

@@ -12,7 +12,7 @@ from typing import Any
 
 from jounce.reporting.terminal import say, say_json, show_columns
 
-PACKAGES = ("jax", "jaxlib", "equinox", "numpy", "scipy", "xarray", "llvmlite", "pydantic", "pint", "matplotlib")
+PACKAGES = ("jax", "jaxlib", "numpy", "scipy", "xarray", "llvmlite", "pydantic", "pint", "matplotlib")
 FOR_DEVELOPERS = ("test", "bench", "docs", "all")
 VARIABLES = ("JOUNCE_CACHE_DIR", "JOUNCE_THREADS", "JOUNCE_NATIVE", "JOUNCE_DEBUG", "JAX_PLATFORMS")
 LARGEST_ERROR = 1e-12  # of the peak of each derivative

@@ -6,12 +6,11 @@ from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 from typing import Annotated, Any, ClassVar
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 from jaxtyping import Bool
 
-from jounce.base.modules import Module
+from jounce.base.modules import Module, field
 from jounce.base.shapes import Numbers
 from jounce.constraints.facts import (
     USUAL_DIMENSIONS,
@@ -54,12 +53,12 @@ def register(kind: type[Any], type: str, space: str, role: str) -> None:  # noqa
     check_choice("role", role, ROLES, MechanismError)
     if space:
         check_choice("space", space, SPACES, MechanismError)
-    for field in vars(kind).get("__annotations__", {}):
-        if field in RESERVED_KEYS:
+    for name in vars(kind).get("__annotations__", {}):
+        if name in RESERVED_KEYS:
             message = (
                 f"no field of {kind.__qualname__} may have this name, which files use for something else; rename it"
             )
-            raise MechanismError(message, name="field", value=field)
+            raise MechanismError(message, name="field", value=name)
     catalogues = [_REGISTRY.setdefault((each, role), {}) for each in ((space,) if space else SPACES)]
     for taken in catalogues:
         other = _last_whole(taken.get(type, ()))
@@ -122,7 +121,7 @@ class AbstractConstraint(Module):
         have; or if its class states a fact that cannot be.
     """
 
-    bodies: tuple[str, ...] = eqx.field(static=True, converter=tuple)
+    bodies: tuple[str, ...] = field(static=True, converter=tuple)
 
     space: ClassVar[str] = ""
     role: ClassVar[str] = ""
@@ -263,13 +262,13 @@ def keep_words_static(kind: type[Any]) -> None:
     for name, annotation in vars(kind).get("__annotations__", {}).items():
         default = vars(kind).get(name, dataclasses.MISSING)
         if annotation in (str, "str") and not isinstance(default, dataclasses.Field):
-            setattr(kind, name, eqx.field(static=True, default=default))
+            setattr(kind, name, field(static=True, default=default))
 
 
 def check_words(element: Any) -> None:
     """Raise MechanismError unless fields of text have words that they may have, and the facts of its class can be."""
-    for field, words in facts_of(type(element)).choices.items():
-        check_choice(field, getattr(element, field), words, MechanismError)
+    for name, words in facts_of(type(element)).choices.items():
+        check_choice(name, getattr(element, name), words, MechanismError)
 
 
 def rows(*parts: Jet) -> Jet:

@@ -4,9 +4,7 @@ import dataclasses
 from collections.abc import Sequence
 from typing import Any
 
-import equinox as eqx
-
-from jounce.base.modules import is_ours
+from jounce.base.modules import field, is_ours
 from jounce.constraints.angles import upright
 from jounce.constraints.base import AbstractConstraint, MotionLaw, Part, rows
 from jounce.constraints.drivers import CoordinateDriver, RotationDriver, SlideDriver, SpatialSlideDriver
@@ -51,9 +49,9 @@ class Cam(AbstractConstraint):
     follower: Part
     motion: MotionLaw
     leader: Part
-    of: str = eqx.field(static=True, default="")
-    slots: tuple[tuple[int, ...], ...] = eqx.field(static=True, default=((), ()))
-    unit: Any = eqx.field(default=None, init=False)  # m, by which the carriage moves with a rad: the size of all
+    of: str = field(static=True, default="")
+    slots: tuple[tuple[int, ...], ...] = field(static=True, default=((), ()))
+    unit: Any = field(default=None, init=False)  # m, by which the carriage moves with a rad: the size of all
 
     body_counts = (2, 3, 4)
     symbol = "none"

@@ -2,9 +2,9 @@
 
 from typing import Any, NamedTuple
 
-import equinox as eqx
 import jax.numpy as jnp
 
+from jounce.base.modules import field
 from jounce.constraints.angles import Datum, Vectors, coaxial, parallel_rows, relative_angle
 from jounce.constraints.base import AbstractConstraint, Nested, Scalar, Vector, rows
 from jounce.constraints.friction import Velocities, check_friction, displacements, relative_turn, velocity_at, where
@@ -112,7 +112,7 @@ class Rolling(AbstractConstraint, type="rolling", space="spatial"):
     offset: Scalar = None  # m
     pressure_angle: Scalar = None  # rad
     friction: Nested = None
-    flank: Any = eqx.field(default=None, init=False)  # 1 or -1, the sign of the multiplier; zero for neither
+    flank: Any = field(default=None, init=False)  # 1 or -1, the sign of the multiplier; zero for neither
 
     dimensions = {"offset": "length", "pressure_angle": "angle"}
     signs = {"pressure_angle": "pressure angle"}
@@ -165,11 +165,11 @@ class Gear(AbstractConstraint, type="gear", space="spatial"):
     point_m: Vector = None  # m, the pitch point, in the frame m
     pressure_angle: Scalar = None  # rad, between the normal of a flank and the plane that both gears touch
     helix_angle: Scalar = None  # rad, between the teeth of gear i and the axis, or the generator of the pitch cone
-    held_i: Datum | None = eqx.field(default=None, init=False)  # that lays each axis on the one that it is in the frame
-    held_j: Datum | None = eqx.field(default=None, init=False)
-    whole: Any = eqx.field(default=None, init=False)  # the smallest whole number whose product with the ratio is whole
+    held_i: Datum | None = field(default=None, init=False)  # that lays each axis on the one that it is in the frame
+    held_j: Datum | None = field(default=None, init=False)
+    whole: Any = field(default=None, init=False)  # the smallest whole number whose product with the ratio is whole
 
-    flank: Any = eqx.field(default=None, init=False)  # 1 or -1, the sign of the multiplier; zero for neither
+    flank: Any = field(default=None, init=False)  # 1 or -1, the sign of the multiplier; zero for neither
 
     body_count = 3
     dimensions = {"ratio": "ratio", "offset": "angle", "pressure_angle": "angle", "helix_angle": "angle"}

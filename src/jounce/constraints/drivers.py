@@ -3,10 +3,10 @@
 Each can be evaluated as an output is: its value is the coordinate that it prescribes, whatever its law.
 """
 
-import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Bool
 
+from jounce.base.modules import field
 from jounce.base.shapes import Numbers
 from jounce.constraints.angles import Datum, check_vectors, relative_angle
 from jounce.constraints.base import AbstractConstraint, MotionLaw, Scalar, Vector
@@ -22,7 +22,7 @@ class CoordinateDriver(AbstractConstraint, type="coordinate", space="planar", ro
     K is 1 unless given (the motion is relative to body i), which from ground makes no difference.
     """
 
-    coordinate: str = eqx.field(static=True)  # angle, x or y of body j
+    coordinate: str = field(static=True)  # angle, x or y of body j
     motion: MotionLaw  # rad or m
     ratio: Scalar = None
     offset: Scalar = 0.0  # rad or m
@@ -104,7 +104,7 @@ class RotationDriver(AbstractConstraint, type="rotation", space="spatial", role=
     motion: MotionLaw  # rad
     vector_i: Vector = None
     vector_j: Vector = None
-    datum: Datum | None = eqx.field(default=None, init=False)  # found when the mechanism is assembled
+    datum: Datum | None = field(default=None, init=False)  # found when the mechanism is assembled
 
     periodic = True
     law_apart = True

@@ -9,11 +9,10 @@ import operator
 from collections.abc import Sequence
 from typing import Any
 
-import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Float
 
-from jounce.base.modules import Module, is_ours
+from jounce.base.modules import Module, field, is_ours
 from jounce.constraints.base import Scalar
 from jounce.errors import MechanismError, UnsupportedError
 from jounce.jet import Jet, cross, exp, sqrt
@@ -331,7 +330,7 @@ class UnitFriction(Module):
     """
 
     radius: Any
-    direction: int = eqx.field(static=True)
+    direction: int = field(static=True)
 
     def resisting(self, slip: Float[Jet, "direction *batch"]) -> Float[Jet, "direction *batch"]:
         """Return one in that direction, and nothing in the others."""

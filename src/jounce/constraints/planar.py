@@ -6,11 +6,11 @@ a body, seen in the global frame. ``cross(a, b)`` is the paper's ``a^T R^T b``.
 
 from typing import Any
 
-import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
+from jounce.base.modules import field
 from jounce.base.shapes import Numbers
 from jounce.constraints.base import AbstractConstraint, Curve, Flag, Nested, Scalar, Vector, rows
 from jounce.constraints.friction import Velocities, check_friction, line_turn, relative_turn, relative_velocity
@@ -188,7 +188,7 @@ class Coordinate(AbstractConstraint, type="coordinate", space="planar"):
     for rolling along x or y the radius. C follows from the starting guess unless given.
     """
 
-    coordinate: str = eqx.field(static=True)  # angle, x or y of body j
+    coordinate: str = field(static=True)  # angle, x or y of body j
     ratio: Scalar = None
     offset: Scalar = None  # rad or m
 
@@ -220,8 +220,8 @@ class Gear(AbstractConstraint, type="gear", space="planar"):
     radius_j: Scalar = None
     pressure_angle: Scalar = None  # rad
     friction: Nested = None
-    arm: Any = eqx.field(default=None, init=False)  # rad, of the line of centers in the frame of a body that has both
-    flank: Any = eqx.field(default=None, init=False)  # 1 or -1, the sign of the multiplier; zero for neither
+    arm: Any = field(default=None, init=False)  # rad, of the line of centers in the frame of a body that has both
+    flank: Any = field(default=None, init=False)  # 1 or -1, the sign of the multiplier; zero for neither
 
     body_counts = (2, 3)
     dimensions = {"ratio": "ratio", "offset": "angle", "pressure_angle": "angle"}
@@ -316,10 +316,10 @@ class Belt(AbstractConstraint, type="belt", space="planar"):
     point_j: Vector
     radius_i: Scalar  # m, to the middle of the belt, or of the pitch circle
     radius_j: Scalar
-    crossed: Flag = eqx.field(static=True, default=False)
+    crossed: Flag = field(static=True, default=False)
     offset: Scalar = None  # rad
     friction: Nested = None
-    arm: Any = eqx.field(default=None, init=False)  # rad, of the line of centers in the frame of a body that has both
+    arm: Any = field(default=None, init=False)  # rad, of the line of centers in the frame of a body that has both
 
     dimensions = {"offset": "angle"}
     symbol = "belt"
@@ -368,7 +368,7 @@ class Rolling(AbstractConstraint, type="rolling", space="planar"):
     offset: Scalar = None  # m
     pressure_angle: Scalar = None  # rad
     friction: Nested = None
-    flank: Any = eqx.field(default=None, init=False)  # 1 or -1, the sign of the multiplier; zero for neither
+    flank: Any = field(default=None, init=False)  # 1 or -1, the sign of the multiplier; zero for neither
 
     dimensions = {"offset": "length", "pressure_angle": "angle"}
     signs = {"pressure_angle": "pressure angle"}

@@ -3,8 +3,7 @@
 from itertools import pairwise
 from typing import Any
 
-import equinox as eqx
-
+from jounce.base.modules import field
 from jounce.base.shapes import Numbers
 from jounce.constraints.base import AbstractConstraint, Points, Scalar
 from jounce.errors import MechanismError
@@ -43,9 +42,7 @@ class Rope(AbstractConstraint, type="rope"):
 
     points: Points  # m, one on each body in its frame
     length: Scalar  # m
-    slots: tuple[int, ...] = eqx.field(
-        static=True, default=(), init=False
-    )  # of the body of each point, where some repeat
+    slots: tuple[int, ...] = field(static=True, default=(), init=False)  # of the body of each point, where some repeat
 
     body_counts = range(2, 101)
     may_repeat = True

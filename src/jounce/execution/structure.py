@@ -24,11 +24,11 @@ import jax
 import numpy as np
 
 from jounce.base.alterations import BEGUN, altered
-from jounce.base.jax_internals import is_missing, trace_settings as settings
+from jounce.base.jax_internals import trace_settings as settings
 from jounce.execution.llvm import machine
 
 PACKAGE = Path(__file__).parents[1]
-LIBRARIES = ("equinox", "jax", "jaxlib", "numpy")  # whose releases decide what is traced and compiled
+LIBRARIES = ("jax", "jaxlib", "numpy")  # whose releases decide what is traced and compiled
 OPTIONS = ("jax_disable_most_optimizations",)  # of JAX, beside those by which it tells its own programs apart
 MARGIN = 2.0  # s, between the clock of files and that of processes
 CONTAINERS = (tuple, list, dict, type(None))
@@ -67,8 +67,6 @@ def description(value: Any) -> str:
     if dataclasses.is_dataclass(value):  # by the fields by which it is compared, as `jax.jit` compares it too
         compared = [field.name for field in dataclasses.fields(value) if field.compare]
         return f"{_own(kind)}({', '.join(f'{name}={description(getattr(value, name))}' for name in compared)})"
-    if is_missing(value):
-        return "missing"
     raise UndescribedError(f"{kind.__module__}.{kind.__qualname__}")
 
 

@@ -1,7 +1,6 @@
 """Forces and torques between two bodies by a law of their displacement, its rate and time: actuators, bumpers."""
 
-import equinox as eqx
-
+from jounce.base.modules import field
 from jounce.base.shapes import Numbers
 from jounce.constraints.angles import Datum, check_vectors, relative_angle
 from jounce.constraints.base import Vector
@@ -79,7 +78,7 @@ class SpatialTorque(AbstractForce, type="torque", space="spatial"):
     law: Law  # N m
     vector_i: Vector = None
     vector_j: Vector = None
-    datum: Datum | None = eqx.field(default=None, init=False)  # found when the mechanism is assembled
+    datum: Datum | None = field(default=None, init=False)  # found when the mechanism is assembled
 
     unit = "N*m"
     dimensions = {"law": "torque"}

@@ -5,11 +5,10 @@ from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Annotated, Any, ClassVar
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 
-from jounce.base.modules import Module
+from jounce.base.modules import Module, field
 from jounce.constraints.base import catalogue, check_bodies, check_words, keep_words_static, register
 from jounce.constraints.facts import USUAL_DIMENSIONS, USUAL_SIGNS
 from jounce.jet import Jet
@@ -54,7 +53,7 @@ class AbstractForce(Module):
     5.0
     """
 
-    bodies: tuple[str, ...] = eqx.field(static=True, converter=lambda b: (b,) if isinstance(b, str) else tuple(b))
+    bodies: tuple[str, ...] = field(static=True, converter=lambda b: (b,) if isinstance(b, str) else tuple(b))
 
     space: ClassVar[str] = ""  # planar or spatial where only one makes sense
     role: ClassVar[str] = "force"

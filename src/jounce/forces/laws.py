@@ -4,11 +4,10 @@ import abc
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 
-from jounce.base.modules import Module, changes_parts, is_ours
+from jounce.base.modules import Module, changes_parts, field, is_ours
 from jounce.jet import Jet, stack
 from jounce.jet.algebra import Quantity
 from jounce.jet.programs.read_methods import ReadObject
@@ -55,10 +54,10 @@ class ExpressionLaw(AbstractLaw):
     [-2.0, -18.0]
     """
 
-    expression: Expression = eqx.field(static=True)
+    expression: Expression = field(static=True)
     parameters: dict[str, Any]
-    displacements: tuple[str, ...] = eqx.field(static=True)
-    velocities: tuple[str, ...] = eqx.field(static=True)
+    displacements: tuple[str, ...] = field(static=True)
+    velocities: tuple[str, ...] = field(static=True)
 
     def __init__(
         self,
@@ -115,7 +114,7 @@ class FunctionLaw(AbstractLaw):
     -0.2
     """
 
-    function: Callable[[Jet, Jet, Jet], Any] = eqx.field(static=True)
+    function: Callable[[Jet, Jet, Jet], Any] = field(static=True)
 
     def value(self, displacement: Jet, velocity: Jet, time: Jet) -> Quantity:
         """Return what the function returns."""
@@ -135,7 +134,7 @@ class VectorLaw(AbstractLaw):
     [-3.0, -4.0]
     """
 
-    parts: Sequence[AbstractLaw] = eqx.field(converter=lambda parts: tuple(parts))
+    parts: Sequence[AbstractLaw] = field(converter=lambda parts: tuple(parts))
 
     def value(self, displacement: Jet, velocity: Jet, time: Jet) -> Jet:
         """Return the jet of the force, a vector."""

@@ -1,8 +1,8 @@
 """Loads on one body: a force at a point and a moment, by laws of place, velocity and time, global or in the body."""
 
-import equinox as eqx
 import jax.numpy as jnp
 
+from jounce.base.modules import field
 from jounce.constraints.base import Vector
 from jounce.forces.base import AbstractForce, Law, Laws, by_law
 from jounce.jet import Jet
@@ -20,7 +20,7 @@ class PointForce(AbstractForce, type="point_force", space="planar"):
 
     point: Vector  # m, in the frame of the body
     law: Laws  # N
-    frame: str = eqx.field(static=True, default="global")
+    frame: str = field(static=True, default="global")
 
     body_count = 1
     dimensions = {"law": "force"}
@@ -78,7 +78,7 @@ class SpatialMoment(AbstractForce, type="moment", space="spatial"):
     """
 
     law: Laws  # N m
-    frame: str = eqx.field(static=True, default="global")
+    frame: str = field(static=True, default="global")
 
     body_count = 1
     unit = "N*m"

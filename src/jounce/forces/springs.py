@@ -2,8 +2,7 @@
 
 from typing import Any
 
-import equinox as eqx
-
+from jounce.base.modules import field
 from jounce.constraints.angles import Datum, check_vectors, relative_angle
 from jounce.constraints.base import Scalar, Vector
 from jounce.constraints.planar import slide
@@ -99,7 +98,7 @@ class SpatialTorsionalSpring(AbstractForce, type="torsional_spring", space="spat
     damping: Scalar = 0.0  # N m s/rad
     vector_i: Vector = None
     vector_j: Vector = None
-    datum: Datum | None = eqx.field(default=None, init=False)  # found when the mechanism is assembled
+    datum: Datum | None = field(default=None, init=False)  # found when the mechanism is assembled
 
     unit = "N*m"
     dimensions = {"stiffness": "torsional stiffness", "damping": "torsional damping", "angle": "angle"}

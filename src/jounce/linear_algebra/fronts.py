@@ -11,11 +11,10 @@ compile it grows with the number of bodies.
 
 import heapq
 
-import equinox as eqx
 import numpy as np
 from jaxtyping import Int
 
-from jounce.base.modules import Module
+from jounce.base.modules import Module, field
 from jounce.base.shapes import Numbers
 from jounce.linear_algebra.pattern import Pattern
 
@@ -53,8 +52,8 @@ class Fronts(Module):
     left_columns: Int[Numbers, "front row column"]
     neighbors: Int[Numbers, "front neighbor"]
     of_body: Int[Numbers, " front"]
-    row_count: int = eqx.field(static=True)
-    width: int = eqx.field(static=True)
+    row_count: int = field(static=True)
+    width: int = field(static=True)
 
     @property
     def shape(self) -> tuple[int, int, int]:

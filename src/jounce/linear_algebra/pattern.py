@@ -4,12 +4,11 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
-import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float, Int
 
-from jounce.base.modules import Module
+from jounce.base.modules import Module, field
 from jounce.base.shapes import Numbers
 
 
@@ -28,8 +27,8 @@ class Pattern(Module):
 
     bodies: Int[Numbers, "row slot"]
     entry_indices: Int[Numbers, "row slot width"]
-    body_count: int = eqx.field(static=True)
-    entry_count: int = eqx.field(static=True)
+    body_count: int = field(static=True)
+    entry_count: int = field(static=True)
 
     @classmethod
     def of(cls, groups: Sequence[Any], row_counts: Sequence[int], width: int, body_count: int) -> "Pattern":

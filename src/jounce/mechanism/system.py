@@ -4,12 +4,11 @@ import dataclasses
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 from jaxtyping import Bool, Float
 
-from jounce.base.modules import Module, unchecked, with_fields
+from jounce.base.modules import Module, field, unchecked, with_fields
 from jounce.base.shapes import Numbers
 from jounce.constraints.friction import check_no_own_code
 from jounce.errors import UnsupportedError
@@ -40,7 +39,7 @@ class Group(Module):
     """
 
     element: Any
-    bodies: tuple[tuple[int, ...], ...] = eqx.field(static=True)
+    bodies: tuple[tuple[int, ...], ...] = field(static=True)
 
     @property
     def instances(self) -> int:
@@ -221,11 +220,11 @@ class System(Module):
     pattern: Pattern  # where the entries of the blocks of the groups stand in the Jacobian
     row_scale: Float[Numbers, "row 1"]
     column_scale: Float[Numbers, " coordinate"]  # one for each coordinate of a body
-    body_count: int = eqx.field(static=True)
+    body_count: int = field(static=True)
     forces: tuple[Group, ...] = ()
     fronts: Fronts | None = None  # how a large Jacobian is eliminated
-    rank: int | None = eqx.field(static=True, default=None)  # of the Jacobian in general, where rows are redundant
-    reflected: bool = eqx.field(static=True, default=False)  # whether the Jacobian is eliminated by reflections
+    rank: int | None = field(static=True, default=None)  # of the Jacobian in general, where rows are redundant
+    reflected: bool = field(static=True, default=False)  # whether the Jacobian is eliminated by reflections
 
     @property
     def shape(self) -> tuple[int, int]:

@@ -11,13 +11,12 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import lru_cache
 from typing import Any
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jax.core import Tracer
 
-from jounce.base.modules import changes_parts, is_ours, unchecked, with_fields
+from jounce.base.modules import changes_parts, field, is_ours, unchecked, with_fields
 from jounce.constraints import AbstractConstraint
 from jounce.constraints.base import field_kinds, value_fields
 from jounce.errors import UnsupportedError
@@ -143,7 +142,7 @@ def _class_for(kind: type) -> type:
             "__module__": kind.__module__,
             "__qualname__": kind.__qualname__,
             "__annotations__": {READINGS: Any},
-            READINGS: eqx.field(default=None, init=False),
+            READINGS: field(default=None, init=False),
             "stands_for": kind,
         }
         _classes[kind] = type(kind)(kind.__name__, (kind,), own)

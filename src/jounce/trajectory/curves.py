@@ -5,14 +5,13 @@ from collections.abc import Mapping, Sequence
 from functools import lru_cache, partial
 from typing import Any
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jax.core import Tracer
 from jaxtyping import Float
 
-from jounce.base.modules import Module
+from jounce.base.modules import Module, field
 from jounce.base.shapes import ArrayLike, real_numbers
 from jounce.errors import JounceError, MechanismError, whole_number
 from jounce.jet import Jet, stack
@@ -98,8 +97,8 @@ class SampledCurve(Module):
 
     parameter: Any
     points: Any
-    closed: bool = eqx.field(static=True)
-    degree: int = eqx.field(static=True)
+    closed: bool = field(static=True)
+    degree: int = field(static=True)
 
     def __init__(self, points: ArrayLike, closed: bool = False, degree: int = 5):
         samples = real_numbers("points", points, MechanismError)
@@ -146,8 +145,8 @@ class CurveLaw(Module):
 class _Formula(Module):
     """One coordinate by an expression."""
 
-    expression: Expression = eqx.field(static=True)
-    names: tuple[str, ...] = eqx.field(static=True)
+    expression: Expression = field(static=True)
+    names: tuple[str, ...] = field(static=True)
     known: dict[str, Any]
 
     def __call__(self, *parameters: Jet) -> Jet:

@@ -4,13 +4,12 @@ import abc
 from collections.abc import Callable, Mapping
 from typing import Any
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
-from jounce.base.modules import Module, Untraced
+from jounce.base.modules import Module, Untraced, field
 from jounce.base.shapes import ArrayLike, Numbers, Real, is_traced
 from jounce.errors import MechanismError, check_choice
 from jounce.jet import Jet, compose
@@ -59,7 +58,7 @@ class ExpressionMotion(AbstractMotion):
     [3.0, 6.0, 6.0]
     """
 
-    expression: Expression = eqx.field(static=True)
+    expression: Expression = field(static=True)
     parameters: dict[str, Any]
 
     def __init__(self, expression: Expression | str, parameters: Mapping[str, Any] | None = None):
@@ -92,7 +91,7 @@ class FunctionMotion(AbstractMotion):
     [1.0, -2.0, 4.0, -8.0]
     """
 
-    function: Callable[[Any], Any] = eqx.field(static=True)
+    function: Callable[[Any], Any] = field(static=True)
 
     def __call__(self, time: Jet) -> Jet:
         """Return the jet of the law at the instants of the time jet."""
@@ -145,9 +144,9 @@ class SplineMotion(AbstractMotion):
     coefficients: Any
     stop: Any
     advance: Any
-    degree: int = eqx.field(static=True)
-    beyond: str = eqx.field(static=True)
-    samples: Untraced = eqx.field(static=True)
+    degree: int = field(static=True)
+    beyond: str = field(static=True)
+    samples: Untraced = field(static=True)
 
     def __init__(self, times: ArrayLike, values: ArrayLike, degree: int = 5, beyond: str = "refuse"):
         check_choice("beyond", beyond, BEYOND, MechanismError)

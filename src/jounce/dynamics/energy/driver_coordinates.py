@@ -8,13 +8,12 @@ these are the columns of the Jacobian of the bodies, as jets.
 import dataclasses
 from typing import TYPE_CHECKING, Any
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
-from jounce.base.modules import Module
+from jounce.base.modules import Module, with_fields
 from jounce.base.shapes import Numbers
 from jounce.dynamics.energy.slopes import Columns, Form, column_of, slope_values
 from jounce.dynamics.forward.accelerations import Lanes
@@ -176,8 +175,8 @@ def with_changes(
     for index in {group for group, _ in order}:
         members = [order.index((index, instance)) for instance in range(groups[index].instances)]
         law = ChangedLaw(groups[index].element.motion, changes[:, np.array(members)])
-        groups[index] = eqx.tree_at(lambda g: g.element.motion, groups[index], law)
-    return eqx.tree_at(lambda s: s.groups, system, tuple(groups))
+        groups[index] = with_fields(groups[index], element=with_fields(groups[index].element, motion=law))
+    return with_fields(system, groups=tuple(groups))
 
 
 def followed(system: System, start_pose: Pose, factor: Factor, time: Jet) -> Pose:

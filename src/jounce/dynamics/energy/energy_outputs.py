@@ -3,8 +3,7 @@
 import abc
 from typing import ClassVar
 
-import equinox as eqx
-
+from jounce.base.modules import field
 from jounce.base.shapes import Numbers
 from jounce.constraints.base import Whole
 from jounce.dynamics.energy.energies import energy_coefficients, energy_unit
@@ -62,7 +61,7 @@ class KineticEnergyOutput(AbstractEnergyOutput):
 class AccelerationEnergyOutput(AbstractEnergyOutput):
     """Acceleration energy of order p of all bodies, J/s^(2 p). Negrean 2025, equations 83-122."""
 
-    order: Whole = eqx.field(static=True, default=1)
+    order: Whole = field(static=True, default=1)
 
     def __check_init__(self):
         whole_number("order", self.order, 0, HIGHEST_ORDER, error=MechanismError)
@@ -91,7 +90,7 @@ class PotentialEnergyOutput(AbstractEnergyOutput):
 class BodyKineticEnergyOutput(KineticEnergyOutput):
     """Kinetic energy of a body, J. Negrean 2025, equations 65-72."""
 
-    body: str = eqx.field(static=True, kw_only=True)
+    body: str = field(static=True, kw_only=True)
 
     source = "body"
 
@@ -99,7 +98,7 @@ class BodyKineticEnergyOutput(KineticEnergyOutput):
 class BodyAccelerationEnergyOutput(AccelerationEnergyOutput):
     """Acceleration energy of order p of a body, J/s^(2 p). Negrean 2025, equations 83-122."""
 
-    body: str = eqx.field(static=True, kw_only=True)
+    body: str = field(static=True, kw_only=True)
 
     source = "body"
 
@@ -107,7 +106,7 @@ class BodyAccelerationEnergyOutput(AccelerationEnergyOutput):
 class BodyPotentialEnergyOutput(PotentialEnergyOutput):
     """Potential energy of a body in gravity, J; zero at the origin."""
 
-    body: str = eqx.field(static=True, kw_only=True)
+    body: str = field(static=True, kw_only=True)
 
     source = "body"
 

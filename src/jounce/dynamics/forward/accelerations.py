@@ -10,12 +10,11 @@ from collections.abc import Callable
 from functools import partial
 from typing import Any, NamedTuple
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 from jaxtyping import Bool, Float, Int
 
-from jounce.base.modules import Module
+from jounce.base.modules import Module, field
 from jounce.base.shapes import Numbers
 from jounce.dynamics.forward.ground import turns_with_ground, with_ground
 from jounce.dynamics.forward.loads import inertia_forces, mass_matrices
@@ -121,7 +120,7 @@ class Equations(Module):
     masses: Masses
     gravity: Gravity
     scale: float | Float[Numbers, ""]
-    pose_type: type = eqx.field(static=True)
+    pose_type: type = field(static=True)
     saddle: SaddleFronts | None = None
 
     @property

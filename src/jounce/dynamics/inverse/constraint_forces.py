@@ -10,12 +10,12 @@ from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
+from jounce.base.modules import with_fields
 from jounce.base.shapes import Numbers
 from jounce.dynamics.forward.saddle_point import (
     BodyMatrices,
@@ -216,7 +216,7 @@ def exerted(
         law = partial(_as_measured, driver.evaluate(*poses))
 
     def residual(shift: Any) -> Any:
-        element = eqx.tree_at(lambda e: e.motion, driver, _Shifted(law, shift))
+        element = with_fields(driver, motion=_Shifted(law, shift))
         return stacked(with_rows(element.residual(*poses, time)))
 
     shift = jnp.zeros(forces.shape[2:])

@@ -3,13 +3,12 @@
 from collections.abc import Callable, Sequence
 from typing import Any
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
-from jounce.base.modules import Module
+from jounce.base.modules import Module, field
 from jounce.base.shapes import Numbers
 from jounce.dynamics.friction.coupling import Coupling, pressed, rubs, torque_lost
 from jounce.dynamics.inverse.constraint_forces import BodyMatrices, Slopes, load_solver, onto_bodies
@@ -50,7 +49,7 @@ class Rubbing(Module):
     slopes: Sequence[Any]  # as `Slope`; of other rows than those of friction
     friction: Sequence[Any]
     resisting: Any
-    first: int = eqx.field(static=True)
+    first: int = field(static=True)
 
     def normal_forces(self, multipliers: Sequence[Any]) -> Float[Numbers, "order instance batch"]:
         """Return the normal forces of multipliers of all rows, given by Taylor coefficients, (rows, batch)."""

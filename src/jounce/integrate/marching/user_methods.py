@@ -2,11 +2,10 @@
 
 from typing import Any
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 
-from jounce.base.modules import changes_parts, is_ours
+from jounce.base.modules import changes_parts, field, is_ours
 from jounce.dynamics.forward.accelerations import Equations, Expansion, Flags, Lanes, State
 from jounce.integrate.marching.marching import IntegratorState
 from jounce.integrate.steps.methods import AbstractMethod, Number, Sizes
@@ -27,7 +26,7 @@ class ReadIntegrator(AbstractMethod):
     """
 
     method: AbstractMethod
-    key: tuple[Any, ...] = eqx.field(static=True)
+    key: tuple[Any, ...] = field(static=True)
 
     @property
     def controlled(self) -> bool:

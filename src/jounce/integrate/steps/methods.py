@@ -4,13 +4,12 @@ import abc
 import math
 from typing import Any
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Bool, Float
 
-from jounce.base.modules import Module
+from jounce.base.modules import Module, field
 from jounce.base.shapes import Numbers
 from jounce.dynamics.forward.accelerations import Equations, Expansion, Flags, Inverse, Lanes, State
 from jounce.errors import JounceError
@@ -226,7 +225,7 @@ class Taylor(AbstractMethod):
     21
     """
 
-    order: int | None = eqx.field(static=True, default=None)
+    order: int | None = field(static=True, default=None)
     step: float | int | None = None
 
     def __check_init__(self):

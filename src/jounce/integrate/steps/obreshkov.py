@@ -11,12 +11,12 @@ from fractions import Fraction
 from functools import lru_cache
 from typing import Any
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
+from jounce.base.modules import field
 from jounce.base.shapes import Numbers
 from jounce.dynamics.forward.accelerations import Equations, Expansion, Flags, Lanes, State, expand
 from jounce.errors import JounceError
@@ -53,7 +53,7 @@ class Obreshkov(AbstractMethod):
     2
     """
 
-    order: int = eqx.field(static=True, default=6)
+    order: int = field(static=True, default=6)
     step: float | int | None = None
 
     def __check_init__(self):

@@ -17,7 +17,6 @@ from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import Any, NamedTuple
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -27,8 +26,8 @@ from jax.extend.core import ClosedJaxpr, Jaxpr, JaxprEqn, Literal, jaxpr_as_fun
 from jounce.settings import under_own_settings
 
 MOST_TRACED = 1000  # programs at most, of functions read before
-_LIBRARIES = tuple(Path(str(module.__file__)).parent.as_posix() + "/" for module in (jax, eqx))
-_CALLERS = (_LIBRARIES[1], _LIBRARIES[0] + "_src/numpy/ufunc_api.py")  # which compile functions of users as their own
+_JAX = Path(str(jax.__file__)).parent.as_posix() + "/"
+_CALLER = _JAX + "_src/numpy/ufunc_api.py"  # which compiles functions of users as its own
 _CALLS = ("jit", "pjit")
 _BY_IDENTITY = frozenset("cond scan while".split())  # whose functions JAX traces once for each object
 _OF_ARRAYS = ("_searchsorted_scan_impl",)  # functions of JAX with loops that are no user's
@@ -181,7 +180,7 @@ def _may_be_old(jaxpr: Jaxpr, within: str = "") -> bool:
         if name in _BY_IDENTITY and within not in _OF_ARRAYS:
             return True
         for inner in _inner(equation):
-            known = _is_of_libraries(inner) and not _origin(inner).startswith(_CALLERS)
+            known = _is_of_libraries(inner) and _origin(inner) != _CALLER
             if not known or _may_be_old(inner, str(equation.params.get("name", ""))):
                 return True
     return False
@@ -195,7 +194,7 @@ def _inner(equation: JaxprEqn) -> Iterator[Jaxpr]:
 
 
 def _is_of_libraries(jaxpr: Jaxpr) -> bool:
-    return _origin(jaxpr).startswith(_LIBRARIES)
+    return _origin(jaxpr).startswith(_JAX)
 
 
 def _origin(jaxpr: Jaxpr) -> str:

@@ -9,13 +9,12 @@ with each order.
 from collections.abc import Callable, Sequence
 from typing import Any
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jax.extend.core import JaxprEqn
 
-from jounce.base.modules import Module
+from jounce.base.modules import Module, field
 from jounce.jet.algebra import Jet, bilinear
 from jounce.jet.elementary import FUNCTIONS, erf, tanh
 from jounce.jet.programs.captured import Program, read_off
@@ -66,7 +65,7 @@ class Composed(Module):
         functions, and one that spreads over the batch.
     """
 
-    program: Program = eqx.field(static=True)
+    program: Program = field(static=True)
     captured: tuple[Any, ...]
 
     @classmethod
@@ -111,9 +110,9 @@ class OfSample(Module):
         Of its result.
     """
 
-    program: Program = eqx.field(static=True)
+    program: Program = field(static=True)
     captured: tuple[Any, ...]
-    shape: tuple[int, ...] = eqx.field(static=True)
+    shape: tuple[int, ...] = field(static=True)
 
     @classmethod
     def of(cls, function: Callable[..., Any], *examples: Any) -> "OfSample":

@@ -11,13 +11,12 @@ from contextlib import nullcontext
 from functools import lru_cache
 from typing import Any
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jax.extend.core import ClosedJaxpr
 
-from jounce.base.modules import Module, Untraced
+from jounce.base.modules import Module, Untraced, field
 from jounce.jet.algebra import Jet
 from jounce.jet.programs.captured import Program, Same, known_as, may_be_old, read_off, value_key
 from jounce.jet.programs.composition import has_rules, on_jets as run
@@ -35,7 +34,7 @@ class ReadMethod(Module):
         The numbers; those of stacked instances have the axes of these and of the batch at their ends.
     """
 
-    program: Program = eqx.field(static=True)
+    program: Program = field(static=True)
     captured: tuple[Any, ...]
 
     def __call__(self, method: Callable[[], Any], inputs: Callable[[], Sequence[Any]]) -> Any:
@@ -71,8 +70,8 @@ class Verbatim(Module):
         Whether JAX may have traced parts of it before.
     """
 
-    key: tuple[Any, ...] = eqx.field(static=True)
-    old: bool = eqx.field(static=True)
+    key: tuple[Any, ...] = field(static=True)
+    old: bool = field(static=True)
 
     def __call__(self, method: Callable[[], Any], inputs: Callable[[], Sequence[Any]]) -> Any:
         """Return what the method returns."""
@@ -101,8 +100,8 @@ class ReadObject(Module):
 
     reading: Reading
     fields: tuple[Any, ...]
-    shapes: tuple[tuple[int, ...], ...] = eqx.field(static=True)
-    source: Untraced = eqx.field(static=True)
+    shapes: tuple[tuple[int, ...], ...] = field(static=True)
+    source: Untraced = field(static=True)
 
     @classmethod
     def of(cls, source: Any, orders: Sequence[int], shape: tuple[int, ...] = ()) -> "ReadObject":

@@ -2,8 +2,7 @@
 
 from typing import Any
 
-import equinox as eqx
-
+from jounce.base.modules import field
 from jounce.constraints.facts import dimension_of_field, stem_of, value_fields
 from jounce.errors import MechanismError, check_name
 from jounce.mechanism.outputs.base import AbstractMotionOutput
@@ -21,7 +20,7 @@ def is_turning(driver: Any) -> bool:
 
 
 class _DriverCoordinateOutput(AbstractMotionOutput):
-    driver: str = eqx.field(static=True)
+    driver: str = field(static=True)
 
     source = "driver"
 

@@ -2,10 +2,10 @@
 
 from typing import Any
 
-import equinox as eqx
 import numpy as np
 from jaxtyping import Float
 
+from jounce.base.modules import field
 from jounce.errors import MechanismError
 from jounce.jet import Jet, concatenate, stack
 from jounce.jet.turns import counted_on
@@ -75,7 +75,7 @@ class EulerAnglesOutput(AbstractOutput):
     and last axes are parallel they are not determined, and have no derivatives.
     """
 
-    sequence: str = eqx.field(static=True)
+    sequence: str = field(static=True)
 
     unit = "rad"
     space = "spatial"

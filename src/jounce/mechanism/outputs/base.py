@@ -5,9 +5,7 @@ from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Any, ClassVar
 
-import equinox as eqx
-
-from jounce.base.modules import Module
+from jounce.base.modules import Module, field
 from jounce.constraints.angles import relative_angle
 from jounce.constraints.base import Vector, check_bodies, check_words
 from jounce.constraints.facts import USUAL_DIMENSIONS, USUAL_SIGNS
@@ -80,7 +78,7 @@ class AbstractOutput(AbstractQuantity):
         Names of the bodies that it depends on, in the order of the poses that `evaluate` takes.
     """
 
-    bodies: tuple[str, ...] = eqx.field(static=True, converter=lambda b: (b,) if isinstance(b, str) else tuple(b))
+    bodies: tuple[str, ...] = field(static=True, converter=lambda b: (b,) if isinstance(b, str) else tuple(b))
 
     turning: ClassVar[bool] = False  # an angle known up to whole turns, made continuous along the motion
     wraps: ClassVar[tuple[bool, ...]] = ()  # which components are angles in a range, continued once all are known
@@ -119,8 +117,8 @@ class ParameterOutput(AbstractOutput):
         Name of the joint.
     """
 
-    bodies: Any = eqx.field(static=True, init=False)
-    joint: str = eqx.field(static=True)
+    bodies: Any = field(static=True, init=False)
+    joint: str = field(static=True)
 
     unit = "1"
     body_count = 0
@@ -174,7 +172,7 @@ class RelativeAngleOutput(AbstractOutput):
     axis: Vector
     vector_i: Vector = None
     vector_j: Vector = None
-    datum: Any = eqx.field(default=None, init=False)  # found when the mechanism is assembled
+    datum: Any = field(default=None, init=False)  # found when the mechanism is assembled
 
     unit = "rad"
     space = "spatial"
@@ -204,7 +202,7 @@ class PlanarRelativeAngleOutput(AbstractOutput):
 class AngularVelocityOutput(AbstractOutput):
     """Angular velocity of a body in the global frame or its own, rad/s, shape (3, ...) in space."""
 
-    frame: str = eqx.field(static=True, default="global")
+    frame: str = field(static=True, default="global")
 
     unit = "rad/s"
     lost_orders = 1

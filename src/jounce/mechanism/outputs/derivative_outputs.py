@@ -7,12 +7,11 @@ from collections import Counter
 from collections.abc import Mapping
 from typing import Any, ClassVar, NamedTuple
 
-import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
-from jounce.base.modules import is_ours, unchecked, with_fields
+from jounce.base.modules import field, is_ours, unchecked, with_fields
 from jounce.base.shapes import Numbers
 from jounce.constraints.base import Nested, Whole
 from jounce.errors import MechanismError, no_such, whole_number
@@ -48,10 +47,10 @@ class DerivativeOutput(AbstractMotionOutput):
         n, up to 10.
     """
 
-    of: str = eqx.field(static=True)
-    by: str = eqx.field(static=True)
-    order: Whole = eqx.field(static=True, default=1)
-    bound_operands: Any = eqx.field(default=None, init=False)  # the operands, once it is an output of a mechanism
+    of: str = field(static=True)
+    by: str = field(static=True)
+    order: Whole = field(static=True, default=1)
+    bound_operands: Any = field(default=None, init=False)  # the operands, once it is an output of a mechanism
 
     source: ClassVar[str] = "of"
     rate_names = RATES
@@ -101,13 +100,13 @@ class DerivativeOutput(AbstractMotionOutput):
 class PosedDerivativeOutput(AbstractOutput):
     """A `DerivativeOutput` whose outputs are functions of poses, as a mechanism has it."""
 
-    of: str = eqx.field(static=True)
-    by: str = eqx.field(static=True)
-    order: Whole = eqx.field(static=True)
+    of: str = field(static=True)
+    by: str = field(static=True)
+    order: Whole = field(static=True)
     first: Nested
     second: Nested
-    components: tuple[int, int] = eqx.field(static=True)
-    count: int = eqx.field(static=True)  # bodies of the first
+    components: tuple[int, int] = field(static=True)
+    count: int = field(static=True)  # bodies of the first
 
     form: ClassVar[type] = DerivativeOutput
     rate_names = RATES

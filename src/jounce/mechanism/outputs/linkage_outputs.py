@@ -2,9 +2,9 @@
 
 from typing import Any
 
-import equinox as eqx
 import jax.numpy as jnp
 
+from jounce.base.modules import field
 from jounce.constraints.base import Vector
 from jounce.constraints.planar import length_of
 from jounce.jet import Jet, atan2, cross, dot, stack
@@ -61,7 +61,7 @@ class InstantCenterOutput(_CenterOutput):
     turn relative to each other there is none.
     """
 
-    frame: str = eqx.field(static=True, default="global")
+    frame: str = field(static=True, default="global")
 
     lost_orders = 1
     space = "planar"
@@ -89,7 +89,7 @@ class SpatialInstantCenterOutput(_CenterOutput):
 
     point_i: Vector  # m, in the frame of body i
     normal: Vector
-    frame: str = eqx.field(static=True, default="global")
+    frame: str = field(static=True, default="global")
 
     lost_orders = 1
     space = "spatial"

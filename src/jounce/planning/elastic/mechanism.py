@@ -8,9 +8,9 @@ import dataclasses
 from collections.abc import Callable, Mapping
 from typing import Any, ClassVar
 
-import equinox as eqx
 import numpy as np
 
+from jounce.base.modules import field
 from jounce.base.shapes import real_numbers
 from jounce.constraints import Scalar, Vector, drivers, planar, spatial
 from jounce.errors import MechanismError, RobotError, UnsupportedError
@@ -63,7 +63,7 @@ class _SlideSpring(_DriveSpring):
 
 
 class _CoordinateSpring(_DriveSpring):
-    coordinate: str = eqx.field(static=True)
+    coordinate: str = field(static=True)
     ratio: Scalar
     offset: Scalar
 

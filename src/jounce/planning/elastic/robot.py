@@ -9,10 +9,10 @@ import dataclasses
 from collections.abc import Mapping
 from typing import Any
 
-import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 
+from jounce.base.modules import field
 from jounce.base.shapes import real_numbers
 from jounce.errors import RobotError
 from jounce.integrate import RobotSimulation, simulate
@@ -96,9 +96,9 @@ class _ElasticForces(AbstractJointLaws):
     laws: tuple[AbstractMotion, ...]
     stiffness: Any
     damping: Any
-    indices: tuple[int, ...] = eqx.field(static=True)  # of the laws among the robot's own joints
-    links: tuple[int, ...] = eqx.field(static=True)  # columns of the robot's own joints
-    motors: tuple[int, ...] = eqx.field(static=True)  # of what moves each: its rotor, or itself
+    indices: tuple[int, ...] = field(static=True)  # of the laws among the robot's own joints
+    links: tuple[int, ...] = field(static=True)  # columns of the robot's own joints
+    motors: tuple[int, ...] = field(static=True)  # of what moves each: its rotor, or itself
     feedback: OfSample | None
 
     @property

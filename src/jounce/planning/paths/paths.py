@@ -4,11 +4,11 @@ import dataclasses
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
+from jounce.base.modules import field
 from jounce.base.shapes import ArrayLike, real_numbers
 from jounce.errors import JounceError, TrajectoryError, whole_number
 from jounce.jet import Jet
@@ -45,7 +45,7 @@ class PathExpression(AbstractMotion):
         Of ``s``.
     """
 
-    expression: Expression = eqx.field(static=True)
+    expression: Expression = field(static=True)
 
     def __call__(self, time: Jet) -> Jet:
         """Return the jet of the positions for a jet of s."""

@@ -2,12 +2,11 @@
 
 from typing import Any, NamedTuple
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 from jaxtyping import Float
 
-from jounce.base.modules import Module
+from jounce.base.modules import Module, field
 from jounce.base.shapes import Numbers
 from jounce.linear_algebra.linear import DenseFactor
 from jounce.planning.tool_paths.tool_tasks import Tool, columns_of, task_rows
@@ -50,9 +49,9 @@ class PathEquations(Module):
     basis: Any
     scale: Any
     weights: Any
-    fixed_joints: tuple[int, ...] = eqx.field(static=True)
-    kinds: tuple[str, ...] = eqx.field(static=True)
-    count: int = eqx.field(static=True)
+    fixed_joints: tuple[int, ...] = field(static=True)
+    kinds: tuple[str, ...] = field(static=True)
+    count: int = field(static=True)
 
     @property
     def rows(self) -> int:

@@ -6,7 +6,6 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-import equinox as eqx
 from typing_extensions import TypedDict
 
 from jounce.mechanism import Mechanism
@@ -99,7 +98,7 @@ def _same(motion: Any, law: AbstractMotion | None, parameters: Mapping[str, Any]
     resolved = resolve_motion(motion, parameters)
     if isinstance(resolved, ExpressionMotion) and isinstance(law, ExpressionMotion):
         return resolved.expression == law.expression
-    return resolved is law or bool(eqx.tree_equal(resolved, law))
+    return resolved is law or resolved == law
 
 
 def jump_facts(smoothness: Continuity) -> list[dict[str, Any]]:

@@ -4,11 +4,10 @@ import inspect
 from collections.abc import Sequence
 from typing import Any
 
-import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 
-from jounce.base.modules import Module
+from jounce.base.modules import Module, field
 from jounce.errors import RobotError
 from jounce.jet.programs.composition import OfSample
 from jounce.robot.algorithms.wrenches import Wrench, check_wrenches
@@ -25,7 +24,7 @@ class WrenchPart(Module):
 
     constant: Any
     function: OfSample | None
-    of_state: bool = eqx.field(static=True)
+    of_state: bool = field(static=True)
 
     def __call__(self, time: Any, q: Any, rate: Any) -> Any:
         """Return three components at states, the batch last."""

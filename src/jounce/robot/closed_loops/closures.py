@@ -8,13 +8,13 @@ the coordinates of the tree, near the closed position as well as in it, and left
 from collections.abc import Mapping
 from typing import Any
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 from typing_extensions import TypeAliasType
 
+from jounce.base.modules import field
 from jounce.base.shapes import ArrayLike, Numbers
 from jounce.constraints import AbstractConstraint, Scalar, Vector
 from jounce.constraints.base import Wrenches
@@ -50,7 +50,7 @@ class LinkClosure(AbstractConstraint, type="closure", space="spatial"):
     wrenches: Wrenches  # (rows, 6): force and moment, in axes of body i
     vector_part: Vector = None  # of the Euler parameters of the frame of body j in that of body i, when closed
     scalar_part: Scalar = None
-    sense: Any = eqx.field(default=None, init=False)  # 1 or -1, found from the starting guess
+    sense: Any = field(default=None, init=False)  # 1 or -1, found from the starting guess
 
     dimensions = {"vector_part": "ratio", "scalar_part": "ratio"}
 

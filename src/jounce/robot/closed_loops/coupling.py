@@ -4,9 +4,9 @@ import dataclasses
 from fractions import Fraction
 from typing import Any
 
-import equinox as eqx
 import jax.numpy as jnp
 
+from jounce.base.modules import field
 from jounce.base.shapes import Numbers
 from jounce.constraints import AbstractConstraint, Scalar, Vector
 from jounce.constraints.angles import relative_angle
@@ -80,10 +80,8 @@ class CoupledJoints(AbstractConstraint, type="coupled", space="spatial"):
     stand for inertia against the rate of a coordinate alone.
     """
 
-    roles: str = eqx.field(
-        static=True
-    )  # parent and child of each joint among the bodies i, j, m, n, such as ijim; ij0m
-    kinds: str = eqx.field(static=True)  # of each joint, turn or slide, such as turn-slide
+    roles: str = field(static=True)  # parent and child of each joint among the bodies i, j, m, n, such as ijim; ij0m
+    kinds: str = field(static=True)  # of each joint, turn or slide, such as turn-slide
     point_1: Vector
     axis_1: Vector
     vector_1: Vector

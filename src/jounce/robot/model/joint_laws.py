@@ -4,12 +4,11 @@ import abc
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
-from jounce.base.modules import Module
+from jounce.base.modules import Module, field
 from jounce.base.shapes import ArrayLike, Numbers
 from jounce.errors import JounceError, RobotError, check_name
 from jounce.jet import Jet
@@ -26,8 +25,8 @@ RATE = "_d1"  # as columns of files name rates
 class _Expressed(Module):
     """An expression of time, coordinates and rates by the names of joints."""
 
-    expression: Expression = eqx.field(static=True)
-    names: tuple[str, ...] = eqx.field(static=True)
+    expression: Expression = field(static=True)
+    names: tuple[str, ...] = field(static=True)
 
     def __call__(self, time: Any, q: Any, rate: Any) -> Any:
         known = {name: q[k] for k, name in enumerate(self.names)}
@@ -77,7 +76,7 @@ class JointLaws(AbstractJointLaws):
     constant: Any
     whole: OfSample | None
     single: tuple[Any, ...]
-    columns: tuple[int, ...] = eqx.field(static=True)
+    columns: tuple[int, ...] = field(static=True)
 
     @property
     def changing(self) -> bool:

@@ -7,12 +7,11 @@ this program order after order, and all that is not a sum along branches is done
 import dataclasses
 from typing import Any, NamedTuple
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 from jaxtyping import Float
 
-from jounce.base.modules import Module
+from jounce.base.modules import Module, field
 from jounce.base.shapes import Numbers
 from jounce.jet import Jet, cross
 from jounce.jet.algebra import total
@@ -118,8 +117,8 @@ class TreeEquations(Module):
     driven: Any
     base: BaseBody | None = None
     frames: tuple[Frame, ...] = ()
-    global_axes: tuple[bool, ...] = eqx.field(static=True, default=())
-    drives: bool = eqx.field(static=True, default=False)
+    global_axes: tuple[bool, ...] = field(static=True, default=())
+    drives: bool = field(static=True, default=False)
 
     def motion(self, coordinates: Coordinates, rates: Coordinates, base: FreeBase | None = None) -> TreeState:
         """Return where all bodies are, from the coordinates."""

@@ -3,9 +3,9 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-import equinox as eqx
 import numpy as np
 
+from jounce.base.modules import field
 from jounce.errors import JounceError, TrajectoryError
 from jounce.jet import Jet
 from jounce.trajectory.motion import AbstractMotion, ExpressionMotion, Untraced
@@ -21,7 +21,7 @@ class MadeOfOthers(AbstractMotion):
     """A law whose parts may be expressions of parameters, which have their values from a mechanism."""
 
     parts: tuple[AbstractMotion, ...]
-    recipe: Untraced = eqx.field(static=True)
+    recipe: Untraced = field(static=True)
 
     def _take(self, parts: Sequence[Law], *rest: Any) -> None:
         """Fill in the fields: the parts where they are known, and how they were given."""
@@ -169,7 +169,7 @@ class OutputMotion(MadeOfOthers):
     [[0.523599, 0.57735], [0.848062, 0.755929]]
     """
 
-    output: str = eqx.field(static=True)
+    output: str = field(static=True)
 
     def __init__(self, output: str, law: Law):
         if not isinstance(output, str) or not output:

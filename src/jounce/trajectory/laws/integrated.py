@@ -4,12 +4,12 @@ import functools
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 from numpy.polynomial import chebyshev
 
+from jounce.base.modules import field, jit_over_arrays
 from jounce.base.shapes import Numbers
 from jounce.errors import TrajectoryError
 from jounce.jet import Jet
@@ -76,7 +76,7 @@ class IntegratedMotion(MadeOfOthers):
     breakpoints: Any
     halves: Any
     coefficients: Any
-    derivative: int = eqx.field(static=True)
+    derivative: int = field(static=True)
 
     def __init__(self, law: Law, derivative: int = 1, initial: Sequence[Value] = (), start: Value = 0.0):
         order = self.derivative = whole_number("derivative", derivative, 1, HIGHEST)
@@ -166,7 +166,7 @@ def _known(name: str, value: Value) -> Any:
     return value if isinstance(value, Expression) and value.names else number_of_value(name, value)
 
 
-@eqx.filter_jit
+@jit_over_arrays
 def _panels(law: AbstractMotion, start: Any) -> tuple[Numbers, Numbers, Numbers]:
     """Return panels to both sides of a start, and the integral of a law from there on each of them.
 

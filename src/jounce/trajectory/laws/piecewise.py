@@ -3,12 +3,12 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 from jax.core import Tracer
 from jaxtyping import Float
 
+from jounce.base.modules import field
 from jounce.base.shapes import is_traced
 from jounce.errors import MechanismError, TrajectoryError, check_choice
 from jounce.jet import Jet
@@ -61,7 +61,7 @@ class PiecewiseMotion(MadeOfOthers):
     until: Any
     start: Any
     advance: Any
-    beyond: str = eqx.field(static=True)
+    beyond: str = field(static=True)
 
     def __init__(self, laws: Sequence[Law], until: Sequence[Value], start: Value | None = None, beyond: str = "refuse"):
         check_choice("beyond", beyond, BEYOND, TrajectoryError)

@@ -5,10 +5,10 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
-import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 
+from jounce.base.modules import field
 from jounce.base.shapes import seconds
 from jounce.errors import TrajectoryError, check_name
 from jounce.jet import Jet, sin
@@ -100,7 +100,7 @@ class RestToRestMotion(AbstractProfile):
     [0.5, 0.9375]
     """
 
-    rest: int = eqx.field(static=True)
+    rest: int = field(static=True)
 
     def __init__(
         self, start: float = 0.0, end: float = 1.0, duration: float = 1.0, start_time: float = 0.0, rest: int = 2

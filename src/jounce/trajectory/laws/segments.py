@@ -3,11 +3,11 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
+from jounce.base.modules import field
 from jounce.base.shapes import Numbers, is_traced
 from jounce.errors import TrajectoryError, check_choice, check_name
 from jounce.jet import Jet, sin
@@ -69,7 +69,7 @@ class SegmentedMotion(SplineMotion):
     """
 
     sines: Any
-    recipe: Untraced = eqx.field(static=True)
+    recipe: Untraced = field(static=True)
 
     def __init__(self, segments: Sequence[Segment], initial: Value = 0.0, start: Value = 0.0, beyond: str = "hold"):
         check_choice("beyond", beyond, BEYOND, TrajectoryError)

@@ -3,12 +3,12 @@
 from collections.abc import Sequence
 from typing import Any
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
+from jounce.base.modules import jit_over_arrays
 from jounce.jet import Jet
 from jounce.trajectory.laws.user_laws import read_laws
 from jounce.trajectory.motion import AbstractMotion
@@ -45,7 +45,7 @@ def law_derivatives(
     return _derivatives(read_laws(laws), times, order)
 
 
-@eqx.filter_jit
+@jit_over_arrays
 def _derivatives(
     laws: list[AbstractMotion], times: Float[jax.Array, " time"], order: int
 ) -> Float[jax.Array, "order joint time"]:

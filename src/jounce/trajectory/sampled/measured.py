@@ -4,13 +4,13 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jax.core import Tracer
 from jaxtyping import Float
 
+from jounce.base.modules import field
 from jounce.base.shapes import ArrayLike
 from jounce.errors import MechanismError, check_choice
 from jounce.jet import Jet
@@ -65,9 +65,9 @@ class MeasuredMotion(SplineMotion):
     [2.625, 1.75, 3.0, 6.0]
     """
 
-    derivative: int = eqx.field(static=True)
-    initial: Untraced = eqx.field(static=True)
-    extrapolation: str = eqx.field(static=True)
+    derivative: int = field(static=True)
+    initial: Untraced = field(static=True)
+    extrapolation: str = field(static=True)
 
     def __init__(
         self,

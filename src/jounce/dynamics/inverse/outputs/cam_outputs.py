@@ -2,9 +2,9 @@
 
 from typing import Any
 
-import equinox as eqx
 import numpy as np
 
+from jounce.base.modules import field
 from jounce.base.shapes import Numbers
 from jounce.constraints import Cam
 from jounce.dynamics.inverse.motion_forces import MotionForces
@@ -16,7 +16,7 @@ from jounce.mechanism.laws.driver_outputs import is_turning
 
 
 class _CamOutput(AbstractForceOutput):
-    joint: str = eqx.field(static=True)
+    joint: str = field(static=True)
 
     source = "joint"
 

@@ -3,9 +3,9 @@
 from collections.abc import Iterable
 from typing import Any, ClassVar
 
-import equinox as eqx
 import numpy as np
 
+from jounce.base.modules import field
 from jounce.base.shapes import ArrayLike, Numbers
 from jounce.constraints import Cam, Rope
 from jounce.constraints.base import Vector, by_ratio_alone
@@ -74,7 +74,7 @@ class AbstractForceOutput(AbstractMotionOutput):
 
 
 class _DriverOutput(AbstractForceOutput):
-    driver: str = eqx.field(static=True)
+    driver: str = field(static=True)
 
     source = "driver"
 
@@ -121,11 +121,9 @@ class _Reaction(AbstractForceOutput):
 
 
 class _JointOutput(_Reaction):
-    joint: str = eqx.field(static=True)
-    body: str | None = eqx.field(
-        static=True, default=None
-    )  # on which it acts; the second one of the joint unless given
-    frame: str = eqx.field(static=True, default="global")  # global, body, or the name of a body of the joint
+    joint: str = field(static=True)
+    body: str | None = field(static=True, default=None)  # on which it acts; the second one of the joint unless given
+    frame: str = field(static=True, default="global")  # global, body, or the name of a body of the joint
 
     source = "joint"
 
@@ -311,7 +309,7 @@ class GroundTorqueOutput(_GroundOutput):
 
 
 class _AppliedOutput(AbstractForceOutput):
-    force: str = eqx.field(static=True)
+    force: str = field(static=True)
 
     source = "force"
 
