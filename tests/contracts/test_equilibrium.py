@@ -185,9 +185,8 @@ def test_momentum_changes_by_what_is_applied_and_what_the_ground_gives(name):
     point = np.array([0.3, -0.2, 0.4])[: 2 if motion.mechanism.space == "planar" else 3]
     ground = [taylor(x.values) for x in dataclasses.astuple(jn.dynamics.ground_reaction(motion, point))]
     levels = len(ground[0])
-    assert (
-        levels == (FEWER if name in ("cams", "wheels") else RATES) + 1
-    )  # cams have outputs of forces: two more orders
+    fewer = name in ("cams", "wheels")  # those of cams have outputs of forces: two more orders
+    assert levels == (FEWER if fewer else RATES) + 1
     changes, applied = balance_of_bodies(motion, point), loads(motion, point, levels)
     for whole, load, part in zip(changes, applied, ground, strict=True):
         change = whole[:levels]

@@ -10,7 +10,7 @@ import operator
 from abc import ABCMeta
 from collections.abc import Callable, Iterable, Mapping
 from functools import lru_cache, partial, wraps
-from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar, dataclass_transform
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar, cast, dataclass_transform
 
 import jax
 import numpy as np
@@ -56,7 +56,6 @@ class _ModuleType(ABCMeta):
     None is registered as the virtual base class of another: `isinstance` need not look for such.
     """
 
-    __instancecheck__ = type.__instancecheck__
     __layout__: _Layout
 
     def __new__(mcs, name: str, bases: tuple[type, ...], namespace: dict[str, Any], /, **keywords: Any) -> Any:
@@ -77,31 +76,34 @@ class _ModuleType(ABCMeta):
         _register(kind, layout)
         return kind
 
-    def __call__(cls, *arguments: Any, **keywords: Any) -> Any:
-        module, layout = cls.__new__(cls, *arguments, **keywords), cls.__layout__
-        _being_made.add(id(module))
-        try:
-            cls.__init__(module, *arguments, **keywords)
-        finally:
-            _being_made.discard(id(module))
-        held = vars(module)
-        for name in (*layout.traced, *layout.static):
-            if name not in held and not hasattr(cls, name):
-                raise TypeError(f"{cls.__qualname__}: __init__ gives the field {name!r} no value")
-        for name, converter in layout.converters:
-            held[name] = converter(held[name])
-        for name in layout.static:
-            if isinstance(held.get(name), jax.Array):
-                raise TypeError(f"{cls.__qualname__}.{name}: a static field cannot hold an array of JAX")
-        for check in layout.checks:
-            check(module)
-        return module
-
     @property
     def __signature__(cls) -> inspect.Signature:
         """The signature for `help`, which would be that of `__call__` otherwise."""
         signature = inspect.signature(cls.__init__)
         return signature.replace(parameters=list(signature.parameters.values())[1:])
+
+    if not TYPE_CHECKING:  # those who check types see the dataclasses
+        __instancecheck__ = type.__instancecheck__
+
+        def __call__(cls, *arguments, **keywords):
+            module, layout = cls.__new__(cls, *arguments, **keywords), cls.__layout__
+            _being_made.add(id(module))
+            try:
+                cls.__init__(module, *arguments, **keywords)
+            finally:
+                _being_made.discard(id(module))
+            held = vars(module)
+            for name in (*layout.traced, *layout.static):
+                if name not in held and not hasattr(cls, name):
+                    raise TypeError(f"{cls.__qualname__}: __init__ gives the field {name!r} no value")
+            for name, converter in layout.converters:
+                held[name] = converter(held[name])
+            for name in layout.static:
+                if isinstance(held.get(name), jax.Array):
+                    raise TypeError(f"{cls.__qualname__}.{name}: a static field cannot hold an array of JAX")
+            for check in layout.checks:
+                check(module)
+            return module
 
 
 def _has_own_init(base: type) -> bool:
@@ -141,7 +143,11 @@ class Module(metaclass=_ModuleType):
     object is made, converters run, and then `__check_init__` of its class and of each of its bases.
     """
 
-    if not TYPE_CHECKING:
+    if TYPE_CHECKING:  # classes of joints, laws and outputs are told apart by facts, too
+
+        def __getattr__(self, name: str) -> Any: ...
+
+    else:
 
         def __setattr__(self, name, value):
             if id(self) in _being_made and name in field_names(type(self)):
@@ -158,7 +164,7 @@ class Module(metaclass=_ModuleType):
             raise dataclasses.FrozenInstanceError(f"cannot delete field {name!r} of {type(self).__qualname__}")
 
     def __repr__(self) -> str:
-        shown = (f.name for f in dataclasses.fields(self) if f.repr)  # pyright: ignore[reportArgumentType]
+        shown = (f.name for f in dataclasses.fields(self) if f.repr)
         return f"{type(self).__qualname__}({', '.join(f'{name}={_shown(getattr(self, name))}' for name in shown)})"
 
     def __hash__(self) -> int:
@@ -197,6 +203,7 @@ class Untraced:
 
 
 M = TypeVar("M")
+F = TypeVar("F", bound=Callable[..., Any])
 
 
 def with_fields(module: M, **values: Any) -> M:
@@ -231,7 +238,7 @@ def field_names(kind: type[Any]) -> tuple[str, ...]:
     return tuple(field.name for field in dataclasses.fields(kind))
 
 
-def jit_over_arrays(function: Callable[..., Any]) -> Callable[..., Any]:
+def jit_over_arrays(function: F) -> F:
     """Return a function that `jax.jit` compiles, with arrays in its arguments traced, and all else constants."""
 
     @partial(jax.jit, static_argnums=0)
@@ -247,7 +254,7 @@ def jit_over_arrays(function: Callable[..., Any]) -> Callable[..., Any]:
         others = tuple(_TRACED if is_traced else x for x, is_traced in zip(leaves, traced, strict=True))
         return compiled((structure, others), [x for x, is_traced in zip(leaves, traced, strict=True) if is_traced])
 
-    return called
+    return cast(F, called)
 
 
 def is_ours(thing: Any) -> bool:
