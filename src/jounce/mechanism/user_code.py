@@ -25,7 +25,7 @@ from jounce.forces.laws import AbstractLaw, ReadLaw, is_users_law
 from jounce.jet import Jet
 from jounce.jet.programs.read_methods import Reading, Verbatim, read_method
 from jounce.mechanism.outputs.base import AbstractOutput
-from jounce.mechanism.resolve import stack_elements
+from jounce.mechanism.resolve import stack_elements, static_fields
 from jounce.rigid import PlanarPose, SpatialPose
 from jounce.rigid.pose import Pose
 from jounce.trajectory import AbstractMotion
@@ -192,8 +192,13 @@ def _inputs(element: Any, arguments: tuple[Any, ...]) -> list[Any]:
     laws = _laws(element)
     if isinstance(arguments[-1], Jet):
         jets += [getattr(element, name)(arguments[-1]) for name in laws]
-    names = [name for name in value_fields(users_class(type(element))) if name not in laws]
+    names = _fields_with_numbers(users_class(type(element)), laws)
     return [*jets, *jax.tree.leaves([getattr(element, name) for name in names])]
+
+
+def _fields_with_numbers(kind: type, laws: Sequence[str]) -> list[str]:
+    """Return the fields of a class beside its laws and its words, which are constants of a program."""
+    return [name for name in value_fields(kind) if name not in (*laws, *static_fields(kind))]
 
 
 def _jets(argument: Any) -> list[Jet]:
@@ -242,7 +247,7 @@ class _Reader:
         written, arguments = getattr(self.kind, name), self._arguments(name)
         of_time = [name for name in self.laws if isinstance(arguments[-1], Jet)]
         its = {law: _series((), ORDER) for law in of_time}
-        fields = [n for n in value_fields(self.kind) if n not in self.laws]
+        fields = _fields_with_numbers(self.kind, self.laws)
         held, tree = jax.tree.flatten([getattr(self.element, n) for n in fields])
         jets = [*(x for argument in arguments for x in _jets(argument)), *its.values(), *held]
         rates = [a.angular_velocity for a in arguments if isinstance(a, SpatialPose)]

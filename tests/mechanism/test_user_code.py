@@ -1,0 +1,64 @@
+"""Elements of users whose methods decide by words: any word, also one that NumPy takes for a type of numbers."""
+
+import numpy as np
+import pytest
+
+import jounce as jn
+
+TIME = np.linspace(0.0, 1.0, 5)
+OFFSETS = {"low": 0.25}  # of the module, read at each call
+
+
+class Shelf(jn.joints.AbstractConstraint, space="planar"):
+    """A height that depends on a word."""
+
+    height: jn.joints.Scalar
+    side: str = "d"
+
+    def residual(self, body_i, body_j, time):
+        sign = {"d": -1.0, "f": 1.0, "int": 2.0, "left": 3.0}[self.side]
+        return body_j.position[1] - sign * (self.height + OFFSETS["low"])
+
+
+class Push(jn.forces.AbstractForce, space="planar"):
+    """A force along x that depends on a word."""
+
+    size: jn.joints.Scalar
+    sense: str
+
+    def displacement(self, body_i, body_j, time):
+        return body_j.position[0] - body_i.position[0]
+
+    def force(self, displacement, velocity, time):
+        return self.size * time if self.sense == "b" else -self.size * time
+
+
+def held(joint, **forces):
+    return jn.Mechanism(
+        space="planar",
+        gravity=[0.0, 0.0],
+        bodies={"a": jn.Body([0.0, 0.5], mass=1.0, inertia=0.1)},
+        joints={"shelf": joint},
+        drivers={
+            "x": jn.drivers.CoordinateDriver(("ground", "a"), "x", 0.0),
+            "turn": jn.drivers.CoordinateDriver(("ground", "a"), "angle", "t"),
+        },
+        forces=forces,
+        outputs={"place": jn.outputs.PointOutput("a", [0.0, 0.0])},
+    )
+
+
+@pytest.mark.parametrize("side, sign", [("d", -1.0), ("f", 1.0), ("int", 2.0), ("left", 3.0)])
+def test_a_joint_decides_by_a_word(side, sign, monkeypatch):
+    for offset in (0.25, 0.75):
+        monkeypatch.setitem(OFFSETS, "low", offset)
+        motion = jn.solve(held(Shelf(("ground", "a"), 0.5, side)), TIME, order=2)
+        np.testing.assert_allclose(motion.dataset["place"].values[:, 0, 1], sign * (0.5 + offset), rtol=1e-14)
+
+
+@pytest.mark.parametrize("sense, sign", [("b", 1.0), ("away", -1.0)])
+def test_a_force_decides_by_a_word(sense, sign):
+    mechanism = held(Shelf(("ground", "a"), 0.5), push=Push(("ground", "a"), 3.0, sense))
+    force = jn.driver_force(jn.solve(mechanism, TIME, order=3), "x")
+    np.testing.assert_allclose(force.values[:, 0], -sign * 3.0 * TIME, rtol=0, atol=1e-13)
+    np.testing.assert_allclose(force.values[:, 1], -sign * 3.0, rtol=1e-13)
