@@ -278,6 +278,7 @@ def ring(count=60, turns=1.0):
     [
         (np.delete(ring(), slice(20, 30), axis=0), True, "a gap of .* give points between"),
         (np.array([[0, 0], [1, 0], [2, 0], [3, 0], [3, 1], [3, 2], [3, 3]]), False, "a corner of 90 deg"),
+        (np.array([[0, 0], [1, 0], [2, 0], [3, 0], [4, 0.3], [5, 0.6], [6, 0.9]]), False, r"points\[3\].* of 17 deg"),
         (ring(60, 0.5), True, "a gap of"),
         (np.repeat(ring(), 2, axis=0), True, "repeats the one before"),
         (ring()[:5], False, "at least 7 points"),
