@@ -207,10 +207,30 @@ def test_values_that_are_set_as_they_are_meant_are_not_doubted():
         assert override(mechanism, [given]).parameters
 
 
-def test_a_cam_law_over_degrees_without_a_unit_is_told(tmp_path):
+@pytest.mark.parametrize(
+    "section, coordinate, law, words",
+    [
+        ("drivers", "angle", "profile", r"profile\[2\]\.duration: 180 rad is 29 turns: 180 deg\?"),
+        ("drivers", "y", "profile", r"profile\[2\]\.duration: 180 rad is 29 turns: 180 deg\?"),
+        ("joints", "y", "profile", r"profile\[2\]\.duration: 180 rad is 29 turns: 180 deg\?"),
+        ("joints", "angle", "piecewise", r"piecewise\[1\]\.until: 360 rad is 57 turns: 360 deg\?"),
+    ],
+)
+def test_a_cam_law_over_degrees_without_a_unit_is_told(tmp_path, section, coordinate, law, words):
+    follower = CAM_FOLLOWER.format(coordinate=coordinate, law=CAM_LAWS[law])
     path = tmp_path / "cam.yaml"
-    path.write_text(CAM)
-    with pytest.warns(jn.errors.UnitWarning, match=r"goes on over 360 rad of its leader, 57 turns: degrees\?"):
+    path.write_text(CAM.replace(f"{section}:\n", f"{section}:\n{follower}"))
+    with pytest.warns(jn.errors.UnitWarning, match=rf"{section}\.table\.motion\.{words}"):
+        jn.load(path)
+
+
+@pytest.mark.parametrize("duration", ["120 deg", "2*pi/3", "2.1"])
+def test_a_cam_law_over_angles_is_not_doubted(tmp_path, duration):
+    law = f"profile: [{{profile: cycloidal, duration: {duration}, to: 0.1}}], beyond: hold"
+    path = tmp_path / "cam.yaml"
+    path.write_text(CAM.replace("joints:\n", "joints:\n" + CAM_FOLLOWER.format(coordinate="y", law=law)))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
         jn.load(path)
 
 
@@ -224,17 +244,16 @@ joints:
   pivot: {type: revolute, bodies: [ground, table], points: [[1, 0], [0, 0]]}
 drivers:
   shaft: {type: coordinate, bodies: [ground, shaft], coordinate: angle, motion: 2*pi*t}
-  table:
-    type: coordinate
-    bodies: [ground, table]
-    coordinate: angle
-    motion:
-      profile: [{profile: cycloidal, duration: 120, to: 30 deg}, {profile: dwell, duration: 60},
-                {profile: cycloidal, duration: 180, to: 0}]
-      beyond: repeat
-      of: shaft
 time: {start: 0, stop: 1, step: 0.01}
 """
+CAM_FOLLOWER = """
+  table: {{type: coordinate, bodies: [ground, table], coordinate: {coordinate}, motion: {{{law}, of: shaft}}}}
+"""
+CAM_LAWS = {
+    "profile": "profile: [{profile: cycloidal, duration: 120, to: 0.5}, {profile: dwell, duration: 60}, "
+    "{profile: cycloidal, duration: 180, to: 0}], beyond: repeat",
+    "piecewise": "piecewise: [{until: 90, expression: 0}, {until: 360, expression: 0}], beyond: hold",
+}
 
 
 def test_files_say_what_is_beyond_samples(tmp_path):

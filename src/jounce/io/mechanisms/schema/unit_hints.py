@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from jounce.constraints import catalogue
+from jounce.constraints.cams import Cam
 from jounce.constraints.facts import at_coordinate
 from jounce.errors import JounceError, UnitWarning
 from jounce.io.files.located_data import Location, Source, dotted
@@ -27,6 +28,7 @@ from jounce.mechanism.laws.angle_laws import (
     number_doubt,
     settle,
 )
+from jounce.mechanism.laws.driver_outputs import is_turning
 from jounce.mechanism.resolve import resolve
 from jounce.mechanism.time import instants_of
 from jounce.trajectory.law_checks.unit_doubts import values_of
@@ -235,7 +237,7 @@ def _parameters(data: dict[str, Any], mechanism: Mechanism, dimension: Dimension
 def _angles(data: dict[str, Any], mechanism: Mechanism) -> Iterator[tuple[Location, float]]:
     """Return angles that stand without a unit, laws at time zero."""
     given = [(location, raw) for location, quantity, raw in _fields(data, mechanism) if quantity == "angle"]
-    for location, raw in [*given, *_parameters(data, mechanism, ANGLE)]:
+    for location, raw in [*given, *_parameters(data, mechanism, ANGLE), *_angles_of_leaders(data, mechanism)]:
         text = str(raw)
         if "deg" in text or "pi" in text:
             continue
@@ -244,6 +246,24 @@ def _angles(data: dict[str, Any], mechanism: Mechanism) -> Iterator[tuple[Locati
             yield location, float(formula.evaluate({"t": 0.0}))
         except JounceError:  # it has a unit, or depends on parameters
             continue
+
+
+def _angles_of_leaders(data: dict[str, Any], mechanism: Mechanism) -> Iterator[tuple[Location, Any]]:
+    """Return angles of leaders at which segments and pieces of laws end, the longest of each law."""
+    for section, known in (("drivers", mechanism.drivers), ("joints", mechanism.joints)):
+        for name, element in known.items():
+            law = ((data.get(section) or {}).get(name) or {}).get("motion")
+            if not isinstance(law, dict) or not isinstance(law.get("of"), str):
+                continue
+            leader = element.leader if isinstance(element, Cam) else mechanism.drivers.get(law["of"])
+            if leader is None or not is_turning(leader):
+                continue
+            entries = [
+                (key, k, entry) for key in ("profile", "piecewise") for k, entry in enumerate(law.get(key) or ())
+            ]
+            spans = [((section, name, "motion", key, k, span), entry[span]) for key, k, entry in entries
+                     for span in ("duration", "until") if isinstance(entry.get(span), int | float)]  # fmt: skip
+            yield from sorted(spans, key=lambda span: -span[1])[:1]
 
 
 def _lengths(data: dict[str, Any], mechanism: Mechanism) -> Iterator[tuple[Location, float, bool]]:
