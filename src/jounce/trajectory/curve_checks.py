@@ -24,7 +24,7 @@ SLOW = 0.3  # of it: a tangent that may go on to vanish
 NARROWINGS = 70  # of an interval, for the place where a tangent is least
 SHARPEST = 50.0  # deg between chords
 SHARP = 10.0  # deg between chords, of a corner where those beside it turn by little
-ALONE = 6.0  # times as much as those beside it
+SINGLE = 6.0  # times as much as those beside it
 WIDEST = 8.0  # times the median of the chords
 SMOOTH = {"sin", "cos", "tan", "exp", "sinh", "cosh", "tanh", "atan", "asinh", "erf", "expm1"}
 _POWER = re.compile(r"\*\*\s*[0-9]+(?![0-9.eE])")  # a whole number
@@ -197,10 +197,10 @@ def check_points(points: np.ndarray, *, closed: bool, least: int) -> Float[np.nd
     along = steps / chords[:, None]
     after = np.roll(along, -1, axis=0) if closed else along[1:]
     turns = np.degrees(np.arccos(np.clip((along[: len(after)] * after).sum(axis=1), -1, 1)))
-    beside = (
+    neighbors = (
         [np.roll(turns, shift) for shift in (-1, 1)] if closed else [np.append(turns[1:], 0), np.append(0, turns[:-1])]
     )
-    corners = (turns > SHARPEST) | ((turns > SHARP) & (turns > ALONE * np.maximum(*beside)))
+    corners = (turns > SHARPEST) | ((turns > SHARP) & (turns > SINGLE * np.maximum(*neighbors)))
     if corners.any():
         row = int(np.argmax(np.where(corners, turns, 0.0))) + 1
         message = f"the curve has a corner of {turns[row - 1]:.0f} deg; round it off, or give more points"
