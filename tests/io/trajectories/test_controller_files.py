@@ -1,5 +1,6 @@
 """Trajectories as controllers take them: written, read back and compared; what does not fit is told."""
 
+import json
 import re
 
 import numpy as np
@@ -122,7 +123,18 @@ POINT = "- positions: [1.0]\n  time_from_start: {sec: 0, nanosec: 0}\n"
             "after that of the point before, which is",
         ),
         (f"joint_names: [a]\npoints:\n{POINT}- positions: [1.0, 2.0]\n", "1 finite numbers"),
-        (f"joint_names: [a]\npoints:\n{POINT}- positions: [2.0]\n", "sec and nanosec"),
+        (
+            f"joint_names: [a]\npoints:\n{POINT}- positions: [2.0]\n",
+            r"line 5, points\[1\]\.time_from_start: is missing",
+        ),
+        (
+            f"joint_names: [a]\npoints:\n{POINT}- positions: [2.0]\n  time_from_start: 1 s\n",
+            "must be a time, as {sec: 1",
+        ),
+        (
+            f"joint_names: [a]\npoints:\n{POINT}- positions: [2.0]\n  time_from_start: -1\n",
+            "must be a time, as {sec: 1",
+        ),
         (f"joint_names: [a]\npoints:\n{POINT}- positions: [2.0]\n  time_from_start: {{sec: 1.5}}\n", "whole number"),
         ("joint_names: [a]\npoints:\n- velocities: [0.0]\n- velocities: [0.0]\n", "positions are missing"),
     ],
@@ -133,6 +145,16 @@ def test_faults_of_messages_are_told_with_their_line(tmp_path, text, words):
     with pytest.raises(jn.errors.TrajectoryError, match=words) as caught:
         jn.load_trajectory(path)
     assert re.match(r".*message\.yaml", str(caught.value))
+
+
+@pytest.mark.parametrize("listed", [False, True])
+def test_times_of_points_may_be_numbers_of_seconds_and_a_list_may_hold_one_message(tmp_path, listed):
+    points = [{"positions": [x], "time_from_start": t} for t, x in ((0, 1.0), (0.5, 2.0), (1.25, 2.5))]
+    message = {"joint_names": ["a"], "points": points}
+    path = tmp_path / "message.json"
+    path.write_text(json.dumps([message] if listed else message))
+    values = jn.load_trajectory(path).derivatives([0.0, 0.25, 0.5, 1.25], 0, ["a"])
+    np.testing.assert_allclose(np.ravel(values), [1.0, 1.5, 2.0, 2.5], rtol=1e-14)
 
 
 def test_faults_of_tables_are_told(tmp_path):

@@ -77,6 +77,9 @@ def read_messages(source: Source, joints: Sequence[str] | None = None) -> Record
         recording = _states(source)
     elif isinstance(data, list) and all(measured_part(x) is not None for x in data):
         recording = _controller_states(source)
+    elif isinstance(data, list) and len(data) == 1:
+        lines = {location[1:]: line for location, line in source.lines.items() if location[:1] == (0,)}
+        recording = _trajectories(dataclasses.replace(source, data=data[0], lines=lines))
     elif isinstance(data, list):
         message = f"the file has {len(data)} messages, each a trajectory of its own; keep one"
         raise source.error(message, (1,))
@@ -236,9 +239,13 @@ def _row(source: Source, at: Location, given: Any, count: int) -> list[float]:
 
 
 def _seconds(source: Source, at: Location, given: Any) -> float:
-    if not isinstance(given, dict):
-        location = at if given is not None else at[:-1]
-        raise source.error("must hold sec and nanosec: time_from_start", location, value=given)
+    if given is None:
+        message = (
+            "is missing: the time of each point since the start, as {sec: 1, nanosec: 0} or as a number of seconds"
+        )
+        raise source.error(message, at)
+    if isinstance(given, int | float) and not isinstance(given, bool) and np.isfinite(given) and given >= 0:
+        return float(given)
     return float(_stamp(source, at, given))
 
 
@@ -246,7 +253,7 @@ def _stamp(source: Source, at: Location, given: Any) -> Decimal:
     """Return a time of ROS 2 or ROS, s, exactly."""
     parts = ("sec", "nanosec") if isinstance(given, Mapping) and "sec" in given else ("secs", "nsecs")
     if not isinstance(given, Mapping) or set(given) - set(parts):
-        raise source.error(f"must hold sec and nanosec: {at[-1]}", at, value=given)
+        raise source.error("must be a time, as {sec: 1, nanosec: 0}", at, value=given)
     values = [given.get(part, 0) for part in parts]
     for part, value in zip(parts, values, strict=True):
         if isinstance(value, bool) or not isinstance(value, int) or value < 0:
