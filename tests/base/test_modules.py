@@ -155,9 +155,9 @@ def test_copies_are_equal():
 
 
 def test_what_is_shown_is_what_makes_one():
-    assert repr(Spring(3.0, ["a"])) == "Spring(stiffness=3.0, bodies=('a',), length=0.1, found=None)"
+    assert repr(Spring(3.0, ["a"])) == "Spring(stiffness=3.0, bodies=('a',))"
     assert repr(Spring(np.zeros((3, 200)), ["a"], jnp.ones(2))) == (
-        "Spring(stiffness=float64[3, 200], bodies=('a',), length=Array([1., 1.], dtype=float64), found=None)"
+        "Spring(stiffness=float64[3, 200], bodies=('a',), length=Array([1., 1.], dtype=float64))"
     )
     assert str(inspect.signature(Damped)) == "(stiffness: Any, bodies: Any, length: Any = 0.1, *, damping: Any) -> None"
 

@@ -164,8 +164,8 @@ class Module(metaclass=_ModuleType):
             raise dataclasses.FrozenInstanceError(f"cannot delete field {name!r} of {type(self).__qualname__}")
 
     def __repr__(self) -> str:
-        shown = (f.name for f in dataclasses.fields(self) if f.repr)
-        return f"{type(self).__qualname__}({', '.join(f'{name}={_shown(getattr(self, name))}' for name in shown)})"
+        given = {f.name: getattr(self, f.name) for f in dataclasses.fields(self) if f.repr and not _is_default(self, f)}
+        return f"{type(self).__qualname__}({', '.join(f'{name}={_shown(value)}' for name, value in given.items())})"
 
     def __hash__(self) -> int:
         return hash((type(self), *(getattr(self, name) for name in field_names(type(self)))))
@@ -175,6 +175,11 @@ class Module(metaclass=_ModuleType):
             return False
         (a, structure), (b, other_structure) = jax.tree.flatten(self), jax.tree.flatten(other)
         return structure == other_structure and all(map(_is_same, a, b))
+
+
+def _is_default(module: Module, field: dataclasses.Field) -> bool:
+    value = getattr(module, field.name)
+    return value is field.default or (isinstance(value, bool | int | float | str) and value == field.default)
 
 
 def _shown(value: Any) -> str:
