@@ -62,3 +62,53 @@ def test_a_force_decides_by_a_word(sense, sign):
     force = jn.driver_force(jn.solve(mechanism, TIME, order=3), "x")
     np.testing.assert_allclose(force.values[:, 0], -sign * 3.0 * TIME, rtol=0, atol=1e-13)
     np.testing.assert_allclose(force.values[:, 1], -sign * 3.0, rtol=1e-13)
+
+
+class Listed(jn.joints.AbstractConstraint, space="planar"):
+    """Equations in a list, which is no jet."""
+
+    def residual(self, body_i, body_j, time):
+        return [body_j.position[0], body_j.position[1]]
+
+
+class Steady(Push, space="planar"):
+    """A constant, which is no jet."""
+
+    def force(self, displacement, velocity, time):
+        return self.size
+
+
+class Twice(Push, space="planar"):
+    """Two forces on one displacement."""
+
+    def force(self, displacement, velocity, time):
+        return jn.joints.rows(displacement, velocity)
+
+
+def test_a_residual_that_is_no_jet_is_named():
+    words = r"joints\.shelf: the residual of Listed must return a jet, .* jn\.joints\.rows\(first, second\), not a list"
+    with pytest.raises(jn.errors.MechanismError, match=words):
+        jn.solve(held(Listed(("ground", "a"))), TIME)
+
+
+@pytest.mark.parametrize("kind", [Steady, Twice])
+def test_a_force_that_is_no_jet_of_the_shape_of_its_displacement_is_named(kind):
+    mechanism = held(Shelf(("ground", "a"), 0.5), push=kind(("ground", "a"), 3.0, "b"))
+    words = rf"forces\.push: the force of {kind.__name__} must return a jet of the shape of its displacement"
+    with pytest.raises(jn.errors.MechanismError, match=words):
+        jn.driver_force(jn.solve(mechanism, TIME, order=3), "x")
+
+
+class Between(jn.joints.AbstractConstraint, space="planar"):
+    """A residual of three bodies, in a class that does not say so."""
+
+    def residual(self, body_i, body_j, body_m, time):
+        return body_i.angle + body_j.angle - 2 * body_m.angle
+
+
+def test_a_residual_of_another_number_of_bodies_than_its_class_says_is_named():
+    words = r"joints\.shelf: the residual of Between must take the poses of 2 bodies .* states body_count"
+    with pytest.raises(jn.errors.MechanismError, match=words):
+        jn.solve(held(Between(("ground", "a"))), TIME)
+    with pytest.raises(jn.errors.MechanismError, match="Between joins 2 bodies, as its class says by body_count"):
+        Between(("ground", "a", "b"))

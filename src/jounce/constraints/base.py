@@ -251,6 +251,8 @@ def check_bodies(element: Any, counts: Sequence[int], does: str = "joins", must:
     name = getattr(element, "type_name", "") or type(element).__name__
     if len(element.bodies) not in counts:
         message = f"{name} {does} {counted(counts)} {'body' if counts == (1,) else 'bodies'}"
+        if not _is_ours(type(element)):
+            message += ", as its class says by body_count"
         raise MechanismError(message, name="bodies", value=list(element.bodies))
     if len(set(element.bodies)) != len(element.bodies) and not getattr(element, "may_repeat", False):
         message = f"{name} must {must} different bodies, not a body with itself"

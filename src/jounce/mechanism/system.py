@@ -11,7 +11,7 @@ from jaxtyping import Bool, Float
 from jounce.base.modules import Module, field, unchecked, with_fields
 from jounce.base.shapes import Numbers
 from jounce.constraints.friction import check_no_own_code
-from jounce.errors import UnsupportedError
+from jounce.errors import JounceError
 from jounce.jet import Jet, concatenate
 from jounce.jet.algebra import stacked
 from jounce.linear_algebra.fronts import Fronts
@@ -187,7 +187,7 @@ def group_elements(
         try:
             check_no_own_code(element)
             readings = readings_of(element, values, components) if type(element) in written else {}
-        except UnsupportedError as error:
+        except JounceError as error:
             raise error.located(name=name) from None
         if readings:
             values[READINGS] = readings

@@ -5,6 +5,7 @@ An element of a user's class is replaced by one of a class made here, whose meth
 """
 
 import dataclasses
+import inspect
 import itertools
 import weakref
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -19,7 +20,7 @@ from jax.core import Tracer
 from jounce.base.modules import changes_parts, field, is_ours, unchecked, with_fields
 from jounce.constraints import AbstractConstraint
 from jounce.constraints.base import field_kinds, value_fields
-from jounce.errors import UnsupportedError
+from jounce.errors import MechanismError, UnsupportedError
 from jounce.forces import AbstractForce
 from jounce.forces.laws import AbstractLaw, ReadLaw, is_users_law
 from jounce.jet import Jet
@@ -58,6 +59,8 @@ def readings_of(element: Any, values: Mapping[str, Any], components: int) -> dic
     if not names:
         return {}
     reader = _Reader(element, values, components)
+    if "force" in names:
+        reader.check_forces()
     if "residual" in names and not kind.nonholonomic:
         reader.check_positions()
     return {name: reader.reading(name) for name in names} | {"": Verbatim(_words(kind), old=False)}
@@ -226,6 +229,14 @@ class _Reader:
     def check_positions(self) -> None:
         """Raise UnsupportedError where a residual uses velocities: it has fewer derivatives than its bodies then."""
         example = (*self.poses, self.time)
+        try:
+            inspect.signature(self.kind.residual).bind(self.element, *example)
+        except TypeError:
+            message = (
+                f"the residual of {self.kind.__qualname__} must take the poses of {len(self.poses)} bodies and the "
+                "time: residual(self, body_i, body_j, time); a class for another number of bodies states body_count"
+            )
+            raise MechanismError(message) from None
 
         def residual() -> Any:
             poses = jax.tree.map(lambda x: jnp.zeros(x.shape, x.dtype), example)
@@ -235,13 +246,33 @@ class _Reader:
             shape = jax.eval_shape(residual)
         except Exception:  # noqa: BLE001 - its use raises the error again
             return
-        if isinstance(shape, Jet) and shape.order < ORDER:
+        if not isinstance(shape, Jet):
+            message = (
+                f"the residual of {self.kind.__qualname__} must return a jet, computed from those of its bodies; "
+                "several equations are one jet by jn.joints.rows(first, second), not a list"
+            )
+            raise MechanismError(message)
+        if shape.order < ORDER:
             message = (
                 f"the residual of {self.kind.__qualname__} uses velocities, which no joint of your own may: it must "
                 "be a function of the positions and attitudes of its bodies and of time, such as body.point, "
                 "body.direction and body.angle; write a condition on velocities by its integral, if it has one"
             )
             raise UnsupportedError(message)
+
+    def check_forces(self) -> None:
+        """Raise MechanismError where a force is no jet, or has another shape than the displacement."""
+        try:
+            displacement, velocity = self._displacement()
+            force = jax.eval_shape(self.element.force, displacement, velocity, self.time)
+        except Exception:  # noqa: BLE001 - its use raises the error again
+            return
+        if not isinstance(force, Jet) or force.shape != velocity.shape:
+            message = (
+                f"the force of {self.kind.__qualname__} must return a jet of the shape of its displacement, computed "
+                "from displacement, velocity and time; a constant is 0*displacement + value"
+            )
+            raise MechanismError(message)
 
     def reading(self, name: str) -> Reading:
         written, arguments = getattr(self.kind, name), self._arguments(name)
