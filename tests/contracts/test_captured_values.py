@@ -399,11 +399,11 @@ def hoist(one: Any, two: Any, teeth: Any = jn.planar.Rolling, **parts: Any) -> j
     loss = [jn.joints.GearFriction(speed=1e-4, efficiency=x) for x in (one, two)]
     whole: dict[str, Any] = {
         "space": "planar",
-        "bodies": {"motor": jn.Body([0, 0.5]), "disc": jn.Body([0, 0]), "rack": jn.Body([0, -0.05], mass=1.0)},
+        "bodies": {"motor": jn.Body([0, 0.5]), "disc": jn.Body([0, 0]), "rack": jn.Body([0, 0.05], mass=1.0)},
         "joints": {
             "M": jn.planar.Revolute(("ground", "motor"), [0, 0.5], [0, 0]),
             "D": jn.planar.Revolute(("ground", "disc"), [0, 0], [0, 0]),
-            "R": jn.planar.Prismatic(("ground", "rack"), [0, -0.05], [0, 0], [1, 0], [1, 0]),
+            "R": jn.planar.Prismatic(("ground", "rack"), [0, 0.05], [0, 0], [1, 0], [1, 0]),
             "belt": jn.planar.Belt(("motor", "disc"), [0, 0], [0, 0], 0.02, 0.06, friction=loss[0]),
             "teeth": teeth(("rack", "disc"), [0, 0], [0, 0], [1, 0], 0.05, friction=loss[1]),
         },
