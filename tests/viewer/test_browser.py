@@ -107,7 +107,7 @@ def test_an_impossible_value_shows_the_message_and_keeps_the_motion(opened):
     page.get_by_text("Exact values").click()
     page.wait_for_timeout(800)
     good = shown.page.recording
-    field = page.locator("xpath=(//*[normalize-space(text())='BC'])[last()]/following::input").first
+    field = page.locator("xpath=(//*[normalize-space(text())='BC (m)'])[last()]/following::input").first
     field.fill("0.03")
     field.press("Enter")
     message = page.get_by_text("No motion for these values")
