@@ -5,6 +5,7 @@ numbers. Here one sequence of machine code does all of it (see `jounce.execution
 are in registers, and loops go over what is larger; of many, the registers hold several instants at a time.
 """
 
+import dataclasses
 import threading
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
@@ -37,6 +38,22 @@ def shaped(leaf: Any) -> Any:
 def traces_one_instant() -> bool:
     """Return whether this thread traces a program of a single instant, in which loops are not unrolled."""
     return getattr(_thread, "tracing", False)
+
+
+@dataclasses.dataclass(frozen=True)
+class WhenMade:
+    """A static argument that is found when a program is made, and not at each call.
+
+    Parameters
+    ----------
+    key : object
+        What it depends on beside the forms of the arguments and the whole numbers in their arrays.
+    find : callable
+        Returns it; None where there is to be no machine code.
+    """
+
+    key: Any
+    find: Callable[[], Any] = dataclasses.field(compare=False)
 
 
 class Translated:
@@ -89,7 +106,7 @@ class Translated:
         shared, lanes : tuple
             The leaves of the arguments, or their shapes and types, and their structure.
         static : mapping
-            Further arguments of the function.
+            Further arguments of the function, which may be found when a program is made.
         large : int, optional
             Arrays of more numbers are in memory, as `object_file` has it.
         hasty : bool, default False
@@ -100,15 +117,21 @@ class Translated:
         (arrays, structure), (few, form) = shared, lanes
         kinds = tuple([(x.shape, x.dtype) for x in arrays])
         ones = tuple([(self._one(x.shape), x.dtype) for x in few])
-        indices: Any = {} if self._single else {k: x for k, x in enumerate(arrays) if x.dtype.kind in "iu" and x.ndim}
+        found_later = [name for name, value in static.items() if type(value) is WhenMade]
+        matters = found_later or not self._single
+        indices: Any = {k: x for k, x in enumerate(arrays) if x.dtype.kind in "iu" and x.ndim} if matters else {}
         known = tuple([x.tobytes() for x in indices.values()])
         static_key = tuple([(name, type(value), value) for name, value in static.items()])
         key = structure, form, kinds, ones, known, large, hasty, static_key, settings()
 
         def make() -> Any:
+            found = {name: static[name].find() for name in found_later}
+            if None in found.values():
+                return None
             parts = zip((structure, form), (kinds, ones), strict=True)
             given = [jax.tree.unflatten(tree, [jax.ShapeDtypeStruct(*x) for x in its]) for tree, its in parts]
-            return self._made((given[0], given[1]), indices, {"large": large, "hasty": hasty}, static)
+            constant = {} if self._single else indices
+            return self._made((given[0], given[1]), constant, {"large": large, "hasty": hasty}, {**static, **found})
 
         program = self._programs.get(key, make)
         if isinstance(program, str):

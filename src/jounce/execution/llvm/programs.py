@@ -10,6 +10,7 @@ from typing import Any
 import jax
 import numpy as np
 
+from jounce.execution.buffer_pool import lend
 from jounce.execution.llvm.machine import MachineCode, vector_width
 from jounce.execution.llvm.rounds import Column, RoundRunner
 
@@ -75,7 +76,7 @@ class Single:
 
     def __call__(self, given: Sequence[np.ndarray]) -> Any:
         """Return the results, for the leaves of the arguments, of the shapes and types that the program is for."""
-        memory = np.empty(self._results.end, np.uint8)
+        memory = lend(self._results.end)
         first = _address(memory)
         np.add(self._offsets, first, out=memory[: self._addresses].view(np.int64))
         self._given.put(memory, given)

@@ -54,39 +54,40 @@ class StepState(NamedTuple):
     det_rate: Number  # there where the step leads to, as a batch before has found it; NaN where none has
 
 
-class Records(NamedTuple):
-    """Records of all batches, batches first; of a lane that solved an instant of the grid, which one, or -1."""
+class Solved(NamedTuple):
+    """Solved instants: their states, and what came of each; instants last."""
 
     coordinates: dict[str, Numbers]
     outputs: tuple[Numbers, ...]
-    sign: Float[Numbers, "step batch"]
-    status: Int[Numbers, "step batch"]
-    lane: Int[Numbers, "step batch"]
+    sign: Float[Numbers, " instant"]
+    status: Int[Numbers, " instant"]
+
+
+class Records(NamedTuple):
+    """Records of a run: its anchors, one after another, and the instants of the grid, each in its place."""
+
+    anchors: Solved
     expansion_point: ExpansionPoint
-    taken: Bool[Numbers, " step"]  # whether the first lane is the next anchor
+    grid: Solved
 
 
 class TakenSteps(NamedTuple):
     """Outcome of a run."""
 
-    run: StepState
+    run: StepState  # its next instant of the grid is the first that is not among the records
     records: Records
     last: StepResult  # the last batch
     count: Int[Numbers, ""]  # of batches solved
+    steps: Int[Numbers, ""]  # taken: of anchors
 
 
 _batch = jax.jit(advance, static_argnames=("pose_type", "order"))  # traced once
 
 
-def _calls_code(*_: Any, native: str | None, **__: Any) -> bool:
-    """Tell whether batches are solved by machine code, and not within the program."""
-    return native is not None
-
-
 @compiled(
     *("pose_type", "order", "batches", "native"),
     narrow=True,
-    single=_calls_code,
+    single=True,
     otherwise={"native": None},  # where there is no code for a run, XLA has none to call
 )
 def take_steps(
@@ -148,23 +149,32 @@ def take_steps(
     def go_on(state: TakenSteps) -> TakenSteps:
         arrival = _typed(solved(state.run), blank)
         known = predictor(system, pose_type, (arrival.coordinates, arrival.outputs, arrival.sign))
-        run, record = _after(state.run, arrival, known, grid, limits)
-        put = jax.lax.dynamic_update_index_in_dim
-        records = jax.tree.map(lambda xs, x: put(xs, x, state.count, 0), state.records, _typed(record, state.records))
-        return TakenSteps(_typed(run, state.run), records, arrival, state.count + 1)
+        run, arrived, taken = _after(state.run, arrival, known, grid, limits)
+        solved_now, (anchors, points, instants) = _solved(arrival), state.records
+        anchors = put(anchors, jax.tree.map(lambda x: x[..., :1], solved_now), state.steps)
+        points = put(points, jax.tree.map(lambda x: x[None], arrived), state.steps)
+        instants = put(instants, jax.tree.map(lambda x: x[..., 1:], solved_now), state.run.next_up)
+        records = Records(anchors, points, instants)  # what is no anchor, or not within the step, is replaced
+        return TakenSteps(_typed(run, state.run), records, arrival, state.count + 1, state.steps + taken)
+
+    def put(whole: Any, part: Any, index: Any) -> Any:
+        update = jax.lax.dynamic_update_slice_in_dim
+        return jax.tree.map(lambda xs, x: update(xs, x, index, -1), whole, _typed(part, whole))
+
+    def room(like: Any, length: int) -> Any:
+        return jax.tree.map(lambda x: jnp.zeros((*x.shape[:-1], length), x.dtype), like)
 
     shapes = jax.eval_shape(solved, run)
     blank = jax.tree.map(lambda x: jnp.zeros(x.shape, x.dtype), shapes)
-    yes, lanes, point = (
-        np.zeros((), bool),
-        np.zeros(len(run.instant), int),
-        ExpansionPoint(*map(np.asarray, np.zeros(4))),
-    )
-    once = Records(shapes.coordinates, shapes.outputs, shapes.sign, shapes.status, lanes, point, yes)
-    records = jax.tree.map(lambda x: jnp.zeros((batches, *x.shape), x.dtype), once)
-    run = _typed(run, run)
+    point = ExpansionPoint(*[np.zeros(batches)] * 4)
+    records = Records(room(_solved(shapes), batches), point, room(_solved(shapes), len(grid)))
+    run, none = _typed(run, run), jnp.zeros((), int)
     run = jax.lax.cond(run.planned, lambda: run, lambda: _typed(_planned(run, grid, limits), run))
-    return jax.lax.while_loop(going, go_on, TakenSteps(run, records, blank, jnp.zeros((), int)))
+    return jax.lax.while_loop(going, go_on, TakenSteps(run, records, blank, none, none))
+
+
+def _solved(arrival: StepResult) -> Solved:
+    return Solved(arrival.coordinates, arrival.outputs, arrival.sign, arrival.status)
 
 
 def _typed(values: Any, like: Any) -> Any:
@@ -194,14 +204,16 @@ def _after(
     known: SolvedState,
     grid: Float[Numbers, " time"],
     limits: StepLimits,
-) -> tuple[StepState, Records]:
-    """Return the state of a run after a batch, and the record of the batch; `known` belongs to the arrival."""
+) -> tuple[StepState, ExpansionPoint, Bool[Numbers, ""]]:
+    """Return the state of a run after a batch, where its first lane arrived, and whether that is the next anchor.
+
+    What is `known` belongs to the arrival.
+    """
     control, status, lanes = run.control, arrival.status[0], len(run.instant) - 1
     target = control.target
     arrived = ExpansionPoint(target, arrival.safe_step[0], arrival.radius[0], arrival.det_rate[0])
     good = is_accepted(control, status, arrived)
     within = good & (_next_up(run, grid) <= target)
-    lane = jnp.where(within, run.next_up + np.arange(lanes), -1)
     run = run._replace(next_up=run.next_up + jnp.sum(within))
     behind = jnp.sum(_next_up(run, grid) <= target)  # a few are solved from the next anchor, which is near them
     taken = good & (behind <= jnp.where(target < limits.stop, lanes // 2, 0))  # else the same step with those left
@@ -210,5 +222,4 @@ def _after(
     run = _aimed(
         run._replace(known=known, det_rate=again), next_control(control, status, arrived, limits, (good, taken)), grid
     )
-    solved = (arrival.coordinates, arrival.outputs, arrival.sign, arrival.status)
-    return run, Records(*solved, jnp.concatenate([jnp.full(1, -1), lane]), arrived, taken)
+    return run, arrived, taken

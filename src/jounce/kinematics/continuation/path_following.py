@@ -25,7 +25,7 @@ from jounce.kinematics.continuation.step_control import ExpansionPoint, StopReas
 from jounce.kinematics.status import Status
 from jounce.mechanism.transmissions.axis_angles import AttitudeHistory
 
-OK = Status.OK
+OK = int(Status.OK)  # NumPy takes long to compare with a member of an enumeration
 PASSABLE = (OK, Status.UNDEFINED)
 SMALLEST_STEP = 1e-10  # of the span
 PASSAGE_ORDER = 4  # of the series that leads through: rounding spoils higher derivatives near a singular position
@@ -45,8 +45,9 @@ class Anchor(NamedTuple):
     ----------
     instant : float
         s.
-    leaves, structure
-        Of the state, which most motions never ask for.
+    states, lane, structure
+        Leaves of the states of several anchors, which of them this one is, and the structure of a state: most motions
+        never ask for one.
     safe_step, radius : float
         How far the Taylor series carries, s: with all its terms, and with the first three where its terms grow to one.
     det_rate : float
@@ -56,12 +57,18 @@ class Anchor(NamedTuple):
     """
 
     instant: float
-    leaves: Sequence[np.ndarray]
+    states: Sequence[np.ndarray]
+    lane: int
     structure: Any
     safe_step: float
     radius: float
     det_rate: float
     status: Status
+
+    @property
+    def leaves(self) -> list[np.ndarray]:
+        """Leaves of the state."""
+        return [x[..., self.lane : self.lane + 1] for x in self.states]
 
     @property
     def state(self) -> SolvedState:
@@ -73,7 +80,8 @@ class Anchor(NamedTuple):
         """Build the anchor from the first lane of a batch that was searched for singular positions."""
         safe_step, radius, det_rate = (float(x[0]) for x in (arrival.safe_step, arrival.radius, arrival.det_rate))
         status = Status(int(arrival.status[0]))
-        return cls(float(instant), *jax.tree.flatten(arrival.state(slice(1))), safe_step, radius, det_rate, status)
+        leaves, structure = jax.tree.flatten(arrival.state(slice(1)))
+        return cls(float(instant), leaves, 0, structure, safe_step, radius, det_rate, status)
 
     @property
     def expansion_point(self) -> tuple[float, float, float, float]:
@@ -116,22 +124,19 @@ class FollowedPath:
 
     def add(self, done: TakenSteps, first: int) -> None:
         """Add the anchors of a run, and the instants of the grid that it solved, which begin with the first."""
-        records, count = done.records, int(done.count)
-        self.backends.add(backend_of(records.status))
-        parts, structure = jax.tree.flatten((records.coordinates, records.outputs, records.sign))
-        leaves = [np.asarray(x)[:count] for x in parts]
-        status, lane = np.asarray(records.status)[:count], np.asarray(records.lane)[:count]
-        steps = np.flatnonzero(np.asarray(records.taken)[:count])
-        # copies: an anchor is kept for long, the other lanes are not
-        states = zip(*(x[steps, ..., :1] for x in leaves), strict=True)
-        values = zip(*(np.asarray(x)[steps].tolist() for x in (*records.expansion_point, status[:, 0])), strict=True)
-        for state, (instant, safe_step, radius, det_rate, outcome) in zip(states, values, strict=True):
-            outcome = OK if outcome == OK else Status(outcome)
-            self.anchors.append(Anchor(instant, state, structure, safe_step, radius, det_rate, outcome))
-        batch, column = ((lane >= 0) & (status == OK)).nonzero()
-        if batch.size:
-            last = [x.transpose(*range(1, x.ndim - 1), 0, -1) for x in leaves]
-            self.solved_instants.append((first + lane[batch, column], [x[..., batch, column] for x in last]))
+        (anchors, points, grid), steps, count = done.records, int(done.steps), int(done.run.next_up)
+        self.backends.add(backend_of(anchors.status))
+        leaves, structure = jax.tree.flatten(anchors[:3])
+        states = [np.array(np.asarray(x)[..., :steps]) for x in leaves]  # anchors are kept for long, the records not
+        values, passed = [np.asarray(x)[:steps].tolist() for x in (*points, anchors.status)], Status.OK
+        for lane, (instant, safe_step, radius, det_rate, status) in enumerate(zip(*values, strict=True)):
+            outcome = passed if status == OK else Status(status)
+            self.anchors.append(Anchor(instant, states, lane, structure, safe_step, radius, det_rate, outcome))
+        solved = np.asarray(grid.status)[:count] == OK
+        if count:
+            lanes: Any = slice(count) if solved.all() else np.flatnonzero(solved)
+            parts = [np.array(np.asarray(x)[..., lanes]) for x in jax.tree.leaves(grid[:3])]
+            self.solved_instants.append((np.arange(first, first + count)[lanes], parts))
 
     def anchors_around(self, first: float, last: float) -> list[Anchor]:
         """Return the anchors between two instants, with one before them and one after, where there are some."""

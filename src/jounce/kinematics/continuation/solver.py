@@ -11,6 +11,7 @@ import numpy as np
 from jaxtyping import Float, Int, Shaped
 
 from jounce.execution.mapped import OnLlvm, OnXla, Rounds
+from jounce.execution.translated import WhenMade
 from jounce.kinematics.continuation.continuation_steps import Settings, StepState, TakenSteps, take_steps
 from jounce.kinematics.continuation.correct_and_differentiate import LARGEST_GAP, SolvedState, StepResult, predictor
 from jounce.kinematics.continuation.instant_program import advance_instant, round_width
@@ -214,7 +215,7 @@ class Solver:
             pose_type=kind,
             order=self.order,
             batches=self._batches,
-            native=self.program.name if isinstance(self.program, OnLlvm) else None,
+            native=WhenMade(self.hasty, lambda: self.program.name if isinstance(self.program, OnLlvm) else None),
         )
 
     def fault(self, arrival: StepResult, lane: int) -> str:

@@ -8,6 +8,7 @@ tells an instant on another branch.
 """
 
 from collections.abc import Callable, Iterator, Sequence
+from functools import cached_property
 from typing import Any
 
 import jax
@@ -54,13 +55,22 @@ class GridSolver:
         self.status = np.full(len(time), int(Status.NOT_REACHED))
         self.faults: dict[int, str] = {}
         self._anchors = path.anchors_around(time[0], time[-1])
-        self._instants = np.concatenate([time, [anchor.instant for anchor in self._anchors]])
         self._reached = time < path.ended_at
-        like = self._anchors[0]
-        self._leaves = [np.empty((*x.shape[:-1], len(self._instants))) for x in like.leaves]
-        self._store: SolvedState = jax.tree.unflatten(like.structure, self._leaves)
         for lanes, _ in path.solved_instants:
             self.status[lanes] = OK
+        like, parts = self._anchors[0], path.solved_instants
+        if len(parts) == 1 and len(parts[0][0]) == len(time) and not path.change_points and self._reached.all():
+            self._leaves = parts[0][1]  # all are solved, and stay as they are
+        else:
+            self._leaves = [np.empty((*x.shape[:-1], len(time) + len(self._anchors))) for x in like.leaves]
+            for lanes, leaves in parts:
+                self._store_lanes(lanes, leaves)
+        self._store: SolvedState = jax.tree.unflatten(like.structure, self._leaves)
+
+    @cached_property
+    def _instants(self) -> Float[np.ndarray, " time"]:
+        """The instants, and behind them those of the anchors, s."""
+        return np.concatenate([self.time, [anchor.instant for anchor in self._anchors]])
 
     @property
     def state(self) -> tuple[dict[str, Any], tuple[Any, ...]]:
@@ -79,7 +89,7 @@ class GridSolver:
         count = len(self.time)
         left = self._reached & (self.status != OK)
         remaining = int(np.count_nonzero(left))
-        stride, done = stride_of(self.solver, remaining, count, len(self._anchors)), count - remaining
+        done = count - remaining
 
         def report(solved: int) -> None:
             nonlocal done
@@ -87,11 +97,24 @@ class GridSolver:
             if progress is not None:
                 progress(done, count)
 
+        if remaining or not self._reached.all():
+            self._solve_remaining(left, threads, report)
+        for point in self.path.change_points:
+            self._bridge(point)
+        for point in self.path.singular_positions_outside():
+            self._refuse(np.abs(self.time - point.instant) < spoiled_width(point, self.solver.order))
+        if explain and not self._reached.all():
+            self._explain_end(int(np.argmin(self._reached)))
+        if progress is not None and done < count:
+            progress(count, count)
+
+    def _solve_remaining(self, left: Bool[np.ndarray, " time"], threads: int, report: Callable[[int], None]) -> None:
+        """Solve the instants that are left."""
+        count = len(self.time)
+        stride = stride_of(self.solver, int(np.count_nonzero(left)), count, len(self._anchors))
         with Threads(threads, compiled=self.solver.is_compiled) as pool:
             if count > LONG_GRID:
                 left = self._in_blocks(left, stride, pool, report)
-            for lanes, leaves in self.path.solved_instants:
-                self._store_lanes(lanes, leaves)
             if left.any() or not self._reached.all():
                 self._insert_anchors()
             for lanes in _levels(left, stride):
@@ -101,14 +124,6 @@ class GridSolver:
                 for (batch, _), arrival in zip(batches, pool.map(self._solve_batch, batches), strict=True):
                     self._finish_batch(batch, arrival)
                     report(len(batch))
-        for point in self.path.change_points:
-            self._bridge(point)
-        for point in self.path.singular_positions_outside():
-            self._refuse(np.abs(self.time - point.instant) < spoiled_width(point, self.solver.order))
-        if explain and not self._reached.all():
-            self._explain_end(int(np.argmin(self._reached)))
-        if progress is not None and done < count:
-            progress(count, count)
 
     def _in_blocks(
         self, left: Bool[np.ndarray, " time"], stride: int, pool: Threads, report: Callable[[int], None]
