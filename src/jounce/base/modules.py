@@ -8,7 +8,7 @@ import dataclasses
 import inspect
 import operator
 from abc import ABCMeta
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Set
 from functools import lru_cache, partial, wraps
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar, cast, dataclass_transform
 
@@ -223,11 +223,11 @@ def with_fields(module: M, **values: Any) -> M:
     >>> with_fields(Spring(3.0, 0.1), length=0.2)
     Spring(stiffness=3.0, length=0.2)
     """
-    names = field_names(type(module))
-    if not values.keys() <= set(names):
-        raise TypeError(f"{type(module).__name__} has no field {sorted(values.keys() - set(names))}")
-    held = vars(module)
-    return unchecked(type(module), {name: held[name] for name in names if name in held} | values)
+    names, held = field_names(type(module)), vars(module)
+    if not values.keys() <= names:
+        raise TypeError(f"{type(module).__name__} has no field {sorted(values.keys() - names)}")
+    own = held if held.keys() <= names else {name: held[name] for name in names if name in held}
+    return unchecked(type(module), {**own, **values})
 
 
 def unchecked(kind: type[M], values: Mapping[str, Any]) -> M:
@@ -238,9 +238,9 @@ def unchecked(kind: type[M], values: Mapping[str, Any]) -> M:
 
 
 @lru_cache(maxsize=1000)
-def field_names(kind: type[Any]) -> tuple[str, ...]:
-    """Return the names of the fields of a dataclass."""
-    return tuple(field.name for field in dataclasses.fields(kind))
+def field_names(kind: type[Any]) -> Set[str]:
+    """Return the names of the fields of a dataclass, in their order."""
+    return dict.fromkeys(field.name for field in dataclasses.fields(kind)).keys()
 
 
 def jit_over_arrays(function: F) -> F:

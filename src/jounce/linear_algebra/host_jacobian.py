@@ -169,12 +169,11 @@ class HostJacobian:
             return False
         matrix = self.dense()
         try:
-            condition = np.linalg.norm(matrix) * np.linalg.norm(
-                np.linalg.inv(matrix)
-            )  # no less than that of the values
+            inverse = np.linalg.inv(matrix)
         except np.linalg.LinAlgError:
             return False
-        return bool(10 * max(SMALL, self.tolerance) * condition < 1)
+        squares = np.vdot(matrix, matrix) * np.vdot(inverse, inverse)  # of the condition, or of more
+        return bool((10 * max(SMALL, self.tolerance)) ** 2 * squares < 1)
 
     @cached_property
     def _sizes(self) -> Float[np.ndarray, " k"]:

@@ -115,11 +115,10 @@ def users_class(kind: type) -> type:
 
 def _read_methods(kind: type) -> tuple[str, ...]:
     """Return the names of the methods of a class that a user may have written, or that call such."""
-    names = _methods_of(kind)
-    known = {name: method for name in names if (method := getattr(kind, name, None)) is not None} if names else {}
-    if known and changes_parts(kind, tuple(_METHODS), known):
-        return tuple(known)
-    return tuple([name for name, method in known.items() if not is_ours(method)])
+    known = [(name, method) for name in _methods_of(kind) if (method := getattr(kind, name, None)) is not None]
+    if known and not is_ours(kind) and changes_parts(kind, tuple(_METHODS), names := [name for name, _ in known]):
+        return tuple(names)
+    return tuple([name for name, method in known if not is_ours(method)])
 
 
 @lru_cache(maxsize=1000)

@@ -21,7 +21,7 @@ from jounce.dynamics.statics.stability import Verdict, judged
 from jounce.errors import MechanismError, RobotError, SolveError, check_choice, check_name, flag
 from jounce.kinematics import Motion, Status
 from jounce.kinematics.assembly.assemble import assemble, freely_moving
-from jounce.kinematics.position_analysis.curve_ends import beyond_end
+from jounce.kinematics.position_analysis.curve_ends import beyond_end, ends_of
 from jounce.kinematics.results.pose_outputs import output_values
 from jounce.mechanism import Body, Mechanism, build, check_mechanism, time_grid
 from jounce.mechanism.building.preconditions import check_holonomic, concrete
@@ -358,7 +358,7 @@ def equilibrium_of(result: SearchResult, start: OperatingPoint, *, of_robot: boo
     """Return the result; a position in which the constraints restrain fewer motions than elsewhere is singular."""
     singular = result.point.free.shape[1] > start.free.shape[1]
     coordinates = {"position": result.point.coordinates["position"][0]}
-    if beyond := beyond_end(result.point.model, coordinates):
+    if beyond := beyond_end(ends_of(result.point.model), coordinates):
         message = f"bodies would come to rest only beyond an end of a curve, {beyond}: {Status.END_OF_CURVE.advice}"
         raise SolveError(message, status=Status.END_OF_CURVE)
     return Equilibrium(result.point, singular, of_robot=of_robot)

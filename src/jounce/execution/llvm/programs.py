@@ -42,13 +42,18 @@ class Layout:
             dtype, sizes = self._kinds[members[0]][1], [math.prod(self._kinds[k][0]) for k in members]
             ends = first + dtype.itemsize * np.cumsum([0, *sizes])
             self.offsets[members], self.end = ends[:-1], int(ends[-1])
-            self._groups.append((members, slice(first, self.end), dtype))
+            self._groups.append((members, slice(first, self.end)))
         self._places = list(zip(self._kinds, self.offsets.tolist(), strict=True))
 
     def put(self, memory: np.ndarray, arrays: Sequence[np.ndarray]) -> None:
         """Copy arrays of these shapes and types to their places in a memory of bytes."""
-        for members, index, dtype in self._groups:
-            np.concatenate([arrays[k] for k in members], axis=None, out=memory[index].view(dtype), casting="no")
+        room = memoryview(memory)
+        for members, index in self._groups:
+            parts = [arrays[k] for k in members]
+            try:
+                room[index] = b"".join(parts)  # pyright: ignore[reportArgumentType, reportCallIssue]
+            except (BufferError, ValueError):  # numbers of an array do not lie one after another
+                room[index] = b"".join([x.tobytes() for x in parts])
 
     def views(self, memory: np.ndarray) -> list[np.ndarray]:
         """Return the arrays in a memory of bytes."""

@@ -258,7 +258,7 @@ def _events_at_ends(start: ConsistentStart) -> list[Event]:
 
 def _check_ends(start: ConsistentStart, instant: float) -> None:
     """Raise SolveError where a point starts beyond an end of its curve."""
-    beyond = beyond_end(start.model, {"position": np.asarray(with_ground(start.state.position))})
+    beyond = beyond_end(ends_of(start.model), {"position": np.asarray(with_ground(start.state.position))})
     if beyond:
         status = Status.END_OF_CURVE
         raise SolveError(f"t = {instant:g} s, {beyond}: end of curve: {status.advice}", status=status)

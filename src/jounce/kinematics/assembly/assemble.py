@@ -209,10 +209,9 @@ def _start_after_turns(
 
 def nearest_to_guess(model: Model, attempt: AssemblyAttempt, instant: float) -> AssemblyAttempt:
     """Return planar bodies assembled, with every angle shifted by whole turns to be nearest to the guess."""
-    displace = Displacements(model, instant)
 
     def residual_at(angle: np.ndarray) -> np.ndarray:
-        return attempt.scale * displace.at({**attempt.coordinates, "angle": angle})[1]
+        return attempt.scale * Displacements(model, instant).at({**attempt.coordinates, "angle": angle})[1]
 
     return attempt._replace(coordinates=nearest_turns(model.guess, attempt.coordinates, residual_at))
 

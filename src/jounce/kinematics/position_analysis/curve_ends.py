@@ -1,7 +1,7 @@
 """Ends of open curves: a motion that comes to one ends there, and is never continued beyond."""
 
 import dataclasses
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 
 import numpy as np
 from jaxtyping import Float
@@ -65,7 +65,7 @@ def ends_of(model: Model) -> list[CurveEnds]:
     """Return the ends of all open curves of a mechanism."""
     ends = []
     for group in model.system.groups:
-        for curve in (x for x in vars(group.element).values() if type(x) is not np.ndarray and isinstance(x, CurveLaw)):
+        for curve in [x for x in vars(group.element).values() if isinstance(x, CurveLaw)]:
             if curve.ends is None:
                 continue
             limits, unit = (np.asarray(x, float) for x in (curve.ends, curve.unit))
@@ -78,21 +78,23 @@ def ends_of(model: Model) -> list[CurveEnds]:
     return ends
 
 
-def beyond_end(model: Model, coordinates: Mapping[str, Float[np.ndarray, "..."]]) -> str:
+def beyond_end(curves: Iterable[CurveEnds], coordinates: Mapping[str, Float[np.ndarray, "..."]]) -> str:
     """Say at which end of which curve bodies are beyond it, in one position; nothing where they are not."""
-    position = np.asarray(coordinates["position"])[..., 0]
-    for ends in ends_of(model):
+    for ends in curves:
+        position = np.asarray(coordinates["position"])[..., 0]
         if ends.excess(position) > 0:
             return ends.words(bool(position[ends.component, ends.body] / ends.unit > ends.high))
     return ""
 
 
-def cut_at_ends(path: FollowedPath, model: Model, grid: Float[np.ndarray, " time"]) -> FollowedPath:
+def cut_at_ends(
+    path: FollowedPath, curves: Iterable[CurveEnds], grid: Float[np.ndarray, " time"]
+) -> FollowedPath:
     """Return a path that ends where a point first comes to an end of its curve; the same where none does.
 
     The grid has the instants that were solved on the way, s.
     """
-    for ends in ends_of(model):
+    for ends in curves:
         end = _leaves(path, ends)
         if end is None:
             continue

@@ -19,7 +19,7 @@ from jounce.kinematics.continuation.path_following import FollowedPath, follow, 
 from jounce.kinematics.continuation.solver import NO_GRID, Solver
 from jounce.kinematics.curves.choice import chosen
 from jounce.kinematics.position_analysis.chunked_motion import ChunkedMotion
-from jounce.kinematics.position_analysis.curve_ends import beyond_end, cut_at_ends
+from jounce.kinematics.position_analysis.curve_ends import beyond_end, cut_at_ends, ends_of
 from jounce.kinematics.position_analysis.grid_blocks import LONG_GRID
 from jounce.kinematics.position_analysis.grid_storage import solve_grid
 from jounce.kinematics.position_analysis.idle_holding import holding_idle
@@ -251,7 +251,8 @@ def _followed(
         for name, motion in output_laws(mechanism).items():
             error.message += f"; the driver {name} follows from the output {motion.output}, which must determine it"
         raise
-    if beyond := beyond_end(model, coordinates):
+    curves = ends_of(model)
+    if beyond := beyond_end(curves, coordinates):
         message = f"t = {first:g} s, {beyond}: end of curve: {Status.END_OF_CURVE.advice}"
         raise SolveError(message, status=Status.END_OF_CURVE)
     check_turns(mechanism, model, coordinates, first)
@@ -261,7 +262,7 @@ def _followed(
     solved_instants = np.asarray(instants) if len(instants) <= LONG_GRID else NO_GRID
     path = follow(solver, start, last, last - first, grid=solved_instants)
     if path.anchors:
-        path = cut_at_ends(path, model, solved_instants)
+        path = cut_at_ends(path, curves, solved_instants)
     else:
         where = f"t = {first:g} s, {path.fault}"
         raise SolveError(f"{where}: {_words(path.status)}: {path.status.advice}", status=path.status)

@@ -95,15 +95,19 @@ class Model:
 
 def group_rows(model: Model) -> list[slice]:
     """Return where the rows of each group stand: those of all its instances in turn, once for each row of the joint."""
+    return list(_group_rows(model.rows, tuple([group.instances for group in model.system.groups])))
+
+
+@lru_cache(maxsize=100)
+def _group_rows(rows: tuple[str, ...], instances: tuple[int, ...]) -> tuple[slice, ...]:
     slices, first = [], 0
-    for group in model.system.groups:
-        count = group.instances
-        names, last = model.rows[first : first + count], first
-        while model.rows[last : last + count] == names:
+    for count in instances:
+        names, last = rows[first : first + count], first
+        while rows[last : last + count] == names:
             last += count
         slices.append(slice(first, last))
         first = last
-    return slices
+    return tuple(slices)
 
 
 def build(mechanism: Mechanism, like: Model | None = None, *, initial: bool = False) -> Model:

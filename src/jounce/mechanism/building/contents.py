@@ -8,8 +8,9 @@ wrote, functions and classes, is not compared but read each time: it may compute
 import dataclasses
 import marshal
 from collections import OrderedDict
-from collections.abc import Callable, Set
+from collections.abc import Callable, Mapping, Sequence
 from functools import lru_cache
+from operator import itemgetter
 from typing import Any, TypeVar
 
 import jax
@@ -58,12 +59,15 @@ def contents_of(mechanism: Mechanism, *more: Any) -> Contents | None:
             values += (..., value.dtype.str, value.shape, value.tobytes())
         elif kind is Expression:
             values += (..., "expression", value.text)
-        elif (names := _given_fields(kind)) is None or not (own := vars(value)).keys() >= names:
-            return None  # of a user, or with values elsewhere than usual
+        elif (read := _given_fields(kind)) is None:
+            return None  # of a user
         else:
             values += (..., "fields", len(kinds))
             kinds.append(kind)
-            pending += map(own.__getitem__, names)
+            try:
+                pending += read(vars(value))
+            except KeyError:  # values are elsewhere than usual
+                return None
     different = set(kinds)
     if not different.isdisjoint(CHECKED) or any(map(has_own_methods, different)):
         return None
@@ -71,14 +75,15 @@ def contents_of(mechanism: Mechanism, *more: Any) -> Contents | None:
 
 
 @lru_cache(maxsize=1000)
-def _given_fields(kind: type) -> Set[str] | None:
-    """Return the names of the fields of a class that are given, in their order; None for a class of a user.
+def _given_fields(kind: type) -> Callable[[Mapping[str, Any]], Sequence[Any]] | None:
+    """Return what reads the fields of a class that are given, in their order; None for a class of a user.
 
     The other fields are found later.
     """
     if not is_ours(kind) or not dataclasses.is_dataclass(kind):
         return None
-    return {field.name: None for field in dataclasses.fields(kind) if field.init}.keys()
+    names = [field.name for field in dataclasses.fields(kind) if field.init]
+    return itemgetter(*names) if len(names) > 1 else lambda own: [own[name] for name in names]
 
 
 def made_or_known(contents: Contents | None, make: Callable[[], T], owned: Callable[[T], T | None]) -> T:
