@@ -52,7 +52,7 @@ class Layout:
             parts = [arrays[k] for k in members]
             try:
                 room[index] = b"".join(parts)  # pyright: ignore[reportArgumentType, reportCallIssue]
-            except (BufferError, ValueError):  # numbers of an array do not lie one after another
+            except (BufferError, TypeError, ValueError):  # numbers of an array do not lie one after another
                 room[index] = b"".join([x.tobytes() for x in parts])
 
     def views(self, memory: np.ndarray) -> list[np.ndarray]:

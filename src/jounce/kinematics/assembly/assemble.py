@@ -17,6 +17,7 @@ from jounce.kinematics.assembly.axis_directions import (
     drawn_axis_signs,
     mirrored_discs,
     pair_names,
+    signs_of,
     starts_with_axis_signs,
 )
 from jounce.kinematics.assembly.gauss_newton import AssemblyAttempt, Displacements, assemble_from_guess
@@ -32,7 +33,7 @@ from jounce.kinematics.assembly.loose_bodies import missing_joint_words
 from jounce.kinematics.assembly.redundancy import Redundancy, redundancy
 from jounce.kinematics.status import Status
 from jounce.mechanism import Model
-from jounce.mechanism.building.builder import group_rows, with_reference
+from jounce.mechanism.building.builder import group_rows, law_values, with_reference
 from jounce.mechanism.carriages import ENDING
 from jounce.mechanism.transmissions.axis_angles import measures_angle, with_angles, with_datums
 from jounce.mechanism.transmissions.gear_checks import check_gears, check_wheels
@@ -109,8 +110,10 @@ def find_assembly(model: Model, instant: float, tolerance: float) -> tuple[Model
     names = [model.rows[rows] for rows in group_rows(model)]
     check_gears(model.system.groups, names)
     check_wheels(model.system.groups, names, model.guess)
-    best = _assemble_near_guess(model, instant, tolerance)
-    initial = best[1]
+    assembled, initial = _assemble_near_guess(model, instant, tolerance)
+    if initial.closed:
+        initial = initial._replace(signs=signs_of(model, initial))
+    best = assembled, initial
     candidates = axis_signs_to_try(model, initial)
     rank = initial.jacobian.rank - 1 if candidates and initial.closed else -1  # of the best so far
     for signs in candidates:
@@ -135,7 +138,8 @@ def _assemble_near_guess(model: Model, instant: float, tolerance: float) -> tupl
     """
     displace, prescribed = Displacements(model, instant), model.prescribed
     residual, attempt, known = displace.closed(model.guess, tolerance)
-    lag = driver_lag(model, instant, residual)
+    laws = law_values(model.system.groups, instant)
+    lag = driver_lag(model, laws, residual)
     model, start = _start_after_turns(model, instant, tolerance, lag)
     if start is not None:
         attempt = assemble_from_guess(model, instant, tolerance, start)
@@ -145,14 +149,14 @@ def _assemble_near_guess(model: Model, instant: float, tolerance: float) -> tupl
         # angles counted from a tilted guess may be far off: first the joints alone, with the drivers as they are
         begin = attempt if lag is None else assemble_from_guess(model, instant, tolerance, lag=lag)
         if begin.closed:
-            model, _ = with_reference(model, begin.coordinates, instant, prescribed)
+            model, _ = with_reference(model, begin.coordinates, instant, prescribed, laws=laws)
             attempt = assemble_from_guess(model, instant, tolerance, begin.coordinates)
     if "angle" in attempt.coordinates and start is None and attempt.closed:
         attempt = nearest_to_guess(model, attempt, instant)
     for _ in range(MAX_DATUMS):
         if not attempt.closed:
             return model, attempt
-        model, away = with_reference(model, attempt.coordinates, instant, prescribed)
+        model, away = with_reference(model, attempt.coordinates, instant, prescribed, laws=laws)
         if away <= SETTLED:
             return model, attempt
         attempt = assemble_from_guess(model, instant, tolerance, attempt.coordinates)
@@ -168,7 +172,7 @@ def warn_of_parts_turned_over(model: Model, attempt: AssemblyAttempt) -> None:
             "along the line (in the plane the center belongs on its right, in space on the side of vector x axis)"
         )
         warnings.warn(AssemblyWarning(message), stacklevel=3)
-    there = axis_signs(model.system, attempt.coordinates)
+    there = signs_of(model, attempt)
     if there.all() or not (odd := there != drawn_axis_signs(model)).any():
         return
     names = [name for name, is_odd in zip(pair_names(model), odd, strict=True) if is_odd]

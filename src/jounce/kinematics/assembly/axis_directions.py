@@ -22,7 +22,7 @@ from jounce.kinematics.assembly.initial_revolutions import Coordinates
 from jounce.mechanism import Model
 from jounce.mechanism.building.builder import group_rows, model_of
 from jounce.mechanism.system import Group, System
-from jounce.mechanism.transmissions.axis_angles import turned
+from jounce.mechanism.transmissions.axis_angles import turned, unit
 from jounce.rigid.pose import Pose
 
 DRAWN_OPPOSITE = -0.9  # cosine: directions as far apart in the starting guess are meant to point opposite ways
@@ -65,6 +65,11 @@ def axis_signs(system: System, coordinates: Coordinates) -> AxisSigns:
     return _cosines(system, coordinates) >= 0
 
 
+def signs_of(model: Model, attempt: AssemblyAttempt) -> AxisSigns:
+    """Return the signs where the bodies were assembled."""
+    return axis_signs(model.system, attempt.coordinates) if attempt.signs is None else attempt.signs
+
+
 def drawn_axis_signs(model: Model) -> AxisSigns:
     """Return the signs that the starting guess means: the same way, unless it draws a pair almost opposite."""
     return _cosines(model.system, model.guess) > DRAWN_OPPOSITE
@@ -82,7 +87,7 @@ def axis_signs_to_try(model: Model, attempt: AssemblyAttempt) -> list[AxisSigns]
     That is where parts lie turned over, and where they were not assembled at all from a guess in which directions
     are far from parallel. What the guess draws may not exist: then all pairs are meant to point the same way.
     """
-    there = axis_signs(model.system, attempt.coordinates) if attempt.closed else None
+    there = signs_of(model, attempt) if attempt.closed else None
     if there is not None and there.all():
         return []
     drawn = _cosines(model.system, model.guess)
@@ -164,7 +169,7 @@ def _pairs(system: System) -> Iterator[tuple[Group, tuple[str, str]]]:
 def _unit(group: Group, name: str) -> Float[np.ndarray, "component instance"]:
     """Return unit vectors along a direction that an element has, in the axes of its body."""
     vectors = np.asarray(getattr(group.element, name))[..., 0]
-    return np.broadcast_to(vectors / np.linalg.norm(vectors, axis=0), (len(vectors), group.instances))
+    return np.broadcast_to(unit(vectors), (len(vectors), group.instances))
 
 
 def _cosines(system: System, coordinates: Coordinates) -> Float[np.ndarray, " pair"]:

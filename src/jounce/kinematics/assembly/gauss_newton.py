@@ -105,6 +105,8 @@ class AssemblyAttempt(NamedTuple):
         Scaled, there.
     closed : bool
         Whether all gaps are closed, to the tolerance of the last correction.
+    signs : array of bool, shape (pairs,), optional
+        Of each pair of directions that joints hold parallel whether they point the same way, where that is known.
     """
 
     coordinates: Coordinates
@@ -112,6 +114,7 @@ class AssemblyAttempt(NamedTuple):
     gaps: Float[np.ndarray, " row"]
     jacobian: HostJacobian
     closed: bool
+    signs: Bool[np.ndarray, " pair"] | None = None
 
 
 class Displacements:

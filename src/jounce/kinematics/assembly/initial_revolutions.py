@@ -6,7 +6,7 @@ those nearest to the guess. So the turns depend neither on the path of assembly 
 starts.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -16,7 +16,6 @@ from jounce.constraints.facts import dimension_of_field
 from jounce.jet.turns import WHOLE_TURN, principal, whole_periods
 from jounce.linear_algebra.host_jacobian import HostJacobian
 from jounce.mechanism import Model
-from jounce.mechanism.building.builder import prescribed_by_drivers
 from jounce.mechanism.transmissions.axis_angles import AttitudeHistory, measures_angle
 
 STEPS_A_TURN = 64
@@ -61,15 +60,18 @@ class DriverLag(NamedTuple):
         return np.where(self.periodic, principal(opened), opened)
 
 
-def driver_lag(model: Model, instant: float, residual: Float[np.ndarray, " row"]) -> DriverLag | None:
-    """Return the lag of the drivers where the residual is that of the guess; None where a driver has several rows."""
+def driver_lag(model: Model, laws: Sequence[np.ndarray], residual: Float[np.ndarray, " row"]) -> DriverLag | None:
+    """Return the lag of the drivers where the residual is that of the guess; None where a driver has several rows.
+
+    Laws are the values of those of angles about axes, as `law_values` returns them.
+    """
     rows = [k for k, name in enumerate(model.rows) if name.startswith(("drivers.", "initial."))]
     groups = [group for group in model.system.groups if group.is_driver]
     if len(rows) != sum(group.instances for group in groups) or not np.isfinite(residual).all():
         return None
     size = np.zeros(len(model.rows))
     turning, periodic = np.zeros(len(size), bool), np.zeros(len(size), bool)
-    prescribed = iter(prescribed_by_drivers(model.system.groups, model.guess, instant))
+    angles = iter(laws)
     first = 0
     for group in groups:
         its = rows[first : first + group.instances]
@@ -78,7 +80,7 @@ def driver_lag(model: Model, instant: float, residual: Float[np.ndarray, " row"]
         turning[its] = dimension_of_field(group.element, "motion") == "angle"
         if measures_angle(group):
             turning[its] = periodic[its] = True
-            size[its] = [next(prescribed).angle for _ in its] - np.asarray(group.element.datum.angle)[:, 0]
+            size[its] = (next(angles) - np.asarray(group.element.datum.angle))[:, 0]
     return DriverLag(size, turning, periodic)
 
 

@@ -87,9 +87,7 @@ def beyond_end(curves: Iterable[CurveEnds], coordinates: Mapping[str, Float[np.n
     return ""
 
 
-def cut_at_ends(
-    path: FollowedPath, curves: Iterable[CurveEnds], grid: Float[np.ndarray, " time"]
-) -> FollowedPath:
+def cut_at_ends(path: FollowedPath, curves: Iterable[CurveEnds], grid: Float[np.ndarray, " time"]) -> FollowedPath:
     """Return a path that ends where a point first comes to an end of its curve; the same where none does.
 
     The grid has the instants that were solved on the way, s.

@@ -1,6 +1,7 @@
 """From names to indices, once: the numeric model of a mechanism and where each of its rows comes from."""
 
 import dataclasses
+from collections.abc import Sequence
 from functools import lru_cache
 from typing import Any
 
@@ -251,6 +252,7 @@ def with_reference(
     prescribed: tuple[PrescribedAngle, ...] = (),
     *,
     keep: bool = False,
+    laws: Sequence[np.ndarray] | None = None,
 ) -> tuple[Model, float]:
     """Return the model with angles about axes counted from a position, and how far off those of drivers were, rad.
 
@@ -266,12 +268,15 @@ def with_reference(
         Angles that are prescribed there by others than the drivers, such as initial conditions.
     keep : bool, default False
         Whether angles go on from those counted so far, instead of those that the frames of the bodies have.
+    laws : sequence of array, optional
+        What `law_values` returns at that instant, where it is known.
     """
     system = model.system
     if not any(map(measures_angle, (*system.groups, *system.forces, *system.outputs))):
         return with_fields(model, reference=coordinates, prescribed=prescribed), 0.0
     groups = with_datums(system.groups, coordinates, keep=keep)
-    prescribed = (*prescribed_by_drivers(groups, coordinates, instant), *prescribed)
+    laws = law_values(groups, instant) if laws is None else laws
+    prescribed = (*prescribed_angles(groups, coordinates, laws), *prescribed)
     forces, outputs = (with_datums(part, coordinates, prescribed) for part in (system.forces, system.outputs))
     system = with_fields(system, groups=groups, forces=forces, outputs=outputs)
     away = departure(model.system.groups, groups)
@@ -288,15 +293,10 @@ def counted_as_in(groups: tuple[Group, ...], model: Model) -> tuple[Group, ...]:
     return with_datums(groups, model.reference, model.prescribed)
 
 
-def prescribed_by_drivers(
-    groups: tuple[Group, ...], coordinates: dict[str, Any], instant: float
-) -> list[PrescribedAngle]:
-    """Return the angles about axes that drivers prescribe at an instant, with their whole turns."""
+def law_values(groups: tuple[Group, ...], instant: float) -> list[np.ndarray]:
+    """Return the angles about axes that drivers of groups prescribe at an instant, s, with their whole turns."""
     motions = [group.element.motion for group in groups if measures_angle(group)]
-    if not motions:
-        return []
-    values = [np.asarray(value) for value in _law_values(motions, np.full((1, 1), instant))]
-    return prescribed_angles(groups, coordinates, values)
+    return list(map(np.asarray, _law_values(motions, np.full((1, 1), instant)))) if motions else []
 
 
 @compiled(narrow=True, brief=True, single=True)

