@@ -82,7 +82,9 @@ def test_only_what_is_large_and_regular_is_called_so():
     assert is_clearly_regular(np.eye(size), 1e-12)
     assert not is_clearly_regular(np.diag([*np.ones(size - 1), 0.0]), 1e-12)
     assert not is_clearly_regular(np.diag([*np.ones(size - 1), 1e-13]), 1e-12)
-    assert not is_clearly_regular(np.eye(3), 1e-12)
+    assert is_clearly_regular(np.eye(3), 1e-12)
+    for size in (0.0, 1e-13, np.nan):
+        assert not is_clearly_regular(np.diag([1.0, 1.0, size]), 1e-12)
 
 
 def test_degrees_of_freedom_of_a_long_chain_are_told_by_body():

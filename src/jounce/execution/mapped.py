@@ -29,6 +29,8 @@ from jounce.settings import under_own_settings
 WIDTHS = (8, 256)  # instants that XLA's programs are for: each compiles once
 GPU_WIDTH = 2**15  # the same on a GPU, which they have to fill
 STARTS = 64  # instants from which those of rounds of XLA start
+FEWEST_TOGETHER, MOST_TOGETHER = 64, 1024  # instants of one call of machine code where a loop gives them
+CACHED_ENTRIES = 2**16  # numbers of their arguments: half a megabyte
 SIDE_BY_SIDE = 128  # samples along the first axis that XLA computes side by side, so that the cache holds them
 Rounds = Callable[[Int[np.ndarray, "round lane"]], None]
 _published: dict[str, Program] = {}  # by the names under which other machine code calls them
@@ -57,6 +59,10 @@ class OnLlvm:
 
     def prepare(self, lanes: Any, count: int) -> None:
         """Do nothing: the code serves any number of instants."""
+
+    def together(self, entries: int) -> tuple[int, ...]:
+        """Return how many instants of so many numbers each are computed in a call where a loop gives them."""
+        return (max(FEWEST_TOGETHER, min(MOST_TOGETHER, CACHED_ENTRIES // max(1, entries))),)
 
     def rounds(self, lanes: tuple[Any, Any, Any], results: Any, sources: Int[np.ndarray, " time"]) -> Rounds:
         """Return what solves instants in rounds, of which later ones start from the results of earlier ones.
@@ -153,6 +159,10 @@ class OnXla:
 
         width = self._block_width(count)
         self.mapped.on_xla.prepare(self.shared, jax.tree.map(block, lanes), self.how)
+
+    def together(self, entries: int) -> tuple[int, ...]:  # noqa: ARG002 - see there
+        """Return how many instants are computed in a call where a loop gives them: few, or many."""
+        return self.mapped.widths
 
     def _block_width(self, count: int) -> int:
         """Return how many instants of so many are computed in one call."""

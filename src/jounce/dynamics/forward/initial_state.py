@@ -26,7 +26,7 @@ from jounce.kinematics.curves.choice import chosen
 from jounce.kinematics.status import Status
 from jounce.linear_algebra.host_jacobian import RANK_TOLERANCE, HostJacobian, is_clearly_regular
 from jounce.mechanism import Mechanism, Model, build
-from jounce.mechanism.building.builder import released, with_reference
+from jounce.mechanism.building.builder import with_reference
 
 TOLERANCE = 1e-12  # of the assembled positions, rad or sizes of the mechanism
 ROUNDING = 1e-15  # of residuals, rad or sizes of the mechanism
@@ -102,7 +102,7 @@ def consistent_start(
         built(model)
     if mechanism.initial:
         whole, coordinates = _assembled(model, instant)
-        model = released(model)
+        model = model.released
         driven = equations_of(whole, masses, gravity)
         state = _set_in_motion(driven, whole, coordinates, instant)
         if whole.system.rank is not None:  # rows may contradict each other by less than is refused

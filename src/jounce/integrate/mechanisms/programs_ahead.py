@@ -18,7 +18,6 @@ from jounce.integrate.results.simulation import derivatives_of_motion, expansion
 from jounce.integrate.steps.methods import AbstractMethod
 from jounce.kinematics.results.output_programs import prepare_outputs
 from jounce.mechanism import AbstractMotionOutput, Mechanism, Model
-from jounce.mechanism.building.builder import released
 
 
 def march_arguments(
@@ -70,7 +69,7 @@ def prepare_run(
 
     @cache
     def free() -> Model:
-        return released(model) if any(name.startswith("initial.") for name in model.rows) else model
+        return model.released if any(name.startswith("initial.") for name in model.rows) else model
 
     @cache
     def begun() -> tuple[Equations, IntegratorState] | None:

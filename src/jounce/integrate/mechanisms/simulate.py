@@ -258,8 +258,8 @@ def _events_at_ends(start: ConsistentStart) -> list[Event]:
 
 def _check_ends(start: ConsistentStart, instant: float) -> None:
     """Raise SolveError where a point starts beyond an end of its curve."""
-    beyond = beyond_end(ends_of(start.model), {"position": np.asarray(with_ground(start.state.position))})
-    if beyond:
+    curves = ends_of(start.model)
+    if curves and (beyond := beyond_end(curves, {"position": np.asarray(with_ground(start.state.position))})):
         status = Status.END_OF_CURVE
         raise SolveError(f"t = {instant:g} s, {beyond}: end of curve: {status.advice}", status=status)
 

@@ -215,7 +215,8 @@ class RobotSimulation(Tabulated):
         example = lanes_of(np.zeros(1, int))
         how: Any = {"large": LARGE, "hasty": is_wanted_soon(), **static}
         program = function.program(self._problem, example, **how)
-        values = in_chunks(lambda lanes: program(lanes_of(lanes)), len(self.time), WIDTHS, filled=False)
+        widths = program.together(sum(np.size(x) for x in jax.tree.leaves(example)))
+        values = in_chunks(lambda lanes: program(lanes_of(lanes)), len(self.time), widths, filled=False)
         return values, program.backend
 
     def at(self, time: ArrayLike, order: int | None = None) -> "RobotSimulation":

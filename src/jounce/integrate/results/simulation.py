@@ -277,7 +277,7 @@ def motion_at(
         return tuple(part[steps].T for part in dense.angles), polynomial, now - dense.start[steps], now
 
     program, _ = expansion_program(equations, outputs, dense, order)
-    widths = FEW_INSTANTS, *WIDTHS
+    widths = program.together(dense.polynomial.position[0].size + dense.polynomial.attitude[0].size)
     values = in_chunks(lambda lanes: program(lanes_of(lanes)), len(instants), widths, filled=False)
     return values, program.backend
 

@@ -2,7 +2,7 @@
 
 import dataclasses
 from collections.abc import Sequence
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from typing import Any
 
 import jax
@@ -93,6 +93,11 @@ class Model:
     prescribed: tuple[PrescribedAngle, ...] = ()
     history: AttitudeHistory | None = None
 
+    @cached_property
+    def released(self) -> "Model":
+        """The model without the initial conditions with which it was built."""
+        return _released(self)
+
 
 def group_rows(model: Model) -> list[slice]:
     """Return where the rows of each group stand: those of all its instances in turn, once for each row of the joint."""
@@ -168,8 +173,7 @@ def _built(mechanism: Mechanism, like: Model | None, *, initial: bool) -> Model:
     return model_of(tuple(mechanism.bodies), parts, guess, length, history)
 
 
-def released(model: Model) -> Model:
-    """Return the model without the initial conditions with which it was built."""
+def _released(model: Model) -> Model:
     system, groups, names = model.system, [], []
     for group, rows in zip(model.system.groups, group_rows(model), strict=True):
         its = model.rows[rows][: group.instances]
