@@ -155,7 +155,7 @@ def take_steps(
         points = put(points, jax.tree.map(lambda x: x[None], arrived), state.steps)
         instants = put(instants, jax.tree.map(lambda x: x[..., 1:], solved_now), state.run.next_up)
         records = Records(anchors, points, instants)  # what is no anchor, or not within the step, is replaced
-        return TakenSteps(_typed(run, state.run), records, arrival, state.count + 1, state.steps + taken)
+        return TakenSteps(_typed(run, state.run), records, arrival, state.count + 1, state.steps + jnp.sum(taken))
 
     def put(whole: Any, part: Any, index: Any) -> Any:
         update = jax.lax.dynamic_update_slice_in_dim
