@@ -1,14 +1,17 @@
 """Blocks of memory that are lent again, and the arrays in them."""
 
 import threading
+from collections import deque
 
+import jax.numpy as jnp
 import numpy as np
 import pytest
 
 import jounce as jn
 from jounce.execution import buffer_pool
 from jounce.execution.backends import is_wanted
-from jounce.execution.buffer_pool import LINE, acquire, arrays_in, bytes_needed, release
+from jounce.execution.buffer_pool import LENT, LINE, MOST_LENT, acquire, arrays_in, bytes_needed, lend, release
+from jounce.execution.compilation import Compiled
 from tests.problems.small import four_bar
 
 
@@ -37,6 +40,65 @@ def test_no_more_is_kept_than_is_allowed(kept, monkeypatch):
     for block in [acquire(600), acquire(401), acquire(300), acquire(200), acquire(100)]:
         release(block)
     assert list(map(len, kept)) == [600, 300, 100]
+
+
+@pytest.fixture
+def lent(monkeypatch):
+    blocks = deque(maxlen=MOST_LENT)
+    monkeypatch.setattr(buffer_pool, "_lent", blocks)
+    return blocks
+
+
+def address(block):
+    return block.ctypes.data
+
+
+def test_a_block_comes_back_when_no_array_in_it_is_left(lent):
+    size = LENT[0]
+    block = lend(size)
+    first, array = address(block), block[8:16].view(float).reshape(1, 1)[0]
+    del block
+    other = lend(size)
+    assert address(other) != first
+    array[0] = 3.0
+    other[:] = 0
+    assert array[0] == 3.0
+    del array
+    assert address(lend(size - 1)) != first  # it is small: new memory
+    assert address(lend(size)) == first
+    assert len(lent) == MOST_LENT
+
+
+def test_blocks_that_are_in_use_are_not_kept_for_ever(lent):
+    blocks = [lend(LENT[0]) for _ in range(5)]
+    assert len({address(block) for block in blocks}) == 5
+    assert len(lent) == MOST_LENT
+    assert not {id(block) for block in lent} - {id(block) for block in blocks[-MOST_LENT:]}
+
+
+@pytest.mark.parametrize("size", [0, LENT[0] - 1, LENT[1] + 1])
+def test_little_and_very_much_memory_is_new(lent, size):
+    assert len(lend(size)) == size
+    assert not lent
+
+
+def test_a_block_that_came_back_and_is_too_small_makes_room_for_another(lent):
+    lend(LENT[0])
+    assert len(lend(LENT[0] + 1)) == LENT[0] + 1
+    assert [len(block) for block in lent] == [LENT[0] + 1]
+
+
+def test_results_of_one_call_stay_as_they_are_in_the_next():
+    run = Compiled(lambda x: (x + 1.0, jnp.sum(x)), (), single=True)
+    given = [np.full(LENT[0] // 8 + k, float(k)) for k in range(3)]
+    shapes = [np.full(len(given[0]), float(k)) for k in range(5)]
+    found = [run(x) for x in shapes]
+    for k, (more, total) in enumerate(found):
+        np.testing.assert_array_equal(more, k + 1.0)
+        assert total == k * len(more)
+    part = run(given[2])[0][5:6]
+    run(given[2] + 9.0)
+    assert part == [3.0]
 
 
 def test_arrays_begin_at_lines_and_have_nothing_in_common():

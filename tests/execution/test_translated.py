@@ -11,6 +11,7 @@ from jounce.execution import backends, structure, translated
 from jounce.execution.compilation import Compiled, compiled
 from jounce.execution.llvm import self_test
 from jounce.execution.store import programs as store_
+from jounce.execution.translated import WhenMade
 from tests.execution.test_compilation import Shelf
 
 pytestmark = pytest.mark.skipif(
@@ -88,6 +89,31 @@ def test_an_operation_without_code_is_left_to_xla(monkeypatch):
     with pytest.warns(jn.errors.MachineCodeWarning, match="digamma"):
         found = transformed(np.arange(1.0, 5.0))
     np.testing.assert_allclose(found, digamma(np.arange(1.0, 5.0)), rtol=1e-13)
+
+
+def test_arrays_may_lie_in_any_way():
+    run = Compiled(lambda x, y: (x - y, jnp.sum(x)), (), single=True)
+    whole = np.arange(24.0).reshape(2, 3, 4)
+    for x in (whole, whole[::-1], whole[:, ::2], whole.transpose(2, 0, 1), np.broadcast_to(1.5, (2, 3)), whole[:0]):
+        difference, total = run(x, 2.0)
+        np.testing.assert_array_equal(difference, x - 2.0)
+        assert total == x.sum()
+
+
+def test_a_static_argument_is_found_once_for_arguments_of_a_form():
+    found, indices = [], np.array([2, 0])
+
+    def times(factor):
+        return lambda: found.append(factor) or factor
+
+    run = Compiled(lambda x, k, *, factor: factor * x[k], ("factor",), single=True, otherwise={"factor": 5.0})
+    for key, factor, x, k in (("a", 2.0, 3, indices), ("a", None, 3, indices), ("b", 3.0, 3, indices)):
+        x = np.arange(float(x))
+        np.testing.assert_array_equal(run(x, k, factor=WhenMade(key, times(factor))), (factor or 2.0) * x[k])
+    assert found == [2.0, 3.0]
+    np.testing.assert_array_equal(run(x, indices[::-1], factor=WhenMade("b", times(4.0))), 4.0 * x[indices[::-1]])
+    assert found == [2.0, 3.0, 4.0]  # for other whole numbers it may be another one
+    np.testing.assert_array_equal(run(np.arange(9.0), indices, factor=WhenMade("a", times(None))), [10.0, 0.0])
 
 
 @pytest.mark.parametrize("damage", [None, b"", b"no program"])
