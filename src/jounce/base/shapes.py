@@ -54,8 +54,13 @@ Refused = object
 
 def is_traced(values: Any) -> bool:
     """Tell whether JAX traces an array in a pytree: then there are no numbers to check or to choose by."""
-    # of an array, JAX is slow to tell
-    return any(type(x) is not np.ndarray and isinstance(x, Tracer) for x in jax.tree.leaves(values))
+    leaves = jax.tree.leaves(values)
+    return not only_arrays(leaves) and any(isinstance(x, Tracer) for x in leaves)
+
+
+def only_arrays(leaves: Sequence[Any]) -> bool:
+    """Tell whether all are arrays of NumPy, of which JAX would be slow to tell one by one that it traces none."""
+    return set(map(type, leaves)) <= {np.ndarray}
 
 
 def real_numbers(

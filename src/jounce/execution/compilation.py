@@ -22,11 +22,12 @@ from jax.experimental import serialize_executable
 from jounce.base.activity import compiling
 from jounce.base.importing import uncollected
 from jounce.base.jax_internals import description_reader, runs_at_once, without_sources
+from jounce.base.shapes import only_arrays
 from jounce.execution.background import ByKey
 from jounce.execution.device import on_processor
 from jounce.execution.store.programs import Descriptions, Store, current_store, is_wanted_soon, packed, unpacked
 from jounce.execution.structure import UndescribedError, cache_key, settings
-from jounce.execution.translated import Translated, shaped
+from jounce.execution.translated import Translated, all_shaped
 from jounce.settings import check_process, under_own_settings
 
 LARGE = 32  # numbers of an array that stays in memory in machine code of one instant
@@ -172,9 +173,9 @@ class Compiled:
         """Call the compiled function."""
         check_process()
         arguments, keywords, static, leaves, tree = self._parts(arguments, keywords)
-        traced = [leaf for leaf in leaves if type(leaf) is not np.ndarray and isinstance(leaf, Tracer)]
+        traced = [] if only_arrays(leaves) else [leaf for leaf in leaves if isinstance(leaf, Tracer)]
         if not traced:
-            arrays = list(map(shaped, leaves))
+            arrays = all_shaped(leaves)
             if (code := self._code(arguments, keywords, static, arrays, tree)) is not None:
                 return code(arrays)
         static |= self._otherwise
@@ -192,7 +193,7 @@ class Compiled:
         Where `jax.jit` does everything, it compiles when it is called.
         """
         arguments, keywords, static, leaves, tree = self._parts(arguments, keywords)
-        if self._code(arguments, keywords, static, list(map(shaped, leaves)), tree) is None:
+        if self._code(arguments, keywords, static, all_shaped(leaves), tree) is None:
             self._by_xla(arguments, keywords, static | self._otherwise, leaves, tree)
 
     def _parts(self, arguments: tuple[Any, ...], keywords: dict[str, Any]) -> tuple[Any, Any, dict[str, Any], Any, Any]:

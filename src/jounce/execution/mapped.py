@@ -23,7 +23,7 @@ from jounce.execution.device import on_processor
 from jounce.execution.llvm.programs import Program
 from jounce.execution.llvm.text.scalars import MOST_LINES
 from jounce.execution.threads import Threads
-from jounce.execution.translated import Translated, shaped
+from jounce.execution.translated import Translated, all_shaped
 from jounce.settings import under_own_settings
 
 WIDTHS = (8, 256)  # instants that XLA's programs are for: each compiles once
@@ -286,7 +286,7 @@ class Mapped:
         leaves, structure = jax.tree.flatten(shared)
         few, form = jax.tree.flatten(lanes)
         if not is_traced([*leaves, *few]):
-            arrays, parts = list(map(shaped, leaves)), list(map(shaped, few))
+            arrays, parts = all_shaped(leaves), all_shaped(few)
             code = self.machine_code.program((arrays, structure), (parts, form), static, large=large, hasty=hasty)
             if code is not None:
                 return OnLlvm(code, arrays)

@@ -16,6 +16,7 @@ import jax
 import numpy as np
 
 from jounce.base.activity import compiling
+from jounce.base.shapes import only_arrays
 from jounce.execution.backends import is_wanted, tell_missing
 from jounce.execution.background import ByKey
 from jounce.execution.llvm.modules import object_file
@@ -30,9 +31,11 @@ LITTLE = 20_000  # numbers that a program is given: of more, even one call takes
 _thread = threading.local()
 
 
-def shaped(leaf: Any) -> Any:
-    """Return a leaf as an array of NumPy; a form, which has only shape and type, stays as it is."""
-    return leaf if type(leaf) in (np.ndarray, jax.ShapeDtypeStruct) else np.asarray(leaf)
+def all_shaped(leaves: Sequence[Any]) -> list[Any]:
+    """Return leaves as arrays of NumPy; a form, which has only shape and type, stays as it is."""
+    if only_arrays(leaves):
+        return list(leaves)
+    return [leaf if type(leaf) in (np.ndarray, jax.ShapeDtypeStruct) else np.asarray(leaf) for leaf in leaves]
 
 
 def traces_one_instant() -> bool:

@@ -124,7 +124,7 @@ class Displacements:
     """
 
     def __init__(self, model: Model, instant: float):
-        self._model, self._instant = model, np.float64(instant)
+        self._model, self._instant = model, np.array(instant, float)
         rows, columns = model.system.shape
         self._dense, self._still = rows == columns and model.system.fronts is None, np.zeros(columns)
 
@@ -150,7 +150,7 @@ class Displacements:
     def _moved(
         self, coordinates: Coordinates, increment: Float[np.ndarray, " column"], steps: int, tolerance: float
     ) -> tuple[Displaced, Float[np.ndarray, " row"], bool]:
-        settings = self._instant, np.int64(steps), np.float64(tolerance)
+        settings = self._instant, np.array(steps), np.array(tolerance, float)
         result = _moved(self._system, coordinates, increment, *settings, self._model.pose_type)
         to = {name: np.asarray(x) for name, x in result[0].items()}
         residual, entries, *ending = map(np.asarray, result[1:])

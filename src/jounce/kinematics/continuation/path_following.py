@@ -164,7 +164,7 @@ class FollowedPath:
         """
         end, passed = self.anchors[-1].instant, self.change_points[-1].instant if self.change_points else -np.inf
         since = itertools.takewhile(lambda anchor: anchor.instant > passed, reversed(self.anchors))
-        ahead = [x for x in since if _is_just_beyond(x, end)]
+        ahead = [x for x in since if x.det_rate < 0 and _is_just_beyond(x, end)]
         largest = max((x.radius for x in ahead), default=0.0)
         return [ChangePoint(x.instant + x.reach, x.radius) for x in ahead if x.radius >= 0.5 * largest][:1]
 

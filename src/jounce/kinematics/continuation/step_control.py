@@ -78,8 +78,9 @@ class StepControl(NamedTuple):
 def initial_control(point: ExpansionPoint, target: Float[np.ndarray, "*batch"]) -> StepControl:
     """Return the step that solves the first instant itself, s; or, at a known expansion point, none that is planned."""
     blank = np.zeros(target.shape)
-    no, none = np.zeros(target.shape, bool), np.zeros(target.shape, int)
-    return StepControl(point, blank, target, ~no, blank + np.inf, none, blank + np.nan, none)
+    none = np.zeros(target.shape, int)
+    yes, far, unknown = (np.full(target.shape, value) for value in (True, np.inf, np.nan))
+    return StepControl(point, blank, target, yes, far, none, unknown, none)
 
 
 def plan_next_step(control: StepControl, limits: StepLimits) -> StepControl:
