@@ -47,11 +47,11 @@ class Layout:
 
     def put(self, memory: np.ndarray, arrays: Sequence[np.ndarray]) -> None:
         """Copy arrays of these shapes and types to their places in a memory of bytes."""
-        room = memoryview(memory)
+        room = memoryview(memory)  # pyright: ignore[reportArgumentType]
         for members, index in self._groups:
-            parts = [arrays[k] for k in members]
+            parts: Any = [arrays[k] for k in members]
             try:
-                room[index] = b"".join(parts)  # pyright: ignore[reportArgumentType, reportCallIssue]
+                room[index] = b"".join(parts)
             except (BufferError, TypeError, ValueError):  # numbers of an array do not lie one after another
                 room[index] = b"".join([x.tobytes() for x in parts])
 
