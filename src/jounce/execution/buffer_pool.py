@@ -5,7 +5,7 @@ threads, whose memory it takes back after each.
 """
 
 import math
-import sys
+import weakref
 from collections import deque
 from collections.abc import Sequence
 
@@ -15,10 +15,9 @@ MOST = 2**26  # bytes that are kept
 LINE = 64  # bytes of the cache's lines, at which arrays begin
 ENTRY = 8  # bytes of a number
 LENT = 2**16, 2**24  # bytes of blocks that come back by themselves: new memory of fewer costs little
-MOST_LENT = 2  # of these: the results of one call are given to the next
-UNUSED = 2  # references to a block of which no array is left: a name's, and that of the call that counts them
+MOST_RETURNED = 2  # of these: the results of one call are given to the next
 _free: list[np.ndarray] = []
-_lent: deque[np.ndarray] = deque(maxlen=MOST_LENT)
+_returned: deque[bytearray] = deque(maxlen=MOST_RETURNED)
 
 
 def acquire(size: int) -> np.ndarray:
@@ -37,30 +36,22 @@ def release(block: np.ndarray) -> None:
 
 
 def lend(size: int) -> np.ndarray:
-    """Return a block of so many bytes or more, whatever is in it, which comes back once no array in it is left.
+    """Return an array of so many bytes or more, whatever is in it, whose memory is lent again once nobody has it.
 
-    Nobody gives it back: whether an array in it is left, Python tells by its references.
+    Nobody gives it back: the arrays in it, and only they, keep it.
     """
     least, most = LENT
     if not least <= size <= most:
         return np.empty(size, np.uint8)
-    block = _unused(size)
-    _lent.append(block)  # in the place of one that is in use still, where there are enough
-    return block
-
-
-def _unused(size: int) -> np.ndarray:
-    """Return a block that was lent and came back, or a new one; none that another thread looks at is in the queue."""
-    for _ in range(MOST_LENT):
-        try:
-            block = _lent.popleft()
-        except IndexError:
-            break
-        if sys.getrefcount(block) > UNUSED:
-            _lent.append(block)
-        elif len(block) >= size:
-            return block
-    return np.empty(size, np.uint8)
+    try:
+        block = _returned.popleft()
+    except IndexError:
+        block = bytearray()
+    if len(block) < size:
+        block = bytearray(size)
+    lease = np.frombuffer(block, np.uint8)  # the base of arrays in it, as its own memory is that of no array
+    weakref.finalize(lease, _returned.append, block).atexit = False
+    return lease
 
 
 def bytes_needed(shapes: Sequence[Sequence[int]]) -> int:
