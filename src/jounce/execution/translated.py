@@ -128,13 +128,13 @@ class Translated:
         key = structure, form, kinds, ones, known, large, hasty, static_key, settings()
 
         def make() -> Any:
-            found = {name: static[name].find() for name in found_later}
-            if None in found.values():
+            late = {name: static[name].find() for name in found_later}
+            if None in late.values():
                 return None
             parts = zip((structure, form), (kinds, ones), strict=True)
             given = [jax.tree.unflatten(tree, [jax.ShapeDtypeStruct(*x) for x in its]) for tree, its in parts]
             constant = {} if self._single else indices
-            return self._made((given[0], given[1]), constant, {"large": large, "hasty": hasty}, {**static, **found})
+            return self._made((given[0], given[1]), constant, {"large": large, "hasty": hasty}, {**static, **late})
 
         program = self._programs.get(key, make)
         if isinstance(program, str):
