@@ -526,7 +526,7 @@ def all_in_the_plane():
             "level": planar.Parallel1(("block", "pin"), y, y),
             "slot": planar.Parallel2(("block", "pin"), [0.2, 0], o, y),
             "line": planar.Parallel2(("ground", "disc"), [3.0, 1.0], o, x),
-            "rolling": planar.Rolling(("ground", "disc"), [3.0, 0.7], o, x, 0.3),
+            "rolling": planar.Rolling(("ground", "disc"), [3.0, 1.3], o, x, 0.3),
             "axle": planar.Revolute(("disc", "wheel"), [2.0, 0], o),
             "W": planar.Revolute(("wheel", "second"), [1.0, 0], o),
             "weld": planar.Fixed(("second", "plate"), x, [-0.1, 0.2]),
