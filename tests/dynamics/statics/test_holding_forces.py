@@ -270,11 +270,11 @@ def test_a_rack_and_a_belt_hold_between_their_efficiencies(weight):
     o, loss = [0, 0], {"speed": 1.0, "efficiency": 0.8, "backward": 0.7}
     machine = jn.Mechanism(
         space="planar",
-        bodies={"motor": jn.Body([0, 0.5]), "disc": jn.Body([0, 0]), "rack": jn.Body([0, -0.05], mass=1.0)},
+        bodies={"motor": jn.Body([0, 0.5]), "disc": jn.Body([0, 0]), "rack": jn.Body([0, 0.05], mass=1.0)},
         joints={
             "M": jn.planar.Revolute(("ground", "motor"), [0, 0.5], o),
             "D": jn.planar.Revolute(("ground", "disc"), o, o),
-            "R": jn.planar.Prismatic(("ground", "rack"), [0, -0.05], o, [1, 0], [1, 0]),
+            "R": jn.planar.Prismatic(("ground", "rack"), [0, 0.05], o, [1, 0], [1, 0]),
             "belt": jn.planar.Belt(("motor", "disc"), o, o, 0.02, 0.06, friction=jn.joints.GearFriction(**loss)),
             "teeth": jn.planar.Rolling(("rack", "disc"), o, o, [1, 0], 0.05, friction=jn.joints.GearFriction(**loss)),
         },
