@@ -7,6 +7,7 @@ known at once.
 """
 
 from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager
 from typing import Any
 
 import jax
@@ -14,6 +15,7 @@ from jax._src import config as config, core as core
 from jax.core import Tracer
 
 TRIED = (0, 10), (0, 11)  # releases of JAX
+CERTAIN = "by_certain_entries"  # a name of operations
 
 
 def is_tried() -> bool:
@@ -98,6 +100,19 @@ def use_file_cache(make: Callable[[str], tuple[Any, str]]) -> bool:
     if known := hasattr(compilation_cache, "get_file_cache"):
         compilation_cache.get_file_cache = make
     return known
+
+
+def by_certain_entries() -> AbstractContextManager[None]:
+    """Mark operations in which a constant zero is an entry that a matrix does not have, whatever it is multiplied by.
+
+    Machine code leaves such products out; elsewhere zero times what is not finite is NaN.
+    """
+    return jax.named_scope(CERTAIN)
+
+
+def is_by_certain_entries(equation: Any) -> bool:
+    """Tell whether an operation is so marked."""
+    return CERTAIN in str(equation.source_info.name_stack)
 
 
 def sizes_of_scan(equation: Any) -> tuple[int, int]:

@@ -23,12 +23,15 @@ class Pattern(Module):
         Of the entries in the columns of that body; the number of entries where there are none.
     body_count, entry_count : int
         Number of bodies, and of entries.
+    row_counts : tuple of int
+        Rows of an instance of each group.
     """
 
     bodies: Int[Numbers, "row slot"]
     entry_indices: Int[Numbers, "row slot width"]
     body_count: int = field(static=True)
     entry_count: int = field(static=True)
+    row_counts: tuple[int, ...] = field(static=True, default=())
 
     @classmethod
     def of(cls, groups: Sequence[Any], row_counts: Sequence[int], width: int, body_count: int) -> "Pattern":
@@ -60,7 +63,7 @@ class Pattern(Module):
                 entry_indices[its, k] = np.where(touched[:, None] < 0, entry_count, there)
                 first += width * block
             row += block
-        return cls(bodies.astype(np.int32), entry_indices.astype(np.int32), body_count, entry_count)
+        return cls(bodies.astype(np.int32), entry_indices.astype(np.int32), body_count, entry_count, tuple(row_counts))
 
     @property
     def width(self) -> int:

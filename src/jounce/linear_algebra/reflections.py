@@ -9,7 +9,8 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
-from jounce.base.modules import Module
+from jounce.base.jax_internals import by_certain_entries
+from jounce.base.modules import Module, field, with_fields
 from jounce.base.shapes import Numbers
 
 Columns = Float[Numbers, "row batch"]
@@ -26,10 +27,13 @@ class ReflectedFactor(Module):
     reduced: Float[Numbers, "row row batch"]  # above its diagonal the triangle, below and on it the reflections
     pivots: Columns  # diagonal of the triangle
     shares: Columns  # two over the squared length of each reflection; 0 where nothing is reflected
+    order: tuple[int, ...] = field(static=True)  # of the rows in all of these
 
     @classmethod
-    def of(cls, matrix: Float[Numbers, "row row batch"]) -> "ReflectedFactor":
-        """Factor matrices of shape (rows, rows, batch)."""
+    @by_certain_entries()
+    def of(cls, matrix: Float[Numbers, "row row batch"], order: tuple[int, ...]) -> "ReflectedFactor":
+        """Factor matrices of shape (rows, rows, batch), their rows in an order."""
+        matrix = _ordered(matrix, order)
         columns, pivots, shares, rows, rest = [], [], [], [], matrix
         for _ in range(len(matrix)):
             first = rest[:, 0]
@@ -51,18 +55,20 @@ class ReflectedFactor(Module):
         reduced = [
             jnp.concatenate([jnp.stack([columns[j][i - j] for j in range(i + 1)]), rows[i]]) for i in range(size)
         ]
-        return cls(matrix, jnp.stack(reduced), jnp.stack(pivots), jnp.stack(shares))
+        return cls(matrix, jnp.stack(reduced), jnp.stack(pivots), jnp.stack(shares), order)
 
     @classmethod
-    def blank(cls, shape: tuple[int, ...], lanes: int) -> "ReflectedFactor":
+    def blank(cls, order: tuple[int, ...], lanes: int) -> "ReflectedFactor":
         """Return a placeholder for the factors of a batch, to start a loop with."""
-        matrix, column = np.zeros((*shape, lanes)), np.zeros((shape[0], lanes))
-        return cls(matrix, matrix, column, column)
+        size = len(order)
+        matrix, column = np.zeros((size, size, lanes)), np.zeros((size, lanes))
+        return cls(matrix, matrix, column, column, order)
 
     def refining(self, matrix: Float[Numbers, "row row batch"]) -> "ReflectedFactor":
         """Return these factors for matrices near to those that were factored, by which solutions are refined."""
-        return ReflectedFactor(matrix, self.reduced, self.pivots, self.shares)
+        return with_fields(self, matrix=_ordered(matrix, self.order))
 
+    @by_certain_entries()
     def defect(self) -> Float[Numbers, " batch"]:
         """Return by which part solutions are off that are not refined, as one of known solution tells, shape (batch,).
 
@@ -70,13 +76,15 @@ class ReflectedFactor(Module):
         """
         known = np.where(np.arange(len(self.pivots)) % 3 == 1, -1.0, 1.0)
         right = jnp.sum(self.matrix * known[None, :, None], axis=1)
-        return jnp.max(jnp.abs(self.solve(right, refined=False) - known[:, None]), axis=0)
+        return jnp.max(jnp.abs(_substituted(self, right) - known[:, None]), axis=0)
 
+    @by_certain_entries()
     def solve(self, right: Columns, *, refined: bool = True) -> Columns:
         """Return the solution for right-hand sides of shape (rows, batch); it is not finite where one is singular.
 
         A correction that is followed by another need not be refined.
         """
+        right = _ordered(right, self.order)
         solution = _substituted(self, right)
         if not refined:
             return solution
@@ -84,7 +92,7 @@ class ReflectedFactor(Module):
 
     def applied_inverse(self, matrix: Float[Numbers, "row column"]) -> Float[Numbers, "row column"]:
         """Return the products of the inverse of the first matrix with the columns of another, shape (rows, columns)."""
-        first = ReflectedFactor(*(x[..., :1] for x in (self.matrix, self.reduced, self.pivots, self.shares)))
+        first = jax.tree.map(lambda x: x[..., :1], self)
         return jax.lax.map(lambda column: first.solve(column[:, None], refined=False)[:, 0], matrix.T).T
 
     def pivot_ratio(self) -> Float[Numbers, " batch"]:
@@ -95,10 +103,16 @@ class ReflectedFactor(Module):
     def sign(self) -> Float[Numbers, " batch"]:
         """Return the signs of the determinants, shape (batch,): 0 where singular, NaN where not finite."""
         reflected = jnp.where(self.shares == 0, 1.0, -1.0)
-        return jnp.prod(reflected * jnp.sign(self.pivots), axis=0)
+        swaps = sum(later < row for k, row in enumerate(self.order) for later in self.order[k:])
+        return jnp.prod(reflected * jnp.sign(self.pivots), axis=0) * (-1.0) ** swaps
+
+
+def _ordered(rows: Float[Numbers, "row *rest"], order: tuple[int, ...]) -> Float[Numbers, "row *rest"]:
+    return jnp.stack([rows[row] for row in order])
 
 
 @jax.jit  # traced once for all orders
+@by_certain_entries()
 def _substituted(factor: ReflectedFactor, right: Columns) -> Columns:
     size = len(factor.pivots)
     for k in range(size):

@@ -7,9 +7,10 @@ import pytest
 from jax import lax
 
 from jounce.base import jax_internals
-from jounce.execution.llvm import modules, translation
+from jounce.execution.llvm import machine, modules, translation
 from jounce.execution.llvm.text import code
 from jounce.execution.llvm.text.values import Region, UnsupportedOperationError
+from jounce.linear_algebra.reflections import ReflectedFactor
 from tests.execution.llvm.lanes import COUNT, TRUTH, assert_agree, assert_same, compiled, one_by_one, ordinary, whole
 
 COUNTS = (1, 3, 8, COUNT)
@@ -428,3 +429,85 @@ def test_what_another_release_of_jax_says_otherwise_is_left_to_xla(monkeypatch, 
         monkeypatch.setattr(jax_internals, "TRIED", ())
     with pytest.raises(KeyError if tried else UnsupportedOperationError, match="length"):
         modules.object_file(lambda shared, lanes: shared * lanes, np.ones(1), np.ones(1), {})
+
+
+def masked(x, places):
+    """Return a matrix that has the given entries, and certain zeros elsewhere."""
+    flat = iter(x)
+    return jnp.stack([jnp.stack([next(flat) if here else jnp.zeros_like(x[0]) for here in row]) for row in places])
+
+
+def test_certain_zeros_have_no_products_and_others_do():
+    places = np.array([[1, 0], [1, 1]], bool)
+
+    def product(entries, column):
+        return jnp.sum(masked(entries, places) * column[None], axis=1)
+
+    def certain(entries, column):
+        with jax_internals.by_certain_entries():
+            return product(entries, column)
+
+    entries, column = ordinary(3), np.stack([ordinary(seed=1), np.where(TRUTH, np.inf, np.nan)])
+    assert_agree(product, entries, column)
+    result = compiled(certain, [entries, column])([], [entries, column])
+    np.testing.assert_array_equal(result[0], entries[0] * column[0])
+    np.testing.assert_array_equal(np.isnan(result[1]), np.isnan(entries[2] * column[1]))
+
+
+@pytest.mark.parametrize("width", WIDTHS)
+def test_constants_that_a_loop_keeps_and_those_that_it_changes(width):
+    def run(x):
+        def body(state):
+            matrix, turns = state
+            changed = matrix.at[1, 1].add(x).at[2, 0].set(matrix[2, 0] - x)
+            return jax.lax.cond(turns[0] % 2 == 0, lambda: changed, lambda: matrix.at[3, 3].set(-matrix[3, 3])), turns + 1
+
+        start = jnp.zeros((5, 5, 1)).at[0, 4].set(2.5).at[4, 4].set(-0.0), jnp.zeros(1, int)
+        matrix, turns = lax.while_loop(lambda s: (s[1][0] < 3) | (s[0][1, 1, 0] < 4.0), body, start)
+        return matrix, turns, jnp.sum(matrix, axis=(0, 1))
+
+    assert_agree(run, ordinary(low=0.5), width=width, counts=COUNTS)
+
+
+def test_constants_that_some_ways_have_in_common():
+    def run(n, x):
+        ways = [
+            lambda: jnp.stack([x, jnp.full_like(x, 3.0), jnp.zeros_like(x), jnp.zeros_like(x)]),
+            lambda: jnp.stack([2 * x, jnp.full_like(x, 3.0), -jnp.zeros_like(x), x]),
+            lambda: jnp.stack([x, jnp.full_like(x, 3.0), jnp.zeros_like(x), jnp.zeros_like(x)]),
+        ]
+        return lax.switch(n[0], ways)
+
+    lanes = np.arange(COUNT) % 3
+    assert_agree(run, lanes, ordinary(), counts=COUNTS)
+    for n in range(3):
+        assert_agree(run, np.full(COUNT, n), ordinary())
+        assert_agree(lambda n, x: run(n, x), ordinary(), shared=(np.array([n]),))
+
+
+def test_a_matrix_with_certain_zeros_is_eliminated_with_fewer_lines():
+    places = np.abs(np.subtract.outer(np.arange(6), np.arange(6))) < 2
+    lines = []
+
+    def solved(entries, right):
+        factor = ReflectedFactor.of(masked(entries, places), tuple(range(6)))
+        return factor.solve(right), factor.sign(), factor.pivot_ratio()
+
+    def dense(entries, right):
+        factor = ReflectedFactor.of(jnp.reshape(entries, (6, 6, 1)), tuple(range(6)))
+        return factor.solve(right), factor.sign(), factor.pivot_ratio()
+
+    entries, right = ordinary(places.sum()), ordinary(6, seed=1)
+    matrix = np.zeros((6, 6, COUNT))
+    matrix[places] = entries
+    with pytest.MonkeyPatch.context() as patch:
+        made = modules.compiled
+        patch.setattr(machine, "compiled", lambda text, **how: lines.append(text.count("\n")) or made(text, **how))
+        solution, sign, ratio = compiled(solved, [entries, right])([], [entries, right])
+        of_all = compiled(dense, [matrix.reshape(36, COUNT), right])([], [matrix.reshape(36, COUNT), right])
+    by_lane = np.moveaxis(matrix, -1, 0)
+    np.testing.assert_allclose(solution, np.linalg.solve(by_lane, right.T[..., None])[..., 0].T, rtol=1e-10)
+    np.testing.assert_array_equal(sign, np.linalg.slogdet(by_lane).sign)
+    for mine, theirs in zip((solution, sign, ratio), of_all, strict=True):
+        np.testing.assert_allclose(mine, theirs, rtol=1e-10)
+    assert lines[0] < 0.6 * lines[1]

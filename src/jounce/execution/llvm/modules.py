@@ -158,7 +158,7 @@ def _text(
         lines += [f"declare double @{name}({', '.join(['double'] * count)}) #0", _lane_by_lane(name, count, width)]
     if not single:
         lines.append(rounds_text(width))
-    return "\n".join([*lines, ATTRIBUTES])
+    return "\n".join(filter(None, [*lines, ATTRIBUTES]))
 
 
 def _region(code: Code, number: int, kind: str, *, lanes: bool) -> Region:

@@ -6,6 +6,8 @@ from typing import Any
 
 from jax.extend.core import Literal
 
+from jounce.base.jax_internals import is_by_certain_entries
+
 CALLS = ("jit", "pjit", "closed_call", "core_call", "custom_jvp_call", "custom_vjp_call", "checkpoint", "remat2")
 """Operations that call a program, which is written in their place."""
 
@@ -25,7 +27,7 @@ class Operation:
     params: Mapping[str, Any]
     invars: Sequence[Any]
     outvars: Sequence[Any]
-    source_info: Any
+    sparse: bool  # whether a constant zero is an entry that is not there
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,7 +116,8 @@ def _written(
         if not whole:
             result = [Variable(variable.aval) for variable in result]
             names |= zip(equation.outvars, result, strict=True)
-        operations.append(Operation(equation.primitive, equation.params, given, result, equation.source_info))
+        sparse = is_by_certain_entries(equation)
+        operations.append(Operation(equation.primitive, equation.params, given, result, sparse))
     return [name(variable) for variable in program.outvars]
 
 

@@ -4,7 +4,7 @@ Where lanes part, all ways that some lane takes are run, and each keeps what its
 last lane that is in it has left. So the results of a lane depend on no other.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -12,12 +12,13 @@ from jax.extend.core import Literal, jaxprs_in_params
 
 from jounce.base.jax_internals import sizes_of_scan
 from jounce.execution.llvm.calls import call
-from jounce.execution.llvm.loop_variables import LoopVariables
+from jounce.execution.llvm.loop_variables import LoopVariables, constants_of
 from jounce.execution.llvm.plans import plan_of
 from jounce.execution.llvm.rules.loops import DEFERRED, READING, STORED
 from jounce.execution.llvm.rules.operations import RULES
 from jounce.execution.llvm.text.arrays import constants, each, filled
-from jounce.execution.llvm.text.code import Code
+from jounce.execution.llvm.text.code import Code, flat
+from jounce.execution.llvm.text.scalars import is_same_constant
 from jounce.execution.llvm.text.stored import (
     any_lanes,
     is_large,
@@ -82,7 +83,7 @@ def translate(
     with code.used(lambda region: read_last.get(region, -1) > now):
         for now, operation in enumerate(plan.operations):
             inputs = [read(variable) for variable in operation.invars]
-            before = len(code.taken)
+            before, code.sparse = len(code.taken), operation.sparse and code.large is None
             result = _results(code, operation, inputs, delayed=now in plan.delayed)
             for variable, values in zip(operation.outvars, result, strict=True):
                 noted(variable, _checked(values, variable.aval))
@@ -161,23 +162,23 @@ def _closed(code: Code, closed: Any, *given: Sequence[Array], late: bool = False
     return translate(code, closed.jaxpr, numbers, [array for some in given for array in some], late=late)
 
 
-def _until_settled(code: Code, lanes: list[bool], attempt: Callable[[list[bool]], tuple[list[bool], Any]]) -> Any:
+def _until_settled(code: Code, known: Any, attempt: Callable[[Any], tuple[Any, Any]]) -> Any:
     """Return what an attempt gives that knows of each array whether its numbers differ from lane to lane.
 
     Parameters
     ----------
-    lanes : list of bool
+    known : list of bool, or more
         What is known of the arrays before.
     attempt : callable
-        Writes code, and returns which arrays differ, possibly more than those given, and its results.
+        Writes code, and returns what is so, possibly less than what was known, and its results.
     """
     while True:
         mark = code.mark()
-        differing, results = attempt(lanes)
-        if differing == lanes:
+        found, results = attempt(known)
+        if found == known:
             return results
         code.back_to(mark)
-        lanes = differing
+        known = found
 
 
 def _in_lanes(arrays: Sequence[Array], already: Sequence[bool] | None = None) -> list[bool]:
@@ -219,8 +220,9 @@ def _while(code: Code, equation: Any, given: Sequence[Array]) -> list[Array]:
     split = p["cond_nconsts"], p["cond_nconsts"] + p["body_nconsts"]
     condition, needed, start = given[: split[0]], given[split[0] : split[1]], given[split[1] :]
 
-    def attempt(lanes: list[bool]) -> tuple[list[bool], list[Array]]:
-        state = LoopVariables(code, [variable.aval for variable in equation.outvars], lanes)
+    def attempt(known: tuple[list[bool], list[dict[int, Value]]]) -> tuple[Any, list[Array]]:
+        lanes, kept = known
+        state = LoopVariables(code, avals, lanes, kept)
         state.store(start)
         head, body, end = code.label(), code.label(), code.label()
         code.jump(head)
@@ -230,7 +232,7 @@ def _while(code: Code, equation: Any, given: Sequence[Array]) -> list[Array]:
             with code.used(_among([*condition, *needed, *before])):
                 goes = code.among_here(_number(code, _closed(code, p["cond_jaxpr"], condition, before)[0]))
             if goes.lanes and not all(lanes):  # what a lane keeps that has left differs
-                return [True] * len(lanes), []
+                return ([True] * len(lanes), kept), []
             code.branch(code.anywhere(goes), body, end)
             code.begin(body)
             live = [*condition, *needed, *(before if goes.lanes else ())]
@@ -242,9 +244,18 @@ def _while(code: Code, equation: Any, given: Sequence[Array]) -> list[Array]:
                 _give_back(code, after)
             code.jump(head)
         code.begin(end)
-        return _in_lanes(after, lanes), state.load()
+        return (_in_lanes(after, lanes), [*map(_still_kept, kept, after)]), state.load()
 
-    return _until_settled(code, _likely(code, start, [variable.aval for variable in equation.outvars]), attempt)
+    avals = [variable.aval for variable in equation.outvars]
+    return _until_settled(code, (_likely(code, start, avals), [constants_of(code, x) for x in start]), attempt)
+
+
+def _still_kept(kept: Mapping[int, Value], array: Array) -> dict[int, Value]:
+    """Return the constants of an array that are there after a turn of a loop as before."""
+    if not kept:
+        return {}
+    values = flat(array)
+    return {k: value for k, value in kept.items() if is_same_constant(value, values[k])}
 
 
 def _among(arrays: Sequence[Array]) -> Callable[[Region], bool]:
@@ -384,10 +395,11 @@ def _cond(code: Code, equation: Any, given: Sequence[Array]) -> list[Array]:
                 made = _closed(code, way, inputs)
                 differing = _in_lanes(made, differing)
                 if which.lanes and k > 0:
-                    made = _chosen(code, here, made, results.load())
+                    made = _chosen(code, here, made, results.load(k))
                 results.store(made)
             code.jump(end)
             code.begin(end)
+        results.keep_constants(len(ways))
         return differing, results.load()
 
     avals = [variable.aval for variable in equation.outvars]

@@ -5,7 +5,7 @@ With redundant constraints, which agree, it has more rows than columns, and its 
 
 import jax
 import jax.numpy as jnp
-from jaxtyping import Bool
+from jaxtyping import Bool, Float
 
 from jounce.base.shapes import Numbers
 from jounce.jet import Jet
@@ -23,7 +23,7 @@ STALE = 1e-9  # part by which solutions may be off before they are refined, whic
 def factored(system: System, pose: Pose, time: Jet) -> Factor:
     """Return the factored Jacobian at a pose of order zero."""
     if system.fronts is None:
-        return _dense(system).of(system.jacobian(pose, time))
+        return _of(system, system.jacobian(pose, time))
     return FrontalFactor.of(system.fronts, system.entries(pose, time), system.row_scale)
 
 
@@ -38,17 +38,21 @@ def refactored(system: System, pose: Pose, time: Jet, known: Factor, anew: Bool[
     matrix = system.jacobian(pose, time)
     reused = known.refining(matrix)
     stale = jnp.any(~(reused.defect() <= STALE))
-    return jax.lax.cond(anew | stale, lambda: type(known).of(matrix), lambda: reused)
+    return jax.lax.cond(anew | stale, lambda: _of(system, matrix), lambda: reused)
 
 
 def blank_factor(system: System, lanes: int) -> Factor:
     """Return a placeholder for the factors of a batch, to start a loop with."""
-    if system.fronts is None:
-        return _dense(system).blank(system.shape, lanes)
-    return FrontalFactor.blank(system.fronts, lanes)
-
-
-def _dense(system: System) -> type[DenseFactor] | type[ReflectedFactor] | type[LeastSquaresFactor]:
+    if system.fronts is not None:
+        return FrontalFactor.blank(system.fronts, lanes)
     if system.rank is not None:
-        return LeastSquaresFactor
-    return ReflectedFactor if system.reflected else DenseFactor
+        return LeastSquaresFactor.blank(system.shape, lanes)
+    if system.reflected:
+        return ReflectedFactor.blank(system.row_order, lanes)
+    return DenseFactor.blank(system.shape, lanes)
+
+
+def _of(system: System, matrix: Float[Numbers, "row column batch"]) -> Factor:
+    if system.rank is not None:
+        return LeastSquaresFactor.of(matrix)
+    return ReflectedFactor.of(matrix, system.row_order) if system.reflected else DenseFactor.of(matrix)

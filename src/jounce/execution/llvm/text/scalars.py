@@ -64,6 +64,8 @@ class Scalars:
         Declarations of the functions of LLVM that are called.
     here : Value or None
         In which lanes what is written now is asked for; None for all.
+    sparse : bool
+        Whether a constant zero is an entry that is not there, and no product with it is written.
     """
 
     width: int
@@ -72,6 +74,7 @@ class Scalars:
     functions: set[tuple[str, int]] = field(default_factory=set)
     intrinsics: set[str] = field(default_factory=set)
     here: Value | None = None
+    sparse: bool = False
     _count: int = 0
     _known: list[dict[str, Value]] = field(default_factory=lambda: [{}])
     _vectors: dict[tuple[str, str], str] = field(default_factory=dict)
@@ -169,6 +172,8 @@ class Scalars:
                 return self.constant(python(a.constant, b.constant), a.kind)
         if (same := _neutral(operation, a, b)) is not None:
             return same
+        if self.sparse and operation == "mul" and a.kind == "f" and (_is_zero(a) or _is_zero(b)):
+            return self.constant(0.0)  # of no sign
         if operation in COMMUTATIVE and a.name > b.name:
             a, b = b, a
         if operation == "rem" and a.kind == "f":
@@ -236,7 +241,7 @@ class Scalars:
         """Return the first of two numbers where a truth value holds, the second elsewhere."""
         if choice.constant is not None:
             return a if choice.constant else b
-        if a is b or (a.name and a.name == b.name) or _same(a.constant, b.constant):
+        if a is b or (a.name and a.name == b.name) or is_same_constant(a, b):
             return a
         lanes = choice.lanes or a.lanes or b.lanes
         which, on = self.operand(choice, lanes=lanes), self.type_of("b", lanes=lanes)
@@ -301,9 +306,14 @@ class Scalars:
         self.lines.append(f"br i1 {choice}, label %{then}, label %{otherwise}")
 
 
-def _same(a: Any, b: Any) -> bool:
-    """Tell whether two constants are one, which zeros of different signs are not."""
-    return a is not None and b is not None and bool(a == b) and math.copysign(1, a) == math.copysign(1, b)
+def _is_zero(a: Value) -> bool:
+    return a.constant is not None and bool(a.constant == 0)
+
+
+def is_same_constant(a: Value, b: Value) -> bool:
+    """Tell whether two values are one constant, which zeros of different signs are not."""
+    x, y = a.constant, b.constant
+    return x is not None and y is not None and bool(x == y) and math.copysign(1, x) == math.copysign(1, y)
 
 
 def _neutral(operation: str, a: Value, b: Value) -> Value | None:
