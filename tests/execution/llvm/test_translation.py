@@ -460,7 +460,9 @@ def test_constants_that_a_loop_keeps_and_those_that_it_changes(width):
         def body(state):
             matrix, turns = state
             changed = matrix.at[1, 1].add(x).at[2, 0].set(matrix[2, 0] - x)
-            return jax.lax.cond(turns[0] % 2 == 0, lambda: changed, lambda: matrix.at[3, 3].set(-matrix[3, 3])), turns + 1
+            return jax.lax.cond(
+                turns[0] % 2 == 0, lambda: changed, lambda: matrix.at[3, 3].set(-matrix[3, 3])
+            ), turns + 1
 
         start = jnp.zeros((5, 5, 1)).at[0, 4].set(2.5).at[4, 4].set(-0.0), jnp.zeros(1, int)
         matrix, turns = lax.while_loop(lambda s: (s[1][0] < 3) | (s[0][1, 1, 0] < 4.0), body, start)

@@ -13,7 +13,8 @@ from jounce.execution.llvm.machine import compiled, vector_width
 from jounce.execution.llvm.rounds import rounds_text
 from jounce.execution.llvm.text.arrays import constants
 from jounce.execution.llvm.text.code import Code, flat
-from jounce.execution.llvm.text.scalars import MOST_LINES
+from jounce.execution.llvm.text.scalars import MOST_LINES, TURNS
+from jounce.execution.llvm.text.sine_cosine import sine_and_cosine
 from jounce.execution.llvm.text.stored import is_large, put, values_of
 from jounce.execution.llvm.text.values import Region, UnsupportedOperationError, kind_of
 from jounce.execution.llvm.text.views import Array, Stored, contiguous
@@ -140,8 +141,10 @@ def _text(
         "br i1 %over, label %end, label %lanes",
         "end:",
     ]
+    turning = [sine_and_cosine(code)] if {(name, 1) for name in TURNS} <= code.functions else []
     lines = [
         *code.constants,
+        *turning,
         "define void @run(ptr noalias %arguments, i64 %total) #1 {",
         "begin:",
         *borrowed,

@@ -34,6 +34,7 @@ INTEGERS: dict[str, tuple[str, Any]] = {
 BOOLEANS = {"add": "or", "max": "or", "mul": "and", "min": "and"}
 COMMUTATIVE = frozenset("add mul max min".split())
 NEUTRAL = {"add": 0, "sub": 0, "mul": 1, "div": 1}
+TURNS = "sin", "cos"  # which of lanes are found together
 COMPARISONS: dict[str, tuple[str, str, str, Any]] = {  # of doubles, of whole numbers, of truth values, in Python
     "eq": ("oeq", "eq", "eq", operator.eq),
     "ne": ("une", "ne", "ne", operator.ne),
@@ -257,8 +258,14 @@ class Scalars:
         return self._called(operation, "f", "f", (self.operand(a, lanes=a.lanes),), lanes=a.lanes)
 
     def call(self, function: str, *given: Value) -> Value:
-        """Return a function of doubles of C's library, one call for each lane."""
+        """Return a function of doubles of C's library, but for sine and cosine one call for each lane."""
         lanes = any(value.lanes for value in given)
+        if lanes and function in TURNS:
+            self.functions |= {(name, 1) for name in TURNS}
+            of = self.type_of("f", lanes=True)
+            both = self._emitted(f"call {{ {of}, {of} }} @sine_and_cosine({of} {given[0].name})", "f", lanes=True)
+            which = TURNS.index(function)
+            return self._emitted(f"extractvalue {{ {of}, {of} }} {both.name}, {which}", "f", lanes=True)
         operands, kind = [self.operand(value, lanes=lanes) for value in given], self.type_of("f", lanes=lanes)
         self.functions.add((function, len(given)))
         called = f"@{function}_of_lanes" if lanes else f"@{function}"

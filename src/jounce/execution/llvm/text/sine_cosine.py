@@ -1,0 +1,99 @@
+"""Sines and cosines of a vector of angles at once, where C's library has them one after another."""
+
+import math
+
+from jounce.execution.llvm.text.scalars import Scalars
+from jounce.execution.llvm.text.values import Value
+
+LARGEST = 1e5  # rad, beyond which C's library is asked
+SMALLEST = 2.0**-27  # rad, left of an angle, below which a sine is its angle
+SHIFT = 1.5 * 2.0**52  # added to a number, it leaves the nearest whole one in its last digits
+QUARTER = 3373259426 * 2.0**-31, 2242054355 * 2.0**-65, 2.0222662487959506e-21
+"""Parts of pi / 2, the first two of 32 digits: products with a whole number below 2**21 are exact."""
+SINE = tuple((-1.0) ** (k // 2) / math.factorial(k) for k in range(17, 2, -2))
+COSINE = tuple((-1.0) ** (k // 2) / math.factorial(k) for k in range(18, 3, -2))
+
+
+def sine_and_cosine(around: Scalars) -> str:
+    """Return the text of a function of a vector of angles, rad, whose results are wrong by a last digit at most.
+
+    Whole quarter turns are taken off an angle (Cody and Waite 1980, Software Manual for the Elementary Functions,
+    chapter 8), and Taylor's series are summed for what is left, at most an eighth of a turn. Where little is left of
+    whole quarter turns, so that digits of pi would be missing, C's library is asked as well.
+
+    Parameters
+    ----------
+    around : Scalars
+        The program that it belongs to.
+    """
+    code = Scalars(around.width)
+    x, vector, truths = Value("%x", "f", True), code.type_of("f", lanes=True), code.type_of("b", lanes=True)
+
+    def number(value: float) -> Value:
+        return code.constant(value)
+
+    def plus(a: Value, b: Value) -> Value:
+        return code.arithmetic("add", a, b)
+
+    def minus(a: Value, b: Value) -> Value:
+        return code.arithmetic("sub", a, b)
+
+    def times(a: Value, b: Value) -> Value:
+        return code.arithmetic("mul", a, b)
+
+    def series(coefficients: tuple[float, ...], square: Value) -> Value:
+        result = number(coefficients[0])
+        for coefficient in coefficients[1:]:
+            result = plus(times(result, square), number(coefficient))
+        return result
+
+    def is_negative(turns: Value) -> Value:
+        two = code.constant(2, "l")
+        return code.compare("eq", code.logic("and", turns, two), two)
+
+    shifted = plus(times(x, number(2 / math.pi)), number(SHIFT))
+    turns = minus(shifted, number(SHIFT))
+    first = minus(x, times(turns, number(QUARTER[0])))
+    second = times(turns, number(QUARTER[1]))
+    left = minus(first, second)
+    third = minus(times(turns, number(QUARTER[2])), minus(minus(first, left), second))
+    angle = minus(left, third)
+    rest = minus(minus(left, angle), third)  # of the angle, below its last digit
+    square = times(angle, angle)
+    half = times(square, number(0.5))
+    nearly = minus(number(1.0), half)
+    small = code.compare("lt", code.intrinsic("fabs", angle), number(SMALLEST))
+    sine = plus(angle, plus(times(times(square, angle), series(SINE, square)), times(rest, nearly)))
+    sine = code.select(small, angle, sine)
+    cosine = minus(times(times(square, square), series(COSINE, square)), times(angle, rest))
+    cosine = plus(nearly, plus(minus(minus(number(1.0), nearly), half), cosine))
+
+    one, count = code.constant(1, "l"), Value("%count", "l", True)
+    code.lines.append(f"{count.name} = bitcast {vector} {shifted.name} to {code.type_of('l', lanes=True)}")
+    swapped = code.compare("eq", code.logic("and", count, one), one)
+    sine, cosine = code.select(swapped, cosine, sine), code.select(swapped, sine, cosine)
+    sine = code.select(is_negative(count), code.negated(sine), sine)
+    cosine = code.select(is_negative(code.arithmetic("add", count, one)), code.negated(cosine), cosine)
+    known = code.compare("le", code.intrinsic("fabs", x), number(LARGEST))
+    cancelled = code.logic("and", small, code.compare("ne", turns, number(0.0)))
+    others = code.logic("or", code.inverted(known), cancelled)
+    code.branch(code.anywhere(others), "others", "end")
+    code.begin("others")
+    for letter, own, function in (("s", sine, "sin"), ("c", cosine, "cos")):
+        code.lines += [
+            f"%{letter}1 = call {vector} @{function}_of_lanes({vector} %x)",
+            f"%{letter}2 = select {truths} {others.name}, {vector} %{letter}1, {vector} {own.name}",
+        ]
+    code.jump("end")
+    code.begin("end")
+    for letter, own in (("s", sine), ("c", cosine)):
+        code.lines.append(f"%{letter} = phi {vector} [{own.name}, %begin], [%{letter}2, %others]")
+    pair = f"{{ {vector}, {vector} }}"
+    code.lines += [
+        f"%one = insertvalue {pair} poison, {vector} %s, 0",
+        f"%both = insertvalue {pair} %one, {vector} %c, 1",
+        f"ret {pair} %both",
+    ]
+    around.intrinsics |= code.intrinsics
+    body = "\n".join(code.lines)
+    return f"define internal {pair} @sine_and_cosine({vector} %x) noinline #2 {{\nbegin:\n{body}\n}}"
