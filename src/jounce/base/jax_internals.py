@@ -7,7 +7,6 @@ known at once.
 """
 
 from collections.abc import Callable, Sequence
-from contextlib import AbstractContextManager
 from typing import Any
 
 import jax
@@ -102,10 +101,11 @@ def use_file_cache(make: Callable[[str], tuple[Any, str]]) -> bool:
     return known
 
 
-def by_certain_entries() -> AbstractContextManager[None]:
+def by_certain_entries() -> Any:
     """Mark operations in which a constant zero is an entry that a matrix does not have, whatever it is multiplied by.
 
-    Machine code leaves such products out; elsewhere zero times what is not finite is NaN.
+    Machine code leaves such products out; elsewhere zero times what is not finite is NaN. The mark is a context, or
+    decorates a function.
     """
     return jax.named_scope(CERTAIN)
 

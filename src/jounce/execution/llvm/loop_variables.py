@@ -55,7 +55,7 @@ class LoopVariables:
         """
 
         def number(which: int, k: int) -> Value:
-            known = self.kept[which].get(k) or (self._same_in(which, k, ways) if ways else None)
+            known = self.kept[which].get(k) or self._same_in(which, k, ways)
             return known or self.code.load(self.regions[which], k)
 
         return [
@@ -107,9 +107,10 @@ class LoopVariables:
 
     def _same_in(self, which: int, k: int, ways: int) -> Value | None:
         """Return the constant that all of so many ways have stored in a place."""
-        (value, _), *others = stores = self._stored.get((which, k)) or [(None, None)]
-        same = len(stores) == ways and all(is_same_constant(value, other) for other, _ in others)
-        return value if same else None
+        stored = [value for value, _ in self._stored.get((which, k), ())]
+        if len(stored) != ways or not all(is_same_constant(stored[0], value) for value in stored):
+            return None
+        return stored[0] if stored else None
 
 
 def may_be_kept(value: Value) -> bool:

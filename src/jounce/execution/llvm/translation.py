@@ -252,7 +252,7 @@ def _while(code: Code, equation: Any, given: Sequence[Array]) -> list[Array]:
 
 def _still_kept(kept: Mapping[int, Value], array: Array) -> dict[int, Value]:
     """Return the constants of an array that are there after a turn of a loop as before."""
-    if not kept:
+    if not kept or isinstance(array, InMemory):
         return {}
     values = flat(array)
     return {k: value for k, value in kept.items() if is_same_constant(value, values[k])}
