@@ -12,7 +12,7 @@ from jounce.execution.llvm.text.stored import copied, is_large, put
 from jounce.execution.llvm.text.values import Region, Value, kind_of
 from jounce.execution.llvm.text.views import Array, Deferred, InMemory, Stored, contiguous
 
-LEAST_KEPT = 16  # numbers of an array of which constants are looked for: to find that they do not stay costs a turn
+LEAST_SIZE = 16  # numbers of an array of which constants are looked for: to find that they do not stay costs a turn
 
 
 class LoopVariables:
@@ -24,7 +24,7 @@ class LoopVariables:
         What is written to.
     avals, lanes : sequence
         Shapes and types of the arrays, and whether their numbers differ from lane to lane.
-    kept : sequence of mapping, optional
+    invariants : sequence of mapping, optional
         Of the places in each array at which a constant stays to that constant.
     """
 
@@ -33,9 +33,9 @@ class LoopVariables:
         code: Code,
         avals: Sequence[Any],
         lanes: Sequence[bool],
-        kept: Sequence[Mapping[int, Value]] | None = None,
+        invariants: Sequence[Mapping[int, Value]] | None = None,
     ):
-        self.kept: list[dict[int, Value]] = list(map(dict, kept)) if kept else [{} for _ in avals]
+        self.invariants: list[dict[int, Value]] = list(map(dict, invariants)) if invariants else [{} for _ in avals]
         self._stored: dict[tuple[int, int], list[tuple[Value, slice]]] = {}  # constants, and by which lines
         self.code, self.shapes = code, [aval.shape for aval in avals]
         self.large = [is_large(code, aval) for aval in avals]
@@ -55,7 +55,7 @@ class LoopVariables:
         """
 
         def number(which: int, k: int) -> Value:
-            known = self.kept[which].get(k) or self._same_in(which, k, ways)
+            known = self.invariants[which].get(k) or self._same_in(which, k, ways)
             return known or self.code.load(self.regions[which], k)
 
         return [
@@ -89,19 +89,19 @@ class LoopVariables:
                     put(self.code, target, array)
                 continue
             for k, value in enumerate(flat(array)):
-                if value.home == (target.region, k) or k in self.kept[number]:
+                if value.home == (target.region, k) or k in self.invariants[number]:
                     continue
                 before = len(self.code.lines)
                 self.code.store(target.region, k, value)
-                if may_be_kept(value):
+                if may_be_invariant(value):
                     lines = slice(before, len(self.code.lines))
                     self._stored.setdefault((number, k), []).append((value, lines))
 
-    def keep_constants(self, ways: int) -> None:
+    def note_invariants(self, ways: int) -> None:
         """Take back what stored a constant that is the same in all ways, each written in a scope of its own."""
         for (which, k), stores in self._stored.items():
             if (value := self._same_in(which, k, ways)) is not None:
-                self.kept[which][k] = value
+                self.invariants[which][k] = value
                 for _, lines in stores:
                     self.code.lines[lines] = [""] * (lines.stop - lines.start)
 
@@ -113,16 +113,16 @@ class LoopVariables:
         return stored[0] if stored else None
 
 
-def may_be_kept(value: Value) -> bool:
+def may_be_invariant(value: Value) -> bool:
     """Tell whether a value is a constant double, of which matrices of certain zeros are full."""
     return value.constant is not None and value.kind == "f"
 
 
-def constants_of(code: Code, array: Array) -> dict[int, Value]:
+def invariants_of(code: Code, array: Array) -> dict[int, Value]:
     """Return the constants of a matrix that a loop begins with, by their places, which the loop may keep."""
-    if isinstance(array, InMemory) or code.large is not None or array.size < LEAST_KEPT:
+    if isinstance(array, InMemory) or code.large is not None or array.size < LEAST_SIZE:
         return {}
-    return {k: value for k, value in enumerate(flat(array)) if may_be_kept(value)}
+    return {k: value for k, value in enumerate(flat(array)) if may_be_invariant(value)}
 
 
 def _reads_others(array: Array, target: Stored, changing: Collection[Region]) -> bool:

@@ -12,7 +12,7 @@ from jax.extend.core import Literal, jaxprs_in_params
 
 from jounce.base.jax_internals import sizes_of_scan
 from jounce.execution.llvm.calls import call
-from jounce.execution.llvm.loop_variables import LoopVariables, constants_of
+from jounce.execution.llvm.loop_variables import LoopVariables, invariants_of
 from jounce.execution.llvm.plans import plan_of
 from jounce.execution.llvm.rules.loops import DEFERRED, READING, STORED
 from jounce.execution.llvm.rules.operations import RULES
@@ -174,11 +174,11 @@ def _until_settled(code: Code, known: Any, attempt: Callable[[Any], tuple[Any, A
     """
     while True:
         mark = code.mark()
-        found, results = attempt(known)
-        if found == known:
+        settled_as, results = attempt(known)
+        if settled_as == known:
             return results
         code.back_to(mark)
-        known = found
+        known = settled_as
 
 
 def _in_lanes(arrays: Sequence[Array], already: Sequence[bool] | None = None) -> list[bool]:
@@ -221,8 +221,8 @@ def _while(code: Code, equation: Any, given: Sequence[Array]) -> list[Array]:
     condition, needed, start = given[: split[0]], given[split[0] : split[1]], given[split[1] :]
 
     def attempt(known: tuple[list[bool], list[dict[int, Value]]]) -> tuple[Any, list[Array]]:
-        lanes, kept = known
-        state = LoopVariables(code, avals, lanes, kept)
+        lanes, invariants = known
+        state = LoopVariables(code, avals, lanes, invariants)
         state.store(start)
         head, body, end = code.label(), code.label(), code.label()
         code.jump(head)
@@ -232,7 +232,7 @@ def _while(code: Code, equation: Any, given: Sequence[Array]) -> list[Array]:
             with code.used(_among([*condition, *needed, *before])):
                 goes = code.among_here(_number(code, _closed(code, p["cond_jaxpr"], condition, before)[0]))
             if goes.lanes and not all(lanes):  # what a lane keeps that has left differs
-                return ([True] * len(lanes), kept), []
+                return ([True] * len(lanes), invariants), []
             code.branch(code.anywhere(goes), body, end)
             code.begin(body)
             live = [*condition, *needed, *(before if goes.lanes else ())]
@@ -244,18 +244,18 @@ def _while(code: Code, equation: Any, given: Sequence[Array]) -> list[Array]:
                 _give_back(code, after)
             code.jump(head)
         code.begin(end)
-        return (_in_lanes(after, lanes), [*map(_still_kept, kept, after)]), state.load()
+        return (_in_lanes(after, lanes), [*map(_still_invariant, invariants, after)]), state.load()
 
     avals = [variable.aval for variable in equation.outvars]
-    return _until_settled(code, (_likely(code, start, avals), [constants_of(code, x) for x in start]), attempt)
+    return _until_settled(code, (_likely(code, start, avals), [invariants_of(code, x) for x in start]), attempt)
 
 
-def _still_kept(kept: Mapping[int, Value], array: Array) -> dict[int, Value]:
+def _still_invariant(invariants: Mapping[int, Value], array: Array) -> dict[int, Value]:
     """Return the constants of an array that are there after a turn of a loop as before."""
-    if not kept or isinstance(array, InMemory):
+    if not invariants or isinstance(array, InMemory):
         return {}
     values = flat(array)
-    return {k: value for k, value in kept.items() if is_same_constant(value, values[k])}
+    return {k: value for k, value in invariants.items() if is_same_constant(value, values[k])}
 
 
 def _among(arrays: Sequence[Array]) -> Callable[[Region], bool]:
@@ -399,7 +399,7 @@ def _cond(code: Code, equation: Any, given: Sequence[Array]) -> list[Array]:
                 results.store(made)
             code.jump(end)
             code.begin(end)
-        results.keep_constants(len(ways))
+        results.note_invariants(len(ways))
         return differing, results.load()
 
     avals = [variable.aval for variable in equation.outvars]

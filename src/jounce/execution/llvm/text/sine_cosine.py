@@ -75,8 +75,8 @@ def sine_and_cosine(around: Scalars) -> str:
     sine = code.select(is_negative(count), code.negated(sine), sine)
     cosine = code.select(is_negative(code.arithmetic("add", count, one)), code.negated(cosine), cosine)
     known = code.compare("le", code.intrinsic("fabs", x), number(LARGEST))
-    cancelled = code.logic("and", small, code.compare("ne", turns, number(0.0)))
-    others = code.logic("or", code.inverted(known), cancelled)
+    canceled = code.logic("and", small, code.compare("ne", turns, number(0.0)))
+    others = code.logic("or", code.inverted(known), canceled)
     code.branch(code.anywhere(others), "others", "end")
     code.begin("others")
     for letter, own, function in (("s", sine, "sin"), ("c", cosine, "cos")):
