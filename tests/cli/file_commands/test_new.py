@@ -65,7 +65,7 @@ def test_a_file_that_is_there_is_kept_unless_forced(run):
     "arguments, part",
     [
         (("fourbar",), "did you mean 'four-bar'?"),
-        (("press",), "no starter has this name, got 'press'; `jounce example press` copies the example"),
+        (("press",), "no starter has this name, got 'press'; `jounce new --from press` copies the example"),
         (("cam", "cam.txt"), "valid: .yaml, .yml, .toml, .json"),
         (("cam", "no/where/cam.yaml"), "does not exist"),
         (("cam", "--forse"), "--force"),
@@ -133,3 +133,25 @@ def test_facts_of_the_starters():
     reach = np.linalg.norm(arm.outputs["tip"][:, 0] - np.array([0, 0, 0.35]), axis=1)
     angles = -80 + 50 * (arm.time / 2 - np.sin(np.pi * arm.time) / (2 * np.pi))
     np.testing.assert_allclose(reach, np.sqrt(0.4**2 + 0.35**2 + 0.28 * np.cos(np.radians(angles))), atol=1e-12)
+
+
+def test_an_example_may_be_what_a_file_starts_from(run):
+    status, out, err = run("new", "--from", "press", "mine.yaml")
+    assert (status, err) == (0, "")
+    example = pathlib.Path(__file__).resolve().parents[3] / "examples" / "press.yaml"
+    assert pathlib.Path("mine.yaml").read_text() == example.read_text()
+    assert "jounce inspect mine.yaml" in out
+    assert run("new", "--from", "press")[0] == 0
+    assert pathlib.Path("press.yaml").read_text() == example.read_text()
+    assert run("new", "--from", "four-bar", "linkage.yaml")[0] == 0
+    assert pathlib.Path("linkage.yaml").read_text() == STARTERS["four-bar"].text
+
+
+def test_from_takes_one_file_and_a_name_that_is_known(run):
+    status, _, err = run("new", "--from", "press", "one.yaml", "two.yaml")
+    assert status == 2
+    assert "writes one file: jounce new --from NAME [FILE]" in err
+    status, _, err = run("new", "--from", "pres")
+    assert status == 2
+    assert "did you mean 'press'" in err.lower()
+    assert not list(pathlib.Path().iterdir())

@@ -28,6 +28,10 @@ def test_a_log_is_smoothed_written_and_read(tmp_path, capsys):
     assert main(["torques", robot, str(log), "--deviation", "6e-5", "--rates", "1"]) == 0
     assert main(["smooth", robot, str(log), "--deviation", "-1", "--out", str(tmp_path / "none.csv")]) == 2
     assert not (tmp_path / "none.csv").exists()
+    for command in (["smooth", "--rate", "200Hz"], ["torques"], ["check"]):
+        capsys.readouterr()
+        assert main([command[0], robot, str(log), "--deviation", "0.1mm", *command[1:]]) == 2
+        assert "--deviation: must be an angle, such as 0.1deg: all joints turn, got '0.1mm'" in capsys.readouterr().err
 
 
 def test_a_smoothed_log_is_told_as_json_and_drawn(tmp_path, capsys):

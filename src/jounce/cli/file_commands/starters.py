@@ -4,22 +4,35 @@ from __future__ import annotations
 
 import shlex
 from pathlib import Path
+from typing import Annotated
 
+from cyclopts import Parameter
+
+from jounce.cli.file_commands.example_files import example
 from jounce.cli.options import Overwrite
+from jounce.errors import JounceError
 from jounce.reporting.terminal import say, say_json, show_columns
 
 
 def new(
-    name: str | None = None, file: Path | None = None, /, *, overwrite: Overwrite = False, json: bool = False
+    name: str | None = None,
+    file: Path | None = None,
+    /,
+    *,
+    from_: Annotated[str | None, Parameter(name="--from")] = None,
+    overwrite: Overwrite = False,
+    json: bool = False,
 ) -> int:
     """Write a commented starter file, or list the starters.
 
     Parameters
     ----------
     name
-        Name of the starter, such as four-bar.
+        Name of the starter, such as four-bar; with --from the file to write.
     file
         File to write: .yaml, .yml, .toml or .json [default: NAME.yaml].
+    from_
+        Start from an example, such as press, with the files that it names; `jounce example` lists them.
     overwrite
         Replace an existing file.
     json
@@ -30,9 +43,16 @@ def new(
       jounce new
       jounce new four-bar
       jounce new slider-crank engine.yaml
+      jounce new --from press my_press.yaml
     """
     from jounce.io.mechanisms.starters import STARTERS, write_starter
 
+    if from_ is not None:
+        if file is not None:
+            raise JounceError("writes one file: jounce new --from NAME [FILE]", name="--from", value=from_)
+        if from_ not in STARTERS:
+            return example(from_, None if name is None else Path(name), overwrite=overwrite, json=json)
+        name, file = from_, None if name is None else Path(name)
     if name is None:
         if json:
             listed = [{"name": s.name, "about": s.about, "command": s.command} for s in STARTERS.values()]

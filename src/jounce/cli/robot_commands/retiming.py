@@ -26,6 +26,7 @@ from jounce.reporting.terminal import say, show_table
 
 if TYPE_CHECKING:
     from jounce.planning import RetimedTrajectory
+    from jounce.robot import Robot
 
 ROWS = 3  # derivatives that are written
 
@@ -142,17 +143,24 @@ def retime(
                 reading,
                 output,
                 None if running is None or at is None else (running, instant_of(at)),
+                deviation,
                 moving=in_motion,
             )
     _write_result(result, (file, path), figure, output)
     return 0 if result.retimed.report.kept else 1
 
 
-def deviation_of(text: str) -> float:
-    """Return an angle or a length, rad or m."""
+def deviation_of(text: str, robot: Robot | None = None) -> float:
+    """Return an angle or a length, rad or m, that joints of a robot may deviate by."""
     from jounce.units.dimensions import ANGLE, LENGTH
 
-    return positive_quantity("--deviation", text, (ANGLE, LENGTH), "an angle or a length, such as 0.1deg or 1mm")
+    allowed, words = (ANGLE, LENGTH), "an angle or a length, such as 0.1deg or 1mm"
+    moving = () if robot is None else robot.moving_joints
+    if moving and all(joint.turning for joint in moving):
+        allowed, words = (ANGLE,), "an angle, such as 0.1deg: all joints turn"
+    elif moving and all(joint.type == "prismatic" for joint in moving):
+        allowed, words = (LENGTH,), "a length, such as 1mm: all joints slide"
+    return positive_quantity("--deviation", text, allowed, words)
 
 
 def duration_of(text: str) -> float:
@@ -221,6 +229,7 @@ def _of_robot(
     reading: RobotReading,
     output: TableOutput,
     running: tuple[Path, float] | None,
+    deviation: str | None,
     *,
     moving: bool,
 ) -> _Result:
@@ -230,6 +239,8 @@ def _of_robot(
     from jounce.trajectory import JointTrajectory
 
     model = reading.robot(file, carries=True)
+    if deviation is not None:
+        settings = settings | {"deviation": deviation_of(deviation, model)}
     settings = settings | {"loads": reading.loads(model, moving=moving)}
     if moving and not settings["loads"]:
         raise JounceError(

@@ -88,7 +88,7 @@ def check(
             bounds = load_motion_limits(limits, model)
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always", SampleWarning)
-        motion = _smoothed(reading.trajectory(trajectory, model), deviation, trajectory)
+        motion = _smoothed(reading.trajectory(trajectory, model), model, deviation, trajectory)
         with errors_about(trajectory, robot):
             spare_inputs(out, overwrite=overwrite)
             report = check_motion(model, motion, bounds, hand_over=hand_over, loads=loads)
@@ -155,7 +155,7 @@ def torques(
     output.check()
     model = reading.robot(robot, carries=True)
     loads = reading.loads(model)
-    motion = _smoothed(reading.trajectory(trajectory, model), deviation, trajectory)
+    motion = _smoothed(reading.trajectory(trajectory, model), model, deviation, trajectory)
     spare_inputs(output.out, overwrite=output.overwrite)
     with errors_about(trajectory, robot):
         dataset = trajectory_torques(model, motion, rates, drives=not no_drives, loads=loads)
@@ -191,12 +191,13 @@ def _torques_at_breaks(robot: Any, motion: Any, rates: int, loads: Any, *, drive
     return torques_there.assign_coords(time=breaks[which])
 
 
-def _smoothed(motion: Any, deviation: str | None, file: Path) -> Any:
+def _smoothed(motion: Any, robot: Any, deviation: str | None, file: Path) -> Any:
     """Return a motion within a deviation of the samples of another, where one is given."""
     if deviation is None:
         return motion
     from jounce.cli.robot_commands.retiming import deviation_of
     from jounce.planning import smooth
 
+    allowed = deviation_of(deviation, robot)
     with errors_about(file):
-        return smooth(motion, deviation_of(deviation))
+        return smooth(motion, allowed)

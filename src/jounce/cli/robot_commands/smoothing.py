@@ -65,7 +65,9 @@ def smooth(
     frequency, allowed = frequency_of(rate), deviation_of(deviation)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", SampleWarning)
-        given = reading.trajectory(trajectory, reading.robot(robot), samples=True)
+        model = reading.robot(robot)
+        allowed = deviation_of(deviation, model)
+        given = reading.trajectory(trajectory, model, samples=True)
         for file in (output.out, figure):
             spare_inputs(file, overwrite=output.overwrite)
         with errors_about(trajectory, robot):

@@ -84,7 +84,7 @@ def write_starter(name: str, path: str | PathLike[str], *, overwrite: bool = Fal
     from jounce.io.files.writing import check_target, replacing
 
     if name not in STARTERS and name in example_names():
-        message = f"no starter has this name; `jounce example {name}` copies the example"
+        message = f"no starter has this name; `jounce new --from {name}` copies the example"
         raise JounceError(message, value=name)
     check_name("starter", name, STARTERS, JounceError)
     starter, suffix = STARTERS[name], Path(path).suffix.lower()
