@@ -41,6 +41,7 @@ def planetary(load):
     )
 
 
+@pytest.mark.slow
 def test_a_planetary_gear_loads_its_pins_and_bearings_as_its_free_bodies_say():
     """Willis: the carrier turns 24/84 as fast as the sun. Half the pin force at each mesh, of radii 24 and 18 mm."""
     time = [0.1, 0.9]

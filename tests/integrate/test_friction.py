@@ -102,6 +102,7 @@ def test_a_simulation_near_locking_friction_goes_on():
     assert (jn.simulate(pushed_wedge(3.4), [0.0, 0.01]).status == 0).all()
 
 
+@pytest.mark.slow
 def test_a_simulation_that_friction_locks_says_so():
     mechanism = pushed_wedge(3.6)
     words = r"friction locks at t = 0 s: joints\.guide: locked: no force or acceleration"

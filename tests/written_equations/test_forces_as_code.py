@@ -54,6 +54,7 @@ def test_friction_is_refused_by_name(name):
     assert "def residual" in jn.equations(mechanism, order=1)
 
 
+@pytest.mark.slow
 def test_accelerations_and_multipliers_follow_from_one_matrix():
     """Of a double pendulum: those of a simulation, and their rates to order 2."""
     motion = jn.simulate(jn.load(example("double_pendulum")), [0.0, 0.3])

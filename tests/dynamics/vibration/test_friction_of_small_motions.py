@@ -117,6 +117,7 @@ def test_teeth_press_pins_that_resist(load):
     np.testing.assert_allclose(small.stiffness, 40.0, rtol=1e-10)
 
 
+@pytest.mark.slow
 def test_small_motions_about_a_motion_are_refused_by_name():
     driver = jn.drivers.SlideDriver(("ground", "sled"), [0, 0], [0, 0], [np.cos(0.4), np.sin(0.4)], "0.3*t")
     motion = jn.simulate(dataclasses.replace(sled(), initial={"go": driver}), [0.0])

@@ -136,6 +136,7 @@ def test_a_disc_on_the_other_side_of_its_line_is_told(line, on):
         jn.solve(disc(line, on=on), [0.0, 1.0], order=1)
 
 
+@pytest.mark.slow
 def test_a_pinion_on_the_other_side_of_its_rack_in_space_is_told():
     def pinion(side):
         return jn.Mechanism(

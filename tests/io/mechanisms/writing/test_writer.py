@@ -182,6 +182,7 @@ def test_words_of_coupled_joints_are_checked(roles, kinds, words, tmp_path):
     assert dataclasses.asdict(jn.load(path).joints["J"])["roles"] == "ijim"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("weights", ["weight_1: -3, weight_2: 40, offset: 0.5"])
 def test_coupled_joints_keep_count_of_turns_without_a_period(weights, tmp_path):
     path = tmp_path / "a.yaml"
