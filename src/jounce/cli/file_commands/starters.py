@@ -32,7 +32,7 @@ def new(
     file
         File to write: .yaml, .yml, .toml or .json [default: NAME.yaml].
     from_
-        Start from an example, such as press, with the files that it names; `jounce example` lists them.
+        Start from an example, such as press, with the files that it names.
     overwrite
         Replace an existing file.
     json
