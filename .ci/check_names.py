@@ -19,13 +19,16 @@ def read_words(path: Path) -> dict[str, str]:
 
 def names_in(tree: ast.AST) -> Iterator[tuple[int, str]]:
     """Yield the names that a module binds, with their lines."""
+    fields = {line for node in ast.walk(tree) if isinstance(node, ast.ClassDef) for line in node.body}
     for node in ast.walk(tree):
         match node:
             case ast.FunctionDef() | ast.ClassDef():
                 yield node.lineno, node.name
             case ast.arg():
                 yield node.lineno, node.arg
-            case ast.Assign() | ast.For() | ast.NamedExpr() | ast.comprehension() | ast.With():
+            case ast.AnnAssign() if node in fields:
+                pass
+            case ast.Assign() | ast.AnnAssign() | ast.For() | ast.NamedExpr() | ast.comprehension() | ast.With():
                 for part in ast.walk(node):
                     if isinstance(part, ast.Name) and isinstance(part.ctx, ast.Store):
                         yield part.lineno, part.id

@@ -103,7 +103,7 @@ import jounce as jn
 mechanism = jn.load("examples/four_bar.yaml")
 jn.solve(mechanism, [0.0], order=1)
 jn.load_trajectory
-print([*{name for name in sys.modules if name.startswith(tuple(f"{room}." for room in jn.settings._rooms))}
+print([*{name for name in sys.modules if name.startswith(tuple(f"{room}." for room in jn.settings._packages))}
     - jn.settings._modules])"""
     assert printed(code) == "[]\n"
 

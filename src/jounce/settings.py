@@ -26,7 +26,7 @@ from jounce.base.jax_internals import config, core
 from jounce.base.jax_options import OPTIONS
 from jounce.errors import UnsupportedError
 
-_rooms: list[str] = []  # of which all that they offer computes in double precision
+_packages: list[str] = []  # of which all that they offer computes in double precision
 _modules: set[str] = set()  # of them, whose classes do
 
 P = ParamSpec("P")
@@ -235,7 +235,7 @@ def compute_under_own_settings(room: str) -> None:
     rooms below that it is the first to import. It is at the end of a room's ``__init__.py``, so that whatever is
     added to the room is included.
     """
-    _rooms.append(room)
+    _packages.append(room)
     offered = vars(sys.modules[room])
     for name, value in list(offered.items()):
         if _is_open(value, room) and not name.startswith("_"):
@@ -251,13 +251,13 @@ def cover_new_modules() -> None:
 
     A room above may be the first to import a module of one below.
     """
-    prefixes = tuple(f"{room}." for room in _rooms)
+    prefixes = tuple(f"{room}." for room in _packages)
     for name in [name for name in list(sys.modules) if name.startswith(prefixes) and name not in _modules]:
         _modules.add(name)
         for value in list(vars(sys.modules[name]).values()):
             if inspect.isclass(value) and value.__module__ == name:
                 _compute_under_own_settings(value)
-    alterations.note(_rooms)
+    alterations.note(_packages)
 
 
 def _is_open(value: Any, room: str) -> bool:

@@ -108,6 +108,7 @@ def own(name, **stated):
         ({"dimensions": {"size": "lenght"}}, "dimensions.size: .*did you mean 'length'"),
         ({"held_parallel": (("axis_i", "axis_j"),)}, "held_parallel: the class Own: no field has this name"),
         ({"squared_distance": "length"}, "squared_distance: the class Own: no field"),
+        ({"rolls_along": ("point_i",)}, "rolls_along: the class Own: no field has this name.*'point_j'"),
         ({"pair": "rod"}, "pair rod: the class Own: no field has this name"),
         (
             {"symbol": "sphere"},

@@ -159,7 +159,7 @@ def test_a_name_that_says_little_is_reported_with_its_line(tmp_path):
     (tmp_path / ".ci" / "names.txt").write_text("told->reported\n")
     (tmp_path / "src" / "jounce").mkdir(parents=True)
     (tmp_path / "src" / "jounce" / "module.py").write_text(
-        "untold = 1\n\n\ndef f(x):\n    _told = x.told\n    return _told\n"
+        "untold = 1\n\n\ndef f(x):\n    _told: int = x.told\n    return _told\n"
     )
     assert list(check_names().reports(tmp_path)) == ["src/jounce/module.py:5: the name _told says little: reported"]
 

@@ -136,7 +136,7 @@ def test_a_long_chain_is_eliminated_by_bodies_and_moves_in_closed_form():
 def cost(request, monkeypatch):
     """Set the cost of fronts by which the elimination is chosen; choices made before, and with it, are forgotten."""
     monkeypatch.setattr("jounce.linear_algebra.fronts.FRONT_COST", request.param)
-    monkeypatch.setattr("jounce.mechanism.building.contents._kept", OrderedDict())
+    monkeypatch.setattr("jounce.mechanism.building.contents._results", OrderedDict())
     builder._layout.cache_clear()
     yield request.param
     builder._layout.cache_clear()

@@ -107,6 +107,9 @@ class AbstractConstraint(Module):
         Class variable: pairs of fields of one body, of which the first must not be parallel to the second.
     squared_distance : str
         Class variable: the field, a value or a law, whose square the residual subtracts from that of a distance.
+    rolls_along : tuple of str
+        Class variable, of a disc that rolls on the first body: fields of the direction of its line, and in space of the
+        axis of the disc, whose center ``point_j`` lies by ``radius`` on the right of the line through ``point_i``.
     symbol : str
         Class variable: what plots and the viewer draw, one of `jounce.constraints.facts.symbols`, from the fields of
         the joint of the library that has it; ``none`` for nothing, empty for a mark at each point.
@@ -143,6 +146,7 @@ class AbstractConstraint(Module):
     held_parallel: ClassVar[tuple[tuple[str, str], ...]] = ()
     never_parallel: ClassVar[tuple[tuple[str, str], ...]] = ()
     squared_distance: ClassVar[str] = ""
+    rolls_along: ClassVar[tuple[str, ...]] = ()
     symbol: ClassVar[str] = ""
     pair: ClassVar[str] = ""
 

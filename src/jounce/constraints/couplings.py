@@ -117,6 +117,7 @@ class Rolling(AbstractConstraint, type="rolling", space="spatial"):
     dimensions = {"offset": "length", "pressure_angle": "angle"}
     signs = {"pressure_angle": "pressure angle"}
     never_parallel = (("axis_i", "vector_i"),)
+    rolls_along = ("vector_i", "axis_i")
     symbol = "rolling"
 
     def __check_init__(self):
@@ -213,7 +214,7 @@ class Gear(AbstractConstraint, type="gear", space="spatial"):
         normal = mesh.across_teeth(self.helix_angle)
         moved = normal.dot(mesh.arms[1])
         slope = -self.flank * jnp.tan(self.pressure_angle) * jnp.sign(moved.coefficients[0])
-        return mesh.place, (normal + mesh.apart * slope) / moved, mesh.axes, mesh.arms
+        return mesh.place, (normal + mesh.normal * slope) / moved, mesh.axes, mesh.arms
 
     def slip(self, bodies: tuple[Any, ...], moving: Velocities) -> Jet:
         """Return how fast shaft i turns about its axis relative to the frame, rad/s."""
@@ -240,7 +241,7 @@ class PitchPoint(NamedTuple):
         How fast the gears slide on each other there, as gear i turns by one.
     rolls : array of bool
         Whether they do not, as on axes that are parallel or cut each other.
-    apart : Jet
+    normal : Jet
         Normal of the plane that both touch, from gear i to gear j.
     """
 
@@ -249,7 +250,7 @@ class PitchPoint(NamedTuple):
     arms: list[Jet]
     sliding: Jet
     rolls: Any
-    apart: Jet
+    normal: Jet
 
     @classmethod
     def of(cls, gear: Gear, bodies: tuple[Any, ...]) -> "PitchPoint":
@@ -272,11 +273,11 @@ class PitchPoint(NamedTuple):
     def across_teeth(self, helix_angle: Any) -> Jet:
         """Return a vector in the plane that both gears touch, across their teeth."""
         around = unit(self.arms[0])
-        along = cross(self.apart, around)
+        along = cross(self.normal, around)
         along = along * jnp.where(along.dot(self.axes[0]).coefficients[0] < 0, -1.0, 1.0)
         angle = 0.0 if helix_angle is None else helix_angle
         rolling = around * jnp.cos(angle) - along * jnp.sin(angle)
-        return where(self.rolls, rolling, unit(cross(self.apart, where(self.rolls, around, self.sliding))))
+        return where(self.rolls, rolling, unit(cross(self.normal, where(self.rolls, around, self.sliding))))
 
 
 def _frame_of(axis: Vectors, normal: Vectors) -> tuple[Any, Any]:

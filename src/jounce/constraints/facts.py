@@ -118,6 +118,9 @@ class Facts:
         Pairs of fields: the first must not be parallel to the second, on the same body.
     squared_distance : str
         Field of the distance, a value or a law, where the residual is the square of a distance less the square of it.
+    rolls_along : tuple of str
+        Of a disc that rolls on the first body: fields of the direction of its line, and in space of the axis of the
+        disc. Its center ``point_j`` lies by ``radius`` on the right of the line through ``point_i``.
     symbol : str
         What is drawn for it, see `symbols`; ``none`` for nothing, empty for a mark of what is not known.
     pair : str
@@ -130,6 +133,7 @@ class Facts:
     held_parallel: tuple[tuple[str, str], ...]
     never_parallel: tuple[tuple[str, str], ...]
     squared_distance: str
+    rolls_along: tuple[str, ...]
     symbol: str
     pair: str
 
@@ -168,6 +172,7 @@ def facts_of(kind: type[Any]) -> Facts:
         held_parallel=tuple(map(tuple, getattr(kind, "held_parallel", ()))),
         never_parallel=tuple(map(tuple, getattr(kind, "never_parallel", ()))),
         squared_distance=_of_residual(kind, "squared_distance"),
+        rolls_along=tuple(getattr(kind, "rolls_along", ())),
         symbol=getattr(kind, "symbol", ""),
         pair=_of_residual(kind, "pair"),
     )
@@ -210,11 +215,14 @@ def _check(kind: type[Any], facts: Facts, fields: tuple[str, ...]) -> None:
     for field in fields:
         must_be(f"dimensions.{field}", facts.dimensions[field], dimensions, "dimension")
         must_be(f"signs.{field}", facts.signs[field], SIGNS, "sign")
-    for fact in ("held_parallel", "never_parallel"):
-        for name in (name for pair in getattr(facts, fact) for name in pair):
-            must_be(fact, name, fields, "field")
-    if facts.squared_distance:
-        must_be("squared_distance", facts.squared_distance, fields, "field")
+    named = [
+        (fact, name) for fact in ("held_parallel", "never_parallel") for both in getattr(facts, fact) for name in both
+    ]
+    named += [("squared_distance", facts.squared_distance)] if facts.squared_distance else []
+    if facts.rolls_along:
+        named += [("rolls_along", name) for name in (*facts.rolls_along, "point_i", "point_j", "radius")]
+    for fact, name in named:
+        must_be(fact, name, fields, "field")
     if facts.pair:
         must_be("pair", facts.pair, PAIRS, "pair")
         for name in PAIRS[facts.pair]:

@@ -372,6 +372,7 @@ class Rolling(AbstractConstraint, type="rolling", space="planar"):
 
     dimensions = {"offset": "length", "pressure_angle": "angle"}
     signs = {"pressure_angle": "pressure angle"}
+    rolls_along = ("vector_i",)
     symbol = "rolling"
 
     def __check_init__(self):

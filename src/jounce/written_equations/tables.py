@@ -19,7 +19,7 @@ def columns(equations: "xarray.Dataset") -> "xarray.Dataset":
     """
     import xarray
 
-    found: dict[str, Any] = {}
+    columns: dict[str, Any] = {}
     for name, variable in equations.data_vars.items():
         axes = [axis for axis in variable.dims if axis != "time"]
         for labels in itertools.product(*(variable[axis].values.tolist() for axis in axes)):
@@ -29,8 +29,8 @@ def columns(equations: "xarray.Dataset") -> "xarray.Dataset":
             values = np.asarray(variable.sel(at), float)
             if len(values) and np.isnan(values).all() and not np.isnan(np.asarray(equations.residual)).all():
                 continue
-            found[".".join([f"{name}{order}", *rest])] = (("time", "derivative"), values[:, None])
-    return xarray.Dataset(found, {"time": equations["time"], "derivative": [0]}, equations.attrs)
+            columns[".".join([f"{name}{order}", *rest])] = (("time", "derivative"), values[:, None])
+    return xarray.Dataset(columns, {"time": equations["time"], "derivative": [0]}, equations.attrs)
 
 
 def as_json(equations: "xarray.Dataset") -> str:

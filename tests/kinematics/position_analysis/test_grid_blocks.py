@@ -1,4 +1,4 @@
-"""Spans of a grid: each instant once, after what it starts from; the same motion as one instant after another."""
+"""Blocks of a grid: each instant once, after what it starts from; the same motion as one instant after another."""
 
 import numpy as np
 import pytest
@@ -26,17 +26,17 @@ def _wanted(monkeypatch):
 @pytest.mark.parametrize("full", [False, True])
 def test_each_instant_comes_after_what_it_starts_from(count, stride, width, full):
     solved = np.zeros(count, bool)
-    for span in blocks_of(0, count, stride, width, full=full):
-        seen = np.zeros(count, bool)  # what other spans solve, it cannot count on
-        turns = rounds(span.count, span.stride, width)
-        assert not full or turns.size < 2 * max(span.count, width)  # half of a round is in use at least
-        for lanes in span.first + turns:
-            sources = (lanes & (lanes - 1))[lanes % span.stride != 0]
+    for block in blocks_of(0, count, stride, width, full=full):
+        seen = np.zeros(count, bool)  # what other blocks solve, it cannot count on
+        turns = rounds(block.count, block.stride, width)
+        assert not full or turns.size < 2 * max(block.count, width)  # half of a round is in use at least
+        for lanes in block.first + turns:
+            sources = (lanes & (lanes - 1))[lanes % block.stride != 0]
             assert seen[sources].all()
             assert not solved[lanes].any()
             seen[lanes] = True
-        assert seen[span.indices].all()
-        assert seen.sum() == span.count
+        assert seen[block.indices].all()
+        assert seen.sum() == block.count
         solved |= seen
     assert solved.all()
 
@@ -111,7 +111,7 @@ def test_instants_that_start_from_failures_are_solved_again(monkeypatch):
     """Where it is told that some instants failed, they and what starts from them are solved once more."""
     time, again = np.linspace(0, 2, 3001), []
     expected = jn.solve(four_bar(), time)
-    in_spans, solve = grid.GridSolver._in_blocks, solve_buffers.SolveBuffer.solve
+    in_blocks, solve = grid.GridSolver._in_blocks, solve_buffers.SolveBuffer.solve
 
     def spoiling(room):
         solve(room)
@@ -119,7 +119,7 @@ def test_instants_that_start_from_failures_are_solved_again(monkeypatch):
             room.status[64], room.state[0]["angle"][..., 64] = Status.NOT_CONVERGED, np.nan
 
     def told(self, *given):
-        again.append(in_spans(self, *given))
+        again.append(in_blocks(self, *given))
         return again[-1]
 
     monkeypatch.setattr(solve_buffers.SolveBuffer, "solve", spoiling)

@@ -152,7 +152,7 @@ def _meshing(gears: Any, poses: Sequence[Any], instants: Any, pose_type: Any) ->
         "distance": jnp.abs((points[1] - points[0]).dot(across).coefficients[0]) / jnp.maximum(_size(across), 1e-300),
         "lead": jnp.arcsin(jnp.minimum(jnp.abs(mesh.sliding.dot(mesh.axes[0]).coefficients[0]) / sliding, 1.0)),
         "plane": _size(cross(*mesh.arms)),
-        "cone": jnp.abs(cross(mesh.apart, mesh.arms[0]).dot(mesh.axes[0]).coefficients[0]) / _size(mesh.arms[0]),
+        "cone": jnp.abs(cross(mesh.normal, mesh.arms[0]).dot(mesh.axes[0]).coefficients[0]) / _size(mesh.arms[0]),
     }
 
 

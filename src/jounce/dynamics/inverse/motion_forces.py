@@ -75,7 +75,7 @@ class MotionForces:
         groups = system.groups if friction else map(friction_left_out, system.groups)
         self._joined = dataclasses.replace(system, groups=tuple(map(law_left_out, groups)), outputs=())
         check_unique_pressing(self.model, self._joined)
-        self._kept: dict[tuple[Any, ...], Numbers] = {}
+        self._numbers: dict[tuple[Any, ...], Numbers] = {}
         self.flanks: teeth.Flanks = teeth.either_flank(system.groups, len(motion.time)) if flanks else {}
         self._reversals: dict[int, np.ndarray] = {}
         self.passing: dict[str, np.ndarray] = {}  # instants at which a joint with friction carries no load
@@ -202,7 +202,7 @@ class MotionForces:
         if not self._looks_for_open:
             return None
         twin = copy.copy(self)
-        twin._kept = {}
+        twin._numbers = {}
         multipliers = self._balancing[1]
         solved = self.motion.status == Status.OK
         size = np.abs(multipliers[0][:, solved] * self.open.weights[:, None]).max(initial=0.0)
@@ -372,9 +372,9 @@ class MotionForces:
 
     def _once(self, chunk: Callable[[np.ndarray], Any], *key: Any) -> Numbers:
         """Return the values of a function of indices of instants for all of them, cached by a key."""
-        if key not in self._kept:
-            self._kept[key] = self.in_chunks(chunk)
-        return self._kept[key]
+        if key not in self._numbers:
+            self._numbers[key] = self.in_chunks(chunk)
+        return self._numbers[key]
 
     def _expressed(self, work: Numbers, body: int, frame: int | None, point: Numbers) -> tuple[Any, Any]:
         """Return a wrench on a body as force and moment about a point of it, (levels, components, time).

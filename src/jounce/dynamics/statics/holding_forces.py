@@ -187,6 +187,6 @@ def _about_the_middle(
 def _with_multipliers(forces: MotionForces, multipliers: Numbers) -> MotionForces:
     """Return the forces in a mechanism at rest whose multipliers are these, (rows, time)."""
     twin = copy.copy(forces)
-    twin._kept = {}
+    twin._numbers = {}
     twin.__dict__["multipliers"] = multipliers[None]
     return twin

@@ -102,9 +102,9 @@ def rounds_text(width: int) -> str:
     return "\n".join(lines)
 
 
-def _copies(name: str, span: tuple[str, str, str], after: str, copy: Sequence[str]) -> list[str]:
-    """Return a loop over pairs; their span is the block before the loop, the first of them and where they end."""
-    before, first, stop = span
+def _copies(name: str, limits: tuple[str, str, str], after: str, copy: Sequence[str]) -> list[str]:
+    """Return a loop over pairs; limits are the block before the loop, the first pair and where they end."""
+    before, first, stop = limits
     return [
         f"{name}:",
         f"%{name}_pair = phi i64 [{first}, %{before}], [%{name}_next, %{name}_copy]",

@@ -272,16 +272,16 @@ class _Description(Pass):
     def __init__(self, *, values: bool = False, rules: bool = True):
         self.values: list[Any] = []
         self.nameless: list[Any] = []
-        self._told, self._results, self._with_values, self._rules = [], itertools.count(), values, rules
+        self._lines, self._results, self._with_values, self._rules = [], itertools.count(), values, rules
 
     def of(self, closed: ClosedJaxpr, arguments: Sequence[Any] = ()) -> list[Any]:
         del arguments
         given = [self._argument(k, v.aval) for k, v in enumerate(closed.jaxpr.invars)]
-        self._told.append(f"return {super().of(closed, given)}")
+        self._lines.append(f"return {super().of(closed, given)}")
         return self.values
 
     def digest(self) -> str:
-        return hashlib.sha256("\n".join(self._told).encode()).hexdigest()
+        return hashlib.sha256("\n".join(self._lines).encode()).hexdigest()
 
     def captured(self, value: Any, dtype: np.dtype) -> Any:
         if self._with_values:
@@ -294,23 +294,23 @@ class _Description(Pass):
         if isinstance(value, Tracer):
             self.nameless.append(value)
             return f"nameless {len(self.nameless)}"
-        return told_array(np.asarray(value, dtype))
+        return array_digest(np.asarray(value, dtype))
 
     def applied(self, equation: JaxprEqn, operands: list[Any]) -> Sequence[Any]:
         names = [f"%{next(self._results)}" for _ in equation.outvars]
         made: list[Any] = [v.aval for v in equation.outvars]
         kinds = [f"{aval.shape} {aval.dtype}" for aval in made]
-        self._told.append(f"{names} {kinds} = {equation.primitive.name} {self.parameters(equation)} {operands}")
+        self._lines.append(f"{names} {kinds} = {equation.primitive.name} {self.parameters(equation)} {operands}")
         return names
 
     def parameters(self, equation: JaxprEqn) -> list[str]:
         """Return what tells an operation from others of its name."""
         trusted = all(map(_is_of_libraries, _inner(equation))) and equation.primitive.name.startswith("custom_")
         given = sorted((key, value) for key, value in equation.params.items() if key != "name")
-        nan_where_rounding = [f"{key}={self._parameter(key, value, trusted)}" for key, value in given]
+        description = [f"{key}={self._parameter(key, value, trusted)}" for key, value in given]
         if equation.primitive.name == "custom_jvp_call" and not trusted and self._rules:
-            nan_where_rounding.append(f"rule={self._rule(equation)}")
-        return nan_where_rounding
+            description.append(f"rule={self._rule(equation)}")
+        return description
 
     def _argument(self, k: int, aval: Any) -> str:
         return f"argument {k} {aval.shape} {aval.dtype}"
@@ -321,18 +321,18 @@ class _Description(Pass):
         if isinstance(value, tuple | list):
             return f"{type(value).__name__}({', '.join(self._parameter(key, part, trusted) for part in value)})"
         if isinstance(value, np.ndarray | np.generic | jax.Array):
-            return told_array(np.asarray(value))
+            return array_digest(np.asarray(value))
         if isinstance(value, bool | int | float | str | bytes | None):
             return repr(value)
-        nan_where_rounding = repr(value)
+        description = repr(value)
         if not callable(value) or isinstance(value, type):
-            if " at 0x" not in nan_where_rounding and type(value).__module__.partition(".")[0] in (
+            if " at 0x" not in description and type(value).__module__.partition(".")[0] in (
                 "jax",
                 "jaxlib",
                 "numpy",
                 "enum",
             ):
-                return f"{type(value).__qualname__} {nan_where_rounding}"
+                return f"{type(value).__qualname__} {description}"
         elif trusted or key == "jvp_jaxpr_fun":
             return "a rule"
         self.nameless.append(value)
@@ -352,6 +352,6 @@ class _Description(Pass):
         return f"{self._within(ClosedJaxpr(jaxpr, constants), rules=False)} {zeros}"
 
 
-def told_array(array: np.ndarray) -> str:
+def array_digest(array: np.ndarray) -> str:
     """Return what tells an array from others: not rounded, and zero from minus zero."""
     return f"{array.shape} {array.dtype} {hashlib.sha256(array.tobytes()).hexdigest()}"

@@ -7,7 +7,7 @@ import numpy as np
 from jax.core import Tracer
 from jax.extend.core import ClosedJaxpr, JaxprEqn
 
-from jounce.jet.programs.captured import Pass, parameters_of, told_array
+from jounce.jet.programs.captured import Pass, array_digest, parameters_of
 
 _SPREADING = frozenset("add add_any sub mul div max min pow atan2 select_n".split())  # which take single numbers too
 
@@ -37,7 +37,7 @@ class _Nodes(Pass):
     def fixed(self, value: Any, dtype: np.dtype) -> Any:
         if isinstance(value, Tracer):
             return self._node(("held", id(value)))
-        return self._node(("number", told_array(np.asarray(value, dtype))))
+        return self._node(("number", array_digest(np.asarray(value, dtype))))
 
     def applied(self, equation: JaxprEqn, operands: list[Any]) -> Sequence[Any]:
         given: list[Any] = [v.aval for v in equation.invars]
@@ -47,8 +47,8 @@ class _Nodes(Pass):
             operands = [self._unspread(x) for x in operands]
         if name == "reshape" and given[0].shape == made[0].shape:
             return operands
-        nan_where_rounding, nameless = parameters_of(equation)
-        key = name, tuple(nan_where_rounding), tuple(map(id, nameless)), tuple(operands), tuple(shapes)
+        parameters, nameless = parameters_of(equation)
+        key = name, tuple(parameters), tuple(map(id, nameless)), tuple(operands), tuple(shapes)
         node = self._node(key)
         if name in ("broadcast_in_dim", "reshape") and not given[0].shape:
             self._nodes[("spread", node)] = operands[0]

@@ -12,7 +12,6 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from jounce.base.modules import Module
-from jounce.constraints import planar, spatial
 from jounce.constraints.angles import perpendiculars
 from jounce.constraints.base import rows
 from jounce.constraints.facts import facts_of
@@ -192,26 +191,27 @@ def mirrored_discs(model: Model, coordinates: Coordinates) -> list[str]:
     names: list[str] = []
     for group, its_rows in zip(model.system.groups, group_rows(model), strict=True):
         rolling = group.element
-        if not isinstance(rolling, (planar.Rolling, spatial.Rolling)):
+        if not (along := facts_of(type(rolling)).rolls_along):
             continue
         slots = [np.array(slot) for slot in group.bodies]
         line, center = (
             np.asarray(coordinates["position"])[:, slot, 0] + _globally(np.asarray(point)[..., 0], coordinates, slot)
             for point, slot in zip((rolling.point_i, rolling.point_j), slots, strict=True)
         )
-        side = _globally(_side(group), coordinates, slots[0])
+        side = _globally(_right_of(*(_unit(group, name) for name in along)), coordinates, slots[0])
         radius = np.asarray(rolling.radius)[..., 0]
         off = np.abs(np.sum(side * (center - line), axis=0) + radius)
         names += [name for name, x in zip(model.rows[its_rows], off <= MIRRORED * radius, strict=False) if x]
     return names
 
 
-def _side(group: Group) -> Float[np.ndarray, "component instance"]:
-    """Return unit vectors from the lines of rolling joints to the side of their discs, in the axes of body i."""
-    line = _unit(group, "vector_i")
-    if len(line) == 2:
+def _right_of(
+    line: Float[np.ndarray, "component instance"], axis: Float[np.ndarray, "component instance"] | None = None
+) -> Float[np.ndarray, "component instance"]:
+    """Return unit vectors from lines to the right, in space as one sees it who looks against the axis of the disc."""
+    if axis is None:
         return np.stack([line[1], -line[0]])
-    side = np.cross(line, _unit(group, "axis_i"), axis=0)
+    side = np.cross(line, axis, axis=0)
     return side / np.linalg.norm(side, axis=0)
 
 

@@ -22,8 +22,8 @@ from jounce.mechanism import Model
 SMALL_BATCH = 16  # lanes; a batch width compiles once, so a short grid uses one, and so do anchors
 LONGEST_RUN = 32  # batches
 RUN_ENTRIES = 2**19  # of what a run keeps: a large mechanism has shorter ones
-SPAN_ENTRIES = 2**19  # of the coordinates of what a thread solves at once: the cache holds them
-XLA_SPAN_ENTRIES = 2**21  # the same by XLA, whose rounds have more instants, and whose calls take longer
+BLOCK_ENTRIES = 2**19  # of the coordinates of what a thread solves at once: the cache holds them
+XLA_BLOCK_ENTRIES = 2**21  # the same by XLA, whose rounds have more instants, and whose calls take longer
 FEWEST_FROM_ANCHORS = 64  # instants of a long grid that machine code starts from anchors
 MOST_SIDE_BY_SIDE, CALL_ENTRIES = 1024, 2**21  # instants in a call of machine code, and numbers of their coordinates
 FEW_COLUMNS = 36  # of a Jacobian: of more, machine code of single values alone is too long to be fast
@@ -144,13 +144,13 @@ class Solver:
 
     @cached_property
     def from_anchors(self) -> int:
-        """How many instants of a long grid start from anchors at least, unless the cache holds no span of so many."""
+        """How many instants of a grid start from anchors at least, unless the cache holds no block of so many."""
         return FEWEST_FROM_ANCHORS if self.is_compiled else self.program.width
 
     @cached_property
     def longest_stride(self) -> int:
-        """How far apart instants of a long grid that start from anchors are at most, so that the cache holds a span."""
-        entries = SPAN_ENTRIES if self.is_compiled else XLA_SPAN_ENTRIES
+        """How far from each other instants that start from anchors are at most, so that the cache holds a block."""
+        entries = BLOCK_ENTRIES if self.is_compiled else XLA_BLOCK_ENTRIES
         return 2 ** int(math.log2(max(1, entries // (self._entries * self.program.width))))
 
     @cached_property

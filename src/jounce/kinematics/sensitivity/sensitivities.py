@@ -221,7 +221,7 @@ class _Builder:
     """
 
     def __init__(self, mechanism: Mechanism, made_of: Callable[[Mechanism], Mechanism], *, again: bool):
-        self._made, self._made_of, self._kept = template(mechanism), made_of, {}
+        self._made, self._made_of, self._models = template(mechanism), made_of, {}
         self._make, self.change = self._numbers, self._change
         if again:
             self._make = jax.jit(self._numbers, static_argnames="counted")
@@ -235,11 +235,11 @@ class _Builder:
     def numbers(self, values: Values, length: Any, angles: Angles | None, first: Any) -> tuple[list[Any], Any]:
         """Return those numbers of a system that depend on what is traced, and which of its leaves they are."""
         numbers = self._make(values, length, angles, first, counted=angles is not None)
-        return numbers, self._kept[angles is not None][2]
+        return numbers, self._models[angles is not None][2]
 
     def model(self, numbers: Sequence[Any], which: tuple[int, ...], counted: bool) -> Model:
         """Return the model that has these numbers."""
-        model, leaves, _, structure = self._kept[counted]
+        model, leaves, _, structure = self._models[counted]
         whole = list(leaves)
         for k, number in zip(which, numbers, strict=True):
             whole[k] = number
@@ -253,7 +253,7 @@ class _Builder:
         fixed = [None if k in which else leaf for k, leaf in enumerate(leaves)]
         bare = with_fields(model.system, groups=(), forces=(), outputs=(), column_scale=np.ones(1))  # nothing traced
         plain = dataclasses.replace(model, system=bare, guess={}, reference={})
-        self._kept[counted] = plain, fixed, which, structure
+        self._models[counted] = plain, fixed, which, structure
         return [leaves[k] for k in which]
 
     def _change(self, values: Values, changes: Values, solved: Solved, instants: Any) -> dict[str, Any]:

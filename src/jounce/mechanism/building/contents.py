@@ -30,7 +30,7 @@ PLAIN = frozenset({float, int, bool, str, type(None)})
 CHECKED = frozenset({Friction, GearFriction})  # with code of the joint that has it, each time
 LARGE = 10_000  # entries of an array: comparing more takes as long as a model
 MOST = 4  # models that are kept
-_kept: OrderedDict[Contents, Any] = OrderedDict()  # None where contents were seen once
+_results: OrderedDict[Contents, Any] = OrderedDict()  # None where contents were seen once
 
 
 def contents_of(mechanism: Mechanism, *more: Any) -> Contents | None:
@@ -100,15 +100,15 @@ def made_or_known(contents: Contents | None, make: Callable[[], T], owned: Calla
     """
     if contents is None:
         return make()
-    if (known := _kept.get(contents)) is not None:
+    if (known := _results.get(contents)) is not None:
         return known
     result = make()
-    if contents in _kept and (copy := owned(result)) is not None:
-        _kept[contents] = result = copy
+    if contents in _results and (copy := owned(result)) is not None:
+        _results[contents] = result = copy
     else:
-        _kept.setdefault(contents, None)
-    while len(_kept) > MOST:
-        _kept.popitem(last=False)
+        _results.setdefault(contents, None)
+    while len(_results) > MOST:
+        _results.popitem(last=False)
     return result
 
 

@@ -17,7 +17,7 @@ __all__ = ["NamePlace", "place_names"]
 DIRECTIONS = 16
 DISTANCES = (1.7, 2.6, 3.8, 5.5, 8.0)  # of the nearest edge of a name, in units of the drawing
 LEADER = 3.0  # units, from which on a thin line leads from a name to its place
-SPACING = 4.0  # pixels between the places along a line that a name should not cover
+SPACING = 4.0  # pixels between the points along a line that a name should not cover
 MOST_INSTANTS = 9  # at which the names of what moves are tried
 COST_OF_DISTANCE, COST_OF_BAR, COST_OF_SYMBOL = 3.0, 1.5, 4.0  # by unit, by place covered on a bar, on a pin or arrow
 COST_OF_OVERLAP, COST_OF_EDGE, COST_OF_STRANGER = 4.0, 5.0, 30.0  # by pixel of area, by pixel outside, if ambiguous
@@ -72,7 +72,7 @@ def place_names(
     scene : Scene
         What is drawn.
     to_pixels : callable
-        From places of the scene, (..., 2) m, to pixels, upward positive.
+        From points of the scene, (..., 2) m, to pixels, upward positive.
     frame : numpy.ndarray of shape (4,)
         Left, lower, right and upper end of the drawing, pixels.
     taken : numpy.ndarray of shape (boxes, 4)
@@ -88,7 +88,7 @@ def place_names(
     drawn = [_drawn(scene, instant, to_pixels) for instant in instants.tolist()]
     anchors = np.array([to_pixels(_at(label.anchor, instants)) for label in labels]).reshape(-1, len(instants), 2)
     boxes = [taken for _ in instants]
-    places: list[NamePlace | None] = []
+    placements: list[NamePlace | None] = []
     angle = 2 * np.pi * np.arange(1, DIRECTIONS + 1) / DIRECTIONS
     directions = np.tile(np.stack([np.cos(angle), np.sin(angle)], axis=1), (len(DISTANCES), 1))
     distances = np.repeat(DISTANCES, DIRECTIONS)
@@ -96,7 +96,7 @@ def place_names(
         offsets = _offsets(directions, distances, half, unit)
         known = [k for k in range(len(instants)) if np.isfinite(anchors[number, k]).all()]
         if not known:
-            places.append(None)
+            placements.append(None)
             continue
         cost = COST_OF_DISTANCE * distances
         for k in known:
@@ -110,8 +110,8 @@ def place_names(
             boxes[k] = np.vstack([boxes[k], box])
             strange = strange or bool(_strange(box[None, :2], box[None, 2:], own, anchors[:, k])[0])
         direction, distance = (float(directions[best, 0]), float(directions[best, 1])), float(distances[best])
-        places.append(NamePlace(direction, distance, distance > LEADER or strange))
-    return places
+        placements.append(NamePlace(direction, distance, distance > LEADER or strange))
+    return placements
 
 
 def _spread(count: int) -> Int[np.ndarray, " instants"]:
@@ -123,8 +123,11 @@ def _at(points: np.ndarray, instants: Int[np.ndarray, " instants"]) -> np.ndarra
 
 
 def _offsets(
-    directions: Float[np.ndarray, "places 2"], distances: Float[np.ndarray, " places"], half: Pixels, unit: float
-) -> Float[np.ndarray, "places 2"]:
+    directions: Float[np.ndarray, "candidate 2"],
+    distances: Float[np.ndarray, " candidate"],
+    half: Pixels,
+    unit: float,
+) -> Float[np.ndarray, "candidate 2"]:
     """Return vectors from an anchor to centers of a name, so that its edge has a distance from the anchor."""
     reach = np.minimum((half / np.maximum(np.abs(directions), 1e-9)).min(axis=1), half.max())
     return directions * (distances * unit + reach)[:, None]
@@ -146,15 +149,15 @@ def _drawn(
 
 def _costs(
     own: Pixels,
-    offsets: Float[np.ndarray, "places 2"],
+    offsets: Float[np.ndarray, "candidate 2"],
     half: Pixels,
     drawn: Points,
     weights: Float[np.ndarray, " points"],
     boxes: Boxes,
     others: Points,
     frame: Float[np.ndarray, "4"],
-) -> Float[np.ndarray, " places"]:
-    """Return what the places of a name cost at one instant, without their distance."""
+) -> Float[np.ndarray, " candidate"]:
+    """Return what the placements of a name cost at one instant, without their distance."""
     reach = np.abs(offsets).max(axis=0) + half + 2.0
     near = (np.abs(drawn - own) < reach).all(axis=1)
     low, high = own + offsets - half, own + offsets + half
@@ -168,19 +171,19 @@ def _costs(
     return covered + COST_OF_OVERLAP * clash + COST_OF_EDGE * outside + strange
 
 
-def _strange(low: np.ndarray, high: np.ndarray, own: Pixels, anchors: Points) -> Bool[np.ndarray, " places"]:
+def _strange(low: np.ndarray, high: np.ndarray, own: Pixels, anchors: Points) -> Bool[np.ndarray, " candidate"]:
     """Tell which boxes are nearer to another anchor than to their own, so that a name could be read as another's."""
     strangers = anchors[np.linalg.norm(anchors - own, axis=1) > 2.0]  # a joint and its body may have one anchor
     return np.any(_gap(low, high, strangers) <= _gap(low, high, own[None]) + 1.0, axis=1)
 
 
-def _gap(low: np.ndarray, high: np.ndarray, points: Points) -> Float[np.ndarray, "places points"]:
+def _gap(low: np.ndarray, high: np.ndarray, points: Points) -> Float[np.ndarray, "candidate points"]:
     """Return how far points are from boxes, pixels."""
     return np.linalg.norm(np.maximum(0.0, np.maximum(low[:, None] - points, points - high[:, None])), axis=2)
 
 
 def _along(corners: Points) -> Points:
-    """Return places along a line of corners, no farther apart than some pixels."""
+    """Return points along a line of corners, no farther apart than some pixels."""
     parts = [corners[:1]]
     for first, second in pairwise(corners):
         count = min(500, 1 + int(np.linalg.norm(second - first) / SPACING))

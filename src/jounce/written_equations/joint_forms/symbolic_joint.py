@@ -132,16 +132,16 @@ def _values(group: Group, fields: dict[str, Any], vectors: dict[str, str], insta
 
 def evaluated(graph: Graph, root: int, known: dict[Atom, float]) -> float:
     """Return the number that an operation is for values of its inputs."""
-    found: dict[int, Any] = {}
+    values: dict[int, Any] = {}
     for number in graph.reached([root]):
         node = graph.nodes[number]
         if node.operation == "constant":
-            found[number] = node.detail
+            values[number] = node.detail
         elif node.operation == "input":
-            found[number] = known[node.detail]
+            values[number] = known[node.detail]
         else:
-            found[number] = FUNCTIONS[node.operation][0](*(found[x] for x in node.operands))
-    return float(found[root])
+            values[number] = FUNCTIONS[node.operation][0](*(values[x] for x in node.operands))
+    return float(values[root])
 
 
 def _entries(graph: Graph, atoms: list[Atom], shape: tuple[int, ...]) -> Entries:

@@ -97,7 +97,7 @@ def output_function(mechanism: Mechanism, model: Model, inputs: Inputs) -> tuple
     MechanismError
         If there are none, or one cannot be written out.
     """
-    found: dict[str, list[int]] = {}
+    columns: dict[str, list[int]] = {}
     lost = max((group.element.lost_orders for group in model.system.outputs), default=0)
     for group, names in zip(model.system.outputs, model.outputs, strict=True):
         rows = [_output_labels(mechanism, name) for name in names]
@@ -112,13 +112,13 @@ def output_function(mechanism: Mechanism, model: Model, inputs: Inputs) -> tuple
             values = _times(inputs, entries.numbers[..., 0], math.factorial(k))
             for i, its in enumerate(rows):
                 for c, row in enumerate(its):
-                    found.setdefault(row, []).append(int(values[c, i]))
-    if not found:
+                    columns.setdefault(row, []).append(int(values[c, i]))
+    if not columns:
         message = "no output of this mechanism follows from places and motions of bodies alone"
         raise MechanismError(message, name="outputs", value=[*mechanism.outputs])
     known = [name for name, output in mechanism.outputs.items() if not isinstance(output, AbstractMotionOutput)]
     labels = tuple(row for name in known for row in _output_labels(mechanism, name))
-    table = np.array([found[row] for row in labels], np.int64).T
+    table = np.array([columns[row] for row in labels], np.int64).T
     text = "Return OUTPUTS and their derivatives, k = 0, 1, ..., in SI units"
     return Function("outputs", (inputs.t, inputs.q, inputs.velocities(lost)), table, ("order", "output"), text), labels
 

@@ -49,7 +49,7 @@ class Code(Scalars):
     held: list[Region] = field(default_factory=list)
     taken: list[Region] = field(default_factory=list)
     plans: dict[Any, Any] = field(default_factory=dict)
-    _rooms: dict[tuple[int, str, bool], list[Region]] = field(default_factory=dict)  # that nobody uses any more
+    _free: dict[tuple[int, str, bool], list[Region]] = field(default_factory=dict)  # that nobody uses any more
     _taken: dict[Region, tuple[int, str, bool]] = field(default_factory=dict)  # that somebody may, by what they hold
     _tables: dict[tuple[str, bytes], Region] = field(default_factory=dict)
     _users: list[Callable[[Region], bool]] = field(default_factory=list)  # tell whether memory is wanted further on
@@ -70,7 +70,7 @@ class Code(Scalars):
     def taken_room(self, size: int, kind: str, *, lanes: bool) -> Region:
         """Return memory that can be given back, some that was if there is any."""
         key = max(1, size), kind, lanes
-        free = self._rooms.get(key)
+        free = self._free.get(key)
         region = free.pop() if free else self.room(size, kind, lanes=lanes)
         self._taken[region] = key
         self.changeable.add(region)
@@ -80,7 +80,7 @@ class Code(Scalars):
     def release(self, region: Region) -> None:
         """Let memory be used again, if it can be given back."""
         if region not in self.held and (key := self._taken.pop(region, None)) is not None:
-            self._rooms.setdefault(key, []).append(region)
+            self._free.setdefault(key, []).append(region)
 
     @contextmanager
     def used(self, wants: Callable[[Region], bool]) -> Iterator[None]:
@@ -221,7 +221,7 @@ class Code(Scalars):
 
     def mark(self) -> tuple[Any, ...]:
         """Return how far the text has come, for `back_to`."""
-        free_regions = {key: list(regions) for key, regions in self._rooms.items()}
+        free_regions = {key: list(regions) for key, regions in self._free.items()}
         return (
             len(self.lines),
             len(self.entry),
@@ -236,7 +236,7 @@ class Code(Scalars):
     def back_to(self, mark: tuple[Any, ...]) -> None:
         """Take back what was written since a mark in the same scope."""
         lines, entry, known, self.memory, self.heap, free_regions, taken, count = mark
-        self._rooms, self._taken = {key: list(regions) for key, regions in free_regions.items()}, dict(taken)
+        self._free, self._taken = {key: list(regions) for key, regions in free_regions.items()}, dict(taken)
         del self.lines[lines:], self.entry[entry:], self.taken[count:]
         while len(self._known[-1]) > known:
             self._known[-1].popitem()

@@ -99,14 +99,14 @@ def _trajectories(source: Source) -> Recording:
         return _points(source, keys)
     if not displayed:
         raise source.error("holds no trajectory", ("trajectory",))
-    places: list[Location] = [("trajectory", k, "joint_trajectory") for k in range(len(displayed))]
-    for place in places:
-        if not _is_trajectory(_at(source, place)):
-            raise source.error("must hold joint_names and points", place[:2])
-    parts = [_points(source, place) for place in places]
+    locations: list[Location] = [("trajectory", k, "joint_trajectory") for k in range(len(displayed))]
+    for location in locations:
+        if not _is_trajectory(_at(source, location)):
+            raise source.error("must hold joint_names and points", location[:2])
+    parts = [_points(source, location) for location in locations]
     whole = parts[0]
-    for place, part in zip(places[1:], parts[1:], strict=True):
-        whole = _joined(source, place, whole, part)
+    for location, part in zip(locations[1:], parts[1:], strict=True):
+        whole = _joined(source, location, whole, part)
     return _started(source, whole)
 
 

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from typing_extensions import TypedDict
 
-from jounce.constraints import planar, spatial
+from jounce.constraints import spatial
 from jounce.constraints.facts import facts_of
 from jounce.constraints.friction import GearFriction
 from jounce.mechanism.building.builder import group_rows
@@ -68,7 +68,7 @@ def efficiency_facts(state: StartingState) -> list[dict[str, Any]]:
         for k, row in enumerate(state.model.rows[rows][: group.instances]):
             name = row.partition(".")[2]
             bodies = list(state.mechanism.joints[name].bodies[:2])
-            if isinstance(group.element, planar.Rolling | spatial.Rolling):  # the disc is the second body
+            if facts_of(type(group.element)).rolls_along:  # the disc is the second body
                 bodies = bodies[::-1]
             shares = {"forward": float(forward[k]), "backward": float(backward[k])}
             records.append({"joint": name, "bodies": bodies, **shares})
