@@ -1,11 +1,13 @@
 """Runs of an integration method, step by step, for tests of its order: many fixed steps side by side."""
 
+from functools import partial
+
 import jax
 import jax.numpy as jnp
 import numpy as np
 
-from jounce.dynamics.forward.accelerations import State
-from jounce.integrate.marching.marching import Outcome, begin_march, march
+from jounce.dynamics.forward.accelerations import State, expand, inverted
+from jounce.integrate.marching.marching import Outcome, march, unexpanded
 
 COUNT = 4096  # steps tried at most
 LENIENT = 1e-6  # tolerance where the steps are given
@@ -16,16 +18,25 @@ def widened(state, lanes):
     return State(*(jnp.broadcast_to(jnp.asarray(part), (*part.shape[:-1], lanes)) for part in state))
 
 
+@partial(jax.jit, static_argnames="order")
+def expansion_at(equations, state, time, *, order):
+    """Return the expansion of the motion through states at instants, (lanes,)."""
+    inverse = inverted(equations.factored(state, time[None]))
+    return expand(equations, state, time[None], order, inverse)
+
+
 def marched(ready, method, stop, tolerance, longest=np.inf, *, lanes=1, instant=0.0):
     """Run from the start of a mechanism to a time; `longest` holds the largest steps of the runs side by side."""
     order = method.expansion_order(tolerance)
-    current = begin_march(ready.equations, widened(ready.state, lanes), jnp.full(lanes, instant), order=order)
-    return onwards(ready, method, current, stop, tolerance, longest)
+    current = unexpanded(ready.equations, widened(ready.state, lanes), np.full(lanes, instant), order=order)
+    current, tried = onwards(ready, method, current, stop, tolerance, longest)
+    return current, tried - 1  # the first expands the motion
 
 
 def onwards(ready, method, current, stop, tolerance, longest=np.inf):
     """Go on from where other runs are to a time; return where they then are and the number of steps tried."""
-    running = jnp.full(current.time.shape, int(Outcome.RUNNING))
+    arrived = np.asarray(current.outcome) == Outcome.ARRIVED
+    running = np.where(arrived, int(Outcome.RUNNING), current.outcome)
     current, _, tried = march(
         ready.equations,
         current._replace(outcome=running),
@@ -34,7 +45,6 @@ def onwards(ready, method, current, stop, tolerance, longest=np.inf):
         jnp.broadcast_to(jnp.asarray(longest, float), current.time.shape),
         method=method,
         count=COUNT,
-        keep=False,
     )
     assert np.all(np.asarray(current.outcome) == Outcome.ARRIVED)
     return current, int(tried)

@@ -11,10 +11,9 @@ import jounce as jn
 from jounce.dynamics.forward.accelerations import Expansion, State
 from jounce.dynamics.forward.initial_state import consistent_start
 from jounce.errors import JounceError
-from jounce.integrate.marching.marching import begin_march
 from jounce.integrate.steps import registry
 from tests.problems import dynamics
-from tests.problems.marches import LENIENT, ends, marched, widened
+from tests.problems.marches import LENIENT, ends, expansion_at, marched, widened
 
 FREQUENCY = np.sqrt(50.0 / (2.0 + 0.09 / 0.3**2))
 STEPS = np.array([0.01, 0.1, 0.25])
@@ -38,7 +37,7 @@ def pade(p, z):
 @pytest.mark.parametrize("order", [4, 8])
 def test_one_step_of_an_oscillator_is_the_diagonal_approximation_of_its_exponential(order):
     method = jn.Obreshkov(order, step=1.0)
-    expansion = begin_march(disc().equations, widened(disc().state, 3), jnp.zeros(3), order=order // 2).expansion
+    expansion = expansion_at(disc().equations, widened(disc().state, 3), jnp.zeros(3), order=order // 2)
     end = method.arrive(disc().equations, expansion, jnp.zeros(3), jnp.asarray(STEPS))
     before = 0.4 + 0.7j / -FREQUENCY  # x' is the imaginary part times minus the frequency: z = exp(i w t)
     after = pade(order // 2, 1j * FREQUENCY * STEPS) * before
@@ -72,13 +71,13 @@ def test_estimate_of_the_error_is_that_of_one_step():
     tolerance = 1e-9
     pendulum = consistent_start(dynamics.double_pendulum(0.4, 1.3, 1.0, -2.0), 0.0)
     order = method.expansion_order(tolerance)
-    current = begin_march(pendulum.equations, widened(pendulum.state, 2), jnp.zeros(2), order=order)
+    start = expansion_at(pendulum.equations, widened(pendulum.state, 2), jnp.zeros(2), order=order)
     steps = jnp.array([0.01, 0.02])
-    end = method.arrive(pendulum.equations, current.expansion, jnp.zeros(2), steps)
-    later = begin_march(pendulum.equations, end, steps, order=order).expansion
-    estimate = np.asarray(method.error(current.expansion, later, steps, 1.0))
+    end = method.arrive(pendulum.equations, start, jnp.zeros(2), steps)
+    later = expansion_at(pendulum.equations, end, steps, order=order)
+    estimate = np.asarray(method.error(start, later, steps, 1.0))
     powers = np.asarray(steps) ** np.arange(order + 1.0)[:, None]
-    exact = [np.sum(np.asarray(c) * powers[:, None, None], axis=0) for c in current.expansion.state]
+    exact = [np.sum(np.asarray(c) * powers[:, None, None], axis=0) for c in start.state]
     # the series, of order 8, is much better than the formula of order 4
     true = [np.max(np.abs(a - b), axis=(0, 1)) for a, b in zip(end, exact, strict=True)]
     true = np.max([true[0], true[1], true[2] * steps, true[3] * steps], axis=0)

@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from jounce.base.shapes import Numbers
-from jounce.dynamics.forward.accelerations import Equations, Expansion, Flags, Indices, Lanes, State, expand, inverted
+from jounce.dynamics.forward.accelerations import Equations, Expansion, Flags, Indices, Lanes, State, expand
 from jounce.execution.compilation import compiled
 from jounce.integrate.steps.energy_balance import (
     Balance,
@@ -105,9 +105,9 @@ class DenseOutput(NamedTuple):
 
 
 def unexpanded(equations: Equations, state: State, time: Lanes, *, order: int) -> IntegratorState:
-    """Return what `begin_march` does, but for the expansion, which is left to `march`: there is nothing to compile.
+    """Return the start of runs from states on the constraints; the first step that `march` tries expands the motion.
 
-    The arrays are of NumPy, but for angles about axes.
+    Angles about axes have the turns of what they are near to in the equations. The arrays are of NumPy, but for these.
     """
     *_, bodies, lanes = state.position.shape
     size, columns = equations.system.shape
@@ -128,32 +128,12 @@ def _measured(equations: Equations, state: State) -> AnglesOfForces:
     return measured(equations, state)
 
 
-@compiled("order")
-def begin_march(equations: Equations, state: State, time: Lanes, *, order: int) -> IntegratorState:
-    """Return the start of runs from states on the constraints.
-
-    Angles about axes have the turns of what they are near to in the equations.
-    """
-    angles = measured(equations, state)
-    equations = equations.near(angles)
-    inverse = inverted(equations.factored(state, time[None]))
-    expansion = _without_unused(expand(equations, state, time[None], order, inverse))
-    outcome = jnp.where(_finite(expansion), int(Outcome.RUNNING), int(Outcome.LOST))
-    none, nothing = jnp.full(time.shape, -1), jnp.zeros(time.shape)
-    known = mobility_of(equations, inverse), near_singular(equations, inverse)
-    count = jnp.zeros(time.shape, int)
-    began = time, nothing, expansion, count, outcome, nothing, time
-    balanced = is_balanced(equations, state, time[None])
-    balance = begun(energies(equations, state, time[None])) if balanced else unknown(nothing)
-    return IntegratorState(*began, *known, none, angles, nothing, count, count, balance)
-
-
 def _is_one(_: Equations, current: IntegratorState, *__: Any, **___: Any) -> bool:
     """Tell whether there is one run."""
     return current.time.shape[0] == 1
 
 
-@compiled("count", "keep", single=_is_one)
+@compiled("count", single=_is_one)
 def march(
     equations: Equations,
     current: IntegratorState,
@@ -163,8 +143,7 @@ def march(
     *,
     method: AbstractMethod,
     count: int,
-    keep: bool = True,
-) -> tuple[IntegratorState, tuple[DenseOutput, Bool[Numbers, "steps batch"]] | None, Int[Numbers, ""]]:
+) -> tuple[IntegratorState, tuple[DenseOutput, Bool[Numbers, "steps batch"]], Int[Numbers, ""]]:
     """Take up to `count` steps toward a time, all runs of a batch side by side.
 
     Parameters
@@ -183,13 +162,11 @@ def march(
         How steps are taken.
     count : int
         Steps to try at most.
-    keep : bool, default True
-        Whether to return the steps, for dense output.
 
     Returns
     -------
     current : IntegratorState
-    steps : tuple of DenseOutput and array of bool, shape (steps, batch), or None
+    steps : tuple of DenseOutput and array of bool, shape (steps, batch)
         Steps tried, in the order of trial, and whether they were taken.
     tried : int
         How many of them there are.
@@ -273,13 +250,10 @@ def march(
     def iterate(carry: Any) -> Any:
         current, previous, tried = carry
         current, steps = attempt(current)
-        if keep:
-            previous = jax.tree.map(lambda k, s: jax.lax.dynamic_update_index_in_dim(k, s, tried, 0), previous, steps)
+        previous = jax.tree.map(lambda k, s: jax.lax.dynamic_update_index_in_dim(k, s, tried, 0), previous, steps)
         return current, previous, tried + 1
 
-    previous = room_for_steps(method, current, count) if keep else None
-    start = (current, previous, 0)
-    return jax.lax.while_loop(unfinished, iterate, start)
+    return jax.lax.while_loop(unfinished, iterate, (current, room_for_steps(method, current, count), 0))
 
 
 def steps_between_looks(numbers: int, *, watched: bool) -> int:

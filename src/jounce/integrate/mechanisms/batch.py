@@ -16,7 +16,7 @@ from jounce.dynamics.forward.accelerations import Equations, State
 from jounce.dynamics.forward.initial_state import consistent_start, initial_as_drivers
 from jounce.errors import MechanismError
 from jounce.execution.threads import in_callers_context
-from jounce.integrate.marching.marching import DenseOutput, IntegratorState, Outcome, begin_march, march
+from jounce.integrate.marching.marching import MOVING, DenseOutput, IntegratorState, Outcome, march, unexpanded
 from jounce.integrate.marching.user_methods import integrator
 from jounce.integrate.mechanisms.batch_equations import BatchStart, ParametricMechanism, Turns
 from jounce.integrate.results.batch import Batch
@@ -229,7 +229,7 @@ class _Runs:
     @property
     def moving(self) -> np.ndarray:
         """The runs that are still on their way."""
-        return np.flatnonzero((self._current.outcome == Outcome.RUNNING) & (len(self.instants) > 1))
+        return np.flatnonzero(np.isin(self._current.outcome, MOVING))
 
     @property
     def status(self) -> np.ndarray:
@@ -263,7 +263,7 @@ class _Runs:
         equations, _ = self._picked(runs, angles)
         tolerance, _, method = self.settings
         time = np.full(len(runs), self.instants[0])
-        current = begin_march(equations, state, time, order=method.expansion_order(tolerance))
+        current = unexpanded(equations, state, time, order=method.expansion_order(tolerance))
         current = jax.tree.map(np.asarray, current)
         if self._current is None:
             self._current = jax.tree.map(lambda x: np.zeros((*x.shape[:-1], len(self.steps)), x.dtype), current)
@@ -274,10 +274,6 @@ class _Runs:
         for whole, reached, part in zip(self._turns, self._turns_reached, angles.outputs, strict=True):
             whole[:, runs] = reached[:, runs] = part
         self._note(runs, np.zeros(len(runs), int), current.expansion.state, time, current.angles, {})
-        lost = runs[current.outcome == Outcome.LOST]
-        self._reached[lost] = False
-        for values in self._values.values():
-            values[lost] = np.nan
 
     def advance(self, runs: np.ndarray) -> None:
         """March runs by some steps, and note what they pass."""
@@ -304,6 +300,10 @@ class _Runs:
         before |= self._counted_about_axes(runs, steps, taken, (step, lane, share))
         known = tuple(part[step, :, lane].T for part in steps.angles)
         self._note(runs[lane], near[instant], polynomial, steps.start[step, lane], known, before)
+        lost = runs[current.outcome == Outcome.LOST]
+        self._reached[lost] = False
+        for values in self._values.values():
+            values[lost] = np.nan
 
     def _picked(self, runs: np.ndarray, angles: Turns) -> tuple[Equations, Any]:
         """Return equations of motion and outputs of some runs, whose angles about axes have the turns of these."""
