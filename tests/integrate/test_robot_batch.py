@@ -70,10 +70,10 @@ def test_a_run_that_fails_leaves_the_others():
 @pytest.mark.parametrize(
     "given, options, says",
     [
-        ({}, {}, "a batch differs in at least one value"),
+        ({}, {}, "a batch differs in at least one parameter"),
         ({"k.mass": [1.0]}, {}, "no joint, JOINT.rate or LINK.mass has this name, got 'k.mass'"),
         ({"base.mass": [1.0]}, {}, "got 'base.mass'"),
-        ({"k": [0.1, np.nan]}, {}, "parameters.k: must be finite numbers, one for each run"),
+        ({"k": [0.1, np.nan]}, {}, "parameters.k: must be a list of finite numbers, one for each run"),
         ({"k": [0.1, 0.2], "j": [0.1]}, {}, "parameters.j: must have one value for each run, 2 as those before"),
         ({"b.mass": [1.0, -1.0]}, {}, "runs.1.mass: must be greater than zero"),
         ({"k": [0.1]}, {"base": object()}, "base: a batch has no free base by quaternions"),

@@ -8,12 +8,13 @@ from typing import Any
 import jax.numpy as jnp
 import numpy as np
 
-from jounce.base.shapes import is_traced, real_numbers
+from jounce.base.shapes import is_traced
 from jounce.errors import JounceError, RobotError, no_such
 from jounce.execution.threads import in_callers_context
 from jounce.integrate.results.robot_sensitivities import of_traced_robots
 from jounce.integrate.results.robot_simulation import RobotSimulation
 from jounce.integrate.simulate_robot import simulate_robot
+from jounce.kinematics.families.solve_batch import checked_values
 from jounce.robot.model.arguments import checked_state
 from jounce.robot.robot import Robot
 
@@ -94,23 +95,12 @@ def _nominal(robot: Robot, state: Any) -> Any:
 
 def _checked(robot: Robot, parameters: Mapping[str, Any]) -> dict[str, Any]:
     """Return what runs differ in, by name, each of shape (runs,)."""
-    if not parameters:
-        raise RobotError("a batch differs in at least one value", name="parameters", value=dict(parameters))
     massive = [name for name, link in robot.links.items() if link.inertia is not None]
     valid = [*robot.joint_names, *(x + RATE for x in robot.joint_names), *(x + MASS for x in massive)]
-    values: dict[str, Any] = {}
-    for name, given in parameters.items():
+
+    def check(name: str) -> None:
         if name not in valid:
             message = no_such("joint, JOINT.rate or LINK.mass", name, valid)
             raise RobotError(message, name="parameters", value=name)
-        if traced := is_traced(given):
-            array = jnp.asarray(given, float)
-        else:
-            array = real_numbers(f"parameters.{name}", given, RobotError, "finite numbers, one for each run")
-        if array.ndim != 1 or not array.size or not (traced or np.isfinite(array).all()):
-            raise RobotError("must be finite numbers, one for each run", name=f"parameters.{name}", value=given)
-        if values and array.size != (count := len(next(iter(values.values())))):
-            message = f"must have one value for each run, {count} as those before"
-            raise RobotError(message, name=f"parameters.{name}", value=array.size)
-        values[name] = array
-    return values
+
+    return checked_values(parameters, "run", check, RobotError)

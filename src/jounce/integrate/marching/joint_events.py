@@ -12,7 +12,7 @@ import numpy as np
 from jounce.errors import RobotError, check_name
 from jounce.execution.chunks import in_chunks
 from jounce.integrate.marching.robot_marching import RobotSteps
-from jounce.integrate.steps.events import EDGE, INTERPOLATION, NODES, WIDTHS, crossings
+from jounce.integrate.steps.events import NODES, WIDTHS, AbstractDetector
 from jounce.jet.programs.composition import OfSample
 from jounce.robot.model.arguments import whole_number
 from jounce.robot.robot import Robot
@@ -67,10 +67,11 @@ class JointEvent:
             raise RobotError("must be -1, 0 or 1", name="direction", value=self.direction)
 
 
-class JointEventDetector:
-    """The crossings of one event along a run, of which the steps come piece by piece."""
+class JointEventDetector(AbstractDetector):
+    """The crossings of one event of a robot."""
 
     def __init__(self, event: JointEvent, robot: Robot):
+        super().__init__(event)
         self._function: OfSample | None = None
         if isinstance(event.of, str):
             check_name("moving joint", event.of, robot.joint_names, RobotError, name="events.of")
@@ -81,12 +82,10 @@ class JointEventDetector:
             if self._function.shape != ():
                 message = f"the function must return one number, not the shape {self._function.shape}"
                 raise RobotError(message, name="events.of")
-        self.event, self._names = event, robot.joint_names
-        self._last = math.nan, 0.0  # time and sense of the last crossing in either direction
-        self._begun = False
+        self._names = robot.joint_names
 
     def _values(self, steps: RobotSteps) -> np.ndarray:
-        """Return the quantity at the nodes of steps, less the value, (steps, nodes)."""
+        """Return the quantity at the nodes of steps, (steps, nodes)."""
         since = steps.length[:, None] * NODES
         derivative = self.event.derivative
         if isinstance(self.event.of, str):
@@ -105,18 +104,8 @@ class JointEventDetector:
         return np.asarray(values).reshape(time.shape)
 
     def detect(self, steps: RobotSteps) -> list[tuple[int, float]]:
-        """Return the crossings in the next steps, each as the number of the step and the time from its beginning."""
-        values, roots = self._values(steps) - self.event.value, []
-        for k, coefficients in enumerate(values @ INTERPOLATION.T):
-            for root, direction in crossings(coefficients, first=k == 0 and not self._begun):
-                length = steps.length[k]
-                after, rising = float(root * length), float(direction * np.sign(length))
-                again = self._last[1] == rising and abs(steps.start[k] + after - self._last[0]) < 2 * EDGE * abs(length)
-                self._last = float(steps.start[k] + after), rising
-                if not again and self.event.direction * rising >= 0:
-                    roots.append((k, after))
-        self._begun = True
-        return roots
+        """See `AbstractDetector`."""
+        return self._crossings(self._values(steps), ((k, 0.0, 1.0) for k in range(len(steps.length))), steps)
 
 
 @jax.jit

@@ -32,7 +32,7 @@ from jounce.integrate.steps.revolution_counts import POINTS_IN_STEP, attitudes_a
 from jounce.jet.derivatives import plain_derivatives
 from jounce.jet.turns import brought_near, whole_periods
 from jounce.kinematics import Status
-from jounce.kinematics.families.solve_batch import checked_values
+from jounce.kinematics.families.solve_batch import check_parameter, checked_values
 from jounce.kinematics.results.pose_outputs import output_series
 from jounce.mechanism import Mechanism, TimeGrid, build, check_mechanism
 from jounce.mechanism.building.builder import with_reference
@@ -153,7 +153,7 @@ def simulate_batch(
         raise MechanismError(message, name=name)
     check_mechanism(mechanism)
     check_without_ends(mechanism, "a batch of simulations")
-    values = checked_values(mechanism, parameters, "run")
+    values = checked_values(parameters, "run", functools.partial(check_parameter, mechanism))
     names, rows = tuple(values), np.stack(list(values.values()), axis=-1)
     first = mechanism.with_parameters(**dict(zip(names, rows[0].tolist(), strict=True)))
     order, method = checked_options(order, method, tolerance, longest_step)

@@ -16,7 +16,6 @@ from typing import Any, ParamSpec, TypeVar
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jax.core import Tracer
 from jaxtyping import Float
 
 from jounce.base.modules import with_fields
@@ -25,6 +24,7 @@ from jounce.errors import UnsupportedError
 from jounce.execution.compilation import compiled
 from jounce.integrate.marching.robot_marching import RobotProblem, RobotState, at, polynomial_of
 from jounce.integrate.results.robot_simulation import RobotSimulation
+from jounce.integrate.steps.host_calls import recorded
 from jounce.rigid.inertia import Inertia, TracedInertia
 from jounce.robot.robot import Robot
 
@@ -160,32 +160,24 @@ def _recorded(
 ) -> RobotSimulation:
     """Return the simulation at the values that JAX traces."""
     names = [name for name, link in robot.links.items() if isinstance(link.inertia, TracedInertia)]
-    made: list[RobotSimulation] = []
 
-    @jax.custom_jvp
-    def record(values: tuple[Any, Any]) -> Any:
-        if not any(isinstance(x, Tracer) for x in jax.tree.leaves(values)):
-            links, own = dict(robot.links), options
-            if isinstance(state := values[1], Mapping):
-                own = {**options, "state": {name: float(x) for name, x in state.items()}}
-            elif state is not None:
-                own = {**options, "state": jax.tree.map(np.asarray, state)}
-            for name, (mass, center, tensor) in zip(names, values[0], strict=True):
-                inertia = Inertia(float(mass), np.asarray(center), np.asarray(tensor), strict=robot.strict)
-                links[name] = dataclasses.replace(links[name], inertia=inertia)
-            made.append(simulate(robot.changed(links=list(links.values())), *positional, **own))
-        return jnp.zeros(())
-
-    @record.defjvp
-    def record_jvp(primals: tuple[Any], _: tuple[Any]) -> tuple[Any, Any]:
-        return record(*primals), jnp.zeros(())
+    def simulated(values: tuple[Any, Any]) -> RobotSimulation:
+        links, own = dict(robot.links), options
+        if isinstance(state := values[1], Mapping):
+            own = {**options, "state": {name: float(x) for name, x in state.items()}}
+        elif state is not None:
+            own = {**options, "state": jax.tree.map(np.asarray, state)}
+        for name, (mass, center, tensor) in zip(names, values[0], strict=True):
+            inertia = Inertia(float(mass), np.asarray(center), np.asarray(tensor), strict=robot.strict)
+            links[name] = dataclasses.replace(links[name], inertia=inertia)
+        return simulate(robot.changed(links=list(links.values())), *positional, **own)
 
     inertias = [robot.links[name].inertia for name in names]
-    record(([(x.mass, x.center_of_mass, x.tensor) for x in inertias if x is not None], options.get("state")))
-    if not made:
+    numbers = [(x.mass, x.center_of_mass, x.tensor) for x in inertias if x is not None]
+    if (simulation := recorded(simulated, (numbers, options.get("state")))) is None:
         message = "a simulation of a robot decides by values: differentiate it outside of jax.jit and jax.vmap"
         raise UnsupportedError(message, name=robot.name)
-    return made[-1]
+    return simulation
 
 
 def _divided(problem: RobotProblem, simulation: RobotSimulation) -> tuple[np.ndarray, np.ndarray]:

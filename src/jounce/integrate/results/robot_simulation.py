@@ -20,6 +20,7 @@ from jounce.execution.compilation import LARGE
 from jounce.execution.mapped import Mapped, mapped
 from jounce.execution.store.programs import is_wanted_soon
 from jounce.integrate.marching.robot_marching import RobotProblem, RobotState, RobotSteps, at
+from jounce.integrate.results.simulation import steps_of
 from jounce.integrate.steps.methods import Lanes
 from jounce.jet import Jet, compose
 from jounce.kinematics import Status
@@ -86,7 +87,8 @@ class RobotSimulation(Tabulated):
         self.robot, self.time, self.order, self.steps = robot, instants, order, steps
         self.events = [] if events is None else events
         self._problem, self._ending, self._wrenches = problem, ending, wrenches
-        reached, chosen, since = _steps_of(steps, instants)
+        reached, chosen = steps_of(steps, instants)
+        since = np.where(reached, instants - steps.start[chosen], 0.0)
         levels = max(order - 2, 0)
 
         def lanes_of(lanes: np.ndarray) -> Any:
@@ -246,17 +248,6 @@ class RobotSimulation(Tabulated):
             attributes = {"units": unit, "long_name": derivatives_of(name)}
             variables[name] = (tuple(axes), self.q[:, :, k], attributes)
         return xarray.Dataset(variables, axes, attrs={"title": self.robot.name, "source": "jounce"})
-
-
-def _steps_of(steps: RobotSteps, instants: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return which instants the steps reach, in which step each is, and the time since its beginning, s."""
-    direction = 1.0 if steps.length[0] >= 0 else -1.0
-    rounding = 1e-14 * max(abs(steps.start[0]), abs(steps.end))
-    reached = (direction * (instants - steps.start[0]) >= -rounding) & (direction * (instants - steps.end) <= rounding)
-    chosen = np.clip(
-        np.searchsorted(direction * steps.start, direction * instants, side="right") - 1, 0, len(steps.start) - 1
-    )
-    return reached, chosen, np.where(reached, instants - steps.start[chosen], 0.0)
 
 
 def _derivatives(coefficients: np.ndarray) -> np.ndarray:

@@ -35,7 +35,7 @@ from jounce.integrate.marching.force_discontinuities import Kinked, met, shifted
 from jounce.integrate.marching.smoothness_breaks import Break, breaks
 from jounce.integrate.results.simulation import Simulation
 from jounce.integrate.steps.events import pose_coordinates
-from jounce.integrate.steps.host_calls import called
+from jounce.integrate.steps.host_calls import called, recorded
 from jounce.integrate.steps.lookahead import watched_names
 from jounce.integrate.steps.methods import Taylor, evaluated
 from jounce.integrate.steps.options import instants_of
@@ -104,21 +104,13 @@ def _recorded(
     simulate: Callable[..., Simulation], mechanism: Mechanism, options: Mapping[str, Any]
 ) -> tuple[Simulation, Mechanism] | None:
     """Return the simulation at the values that JAX traces, and the mechanism that has them; None if it knows none."""
-    made, recordings = template(mechanism), []
+    made = template(mechanism)
 
-    @jax.custom_jvp
-    def record(values: tuple[Any, ...]) -> Any:
-        if not any(isinstance(value, Tracer) for value in values):
-            known = made(values)
-            recordings.append((simulate(known, **options), known))
-        return jnp.zeros(())
+    def simulated(values: tuple[Any, ...]) -> tuple[Simulation, Mechanism]:
+        known = made(values)
+        return simulate(known, **options), known
 
-    @record.defjvp
-    def record_jvp(primals: tuple[Any], _: tuple[Any]) -> tuple[Any, Any]:
-        return record(*primals), jnp.zeros(())
-
-    record(_values(mechanism))
-    return recordings[-1] if recordings else None
+    return recorded(simulated, _values(mechanism))
 
 
 def _values(mechanism: Mechanism) -> tuple[Any, ...]:

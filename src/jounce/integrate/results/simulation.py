@@ -17,10 +17,11 @@ from jounce.dynamics.motion_values import Coordinates, cut, pose_of
 from jounce.errors import MechanismError
 from jounce.execution.backends import joined
 from jounce.execution.chunks import in_chunks
-from jounce.execution.compilation import compiled
+from jounce.execution.compilation import LARGE, compiled
 from jounce.execution.mapped import OnLlvm, OnXla, mapped
 from jounce.execution.store.programs import is_wanted_soon
 from jounce.integrate.marching.marching import DenseOutput
+from jounce.integrate.marching.robot_marching import RobotSteps
 from jounce.integrate.marching.smoothness_breaks import breaks
 from jounce.integrate.steps.events import WIDTHS, in_pieces, pose_coordinates, series_of
 from jounce.integrate.steps.lookahead import watched_names
@@ -46,7 +47,6 @@ from jounce.mechanism.transmissions.axis_angles import AttitudeHistory, measures
 MUCH_LONGER = (
     1e3  # than the step over a jump or a kink are one of those before and the next; a steep force takes several
 )
-LARGE = 32  # numbers of an array that stays in memory in machine code of an instant
 FEW_INSTANTS = 8  # evaluated together, where there are no more: the end of a long run, say
 APPROACH = 4  # steps to such a place, each much shorter than the one before
 
@@ -90,7 +90,7 @@ class Simulation(Motion):
         self.dense_output, self._start, self.steps_backend = dense, start, steps_backend
         self.events = [] if events is None else events
         self._ending = ending
-        reached, chosen = _steps_of(dense, instants)
+        reached, chosen = steps_of(dense, instants)
         outputs, max_order = start.model.system.outputs, derivatives_of_motion(mechanism, order)
         outcome, backend = motion_at(start.equations, outputs, dense, instants, chosen, max_order)
         state, self._angles, at_instants = outcome
@@ -130,7 +130,7 @@ class Simulation(Motion):
 
     def steps_at(self, instants: np.ndarray) -> np.ndarray:
         """Return the step in which each instant is, by index."""
-        return _steps_of(self.dense_output, instants)[1]
+        return steps_of(self.dense_output, instants)[1]
 
     def output_values(self, group: int) -> np.ndarray:
         """Return the derivatives of the outputs of a group, (order + 1, components, instances, time)."""
@@ -247,7 +247,7 @@ class Simulation(Motion):
         return [np.where(self.status == Status.OK, part, np.nan) for part in checks]
 
 
-def _steps_of(dense: DenseOutput, instants: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def steps_of(dense: DenseOutput | RobotSteps, instants: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return which instants the steps reach, and the step in which each of them is."""
     direction = 1.0 if dense.length[0] >= 0 else -1.0
     rounding = 1e-14 * max(abs(dense.start[0]), abs(dense.end))

@@ -1,9 +1,10 @@
 """Events: instants at which a quantity of the motion crosses a value, found on the polynomials of the steps."""
 
+import abc
 import dataclasses
 import itertools
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any, NamedTuple
 
 import jax
@@ -231,8 +232,49 @@ def _at(
     return series.reshape(*series.shape[:3], *since.shape)
 
 
-class EventDetector:
+class AbstractDetector(abc.ABC):
     """The crossings of one event along a run, of which the steps come piece by piece.
+
+    Parameters
+    ----------
+    event : Event or JointEvent
+        What is looked for.
+    """
+
+    def __init__(self, event: Any):
+        self.event = event
+        self._last = math.nan, 0.0  # time and sense of the last crossing in either direction
+        self._begun = False
+
+    @abc.abstractmethod
+    def detect(self, part: Any) -> list[tuple[int, float]]:
+        """Return the crossings in the next steps, each as the number of the step and the time from its beginning.
+
+        Parameters
+        ----------
+        part : DenseOutput or RobotSteps
+            Steps; their start, length and polynomial count.
+        """
+
+    def _crossings(
+        self, values: Float[np.ndarray, "piece node"], pieces: Iterable[tuple[int, float, float]], part: Any
+    ) -> list[tuple[int, float]]:
+        """Return the crossings in pieces of steps: their steps, and where they begin and end as shares of these."""
+        events = []
+        for (k, begin, end), coefficients in zip(pieces, (values - self.event.value) @ INTERPOLATION.T, strict=True):
+            length = part.length[k]
+            for root, direction in crossings(coefficients, first=not self._begun):
+                after, rising = float((begin + root * (end - begin)) * length), float(direction * np.sign(length))
+                again = self._last[1] == rising and abs(part.start[k] + after - self._last[0]) < 2 * EDGE * abs(length)
+                self._last = float(part.start[k] + after), rising
+                if not again and self.event.direction * rising >= 0:
+                    events.append((k, after))
+            self._begun = True
+        return events
+
+
+class EventDetector(AbstractDetector):
+    """The crossings of one event of a mechanism.
 
     Parameters
     ----------
@@ -245,19 +287,12 @@ class EventDetector:
     """
 
     def __init__(self, event: Event, group: Group, pose_type: type):
-        self.event, self._group, self._pose_type = event, group, pose_type
+        super().__init__(event)
+        self._group, self._pose_type = group, pose_type
         self._angle = np.zeros((3, 0))  # time, angle with its turns, and rate, at the last node so far
-        self._last = math.nan, 0.0  # time and sense of the last crossing in either direction
-        self._begun = False
 
     def detect(self, part: Any) -> list[tuple[int, float]]:
-        """Return the crossings in the next steps, each as the number of the step and the time from its beginning.
-
-        Parameters
-        ----------
-        part : DenseOutput
-            Steps; their start, length and polynomial count.
-        """
+        """See `AbstractDetector`."""
         start, length = part.start, part.length
         derivative, element = self.event.derivative, self._group.element
         order, component = derivative + element.lost_orders + 1, self.event.component
@@ -274,18 +309,8 @@ class EventDetector:
             history[1] = counted_by_rates(history[1], history[2], history[0])
             series[0] = history[1, -len(time) :].reshape(series[0].shape)
             self._angle = history[:, -1:]
-        values = series[derivative] * math.factorial(derivative) - self.event.value
-        events = []
-        for index, coefficients in enumerate(values @ INTERPOLATION.T):
-            k, begin, end = int(pieces.step[index]), pieces.begin[index], pieces.end[index]
-            for root, direction in crossings(coefficients, first=index == 0 and not self._begun):
-                after, rising = float((begin + root * (end - begin)) * length[k]), float(direction * np.sign(length[k]))
-                again = self._last[1] == rising and abs(start[k] + after - self._last[0]) < 2 * EDGE * abs(length[k])
-                self._last = float(start[k] + after), rising
-                if not again and self.event.direction * rising >= 0:
-                    events.append((k, after))
-        self._begun = True
-        return events
+        values = series[derivative] * math.factorial(derivative)
+        return self._crossings(values, zip(pieces.step.tolist(), pieces.begin, pieces.end, strict=True), part)
 
 
 def crossings(coefficients: Float[np.ndarray, " order"], *, first: bool = False) -> list[tuple[float, float]]:

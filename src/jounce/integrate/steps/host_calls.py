@@ -1,4 +1,4 @@
-"""Functions that run on the host, called by what JAX compiles or maps, with derivatives of any order."""
+"""Functions that run on the host, on numbers that JAX traces: at once, or called by what JAX compiles or maps."""
 
 from collections.abc import Callable
 from typing import Any
@@ -6,11 +6,38 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jax.core import Tracer
 
 from jounce.base.shapes import Numbers
 from jounce.settings import called_back
 
 Values = tuple[Any, ...]
+
+
+def recorded(function: Callable[[Any], Any], values: Any) -> Any:
+    """Return what a function gives of the numbers of values that JAX traces; None where it knows none yet.
+
+    Parameters
+    ----------
+    function : callable
+        Maps such values to anything.
+    values : pytree
+        As within `jax.jit` and `jax.vmap` nothing is known of them.
+    """
+    results: list[Any] = []
+
+    @jax.custom_jvp
+    def record(values: Any) -> Any:
+        if not any(isinstance(value, Tracer) for value in jax.tree.leaves(values)):
+            results.append(function(values))
+        return jnp.zeros(())
+
+    @record.defjvp
+    def record_jvp(primals: tuple[Any], _: tuple[Any]) -> tuple[Any, Any]:
+        return record(*primals), jnp.zeros(())
+
+    record(values)
+    return results[-1] if results else None
 
 
 def called(function: Callable[[Values], Any], shapes: Any, values: Values) -> Any:

@@ -2,15 +2,17 @@
 
 import itertools
 from collections.abc import Callable, Mapping
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import jax
+import jax.numpy as jnp
 import numpy as np
 from jax.core import Tracer
 from jaxtyping import Float, Int
 
 from jounce.base.activity import Count
-from jounce.base.shapes import ArrayLike, real_numbers
+from jounce.base.shapes import ArrayLike, is_traced, real_numbers
 from jounce.errors import AssemblyError, JounceError, MechanismError, MobilityError, SolveError, check_name
 from jounce.execution.threads import thread_count
 from jounce.kinematics.assembly.assemble import assemble
@@ -48,28 +50,44 @@ if TYPE_CHECKING:
 SPOILED = (AssemblyError, MobilityError, SolveError)  # a design, not the family
 
 
-def checked_values(mechanism: Mechanism, parameters: Mapping[str, Any], each: str) -> dict[str, np.ndarray]:
-    """Return values of parameters that many designs, or runs, have, one for each.
+def checked_values(
+    parameters: Mapping[str, Any],
+    each: str,
+    check: Callable[[str], None],
+    error: type[JounceError] = MechanismError,
+) -> dict[str, Any]:
+    """Return values of parameters that many designs, or runs, have, one for each: arrays of JAX where it traces them.
 
-    Raises
-    ------
-    MechanismError
-        If a parameter does not exist, or values are not finite or of unequal number.
+    Parameters
+    ----------
+    parameters : mapping
+        By name.
+    each : str
+        What they differ in: designs or runs.
+    check : callable
+        Raises for a name that is none of a parameter.
+    error : type
+        To raise if values are not finite or of unequal number.
     """
     if not parameters:
-        raise MechanismError("a batch differs in at least one parameter", name="parameters", value=dict(parameters))
+        raise error("a batch differs in at least one parameter", name="parameters", value=dict(parameters))
     values, count = {}, None
     for name, given in parameters.items():
-        check_name("parameter", name, mechanism.parameters, MechanismError, name="parameters")
-        expected = f"a list of finite numbers, one for each {each}"
-        array = real_numbers(f"parameters.{name}", given, MechanismError, expected)
-        if array.ndim != 1 or not array.size or not np.isfinite(array).all():
-            raise MechanismError(f"must be {expected}", name=f"parameters.{name}", value=given)
+        check(name)
+        expected, traced = f"a list of finite numbers, one for each {each}", is_traced(given)
+        array = jnp.asarray(given, float) if traced else real_numbers(f"parameters.{name}", given, error, expected)
+        if array.ndim != 1 or not array.size or not (traced or np.isfinite(array).all()):
+            raise error(f"must be {expected}", name=f"parameters.{name}", value=given)
         if count is not None and len(array) != count:
             message = f"must have one value for each {each}, {count} as those before"
-            raise MechanismError(message, name=f"parameters.{name}", value=len(array))
+            raise error(message, name=f"parameters.{name}", value=len(array))
         values[name], count = array, len(array)
     return values
+
+
+def check_parameter(mechanism: Mechanism, name: str) -> None:
+    """Raise MechanismError if a mechanism has no such parameter."""
+    check_name("parameter", name, mechanism.parameters, MechanismError, name="parameters")
 
 
 @concrete
@@ -148,7 +166,7 @@ def _family(
 ) -> tuple["_Family", dict[str, np.ndarray]]:
     """Return designs that are to be solved, and the values of their parameters, checked."""
     check_mechanism(mechanism)
-    values = checked_values(mechanism, parameters, "design")
+    values = checked_values(parameters, "design", partial(check_parameter, mechanism))
     for name in ("design", "status"):
         if name in mechanism.outputs:
             message = f"the name {name!r} is that of an array of a family; give the output another name"
