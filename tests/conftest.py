@@ -22,6 +22,8 @@ from jounce.cli.compiled_programs import keep_programs
 from jounce.constraints import base
 from jounce.errors import OutputError
 from jounce.execution.background import NAME
+from jounce.execution.store.folder import ProgramFolder
+from jounce.execution.store.programs import use_store
 from tests.precision import watched
 from tests.shares_of_tests import pytest_addoption, pytest_collection_modifyitems  # noqa: F401 - found here by pytest
 
@@ -29,7 +31,7 @@ from tests.shares_of_tests import pytest_addoption, pytest_collection_modifyitem
 # over loops and reshapes, which go round some thirty times, and in one thread, of which the other worker has the next.
 # Its newer emitters, which the solver's programs leave out too, take twice as long for an operation alone; JAX 0.11 has
 # no others. The same is asked of the results; the examples, the study of branches and the benchmarks run as users do,
-# and so do tests with JOUNCE_TESTS_AS_USERS=1: all optimizations, all threads.
+# and so do tests with JOUNCE_TESTS_AS_USERS=1: all optimizations, all threads, programs kept as for users.
 _QUICK_TO_COMPILE = (
     "--xla_backend_optimization_level=0",
     *(["--xla_cpu_use_fusion_emitters=false"] if jax.__version_info__ < (0, 11) else []),
@@ -72,7 +74,10 @@ def pytest_configure(config):
         shutil.rmtree(folder)
         folder.mkdir()
     with contextlib.suppress(OutputError):  # a checkout that others may write
-        keep_programs(PrivateFolder(folder))
+        if _as_users:  # as a process of Python keeps them
+            use_store(ProgramFolder(PrivateFolder(folder)))
+        else:
+            keep_programs(PrivateFolder(folder))
 
 
 def pytest_collection_finish():

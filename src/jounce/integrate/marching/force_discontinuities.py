@@ -29,13 +29,13 @@ class Kinked(NamedTuple):
     late: Any
 
 
-def shifted(series: State, step: Any = 0.0, count: int = KINKED) -> State:
+def shifted(series: State, step: Any = 0.0) -> State:
     """Return the first coefficients of series about a time `step` away."""
 
     def part(c: Any) -> Any:
-        padded = jnp.concatenate([c, jnp.zeros((count, *c.shape[1:]))])
+        padded = jnp.concatenate([c, jnp.zeros((KINKED, *c.shape[1:]))])
         shifted_breaks = []
-        for level in range(count):
+        for level in range(KINKED):
             weights = np.array([math.comb(level + k, level) for k in range(len(c))], float)
             terms = padded[level : level + len(c)] * weights[:, None, None, None]
             shifted_breaks.append(evaluated(State(terms, terms, terms, terms), jnp.broadcast_to(step, (1,))).position)

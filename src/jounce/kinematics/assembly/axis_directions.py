@@ -176,7 +176,7 @@ def _cosines(system: System, coordinates: Coordinates) -> Float[np.ndarray, " pa
     cosines = []
     for group, names in _pairs(system):
         first, second = (
-            _globally(_unit(group, name), coordinates, np.array(slot))
+            in_global_axes(_unit(group, name), coordinates, np.array(slot))
             for name, slot in zip(names, group.bodies[:2], strict=True)
         )
         cosines.append(np.sum(first * second, axis=0))
@@ -189,16 +189,17 @@ def mirrored_discs(model: Model, coordinates: Coordinates) -> list[str]:
     There a disc that rolls turns the other way than the joint says.
     """
     names: list[str] = []
+    position = np.asarray(coordinates["position"])
     for group, its_rows in zip(model.system.groups, group_rows(model), strict=True):
         rolling = group.element
         if not (along := facts_of(type(rolling)).rolls_along):
             continue
         slots = [np.array(slot) for slot in group.bodies]
         line, center = (
-            np.asarray(coordinates["position"])[:, slot, 0] + _globally(np.asarray(point)[..., 0], coordinates, slot)
+            position[:, slot, 0] + in_global_axes(np.asarray(point)[..., 0], coordinates, slot)
             for point, slot in zip((rolling.point_i, rolling.point_j), slots, strict=True)
         )
-        side = _globally(_right_of(*(_unit(group, name) for name in along)), coordinates, slots[0])
+        side = in_global_axes(_right_of(*(_unit(group, name) for name in along)), coordinates, slots[0])
         radius = np.asarray(rolling.radius)[..., 0]
         off = np.abs(np.sum(side * (center - line), axis=0) + radius)
         names += [name for name, x in zip(model.rows[its_rows], off <= MIRRORED * radius, strict=False) if x]
@@ -215,7 +216,7 @@ def _right_of(
     return side / np.linalg.norm(side, axis=0)
 
 
-def _globally(
+def in_global_axes(
     vectors: Float[np.ndarray, "component instance"], coordinates: Coordinates, bodies: Int[np.ndarray, " instance"]
 ) -> Float[np.ndarray, "component instance"]:
     """Return vectors given in the axes of bodies in global ones."""

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from jounce.errors import AssemblyError
+from jounce.kinematics.assembly.axis_directions import in_global_axes
 from jounce.kinematics.curves.assembly_modes import Assemblies, Assembly, assemblies
 from jounce.mechanism import Mechanism, build
 from jounce.mechanism.mechanism import NEAREST, SIDES
@@ -76,10 +77,5 @@ def _middle(mechanism: Mechanism, body: str) -> np.ndarray:
         if holder == number
     ]
     local = np.mean(points, axis=0) if points else np.zeros(2 if model.pose_type is PlanarPose else 3)
-    coordinates = {name: np.asarray(x)[..., number, 0] for name, x in model.guess.items()}
-    if "angle" in coordinates:
-        c, s = np.cos(coordinates["angle"]), np.sin(coordinates["angle"])
-        return coordinates["position"] + np.array([c * local[0] - s * local[1], s * local[0] + c * local[1]])
-    e0, e = coordinates["quaternion"][0], coordinates["quaternion"][1:]
-    across = np.cross(e, local)
-    return coordinates["position"] + local + 2.0 * (e0 * across + np.cross(e, across))
+    there = np.asarray(model.guess["position"])[:, number, 0]
+    return there + in_global_axes(local[:, None], model.guess, np.array([number]))[:, 0]

@@ -17,6 +17,7 @@ from jounce.mechanism import Mechanism, build, time_grid
 from jounce.trajectory import ExpressionMotion
 
 TIME = "time"
+TOLERANCE = 1e-12
 VANISHING = 1e-9  # of half the second derivatives along directions of one radian: the rows do not forbid them
 
 
@@ -112,7 +113,7 @@ def first_instant(mechanism: Mechanism) -> float:
     return float(time_grid(mechanism.time, mechanism.parameter_values)[0])
 
 
-def start_of_curve(free: Freed, tolerance: float = 1e-12) -> tuple[PathTracker, CurvePoint]:
+def start_of_curve(free: Freed) -> tuple[PathTracker, CurvePoint]:
     """Return what walks along the curve of a mechanism, and where it starts.
 
     Raises
@@ -127,7 +128,7 @@ def start_of_curve(free: Freed, tolerance: float = 1e-12) -> tuple[PathTracker, 
     model = build(free.mechanism)
     if not model.rows:
         raise MobilityError(f"the mechanism has no joints: {model.system.shape[1]} degrees of freedom are left")
-    model, attempt = find_assembly(model, free.value, tolerance)
+    model, attempt = find_assembly(model, free.value, TOLERANCE)
     driven = free.driver is not None
     check_assembled(model, attempt, free.value, free=not driven)
     system = resident(with_fields(model.system, row_scale=attempt.scale[:, None]))
