@@ -41,7 +41,7 @@ def test_each_instant_comes_after_what_it_starts_from(count, stride, width, full
     assert solved.all()
 
 
-def test_lanes_beyond_a_span_solve_the_first_one_again():
+def test_lanes_beyond_a_block_solve_the_first_one_again():
     np.testing.assert_array_equal(rounds(5, 2, 4), [[0, 2, 4, 0], [1, 3, 1, 1]])
 
 
