@@ -31,6 +31,7 @@ from jounce.mechanism.system import System
 from jounce.rigid.pose import Pose
 
 Number = Float[Numbers, ""]
+NOWHERE = ExpansionPoint(*[np.full((), np.nan)] * 4)
 
 
 class Settings(NamedTuple):
@@ -51,7 +52,7 @@ class StepState(NamedTuple):
     instant: Float[Numbers, " batch"]  # when that is, s
     planned: Bool[Numbers, ""]  # whether they are decided
     next_up: Int[Numbers, ""]  # among the instants of the grid
-    det_rate: Number  # there where the step leads to, as a batch before has found it; NaN where none has
+    arrived: ExpansionPoint  # where the step leads to, as a batch before has found it; NaN where none has
 
 
 class Solved(NamedTuple):
@@ -126,16 +127,20 @@ def take_steps(
     """
 
     def solved(run: StepState) -> Any:
-        unknown = jnp.isnan(run.det_rate)
+        unknown = jnp.isnan(run.arrived.instant)
         tolerance, refine, search, finite_order = settings._replace(search=settings.search & unknown)
         arrival = arrived_at(run, tolerance, refine, search, finite_order)
-        return arrival._replace(det_rate=jnp.where(unknown, arrival.det_rate, run.det_rate))
+        names = "safe_step", "radius", "det_rate"
+        return arrival._replace(
+            **{name: jnp.where(unknown, getattr(arrival, name), getattr(run.arrived, name)) for name in names}
+        )
 
     def arrived_at(run: StepState, tolerance: Any, refine: Any, search: Any, finite_order: Any) -> Any:
         if native is not None:
             first = np.arange(len(run.instant)) == 0
             lanes = run.known, run.away, run.instant, None, search & first
             arrival = called(native, (system, tolerance, refine, finite_order), lanes)
+            arrival = arrival._replace(safe_step=arrival.safe_step[:1], radius=arrival.radius[:1])
             if finds_det_rate(system):
                 return arrival._replace(det_rate=arrival.det_rate[:1])
             there = partial(det_rate_at, system, pose_type, arrival.coordinates, run.instant)
@@ -184,7 +189,7 @@ def _typed(values: Any, like: Any) -> Any:
 
 def _planned(run: StepState, grid: Float[Numbers, " time"], limits: StepLimits) -> StepState:
     """Plan the next step of a run, or end it with a reason."""
-    return _aimed(run._replace(det_rate=jnp.full((), jnp.nan)), plan_next_step(run.control, limits), grid)
+    return _aimed(run._replace(arrived=NOWHERE), plan_next_step(run.control, limits), grid)
 
 
 def _aimed(run: StepState, control: StepControl, grid: Float[Numbers, " time"]) -> StepState:
@@ -218,8 +223,8 @@ def _after(
     behind = jnp.sum(_next_up(run, grid) <= target)  # a few are solved from the next anchor, which is near them
     taken = good & (behind <= jnp.where(target < limits.stop, lanes // 2, 0))  # else the same step with those left
     known = jax.tree.map(lambda new, old: jnp.where(taken, new[..., :1], old), known, run.known)
-    again = jnp.where(good & ~taken, arrived.det_rate, jnp.nan)
+    again = jax.tree.map(lambda x: jnp.where(good & ~taken, x, jnp.nan), arrived)
     run = _aimed(
-        run._replace(known=known, det_rate=again), next_control(control, status, arrived, limits, (good, taken)), grid
+        run._replace(known=known, arrived=again), next_control(control, status, arrived, limits, (good, taken)), grid
     )
     return run, arrived, taken

@@ -54,11 +54,11 @@ class StepResult(NamedTuple):
     outputs: tuple[Numbers, ...]  # jets of each group of outputs
     status: Int[Numbers, " batch"]  # see Status
     body: Int[Numbers, " batch"]  # index of the moving body that is farthest from its prediction
-    safe_step: Lanes  # s, over which the motion from here can be predicted
-    radius: Lanes  # s, the same by the first three Taylor terms only, which rounding spoils least
+    safe_step: Lanes  # s, over which the motion from the first lane can be predicted; 0 unless searched; (1,)
+    radius: Lanes  # s, the same by the first three Taylor terms only, which rounding spoils least; likewise
     deviation: Lanes  # departure from the prediction, over how far that moves
     sign: Lanes  # of the determinant of the Jacobian
-    det_rate: Lanes  # 1/s, how fast the first lane nears (< 0) or leaves a singular position; 0 unless searched; (1,)
+    det_rate: Lanes  # 1/s, how fast it nears (< 0) or leaves a singular position; likewise
     pivot_ratio: Lanes  # smallest pivot of the Jacobian over the largest
     admissible: Bool[Numbers, "driver batch"]  # whether each driver has a permitted value
     finite: Bool[Numbers, "result batch"]  # whether all derivatives requested are, of the pose and of each output
@@ -124,13 +124,15 @@ def _largest(coefficient: Float[Numbers, "*rest batch"]) -> Lanes:
     return jnp.max(jnp.abs(coefficient.reshape(-1, coefficient.shape[-1])), axis=0)
 
 
-def _safe_step(terms: list[Lanes]) -> Lanes:
-    """Return the step at which no Taylor term moves a body far.
+def safe_step_and_radius(system: System, coordinates: dict[str, Jet], predictor: tuple[str, ...]) -> tuple[Any, Any]:
+    """Return the step at which no Taylor term moves a body far, and where the first three of them do.
 
     All terms count, since those of the highest orders may vanish together (a body at rest, or at a turning point).
     """
+    terms = _terms(system, coordinates, predictor)
     steps = [jnp.power(jnp.maximum(term, 1e-300), -1.0 / k) for k, term in enumerate(terms, 1)]
-    return SAFE_FRACTION * jnp.min(jnp.stack(steps), axis=0)
+    safe_step, radius = (SAFE_FRACTION * jnp.min(jnp.stack(some), axis=0) for some in (steps, steps[:3]))
+    return safe_step, radius / SAFE_FRACTION
 
 
 def _outputs(system: System, pose: Pose, angles: Sequence[Numbers], step: Lanes) -> tuple[Numbers, ...]:
@@ -251,7 +253,7 @@ def advance(
     refine : bool
         Whether to correct accepted poses to rounding.
     search : bool
-        Whether to look for the nearest singular position.
+        Whether to find how far the motion from the first lane can be predicted, and where it is singular next.
     finite_order : int
         Highest derivative that must be finite.
     pose_type, order
@@ -265,10 +267,13 @@ def advance(
 
     def searched() -> Any:
         hidden = hidden_by_laws(system, first, instant[:1], step[:1], order)
-        return det_rate_of(system, pose_type, reached, factor, instant) if with_det_rate else np.zeros(1), hidden
+        det_rate = det_rate_of(system, pose_type, reached, factor, instant) if with_det_rate else np.zeros(1)
+        here = {name: jet.map(lambda c: c[..., :1]) for name, jet in reached.items()}
+        return hidden, det_rate, *safe_step_and_radius(system, here, pose_type.predictor)
 
-    det_rate, first = jax.lax.cond(search, searched, lambda: (np.zeros(1), first))
-    return arrival._replace(det_rate=det_rate, status=jnp.concatenate([first, arrival.status[1:]]))
+    first, det_rate, safe_step, radius = jax.lax.cond(search, searched, lambda: (first, *[np.zeros(1)] * 3))
+    status = jnp.concatenate([first, arrival.status[1:]])
+    return arrival._replace(status=status, det_rate=det_rate, safe_step=safe_step, radius=radius)
 
 
 def solved_batch(
@@ -285,7 +290,7 @@ def solved_batch(
     pose_type: type[Pose],
     order: int,
 ) -> tuple[StepResult, Factor, dict[str, Jet]]:
-    """Return what `advance` does but for that rate, with the factored Jacobian and the jets of the pose."""
+    """Return what `advance` does but for what it searches, with the factored Jacobian and the jets of the pose."""
     # what a law makes infinite, such as the third derivative of t**2.5 at t = 0, is of no use to a prediction
     moving = {name: Jet(tuple(jnp.where(jnp.isfinite(c), c, 0.0))) for name, c in coordinates.items()}
     predicted = pose_type.predicted_from(moving, step)
@@ -316,8 +321,8 @@ def solved_batch(
         outputs,
         status,
         jnp.argmax(departures, axis=0),
-        _safe_step(terms),
-        _safe_step(terms[:3]) / SAFE_FRACTION,
+        np.zeros(1),
+        np.zeros(1),
         departure / jnp.maximum(travel, 1e-300),
         signs,
         np.zeros(1),

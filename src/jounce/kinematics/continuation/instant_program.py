@@ -10,7 +10,12 @@ import jax.numpy as jnp
 from jounce.base.modules import with_fields
 from jounce.execution.device import on_processor
 from jounce.execution.mapped import GPU_WIDTH, mapped
-from jounce.kinematics.continuation.correct_and_differentiate import StepResult, advance, solved_batch
+from jounce.kinematics.continuation.correct_and_differentiate import (
+    StepResult,
+    advance,
+    safe_step_and_radius,
+    solved_batch,
+)
 from jounce.kinematics.continuation.predictor import hidden_by_laws
 from jounce.kinematics.continuation.singularity_distance import det_rates_of
 from jounce.mechanism.system import System
@@ -43,14 +48,15 @@ def _of_many(shared: Any, instants: Any, *, pose_type: type[Pose], order: int) -
     arrival, factor, reached = solved_batch(system, *given, pose_type=pose_type, order=order)
     nothing = jnp.zeros_like(step)
     if own is None:
-        return arrival._replace(det_rate=nothing)
+        return arrival._replace(det_rate=nothing, safe_step=nothing, radius=nothing)
 
     def searched() -> Any:
         hidden = hidden_by_laws(system, arrival.status, instant, step, order)
-        return det_rates_of(system, pose_type, reached, factor, instant), hidden
+        det_rate = det_rates_of(system, pose_type, reached, factor, instant)
+        return hidden, det_rate, *safe_step_and_radius(system, reached, pose_type.predictor)
 
-    det_rate, status = jax.lax.cond(jnp.any(search), searched, lambda: (nothing, arrival.status))
-    return arrival._replace(det_rate=det_rate, status=status)
+    found = jax.lax.cond(jnp.any(search), searched, lambda: (arrival.status, *[nothing] * 3))
+    return arrival._replace(**dict(zip(("status", "det_rate", "safe_step", "radius"), found, strict=True)))
 
 
 @mapped(by_xla=_of_many)
@@ -63,8 +69,7 @@ def advance_instant(shared: Any, instants: Any, *, pose_type: type[Pose], order:
         System, tolerance, whether to refine, and the highest derivative that must be finite.
     instants : tuple
         Coordinates, angles and sign of the neighbor, the time from there, the instant, s, the values of its design,
-        if there are many (see `of_design`), else None, and whether to look for the nearest singular position: each
-        of length one.
+        if there are many (see `of_design`), else None, and whether to search, as `advance` has it: each of length one.
     pose_type, order
         As those of `advance`.
     """

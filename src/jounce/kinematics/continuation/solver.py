@@ -12,7 +12,7 @@ from jaxtyping import Float, Int, Shaped
 
 from jounce.execution.mapped import OnLlvm, OnXla, Rounds
 from jounce.execution.translated import WhenMade
-from jounce.kinematics.continuation.continuation_steps import Settings, StepState, TakenSteps, take_steps
+from jounce.kinematics.continuation.continuation_steps import NOWHERE, Settings, StepState, TakenSteps, take_steps
 from jounce.kinematics.continuation.correct_and_differentiate import LARGEST_GAP, SolvedState, StepResult, predictor
 from jounce.kinematics.continuation.instant_program import advance_instant, round_width
 from jounce.kinematics.continuation.step_control import ExpansionPoint, StepLimits, initial_control
@@ -55,7 +55,7 @@ class Solver:
     ) -> StepResult:
         """Solve instants from what is `needed` of solved ones.
 
-        Of a few instants, `search` looks for singular positions.
+        Of a few instants, `search` is as `advance` has it.
         """
         lanes = len(instant)
         if lanes <= SMALL_BATCH:
@@ -255,7 +255,7 @@ def _run_from(
     control = initial_control(ExpansionPoint(*map(np.asarray, expansion_point)), np.asarray(here[0]))
     control = control._replace(largest=np.asarray(largest), crawled=np.asarray(crawled))
     decided, first = np.asarray(instant is not None), np.zeros((), int)
-    return StepState(known, control, nothing if away is None else away, here, decided, first, np.full((), np.nan))
+    return StepState(known, control, nothing if away is None else away, here, decided, first, NOWHERE)
 
 
 def _limits(stop: float, smallest: float) -> StepLimits:

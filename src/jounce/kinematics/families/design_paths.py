@@ -5,7 +5,7 @@ A lane is a design. The programs that solve an instant and decide about a step a
 to be solved individually.
 """
 
-import itertools
+from collections.abc import Iterator, Sequence
 from functools import lru_cache
 from typing import Any, NamedTuple
 
@@ -46,46 +46,37 @@ Indices = Int[np.ndarray, " lane"]
 
 
 class Anchors(NamedTuple):
-    """Instants of designs that one step has solved: the designs, rising, the instants, s, and the states."""
+    """The anchors of designs that were followed together, by design and instant.
 
-    owner: Indices
-    instant: Float[np.ndarray, " lane"]
-    state: SolvedState
-
-
-class Group(NamedTuple):
-    """Designs that are followed together, and the anchors that each step has made."""
+    Attributes
+    ----------
+    designs : array of int
+        Rising.
+    begins : array of int
+        Index of the first anchor of each design, and behind them how many anchors there are.
+    instant : array of shape (anchors,)
+        s.
+    state : tuple
+        Anchors last.
+    """
 
     designs: Indices
-    steps: list[Anchors]
+    begins: Int[np.ndarray, " design_and_one"]
+    instant: Float[np.ndarray, " anchor"]
+    state: SolvedState
 
-    def anchors_of(
-        self, designs: Indices
-    ) -> tuple[
-        Int[np.ndarray, " anchor"], Float[np.ndarray, " anchor"], list[list[np.ndarray]], Int[np.ndarray, " anchor"]
-    ]:
-        """Return the anchors of some of the designs.
+    @property
+    def owner(self) -> Int[np.ndarray, " anchor"]:
+        """The design of each, among these."""
+        return np.repeat(np.arange(len(self.designs)), np.diff(self.begins))
 
-        Returns
-        -------
-        owner, instant : array
-            The design of each, among these designs, and its instant, s.
-        parts : list of list of array
-            The parts of each leaf of their states.
-        order : array of int
-            The order that sorts them by design and instant.
-        """
-        first, last = designs[0], designs[-1]
-        owners, instants, states = [], [], []
-        for owner, instant, state in self.steps:
-            some: Any = slice(*np.searchsorted(owner, (first, last + 1)))
-            if last - first + 1 > len(designs):
-                some = some.start + np.flatnonzero(np.isin(owner[some], designs))
-            owners.append(np.searchsorted(designs, owner[some]))
-            instants.append(instant[some])
-            states.append([leaf[..., some] for leaf in jax.tree.leaves(state)])
-        owner, instant = np.concatenate(owners), np.concatenate(instants)
-        return owner, instant, [*map(list, zip(*states, strict=True))], np.lexsort((instant, owner))
+    def parts(self, size: int) -> Iterator["Anchors"]:
+        """Yield the anchors of so many of the designs after others."""
+        for k in range(0, len(self.designs), size):
+            begins = self.begins[k : k + size + 1]
+            some = slice(begins[0], begins[-1])
+            state = jax.tree.map(lambda x, some=some: x[..., some], self.state)
+            yield Anchors(self.designs[k : k + size], begins - begins[0], self.instant[some], state)
 
 
 class DesignPaths:
@@ -115,7 +106,7 @@ class DesignPaths:
         order = np.argsort(instants, axis=1, kind="stable")
         self._instants = np.take_along_axis(instants, order, axis=1)
         self._rank = np.argsort(order, axis=1) if np.any(np.diff(order, axis=1) < 0) else None
-        self._groups: list[Group] = []
+        self._groups: list[Anchors] = []
 
     def follow(self, coordinates: Coordinates, plain: Bool[np.ndarray, " design"], threads: int) -> None:
         """Follow the designs from where they are assembled, those that are plain."""
@@ -125,11 +116,13 @@ class DesignPaths:
         with Threads(threads, compiled=self.solver.is_compiled) as pool:
             self._groups = list(pool.map(lambda group: self._followed(coordinates, group), groups))
 
-    def _followed(self, coordinates: Coordinates, lanes: Indices) -> Group:
-        """Follow some designs."""
-        solver, (first, last), group = self.solver, self._ends, Group(lanes, [])
+    def _followed(self, coordinates: Coordinates, lanes: Indices) -> Anchors:
+        """Follow some designs, and return the anchors of those that are not left to be solved individually."""
+        solver, (first, last) = self.solver, self._ends
+        steps: list[tuple[Indices, Lanes, SolvedState]] = []  # the designs, the instants and the states of the anchors
         limits = StepLimits(np.asarray(last), np.asarray(SMALLEST_STEP * (last - first)))
-        known = solver.needed(solver.still({name: x[..., lanes] for name, x in coordinates.items()}))
+        known, own = solver.still({name: x[..., lanes] for name, x in coordinates.items()}), self.designs.own(lanes)
+        known = solver.needed(known)
         start = np.full(len(lanes), first)
         control = initial_control(
             ExpansionPoint(start, *[np.full(len(lanes), x) for x in (np.inf, np.inf, 0.0)]), start
@@ -139,8 +132,8 @@ class DesignPaths:
         )
         for _ in range(MOST_STEPS):
             if not lanes.size:
-                return group
-            away, own = control.target - control.expansion_point.instant, self.designs.own(lanes)
+                break
+            away = control.target - control.expansion_point.instant
             arrival = solver.program((known, away, control.target, own, np.ones(len(lanes), bool)))
             there: Any = ExpansionPoint(control.target, arrival.safe_step, arrival.radius, arrival.det_rate)
             begins: Any = control.step == 0
@@ -149,14 +142,24 @@ class DesignPaths:
             ended = control.ending != StopReason.UNFINISHED
             self.individual[lanes[unlike | ended & (control.ending != StopReason.ARRIVED)]] = True
             reached = arrival.state(slice(None) if taken.all() else taken)
-            group.steps.append(Anchors(lanes[taken], there.instant[taken], reached))
+            steps.append((lanes[taken], there.instant[taken], reached))
             known = solver.needed(reached) if taken.all() else _replaced(known, taken, solver.needed(reached))
             if (left := ~(ended | unlike)).all():
                 continue
             lanes = lanes[left]
-            control, known = jax.tree.map(lambda x, some=left: x[..., some], (control, known))
+            control, known, own = jax.tree.map(lambda x, some=left: x[..., some], (control, known, own))
         self.individual[lanes] = True
-        return group
+        return self._sorted(steps)
+
+    def _sorted(self, steps: Sequence[tuple[Indices, Lanes, SolvedState]]) -> Anchors:
+        """Return the anchors of steps, without those of designs that are left to be solved individually."""
+        owners, instants, states = zip(*steps, strict=True)
+        owner = np.concatenate(owners)
+        order = np.argsort(owner, kind="stable")  # of each design, the instants rise from step to step
+        order = order[~self.individual[owner[order]]]
+        designs, begins = np.unique(owner[order], return_index=True)
+        state = jax.tree.map(lambda *parts: np.take(np.concatenate(parts, axis=-1), order, axis=-1), *states)
+        return Anchors(designs, np.append(begins, len(order)), np.concatenate(instants)[order], state)
 
     def solved(self, threads: int) -> tuple[list[list[np.ndarray]], Int[np.ndarray, "design time"]]:
         """Return the outputs of all designs, and their status.
@@ -172,36 +175,29 @@ class DesignPaths:
         levels, width = self.solver.finite_order + 1, self.solver.program.width
         size = min(max(1, self.solver.longest_stride * width // times), len(designs))
         size -= size % width if size > width else 0
-        items: list[tuple[Group, Indices]] = []
-        for group in self._groups:
-            some = group.designs[~self.individual[group.designs]]
-            items += [(group, some[k : k + size]) for k in range(0, len(some), size)]
-        steps = itertools.chain(*(group.steps for group in self._groups))
-        each = sum((np.bincount(step.owner, minlength=count) for step in steps), np.zeros(count, int))
-        most = max(int(each[block].sum()) for _, block in items)
-        like = self._groups[0].steps[0].state
-        wholes = [np.full((levels, *x.shape[1:-1], count, times), np.nan) for x in like[1]]
+        blocks = [block for group in self._groups for block in group.parts(size)]
+        most, like = max(len(block.instant) for block in blocks), blocks[0].state
+        wholes = [np.empty((levels, *x.shape[1:-1], count, times)) for x in like[1]]
 
         def new() -> SolveBuffer:
             return SolveBuffer(self.solver, like, size * times, most)
 
-        def put(item: tuple[Group, Indices], state: SolvedState, outcome: Indices) -> None:
-            block = item[1]
-            status[block] = self._as_given(outcome.reshape(len(block), times), block)
+        def put(block: Anchors, state: SolvedState, outcome: Indices) -> None:
+            lanes = _slice_of(block.designs)
+            status[lanes] = self._as_given(outcome.reshape(-1, times), block.designs)
             for whole, part in zip(wholes, state[1], strict=True):
                 with np.errstate(over="ignore"):  # of what failed
                     derivatives = plain_derivatives(part[:levels])
-                values = derivatives.reshape(*derivatives.shape[:-1], len(block), times)
-                whole[..., block, :] = self._as_given(values, block)
+                values = derivatives.reshape(*derivatives.shape[:-1], -1, times)
+                whole[..., lanes, :] = self._as_given(values, block.designs)
 
         with Threads(threads, compiled=self.solver.is_compiled) as pool:
-            for _ in solve_in_buffers(new, items, self._begin, put, pool.map):
+            for _ in solve_in_buffers(new, blocks, self._begin, put, pool.map):
                 pass
         outputs = [[np.transpose(x, (2, 3, 0, 1)) for x in np.moveaxis(whole, 2, 0)] for whole in wholes]
         for group in self._groups:
-            some = group.designs[~self.individual[group.designs]]
-            if some.size:
-                self._count_turns(outputs, group, some)
+            if group.designs.size:
+                self._count_turns(outputs, group)
         self.individual |= (status != Status.OK).any(axis=1)
         return outputs, status
 
@@ -212,37 +208,32 @@ class DesignPaths:
         rank = self._rank[block]
         return np.take_along_axis(values, rank.reshape(*[1] * (values.ndim - 2), *rank.shape), axis=-1)
 
-    def _begin(self, buffer: SolveBuffer, item: tuple[Group, Indices]) -> int:
+    def _begin(self, buffer: SolveBuffer, block: Anchors) -> int:
         """Load all instants of some designs; each starts from the one before, or from the nearest anchor."""
-        group, block = item
-        instants = self._instants[block]
+        instants = self._instants[block.designs]
         count, times = instants.shape
         pieces = min(max(1, buffer.width // count), times)  # of a motion, so that lanes are in use
         length = -(-times // pieces)
-        owner, at, parts, order = group.anchors_of(block)
-        buffer.put_anchors(parts)
-        nearest = _nearest(owner[order], at[order], instants, self._ends)
-        to_anchor = instants - at[order][nearest]
+        buffer.put_anchors([[leaf] for leaf in jax.tree.leaves(block.state)])
+        nearest = _nearest(block.owner, block.instant, instants, self._ends)
+        to_anchor = instants - block.instant[nearest]
         to_one_before = np.diff(instants, axis=1, prepend=np.inf)
         to_one_before[:, ::length] = np.inf
-        near = np.abs(to_one_before) <= np.abs(to_anchor)
+        near = to_one_before <= np.abs(to_anchor)
         before = np.arange(-1, count * times - 1).reshape(count, times)
-        source = np.where(near, before, buffer.size + order[nearest])
+        source = np.where(near, before, buffer.size + nearest)
         step = np.where(near, to_one_before, to_anchor)
-        own = {k: np.repeat(x, times, axis=-1) for k, x in self.designs.own(block).items()}
+        own = {k: np.repeat(x, times, axis=-1) for k, x in self.designs.own(block.designs).items()}
         buffer.load(instants.ravel(), (source.ravel(), step.ravel()), _rounds(count, times, length, buffer.width), own)
         return count * times
 
-    def _count_turns(self, outputs: list[list[np.ndarray]], group: Group, designs: Indices) -> None:
+    def _count_turns(self, outputs: list[list[np.ndarray]], anchors: Anchors) -> None:
         """Give angles about axes the turns that they make along the anchors of their designs."""
         if not any(map(measures_angle, self.solver.model.system.outputs)):
             return
-        owner, at, parts, order = group.anchors_of(designs)
-        owner, at = owner[order], at[order]
+        designs, owner, at, coordinates = anchors.designs, anchors.owner, anchors.instant, anchors.state[0]
         system = self.designs.system(designs[owner])
         measuring = [(g, output) for g, output in zip(system.outputs, outputs, strict=True) if measures_angle(g)]
-        leaves = [np.concatenate(part, axis=-1)[..., order] for part in parts]
-        coordinates = jax.tree.unflatten(jax.tree.structure(group.steps[0].state), leaves)[0]
         series = np.nan_to_num(coordinates["quaternion"], nan=0.0, posinf=0.0, neginf=0.0)
         here = np.arange(len(owner))
         following = np.where(np.append(owner[1:] != owner[:-1], True), here, here + 1)  # or itself, the last one
@@ -289,14 +280,21 @@ def _nearest(
 ) -> Int[np.ndarray, "design time"]:
     """Return the anchor of its design that is nearest to each instant, by index; anchors are in order.
 
-    One number encodes owner and instant, so that one search finds all.
+    One number encodes design and instant, so that one search finds where all anchors give way to the next ones.
     """
-    first, last = ends
-    scale, design = 0.5 / max(last - first, 1e-300), np.arange(len(instants))[:, None]
-    after = np.searchsorted(owner + scale * (at - first), design + scale * (instants - first))
-    begin, end = (np.searchsorted(owner, design, side=side) for side in ("left", "right"))
-    before, after = np.clip(after - 1, begin, end - 1), np.clip(after, begin, end - 1)
-    return np.where(instants - at[before] <= at[after] - instants, before, after)
+    (first, last), times = ends, instants.shape[1]
+    scale = 0.5 / max(last - first, 1e-300)
+    encoded = np.arange(len(instants))[:, None] + scale * (instants - first)
+    middle = owner[:-1] + scale * (0.5 * (at[:-1] + at[1:]) - first)
+    until = np.searchsorted(encoded.ravel(), middle, side="right")
+    until = np.where(owner[1:] == owner[:-1], until, owner[1:] * times)
+    return np.repeat(np.arange(len(at)), np.diff(until, prepend=0, append=instants.size)).reshape(instants.shape)
+
+
+def _slice_of(designs: Indices) -> slice | Indices:
+    """Return some designs as a slice, which takes less time, where they follow one another."""
+    first, last = int(designs[0]), int(designs[-1])
+    return slice(first, last + 1) if last - first + 1 == len(designs) else designs
 
 
 def _replaced(state: Any, lanes: Any, new: Any) -> Any:
