@@ -110,12 +110,13 @@ class ChangePoint:
 class FollowedPath:
     """Anchors in order of time, the change points passed, and where and why following the motion ended, if it did.
 
-    Instants of a grid that the steps have solved are stored by index, with the leaves of their states; and the back
-    ends used.
+    Of the instants of a grid that the steps may solve, it is stored which they have, and the leaves of their states;
+    and the back ends used.
     """
 
     anchors: list[Anchor]
-    solved_instants: list[tuple[Int[np.ndarray, " lane"], list[np.ndarray]]] = dataclasses.field(default_factory=list)
+    is_solved: Bool[np.ndarray, " time"] = dataclasses.field(default_factory=lambda: np.zeros(0, bool))
+    solved_leaves: list[np.ndarray] = dataclasses.field(default_factory=list)
     change_points: list[ChangePoint] = dataclasses.field(default_factory=list)
     status: Status = Status.OK
     ended_at: float = np.inf
@@ -132,11 +133,13 @@ class FollowedPath:
         for lane, (instant, safe_step, radius, det_rate, status) in enumerate(zip(*values, strict=True)):
             outcome = passed if status == OK else Status(status)
             self.anchors.append(Anchor(instant, states, lane, structure, safe_step, radius, det_rate, outcome))
-        solved = np.asarray(grid.status)[:count] == OK
-        if count:
-            lanes: Any = slice(count) if solved.all() else np.flatnonzero(solved)
-            parts = [np.array(np.asarray(x)[..., lanes]) for x in jax.tree.leaves(grid[:3])]
-            self.solved_instants.append((np.arange(first, first + count)[lanes], parts))
+        if not count:
+            return
+        parts, lanes = [np.asarray(x)[..., :count] for x in jax.tree.leaves(grid[:3])], slice(first, first + count)
+        self.solved_leaves = self.solved_leaves or [np.empty((*x.shape[:-1], len(self.is_solved))) for x in parts]
+        self.is_solved[lanes] = np.asarray(grid.status)[:count] == OK
+        for whole, part in zip(self.solved_leaves, parts, strict=True):
+            whole[..., lanes] = part
 
     def anchors_around(self, first: float, last: float) -> list[Anchor]:
         """Return the anchors between two instants, with one before them and one after, where there are some."""
@@ -232,7 +235,7 @@ def follow(
         path, run = FollowedPath([start]), solver.run_from(start.state, start.expansion_point, first_step)
     else:
         path, run = FollowedPath([]), start
-    first = 0
+    first, path.is_solved = 0, np.zeros(len(grid), bool)
     while not path.anchors or path.anchors[-1].instant < stop:
         done = solver.take_steps(run, grid[first:], stop, SMALLEST_STEP * span)
         path.add(done, first)

@@ -101,11 +101,7 @@ def cut_at_ends(path: FollowedPath, curves: Iterable[CurveEnds], grid: Float[np.
             continue
         path.anchors = [anchor for anchor in path.anchors if anchor.instant <= instant] or path.anchors[:1]
         path.change_points = [point for point in path.change_points if point.instant <= instant]
-        path.solved_instants = [
-            (lanes[inside], [x[..., inside] for x in leaves])
-            for lanes, leaves in path.solved_instants
-            for inside in [grid[lanes] < instant]
-        ]
+        path.is_solved &= grid < instant
         path.ended(Status.END_OF_CURVE, instant, ends.words(beyond_high))
     return path
 

@@ -56,15 +56,14 @@ class GridSolver:
         self.faults: dict[int, str] = {}
         self._anchors = path.anchors_around(time[0], time[-1])
         self._reached = time < path.ended_at
-        for lanes, _ in path.solved_instants:
-            self.status[lanes] = OK
-        like, parts = self._anchors[0], path.solved_instants
-        if len(parts) == 1 and len(parts[0][0]) == len(time) and not path.change_points and self._reached.all():
-            self._leaves = parts[0][1]  # all are solved, and stay as they are
+        like, solved = self._anchors[0], np.flatnonzero(path.is_solved)
+        self.status[solved] = OK
+        if len(solved) == len(time) and not path.change_points and self._reached.all():
+            self._leaves = path.solved_leaves  # all are solved, and stay as they are
         else:
             self._leaves = [np.empty((*x.shape[:-1], len(time) + len(self._anchors))) for x in like.leaves]
-            for lanes, leaves in parts:
-                self._store_lanes(lanes, leaves)
+            if solved.size:
+                self._store_lanes(solved, [x[..., solved] for x in path.solved_leaves])
         self._store: SolvedState = jax.tree.unflatten(like.structure, self._leaves)
 
     @cached_property

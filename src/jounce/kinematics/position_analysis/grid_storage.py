@@ -112,7 +112,7 @@ def _solved_at_once(
     Returns the first instants of those in which all are OK; the others are still to be solved, one after another.
     """
     (store, status), blocks = results, {}
-    if path.solved_instants:
+    if path.is_solved.any():
         return frozenset()
     points = [(point, half_width(point, solver.order)) for point in path.change_points]
     points += [(point, spoiled_width(point, solver.order)) for point in path.singular_positions_outside()]
