@@ -40,6 +40,8 @@ from jounce.mechanism.transmissions.turn_counting import counted_along
 
 MOST_STEPS = 10_000  # of a design; one that needs more is left to be solved individually
 TOGETHER = 512  # designs that are followed together
+MOST_BLOCKS = 16  # of a family: more of them, each with fewer designs, take longer, and fewer leave threads idle
+LARGEST_BLOCK = 4  # times as many instants as a span of a long grid has: each is read by the next one only
 
 Lanes = Float[np.ndarray, " design"]
 Indices = Int[np.ndarray, " lane"]
@@ -103,9 +105,10 @@ class DesignPaths:
         self.solver, self.designs = solver, designs
         self._ends = float(instants[0, 0]), last
         self.individual = np.zeros(len(designs.rows), bool)
-        order = np.argsort(instants, axis=1, kind="stable")
-        self._instants = np.take_along_axis(instants, order, axis=1)
-        self._rank = np.argsort(order, axis=1) if np.any(np.diff(order, axis=1) < 0) else None
+        self._instants, self._rank = instants, None
+        if np.any(instants[:, 1:] < instants[:, :-1]):
+            order = np.argsort(instants, axis=1, kind="stable")
+            self._instants, self._rank = np.take_along_axis(instants, order, axis=1), np.argsort(order, axis=1)
         self._groups: list[Anchors] = []
 
     def follow(self, coordinates: Coordinates, plain: Bool[np.ndarray, " design"], threads: int) -> None:
@@ -173,7 +176,8 @@ class DesignPaths:
         if not designs.size:
             return [], status
         levels, width = self.solver.finite_order + 1, self.solver.program.width
-        size = min(max(1, self.solver.longest_stride * width // times), len(designs))
+        least = max(1, self.solver.longest_stride * width // times)
+        size = min(max(least, min(len(designs) // MOST_BLOCKS, LARGEST_BLOCK * least)), len(designs))
         size -= size % width if size > width else 0
         blocks = [block for group in self._groups for block in group.parts(size)]
         most, like = max(len(block.instant) for block in blocks), blocks[0].state
