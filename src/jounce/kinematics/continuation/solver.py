@@ -21,7 +21,7 @@ from jounce.mechanism import Model
 
 SMALL_BATCH = 16  # lanes; a batch width compiles once, so a short grid uses one, and so do anchors
 LONGEST_RUN = 32  # batches
-RUN_ENTRIES = 2**19  # of what a run keeps: a large mechanism has shorter ones
+RUN_ENTRIES = 2**20  # of what a run keeps: a large mechanism has shorter ones
 BLOCK_ENTRIES = 2**19  # of the coordinates of what a thread solves at once: the cache holds them
 XLA_BLOCK_ENTRIES = 2**21  # the same by XLA, whose rounds have more instants, and whose calls take longer
 FEWEST_FROM_ANCHORS = 64  # instants of a long grid that machine code starts from anchors
