@@ -55,8 +55,9 @@ def _of_many(shared: Any, instants: Any, *, pose_type: type[Pose], order: int) -
         det_rate = det_rates_of(system, pose_type, reached, factor, instant)
         return hidden, det_rate, *safe_step_and_radius(system, reached, pose_type.predictor)
 
-    found = jax.lax.cond(jnp.any(search), searched, lambda: (arrival.status, *[nothing] * 3))
-    return arrival._replace(**dict(zip(("status", "det_rate", "safe_step", "radius"), found, strict=True)))
+    nowhere = arrival.status, *[nothing] * 3
+    status, det_rate, safe_step, radius = jax.lax.cond(jnp.any(search), searched, lambda: nowhere)
+    return arrival._replace(status=status, det_rate=det_rate, safe_step=safe_step, radius=radius)
 
 
 @mapped(by_xla=_of_many)
