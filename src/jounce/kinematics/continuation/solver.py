@@ -26,8 +26,7 @@ BLOCK_ENTRIES = 2**19  # of the coordinates of what a thread solves at once: the
 XLA_BLOCK_ENTRIES = 2**21  # the same by XLA, whose rounds have more instants, and whose calls take longer
 FEWEST_FROM_ANCHORS = 64  # instants of a long grid that machine code starts from anchors
 MOST_SIDE_BY_SIDE, CALL_ENTRIES = 1024, 2**21  # instants in a call of machine code, and numbers of their coordinates
-FEW_COLUMNS = 36  # of a Jacobian: of more, machine code of single values alone is too long to be fast
-FEW_OF_REDUNDANT_ROWS = 18  # the same in least squares, whose bases take more code than reflections
+FEW_COLUMNS = 18  # of a Jacobian: of more, machine code of single values alone is longer and no faster
 LARGE = 64  # numbers of an array that stays in memory there
 LARGE_BESIDE_TABLES = 128  # the same in small mechanisms, of which laws through many samples are no single values
 NO_GRID = np.empty(0)
@@ -167,8 +166,7 @@ class Solver:
         nothing, still = np.zeros(1), self.still(self.model.guess)
         instants = self.needed(still), nothing, nothing, self.own, np.zeros(1, bool)
         kind = self.model.pose_type
-        few = FEW_COLUMNS if system.rank is None else FEW_OF_REDUNDANT_ROWS
-        small = system.shape[1] <= few and not self.hasty
+        small = system.shape[1] <= FEW_COLUMNS and not self.hasty
         laws = [getattr(group.element, "motion", ()) for group in system.groups]
         tables = max(map(np.size, jax.tree.leaves(laws)), default=0) > LARGE
         how = {"large": (LARGE_BESIDE_TABLES if tables else None) if small else LARGE, "hasty": self.hasty}

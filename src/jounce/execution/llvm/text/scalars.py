@@ -12,7 +12,7 @@ import numpy as np
 from jounce.execution.llvm.text import values
 from jounce.execution.llvm.text.values import DTYPES, SCALARS, UnsupportedOperationError, Value, kind_of, literal
 
-MOST_LINES = 120_000  # of text: LLVM makes some 20,000 of them into machine code in a second
+MOST_LINES = 500_000  # of text: LLVM makes some 10,000 to 20,000 of them into machine code in a second
 DOUBLES: dict[str, tuple[str, Any]] = {  # in LLVM, in Python
     "add": ("fadd contract", operator.add),
     "sub": ("fsub contract", operator.sub),
