@@ -403,12 +403,3 @@ def test_a_residual_that_uses_velocities_is_refused_by_name(space, joint):
         jn.errors.UnsupportedError, match=rf"joints\.roll: the residual of {type(joint).__name__} uses velocities"
     ):
         jn.solve(mechanism, [0.0, 1.0], 1)
-
-
-def test_rows_in_the_order_of_the_bodies_that_they_touch():
-    model = build(four_bar())
-    order = model.system.row_order
-    bodies = np.asarray(model.system.pattern.bodies) + 1
-    ends = [sorted(b for b in row if b <= model.system.body_count) for row in bodies[list(order)]]
-    assert sorted(order) == list(range(len(model.rows)))
-    assert ends == [[1], [1], [1], [1, 2], [2], [2]]

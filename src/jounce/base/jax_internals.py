@@ -7,6 +7,7 @@ known at once.
 """
 
 from collections.abc import Callable, Sequence
+from functools import wraps
 from typing import Any
 
 import jax
@@ -15,6 +16,7 @@ from jax.core import Tracer
 
 TRIED = (0, 10), (0, 11)  # releases of JAX
 CERTAIN = "by_certain_entries"  # a name of operations
+OWN = "subroutine_"  # how the names of functions begin that are not written in the place of their calls
 
 
 def is_tried() -> bool:
@@ -113,6 +115,22 @@ def by_certain_entries() -> Any:
 def is_by_certain_entries(equation: Any) -> bool:
     """Tell whether an operation is so marked."""
     return CERTAIN in str(equation.source_info.name_stack)
+
+
+def subroutine(function: Callable[..., Any]) -> Any:
+    """Decorate a function of arrays that machine code has once for all its calls: what follows is jitted, too."""
+
+    @wraps(function)
+    def named(*arguments: Any) -> Any:
+        return function(*arguments)
+
+    named.__name__ = OWN + function.__name__
+    return jax.jit(named)
+
+
+def is_subroutine(equation: Any) -> bool:
+    """Tell whether an operation is a call of such a function."""
+    return str(equation.params.get("name", "")).startswith(OWN)
 
 
 def sizes_of_scan(equation: Any) -> tuple[int, int]:

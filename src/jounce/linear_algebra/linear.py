@@ -65,6 +65,10 @@ class DenseFactor(Module):
         """Return these factors for matrices near to those that were factored, by which solutions are refined."""
         return DenseFactor(matrix, self.eliminated, self.order, self.pivots)
 
+    def renewed(self) -> "DenseFactor":
+        """Return the factors of these matrices, where they have been near to those that were factored."""
+        return self.of(self.matrix)
+
     def defect(self) -> Float[Numbers, " batch"]:
         """Return by which part solutions are off that are not refined, as one of known solution tells, shape (batch,).
 

@@ -9,9 +9,10 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
-from jounce.base.jax_internals import by_certain_entries
+from jounce.base.jax_internals import by_certain_entries, subroutine
 from jounce.base.modules import Module, field, with_fields
 from jounce.base.shapes import Numbers
+from jounce.linear_algebra.elimination_order import Order
 
 Columns = Float[Numbers, "row batch"]
 
@@ -27,13 +28,17 @@ class ReflectedFactor(Module):
     reduced: Float[Numbers, "row row batch"]  # above its diagonal the triangle, below and on it the reflections
     pivots: Columns  # diagonal of the triangle
     shares: Columns  # two over the squared length of each reflection; 0 where nothing is reflected
-    order: tuple[int, ...] = field(static=True)  # of the rows in all of these
+    order: Order = field(static=True)  # of the rows and columns in all of these
 
     @classmethod
     @by_certain_entries()
-    def of(cls, matrix: Float[Numbers, "row row batch"], order: tuple[int, ...]) -> "ReflectedFactor":
-        """Factor matrices of shape (rows, rows, batch), their rows in an order."""
-        matrix = _ordered(matrix, order)
+    def of(cls, matrix: Float[Numbers, "row row batch"], order: Order) -> "ReflectedFactor":
+        """Factor matrices of shape (rows, rows, batch), their rows and columns in an order."""
+        return cls._of_ordered(_ordered(matrix, order), order)
+
+    @classmethod
+    @by_certain_entries()
+    def _of_ordered(cls, matrix: Float[Numbers, "row row batch"], order: Order) -> "ReflectedFactor":
         columns, pivots, shares, rows, rest = [], [], [], [], matrix
         for _ in range(len(matrix)):
             first = rest[:, 0]
@@ -58,15 +63,19 @@ class ReflectedFactor(Module):
         return cls(matrix, jnp.stack(reduced), jnp.stack(pivots), jnp.stack(shares), order)
 
     @classmethod
-    def blank(cls, order: tuple[int, ...], lanes: int) -> "ReflectedFactor":
+    def blank(cls, order: Order, lanes: int) -> "ReflectedFactor":
         """Return a placeholder for the factors of a batch, to start a loop with."""
-        size = len(order)
+        size = len(order[0])
         matrix, column = np.zeros((size, size, lanes)), np.zeros((size, lanes))
         return cls(matrix, matrix, column, column, order)
 
     def refining(self, matrix: Float[Numbers, "row row batch"]) -> "ReflectedFactor":
         """Return these factors for matrices near to those that were factored, by which solutions are refined."""
         return with_fields(self, matrix=_ordered(matrix, self.order))
+
+    def renewed(self) -> "ReflectedFactor":
+        """Return the factors of these matrices, where they have been near to those that were factored."""
+        return self._of_ordered(self.matrix, self.order)
 
     @by_certain_entries()
     def defect(self) -> Float[Numbers, " batch"]:
@@ -84,11 +93,12 @@ class ReflectedFactor(Module):
 
         A correction that is followed by another need not be refined.
         """
-        right = _ordered(right, self.order)
+        rows, columns = self.order
+        right = right[np.asarray(rows)]
         solution = _substituted(self, right)
-        if not refined:
-            return solution
-        return solution + _substituted(self, right - jnp.sum(self.matrix * solution[None], axis=1))
+        if refined:
+            solution = solution + _substituted(self, right - jnp.sum(self.matrix * solution[None], axis=1))
+        return solution[np.argsort(columns)]
 
     def applied_inverse(self, matrix: Float[Numbers, "row column"]) -> Float[Numbers, "row column"]:
         """Return the products of the inverse of the first matrix with the columns of another, shape (rows, columns)."""
@@ -103,15 +113,16 @@ class ReflectedFactor(Module):
     def sign(self) -> Float[Numbers, " batch"]:
         """Return the signs of the determinants, shape (batch,): 0 where singular, NaN where not finite."""
         reflected = jnp.where(self.shares == 0, 1.0, -1.0)
-        swaps = sum(later < row for k, row in enumerate(self.order) for later in self.order[k:])
+        swaps = sum(later < index for order in self.order for k, index in enumerate(order) for later in order[k:])
         return jnp.prod(reflected * jnp.sign(self.pivots), axis=0) * (-1.0) ** swaps
 
 
-def _ordered(rows: Float[Numbers, "row *rest"], order: tuple[int, ...]) -> Float[Numbers, "row *rest"]:
-    return jnp.stack([rows[row] for row in order])
+def _ordered(matrix: Float[Numbers, "row row batch"], order: Order) -> Float[Numbers, "row row batch"]:
+    rows, columns = map(np.asarray, order)
+    return matrix[rows[:, None], columns[None]]
 
 
-@jax.jit  # traced once for all orders
+@subroutine  # traced once for all orders
 @by_certain_entries()
 def _substituted(factor: ReflectedFactor, right: Columns) -> Columns:
     size = len(factor.pivots)

@@ -15,6 +15,7 @@ from jounce.constraints.friction import check_no_own_code
 from jounce.errors import JounceError
 from jounce.jet import Jet, concatenate
 from jounce.jet.algebra import stacked
+from jounce.linear_algebra.elimination_order import Order, elimination_order
 from jounce.linear_algebra.fronts import Fronts
 from jounce.linear_algebra.pattern import Pattern
 from jounce.mechanism.carriages import carriages
@@ -239,13 +240,12 @@ class System(Module):
         return rows > columns and self.rank is None
 
     @property
-    def row_order(self) -> tuple[int, ...]:
-        """Rows by the first and the last moving body that they touch: eliminated so, few of their zeros are filled."""
-        ends: list[tuple[int, int]] = []
+    def elimination_order(self) -> Order:
+        """Rows and columns in the order in which reflections eliminate the Jacobian: few of its zeros are filled."""
+        touched = []
         for group, count in zip(self.groups, self.pattern.row_counts, strict=True):
-            touched = [[body for body in bodies if body] for bodies in zip(*group.bodies, strict=True)]
-            ends += [(min(bodies, default=0), max(bodies, default=0)) for bodies in touched] * count
-        return tuple(sorted(range(len(ends)), key=ends.__getitem__))
+            touched += [frozenset(b - 1 for b in bodies if b) for bodies in zip(*group.bodies, strict=True)] * count
+        return elimination_order(tuple(touched), self.body_count, self.pattern.width)
 
     def residual(self, pose: Pose, time: Jet) -> Float[Jet, "row batch"]:
         """Return the residuals of all constraints, shape (rows, batch), scaled."""

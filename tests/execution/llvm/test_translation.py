@@ -488,28 +488,86 @@ def test_constants_that_some_ways_have_in_common():
 
 
 def test_a_matrix_with_certain_zeros_is_eliminated_with_fewer_lines():
-    places = np.abs(np.subtract.outer(np.arange(6), np.arange(6))) < 2
+    size, order = 9, (tuple(range(9)), tuple(range(9)))
+    places = np.abs(np.subtract.outer(np.arange(size), np.arange(size))) < 2
     lines = []
 
     def solved(entries, right):
-        factor = ReflectedFactor.of(masked(entries, places), tuple(range(6)))
+        factor = ReflectedFactor.of(masked(entries, places), order)
         return factor.solve(right), factor.sign(), factor.pivot_ratio()
 
     def dense(entries, right):
-        factor = ReflectedFactor.of(jnp.reshape(entries, (6, 6, 1)), tuple(range(6)))
+        factor = ReflectedFactor.of(jnp.reshape(entries, (size, size, 1)), order)
         return factor.solve(right), factor.sign(), factor.pivot_ratio()
 
-    entries, right = ordinary(places.sum()), ordinary(6, seed=1)
-    matrix = np.zeros((6, 6, COUNT))
+    entries, right = ordinary(places.sum()), ordinary(size, seed=1)
+    matrix = np.zeros((size, size, COUNT))
     matrix[places] = entries
     with pytest.MonkeyPatch.context() as patch:
         made = modules.compiled
         patch.setattr(machine, "compiled", lambda text, **how: lines.append(text.count("\n")) or made(text, **how))
         solution, sign, ratio = compiled(solved, [entries, right])([], [entries, right])
-        of_all = compiled(dense, [matrix.reshape(36, COUNT), right])([], [matrix.reshape(36, COUNT), right])
+        of_all = compiled(dense, [matrix.reshape(-1, COUNT), right])([], [matrix.reshape(-1, COUNT), right])
     by_lane = np.moveaxis(matrix, -1, 0)
     np.testing.assert_allclose(solution, np.linalg.solve(by_lane, right.T[..., None])[..., 0].T, rtol=1e-10)
     np.testing.assert_array_equal(sign, np.linalg.slogdet(by_lane).sign)
     for mine, theirs in zip((solution, sign, ratio), of_all, strict=True):
         np.testing.assert_allclose(mine, theirs, rtol=1e-10)
     assert lines[0] < 0.6 * lines[1]
+
+
+@pytest.mark.parametrize("width", [2, 8])
+def test_branches_that_change_what_a_loop_changes(width):
+    def change(kept, x, mode):
+        new = jnp.where(mode[None] == 0, kept * 0.5 + x[None], -kept)
+        inner = lax.cond(jnp.all(x > 0), lambda: (new, kept), lambda: (kept, kept[::-1] + x[None]))
+        return inner[0], inner[1]
+
+    def run(mode, x):
+        def body(state):
+            a, b, count = state
+            before = a, b
+            c, d = lax.cond(jnp.any(count % 2 == 1), lambda: change(a, x, mode), lambda: (a, b))
+            a, b = lax.cond(jnp.any(c[0] > 1.0), lambda: (c, d + before[0]), lambda: (c, d))
+            return a, jnp.where(count[None] == 2, before[1], b), count + 1
+
+        start = jnp.stack([x, 2 * x, x - 1]), jnp.zeros((3, 1)), jnp.zeros(1, int)
+        return lax.while_loop(lambda s: (s[2][0] < 5) & (s[0][1, 0] < 6.0), body, start), x
+
+    assert_agree(run, np.arange(COUNT) % 2, ordinary(), width=width, counts=(COUNT, 1))
+
+
+def test_values_of_a_loop_that_change_places_in_a_branch():
+    def run(x):
+        def body(state):
+            a, b, count = state
+            c, d = lax.cond(jnp.any(b[0] > a[0]), lambda: (b, a), lambda: (a, b))
+            e = lax.cond(jnp.any(x > 0), lambda: (c + d, a), lambda: (c, b))
+            return e[0], a + e[1], count + 1
+
+        start = jnp.stack([x, -x]), jnp.stack([0.5 * x, x]), jnp.zeros(1, int)
+        return lax.while_loop(lambda s: s[2][0] < 3, body, start)
+
+    assert_agree(run, ordinary())
+
+
+def test_what_no_branch_changes_is_handed_on():
+    def run(n, x):
+        kept = jnp.stack([x, jnp.ones_like(x)])
+        ways = [lambda k=k: (kept, x * k, kept[0]) for k in range(3)]
+        return lax.switch(n[0], ways)
+
+    assert_agree(run, np.arange(COUNT) % 3, ordinary())
+
+
+def test_constants_that_a_loop_of_known_length_keeps(scans):
+    def run(x):
+        @jax_internals.by_certain_entries()
+        def turn(matrix, row):
+            return matrix @ matrix * 0.5, jnp.stack([row * 2, jnp.zeros_like(row), row, jnp.full_like(row, 7.0)])
+
+        start = jnp.zeros((4, 4)).at[0, 1].set(x[0]).at[1, 0].set(0.5).at[2, 2].set(x[0] + 1)
+        matrix, rows = lax.scan(turn, start, jnp.arange(3.0) * x)
+        return matrix[..., None], rows[..., None]
+
+    assert_agree(run, ordinary(), signs=False)

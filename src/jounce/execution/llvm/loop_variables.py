@@ -5,12 +5,15 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import Any
 
-from jounce.execution.llvm.text.arrays import filled
+import numpy as np
+from jax.extend.core import Literal
+
+from jounce.execution.llvm.text.arrays import each, filled
 from jounce.execution.llvm.text.code import Code, flat
 from jounce.execution.llvm.text.scalars import is_same_constant
-from jounce.execution.llvm.text.stored import copied, is_large, put
+from jounce.execution.llvm.text.stored import copied, is_large, put, stored
 from jounce.execution.llvm.text.values import Region, Value, kind_of
-from jounce.execution.llvm.text.views import Array, Deferred, InMemory, Stored, contiguous
+from jounce.execution.llvm.text.views import Array, Deferred, InMemory, Stored, as_read, contiguous
 
 LEAST_SIZE = 16  # numbers of an array of which constants are looked for: to find that they do not stay costs a turn
 
@@ -26,6 +29,8 @@ class LoopVariables:
         Shapes and types of the arrays, and whether their numbers differ from lane to lane.
     invariants : sequence of mapping, optional
         Of the places in each array at which a constant stays to that constant.
+    regions : sequence of Region or None, optional
+        Memory of arrays that are changed in their places.
     """
 
     def __init__(
@@ -34,17 +39,21 @@ class LoopVariables:
         avals: Sequence[Any],
         lanes: Sequence[bool],
         invariants: Sequence[Mapping[int, Value]] | None = None,
+        regions: Sequence[Region | None] | None = None,
     ):
         self.invariants: list[dict[int, Value]] = list(map(dict, invariants)) if invariants else [{} for _ in avals]
         self._stored: dict[tuple[int, int], list[tuple[Value, slice]]] = {}  # constants, and by which lines
         self.code, self.shapes = code, [aval.shape for aval in avals]
         self.large = [is_large(code, aval) for aval in avals]
         self.regions = [
-            (code.taken_room if large else code.room)(math.prod(aval.shape), kind_of(aval.dtype), lanes=vector)
-            for aval, vector, large in zip(avals, lanes, self.large, strict=True)
+            region
+            or (code.taken_room if large else code.room)(math.prod(aval.shape), kind_of(aval.dtype), lanes=vector)
+            for aval, vector, large, region in zip(
+                avals, lanes, self.large, regions or [None] * len(avals), strict=True
+            )
         ]
 
-    def load(self, ways: int = 0) -> list[Array]:
+    def load(self, ways: int = 0, new: Sequence[Array] | None = None) -> list[Array]:
         """Return the arrays as they are; large ones stay where they are.
 
         Parameters
@@ -52,18 +61,25 @@ class LoopVariables:
         ways : int, default 0
             By how many ways they were stored so far, of which one was taken, if constants are to be known that all
             of them have stored.
+        new : sequence of array, optional
+            What the lanes that are written for have in their place; a number that is there already is not loaded.
         """
 
-        def number(which: int, k: int) -> Value:
+        def number(which: int, k: int, there: Value | None) -> Value:
+            if there is not None and there.home == (self.regions[which], k):
+                return there
             known = self.invariants[which].get(k) or self._same_in(which, k, ways)
             return known or self.code.load(self.regions[which], k)
 
-        return [
-            contiguous(self.regions[which], shape)
-            if large
-            else filled(shape, [number(which, k) for k in range(math.prod(shape))])
-            for which, (shape, large) in enumerate(zip(self.shapes, self.large, strict=True))
-        ]
+        result: list[Array] = []
+        for which, (shape, large) in enumerate(zip(self.shapes, self.large, strict=True)):
+            if large:
+                result.append(contiguous(self.regions[which], shape))
+                continue
+            array = None if new is None else new[which]
+            there = flat(array) if isinstance(array, np.ndarray) else [None] * math.prod(shape)
+            result.append(filled(shape, [number(which, k, value) for k, value in enumerate(there)]))
+        return result
 
     @contextmanager
     def held(self) -> Iterator[None]:
@@ -97,6 +113,13 @@ class LoopVariables:
                     lines = slice(before, len(self.code.lines))
                     self._stored.setdefault((number, k), []).append((value, lines))
 
+    def note_rows(self, rows: Sequence[Array], length: int) -> None:
+        """Take note of the constants in rows of which a loop makes one in each of so many turns."""
+        for known, row in zip(self.invariants, rows, strict=True):
+            if not isinstance(row, InMemory):
+                constants = [(k, value) for k, value in enumerate(flat(row)) if may_be_invariant(value)]
+                known |= {turn * row.size + k: value for turn in range(length) for k, value in constants}
+
     def note_invariants(self, ways: int) -> None:
         """Take back what stored a constant that is the same in all ways, each written in a scope of its own."""
         for (which, k), stores in self._stored.items():
@@ -125,7 +148,106 @@ def invariants_of(code: Code, array: Array) -> dict[int, Value]:
     return {k: value for k, value in enumerate(flat(array)) if may_be_invariant(value)}
 
 
+def still_invariant(invariants: Mapping[int, Value], array: Array) -> dict[int, Value]:
+    """Return the constants of an array that are there after a turn of a loop as before."""
+    if not invariants or isinstance(array, InMemory):
+        return {}
+    values = flat(array)
+    return {k: value for k, value in invariants.items() if is_same_constant(value, values[k])}
+
+
+def chosen(code: Code, choice: Value, new: Sequence[Array], old: Sequence[Array]) -> list[Array]:
+    """Return new arrays in lanes where a truth value holds, old ones elsewhere."""
+
+    def either(x: Array, y: Array) -> Array:
+        if not isinstance(x, InMemory) and not isinstance(y, InMemory):
+            return each(lambda a, b: code.select(choice, a, b), x, y)
+        a, b = (array if isinstance(array, Deferred) else as_read(stored(code, array)) for array in (x, y))
+        if a.given[0].is_same(b.given[0]) and not isinstance(x, Deferred) and not isinstance(y, Deferred):
+            return a.given[0]
+        count = len(a.given)
+
+        def body(values: Sequence[Value]) -> Value:
+            return code.select(choice, a.body(values[:count]), b.body(values[count:]))
+
+        return Deferred((*a.given, *b.given), a.kind, body, choice.lanes)
+
+    return [either(x, y) for x, y in zip(new, old, strict=True)]
+
+
 def _reads_others(array: Array, target: Stored, changing: Collection[Region]) -> bool:
     """Tell whether an array reads other numbers that change than the one in whose place a number is put."""
     read = array.given if isinstance(array, Deferred) else [array] if isinstance(array, Stored) else []
     return any(part.region in changing and not target.is_same(part) for part in read)
+
+
+class Homes:
+    """Where values are in memory, while ways are written of which each lane takes one.
+
+    Parameters
+    ----------
+    arrays : sequence of array
+        That the ways are given.
+    """
+
+    def __init__(self, arrays: Sequence[Array]):
+        values = [value for array in arrays if not isinstance(array, InMemory) for value in flat(array)]
+        self._homes = [(value, value.home) for value in values if value.home is not None]
+        self._changed: list[Value] = []
+
+    def restore(self) -> None:
+        """Begin another way: what those before have changed in its place, they have changed in other lanes."""
+        for value, home in self._homes:
+            if value.home is None:
+                self._changed.append(value)
+                value.home = home
+
+    def forget(self, regions: Sequence[Region | None]) -> None:
+        """End with all ways: what was changed, and the memory of some arrays, holds the values of before no more."""
+        for value in self._changed:
+            value.home = None
+        for value, home in self._homes:
+            if home[0] in regions:
+                value.home = None
+
+
+def unchanged(ways: Sequence[Any], inputs: Sequence[Array]) -> list[Array | None]:
+    """Return which results of ways are arguments of theirs that all of them leave as they are; None for others."""
+    result: list[Array | None] = []
+    for variables in zip(*(way.outvars for way in ways), strict=True):
+        indices = {way.invars.index(x) if x in way.invars else None for way, x in zip(ways, variables, strict=True)}
+        index = indices.pop() if len(indices) == 1 else None
+        result.append(None if index is None else inputs[index])
+    return result
+
+
+def changed_in_place(
+    code: Code, which: Value, first: Any, inputs: Sequence[Array], results: Sequence[int]
+) -> list[Region | None]:
+    """Return where results of ways are changed in the memory of a loop, as their first way leaves them as they are.
+
+    Parameters
+    ----------
+    code : Code
+        What is written to.
+    which : Value
+        Number of the way that a lane takes.
+    first : Jaxpr
+        The first way.
+    inputs : sequence of array
+        Arguments of the ways.
+    results : sequence of int
+        Numbers of the results.
+    """
+    given = dict(zip(first.invars, inputs, strict=True))
+    regions: list[Region | None] = []
+    for variable in [first.outvars[k] for k in results]:
+        array, region = None if isinstance(variable, Literal) else given.get(variable), None
+        if isinstance(array, np.ndarray) and code.large is None and (which.lanes or code.here is None):
+            values = [(k, value) for k, value in enumerate(flat(array)) if value.constant is None]
+            homes = {value.home and value.home[0] for _, value in values}
+            its = homes.pop() if len(homes) == 1 else None
+            if its is not None and its.lanes and its in code.changes and its not in regions:
+                region = its if all(value.home == (its, k) for k, value in values) else None
+        regions.append(region)
+    return regions

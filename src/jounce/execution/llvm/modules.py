@@ -145,6 +145,7 @@ def _text(
     lines = [
         *code.constants,
         *turning,
+        *(subroutine.text for subroutine in code.subroutines.values()),
         "define void @run(ptr noalias %arguments, i64 %total) #1 {",
         "begin:",
         *borrowed,

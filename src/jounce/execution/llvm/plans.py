@@ -6,10 +6,10 @@ from typing import Any
 
 from jax.extend.core import Literal
 
-from jounce.base.jax_internals import is_by_certain_entries
+from jounce.base.jax_internals import is_by_certain_entries, is_subroutine
 
 CALLS = ("jit", "pjit", "closed_call", "core_call", "custom_jvp_call", "custom_vjp_call", "checkpoint", "remat2")
-"""Operations that call a program, which is written in their place."""
+"""Operations that call a program, which is written in their place unless it is a subroutine."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,7 +105,7 @@ def _written(
 
     for equation in program.eqns:
         given, result = [name(variable) for variable in equation.invars], list(equation.outvars)
-        if equation.primitive.name in CALLS:
+        if equation.primitive.name in CALLS and not is_subroutine(equation):
             called, values = _called(equation)
             inner = dict(zip(called.invars, given, strict=True))
             for variable, value in zip(called.constvars, values, strict=True):

@@ -4,7 +4,7 @@ Where lanes part, all ways that some lane takes are run, and each keeps what its
 last lane that is in it has left. So the results of a lane depend on no other.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -12,13 +12,21 @@ from jax.extend.core import Literal, jaxprs_in_params
 
 from jounce.base.jax_internals import sizes_of_scan
 from jounce.execution.llvm.calls import call
-from jounce.execution.llvm.loop_variables import LoopVariables, invariants_of
+from jounce.execution.llvm.loop_variables import (
+    Homes,
+    LoopVariables,
+    changed_in_place,
+    chosen,
+    invariants_of,
+    still_invariant,
+    unchanged,
+)
 from jounce.execution.llvm.plans import plan_of
 from jounce.execution.llvm.rules.loops import DEFERRED, READING, STORED
 from jounce.execution.llvm.rules.operations import RULES
-from jounce.execution.llvm.text.arrays import constants, each, filled
-from jounce.execution.llvm.text.code import Code, flat
-from jounce.execution.llvm.text.scalars import is_same_constant
+from jounce.execution.llvm.subroutines import call_subroutine
+from jounce.execution.llvm.text.arrays import constants, filled
+from jounce.execution.llvm.text.code import Code
 from jounce.execution.llvm.text.stored import (
     any_lanes,
     is_large,
@@ -31,7 +39,7 @@ from jounce.execution.llvm.text.stored import (
     values_of,
 )
 from jounce.execution.llvm.text.values import NoRuleError, Region, UnsupportedOperationError, Value, kind_of
-from jounce.execution.llvm.text.views import Array, Deferred, InMemory, Stored, as_read, contiguous, further
+from jounce.execution.llvm.text.views import Array, Deferred, InMemory, Stored, contiguous, further
 
 MOST_UNROLLED = 4_000  # lines of a loop of known length that is written turn after turn
 MOST_UNROLLED_IN_MEMORY = 1_000  # where arrays may stay in memory
@@ -197,23 +205,6 @@ def _likely_made(code: Code, avals: Sequence[Any]) -> list[bool]:
     return [kind_of(aval.dtype) == "f" and not code.single for aval in avals]
 
 
-def _chosen(code: Code, choice: Value, new: Sequence[Array], old: Sequence[Array]) -> list[Array]:
-    def chosen(x: Array, y: Array) -> Array:
-        if not isinstance(x, InMemory) and not isinstance(y, InMemory):
-            return each(lambda a, b: code.select(choice, a, b), x, y)
-        a, b = (array if isinstance(array, Deferred) else as_read(stored(code, array)) for array in (x, y))
-        if a.given[0].is_same(b.given[0]) and not isinstance(x, Deferred) and not isinstance(y, Deferred):
-            return a.given[0]
-        count = len(a.given)
-
-        def body(values: Sequence[Value]) -> Value:
-            return code.select(choice, a.body(values[:count]), b.body(values[count:]))
-
-        return Deferred((*a.given, *b.given), a.kind, body, choice.lanes)
-
-    return [chosen(x, y) for x, y in zip(new, old, strict=True)]
-
-
 def _while(code: Code, equation: Any, given: Sequence[Array]) -> list[Array]:
     """Write a loop that each lane leaves when its condition no longer holds."""
     p = equation.params
@@ -236,26 +227,18 @@ def _while(code: Code, equation: Any, given: Sequence[Array]) -> list[Array]:
             code.branch(code.anywhere(goes), body, end)
             code.begin(body)
             live = [*condition, *needed, *(before if goes.lanes else ())]
-            with code.scope(goes if goes.lanes else None), code.used(_among(live)):
+            with code.scope(goes if goes.lanes else None), code.used(_among(live)), code.changing(state.regions):
                 after = _closed(code, p["body_jaxpr"], needed, before, late=True)
                 if goes.lanes:
-                    after = _chosen(code, goes, after, before)
+                    after = chosen(code, goes, after, state.load(new=after))
                 state.store(after)
                 _give_back(code, after)
             code.jump(head)
         code.begin(end)
-        return (_in_lanes(after, lanes), [*map(_still_invariant, invariants, after)]), state.load()
+        return (_in_lanes(after, lanes), [*map(still_invariant, invariants, after)]), state.load()
 
     avals = [variable.aval for variable in equation.outvars]
     return _until_settled(code, (_likely(code, start, avals), [invariants_of(code, x) for x in start]), attempt)
-
-
-def _still_invariant(invariants: Mapping[int, Value], array: Array) -> dict[int, Value]:
-    """Return the constants of an array that are there after a turn of a loop as before."""
-    if not invariants or isinstance(array, InMemory):
-        return {}
-    values = flat(array)
-    return {k: value for k, value in invariants.items() if is_same_constant(value, values[k])}
 
 
 def _among(arrays: Sequence[Array]) -> Callable[[Region], bool]:
@@ -313,8 +296,9 @@ def _rolled(
     made = [variable.aval for variable in equation.outvars[size:]]
     last = code.constant(p["length"] - 1, "l")
 
-    def attempt(lanes: list[bool]) -> tuple[list[bool], list[Array]]:
-        state = LoopVariables(code, [variable.aval for variable in equation.outvars[:size]], lanes[:size])
+    def attempt(known: tuple[list[bool], list[dict[int, Value]]]) -> tuple[Any, list[Array]]:
+        lanes, invariants = known
+        state = LoopVariables(code, [variable.aval for variable in equation.outvars[:size]], lanes[:size], invariants)
         written, counter = LoopVariables(code, made, lanes[size:]), code.room(1, "l", lanes=False)
         state.store(start)
         code.store(counter, 0, code.constant(0, "l"))
@@ -322,7 +306,13 @@ def _rolled(
         body, end = code.label(), code.label()
         code.jump(body)
         code.begin(body)
-        with code.scope(), code.used(_among([*needed, *homes])), state.held(), written.held():
+        with (
+            code.scope(),
+            code.used(_among([*needed, *homes])),
+            state.held(),
+            written.held(),
+            code.changing(state.regions),
+        ):
             count = code.load(counter, 0)
             at = code.arithmetic("sub", last, count) if p["reverse"] else count
             taken = [row(code, array, at) if array.size else np.empty(array.shape[1:], object) for array in homes]
@@ -330,15 +320,17 @@ def _rolled(
             for region, array in zip(written.regions, results[size:], strict=True):
                 if array.size:
                     put(code, contiguous(region, array.shape, further(code, 0, at, array.size)), array)
+            written.note_rows(results[size:], p["length"])
             state.store(results[:size])  # after what may be a part of what was carried
             _give_back(code, results)
             code.store(counter, 0, code.arithmetic("add", count, code.constant(1, "l")))
             code.branch(code.operand(code.compare("lt", count, last), lanes=False), body, end)
         code.begin(end)
-        return _in_lanes(results, lanes), [*state.load(), *written.load()]
+        remaining = [*map(still_invariant, invariants, results[:size])]
+        return (_in_lanes(results, lanes), remaining), [*state.load(), *written.load()]
 
     likely = [*_likely(code, start, [variable.aval for variable in equation.outvars[:size]]), *_likely_made(code, made)]
-    return _until_settled(code, likely, attempt)
+    return _until_settled(code, (likely, [invariants_of(code, x) for x in start]), attempt)
 
 
 def _unrolled(
@@ -379,10 +371,16 @@ def _cond(code: Code, equation: Any, given: Sequence[Array]) -> list[Array]:
     which = code.converted(which, "i") if which.kind == "b" else which
     if len(ways) == 1 or which.constant is not None:
         return _closed(code, ways[min(max(int(which.constant or 0), 0), len(ways) - 1)], inputs)
+    left = unchanged([way.jaxpr for way in ways], inputs)
+    changing = [k for k, array in enumerate(left) if array is None]
+    avals = [equation.outvars[k].aval for k in changing]
+    in_place = changed_in_place(code, which, ways[0].jaxpr, inputs, changing)
+    homes = Homes(inputs)
 
     def attempt(lanes: list[bool]) -> tuple[list[bool], list[Array]]:
-        results, differing = LoopVariables(code, [variable.aval for variable in equation.outvars], lanes), lanes
+        results, differing = LoopVariables(code, avals, lanes, regions=in_place), lanes
         for k, way in enumerate(ways):
+            homes.restore()
             word = "le" if k == 0 else "ge" if k == len(ways) - 1 else "eq"
             here = code.among_here(code.compare(word, which, code.constant(k, which.kind)))
             begin, end = code.label(), code.label()
@@ -392,18 +390,31 @@ def _cond(code: Code, equation: Any, given: Sequence[Array]) -> list[Array]:
                 code.scope(here if here.lanes else None),
                 code.used(_among(inputs if k < len(ways) - 1 or here.lanes else [])),
             ):
-                made = _closed(code, way, inputs)
+                every = _closed(code, way, inputs)
+                made = [every[k] for k in changing]
                 differing = _in_lanes(made, differing)
                 if which.lanes and k > 0:
-                    made = _chosen(code, here, made, results.load(k))
+                    made = chosen(code, here, made, results.load(k, made))
                 results.store(made)
             code.jump(end)
             code.begin(end)
         results.note_invariants(len(ways))
         return differing, results.load()
 
-    avals = [variable.aval for variable in equation.outvars]
-    return _until_settled(code, [which.lanes or likely for likely in _likely_made(code, avals)], attempt)
+    likely = [
+        which.lanes or likely or region is not None
+        for likely, region in zip(_likely_made(code, avals), in_place, strict=True)
+    ]
+    changed = iter(_until_settled(code, likely, attempt))
+    homes.forget(in_place)
+    return [next(changed) if array is None else array for array in left]
+
+
+def _subroutine(code: Code, equation: Any, given: Sequence[Array]) -> list[Array]:
+    """Write a call of a program that is written once, or that program where arrays may be in memory."""
+    if code.large is not None:
+        return _closed(code, equation.params["jaxpr"], given)
+    return [*call_subroutine(code, equation, [values_of(code, array) for array in given], _closed)]
 
 
 _CONTROL = {
@@ -412,4 +423,6 @@ _CONTROL = {
     "cond": _cond,
     "custom_linear_solve": _linear_solve,
     "ffi_call": call,
+    "jit": _subroutine,
+    "pjit": _subroutine,
 }

@@ -262,13 +262,13 @@ def advance(
         Whether the rate of the determinant is looked for here, too; else it is left at zero.
     """
     given = coordinates, angles, sign, step, instant, tolerance, refine, finite_order
-    arrival, factor, reached = solved_batch(system, *given, pose_type=pose_type, order=order)
+    arrival, factor, pose = solved_batch(system, *given, pose_type=pose_type, order=order)
     first = arrival.status[:1]
 
     def searched() -> Any:
         hidden = hidden_by_laws(system, first, instant[:1], step[:1], order)
-        det_rate = det_rate_of(system, pose_type, reached, factor, instant) if with_det_rate else np.zeros(1)
-        here = {name: jet.map(lambda c: c[..., :1]) for name, jet in reached.items()}
+        det_rate = det_rate_of(system, pose, factor, instant) if with_det_rate else np.zeros(1)
+        here = {name: jet.map(lambda c: c[..., :1]) for name, jet in pose.coordinates().items()}
         return hidden, det_rate, *safe_step_and_radius(system, here, pose_type.predictor)
 
     first, det_rate, safe_step, radius = jax.lax.cond(search, searched, lambda: (first, *[np.zeros(1)] * 3))
@@ -289,8 +289,8 @@ def solved_batch(
     *,
     pose_type: type[Pose],
     order: int,
-) -> tuple[StepResult, Factor, dict[str, Jet]]:
-    """Return what `advance` does but for what it searches, with the factored Jacobian and the jets of the pose."""
+) -> tuple[StepResult, Factor, Pose]:
+    """Return what `advance` does but for what it searches, with the factored Jacobian and the pose."""
     # what a law makes infinite, such as the third derivative of t**2.5 at t = 0, is of no use to a prediction
     moving = {name: Jet(tuple(jnp.where(jnp.isfinite(c), c, 0.0))) for name, c in coordinates.items()}
     predicted = pose_type.predicted_from(moving, step)
@@ -331,4 +331,4 @@ def solved_batch(
         finite,
         gaps,
     )
-    return arrival, factor, reached
+    return arrival, factor, pose

@@ -45,15 +45,15 @@ def _of_many(shared: Any, instants: Any, *, pose_type: type[Pose], order: int) -
     )
     system = of_design(system, own)
     given = coordinates, angles, sign, step, instant, tolerance, refine, finite_order
-    arrival, factor, reached = solved_batch(system, *given, pose_type=pose_type, order=order)
+    arrival, factor, pose = solved_batch(system, *given, pose_type=pose_type, order=order)
     nothing = jnp.zeros_like(step)
     if own is None:
         return arrival._replace(det_rate=nothing, safe_step=nothing, radius=nothing)
 
     def searched() -> Any:
         hidden = hidden_by_laws(system, arrival.status, instant, step, order)
-        det_rate = det_rates_of(system, pose_type, reached, factor, instant)
-        return hidden, det_rate, *safe_step_and_radius(system, reached, pose_type.predictor)
+        det_rate = det_rates_of(system, pose, factor, instant)
+        return hidden, det_rate, *safe_step_and_radius(system, pose.coordinates(), pose_type.predictor)
 
     nowhere = arrival.status, *[nothing] * 3
     status, det_rate, safe_step, radius = jax.lax.cond(jnp.any(search), searched, lambda: nowhere)

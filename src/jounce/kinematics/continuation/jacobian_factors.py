@@ -35,10 +35,9 @@ def refactored(system: System, pose: Pose, time: Jet, known: Factor, anew: Bool[
     """
     if not isinstance(known, DenseFactor | ReflectedFactor):
         return factored(system, pose, time)
-    matrix = system.jacobian(pose, time)
-    reused = known.refining(matrix)
+    reused = known.refining(system.jacobian(pose, time))
     stale = jnp.any(~(reused.defect() <= STALE))
-    return jax.lax.cond(anew | stale, lambda: _of(system, matrix), lambda: reused)
+    return jax.lax.cond(anew | stale, reused.renewed, lambda: reused)
 
 
 def blank_factor(system: System, lanes: int) -> Factor:
@@ -48,11 +47,11 @@ def blank_factor(system: System, lanes: int) -> Factor:
     if system.rank is not None:
         return LeastSquaresFactor.blank(system.shape, lanes)
     if system.reflected:
-        return ReflectedFactor.blank(system.row_order, lanes)
+        return ReflectedFactor.blank(system.elimination_order, lanes)
     return DenseFactor.blank(system.shape, lanes)
 
 
 def _of(system: System, matrix: Float[Numbers, "row column batch"]) -> Factor:
     if system.rank is not None:
         return LeastSquaresFactor.of(matrix)
-    return ReflectedFactor.of(matrix, system.row_order) if system.reflected else DenseFactor.of(matrix)
+    return ReflectedFactor.of(matrix, system.elimination_order) if system.reflected else DenseFactor.of(matrix)

@@ -14,65 +14,57 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
+from jounce.base.jax_internals import by_certain_entries
 from jounce.base.shapes import Numbers, Real
 from jounce.jet import Jet
 from jounce.kinematics.continuation.jacobian_factors import Factor, factored
 from jounce.linear_algebra.frontal import FrontalFactor
 from jounce.mechanism.system import System
+from jounce.rigid.body_arrays import each_jet
 from jounce.rigid.pose import Pose
 
 SQUARINGS = 4  # of the matrix of which the largest eigenvalue is sought
 PROBES = 8  # vectors by which the norm of a power of a large matrix is estimated
 
 
-def det_rate_of(
-    system: System,
-    pose_type: type[Pose],
-    coordinates: dict[str, Jet],
-    factor: Factor,
-    time: Float[Numbers, " batch"],
-) -> Float[Numbers, " 1"]:
-    """Return the eigenvalue of ``J^-1 J'`` of largest size with the sign of its real part, 1/s, for the first lane."""
-    first = {name: jet.truncate(1).map(lambda c: c[..., :1]) for name, jet in coordinates.items()}
-    instant = time[:1]
+def det_rate_of(system: System, pose: Pose, factor: Factor, instant: Float[Numbers, " batch"]) -> Float[Numbers, " 1"]:
+    """Return the eigenvalue of ``J^-1 J'`` of largest size with the sign of its real part, 1/s, for the first lane.
 
-    def entries(step: Any) -> Any:
-        return system.entries(pose_type.predicted_from(first, step), Jet([(instant + step)[None]]))
-
-    _, slope = jax.jvp(entries, (np.zeros(1),), (np.ones(1),))
+    Parameters
+    ----------
+    system : System
+        The mechanism.
+    pose : Pose
+        With its first derivatives.
+    factor : Factor
+        Of the Jacobian there.
+    instant : array of shape (batch,)
+        When that is, s.
+    """
+    slope = _slope(system, each_jet(lambda jet: jet.map(lambda c: c[..., :1]), pose), instant[:1])
     if isinstance(factor, FrontalFactor):
 
         def product(vectors: Any) -> Any:
             return factor.applied_inverse(system.pattern.product(slope, vectors) * system.row_scale)
 
         return _of_products(product, system.shape[1])
-    return _of_matrix(factor.applied_inverse(system.pattern.dense(slope)[..., 0] * system.row_scale))
+    with by_certain_entries():  # many columns do not change
+        return _of_matrix(factor.applied_inverse(system.pattern.dense(slope)[..., 0] * system.row_scale))
 
 
 def det_rate_at(
-    system: System, pose_type: type[Pose], coordinates: dict[str, Numbers], time: Float[Numbers, " batch"]
+    system: System, pose_type: type[Pose], coordinates: dict[str, Numbers], instant: Float[Numbers, " batch"]
 ) -> Float[Numbers, " 1"]:
     """Return what `det_rate_of` does, from the jets of the coordinates alone."""
-    first = {name: Jet(tuple(x[:2, ..., :1])) for name, x in coordinates.items()}
-    pose = pose_type.predicted_from(first, np.zeros(1))
-    return det_rate_of(system, pose_type, first, factored(system, pose, Jet([time[None, :1]])), time)
+    pose = pose_type.from_coordinates({name: Jet(tuple(x[:2, ..., :1])) for name, x in coordinates.items()})
+    return det_rate_of(system, pose, factored(system, pose.truncate(0), Jet([instant[None, :1]])), instant)
 
 
 def det_rates_of(
-    system: System,
-    pose_type: type[Pose],
-    coordinates: dict[str, Jet],
-    factor: Factor,
-    time: Float[Numbers, " batch"],
+    system: System, pose: Pose, factor: Factor, instant: Float[Numbers, " batch"]
 ) -> Float[Numbers, " batch"]:
     """Return what `det_rate_of` does, for all lanes."""
-    first = {name: jet.truncate(1) for name, jet in coordinates.items()}
-
-    def entries(step: Any) -> Any:
-        return system.entries(pose_type.predicted_from(first, step), Jet([(time + step)[None]]))
-
-    _, slope = jax.jvp(entries, (jnp.zeros_like(time),), (jnp.ones_like(time),))
-    relative = system.pattern.dense(slope) * system.row_scale[:, :, None]
+    relative = system.pattern.dense(_slope(system, pose, instant)) * system.row_scale[:, :, None]
     relative = jax.vmap(partial(factor.solve, refined=False), in_axes=1, out_axes=1)(relative)
 
     def product(a: Any, b: Any) -> Any:
@@ -81,7 +73,7 @@ def det_rates_of(
     def norm(x: Any) -> Any:
         return jnp.maximum(jnp.sqrt(jnp.sum(x * x, axis=(0, 1))), 1e-300)
 
-    power, grown = relative, jnp.zeros_like(time)
+    power, grown = relative, jnp.zeros_like(instant)
     for k in range(1, SQUARINGS + 1):
         size = norm(power)
         scaled = power / size[None, None]
@@ -91,14 +83,26 @@ def det_rates_of(
     return _leading(along / jnp.where(trace == 0, 1.0, trace), size, along, size)
 
 
+def _slope(system: System, pose: Pose, instant: Float[Numbers, " batch"]) -> Float[Numbers, "entry batch"]:
+    """Return how fast the entries of the Jacobian change."""
+    still, moving = pose.truncate(0), pose.truncate(1)
+    rates = each_jet(lambda jet: Jet([jet.dense().coefficients[1]]) if jet.order else None, moving)
+
+    def entries(still: Any, now: Any) -> Any:
+        return system.entries(still, Jet([now[None]]))
+
+    return jax.jvp(entries, (still, instant), (rates, jnp.ones_like(instant)))[1]
+
+
 def _of_matrix(relative: Float[Numbers, "column column"]) -> Float[Numbers, " 1"]:
     """Return it for a matrix, from a power of it: the root of its norm is never too small, and tends to the size."""
 
+    @by_certain_entries()
     def squared(k: Any, carry: Any) -> Any:
         power, grown = carry
         size = jnp.maximum(jnp.sqrt(jnp.sum(power * power)), 1e-300)
         scaled = power / size
-        return jax.lax.map(lambda row: row @ scaled, scaled), grown + jnp.log(size) * 0.5**k
+        return jax.lax.map(by_certain_entries()(lambda row: row @ scaled), scaled), grown + jnp.log(size) * 0.5**k
 
     power, grown = jax.lax.fori_loop(0, SQUARINGS, squared, (relative, np.zeros(())))
     size = jnp.exp(grown + jnp.log(jnp.maximum(jnp.sqrt(jnp.sum(power * power)), 1e-300)) / 2**SQUARINGS)

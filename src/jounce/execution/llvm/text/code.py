@@ -37,6 +37,10 @@ class Code(Scalars):
         All memory that was taken, in that order.
     plans : dict
         Of programs to how they are written, as `plans.plan_of` has it.
+    changes : list of Region
+        Memory of what the innermost loop changes, which a branch within it may change in its place.
+    subroutines : dict
+        Those that were written, by the program and what is known of its arguments; see `subroutines`.
     """
 
     entry: list[str] = field(default_factory=list)
@@ -49,6 +53,8 @@ class Code(Scalars):
     held: list[Region] = field(default_factory=list)
     taken: list[Region] = field(default_factory=list)
     plans: dict[Any, Any] = field(default_factory=dict)
+    changes: Sequence[Region] = ()
+    subroutines: dict[Any, Any] = field(default_factory=dict)
     _free: dict[tuple[int, str, bool], list[Region]] = field(default_factory=dict)  # that nobody uses any more
     _taken: dict[Region, tuple[int, str, bool]] = field(default_factory=dict)  # that somebody may, by what they hold
     _tables: dict[tuple[str, bytes], Region] = field(default_factory=dict)
@@ -81,6 +87,15 @@ class Code(Scalars):
         """Let memory be used again, if it can be given back."""
         if region not in self.held and (key := self._taken.pop(region, None)) is not None:
             self._free.setdefault(key, []).append(region)
+
+    @contextmanager
+    def changing(self, regions: Sequence[Region]) -> Iterator[None]:
+        """Write a turn of a loop that changes some memory."""
+        before, self.changes = self.changes, regions
+        try:
+            yield
+        finally:
+            self.changes = before
 
     @contextmanager
     def used(self, wants: Callable[[Region], bool]) -> Iterator[None]:
@@ -231,15 +246,17 @@ class Code(Scalars):
             free_regions,
             dict(self._taken),
             len(self.taken),
+            len(self.subroutines),
         )
 
     def back_to(self, mark: tuple[Any, ...]) -> None:
         """Take back what was written since a mark in the same scope."""
-        lines, entry, known, self.memory, self.heap, free_regions, taken, count = mark
+        lines, entry, known, self.memory, self.heap, free_regions, taken, count, subroutines = mark
         self._free, self._taken = {key: list(regions) for key, regions in free_regions.items()}, dict(taken)
         del self.lines[lines:], self.entry[entry:], self.taken[count:]
-        while len(self._known[-1]) > known:
-            self._known[-1].popitem()
+        for written, number in ((self._known[-1], known), (self.subroutines, subroutines)):
+            while len(written) > number:
+                written.popitem()
 
 
 def flat(array: np.ndarray) -> list[Value]:

@@ -173,7 +173,7 @@ class Scalars:
                 return self.constant(python(a.constant, b.constant), a.kind)
         if (same := _neutral(operation, a, b)) is not None:
             return same
-        if self.sparse and operation == "mul" and a.kind == "f" and (_is_zero(a) or _is_zero(b)):
+        if self.sparse and a.kind == "f" and _is_nothing(operation, a, b):
             return self.constant(0.0)  # of no sign
         if operation in COMMUTATIVE and a.name > b.name:
             a, b = b, a
@@ -315,6 +315,11 @@ class Scalars:
 
 def _is_zero(a: Value) -> bool:
     return a.constant is not None and bool(a.constant == 0)
+
+
+def _is_nothing(operation: str, a: Value, b: Value) -> bool:
+    """Tell whether a product or a quotient is zero as its factor or its dividend is, whatever the other one is."""
+    return (operation in ("mul", "div") and _is_zero(a)) or (operation == "mul" and _is_zero(b))
 
 
 def is_same_constant(a: Value, b: Value) -> bool:
