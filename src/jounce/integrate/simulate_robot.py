@@ -10,6 +10,7 @@ from jounce.base.activity import Count
 from jounce.base.shapes import ArrayLike, is_traced
 from jounce.errors import RobotError, UnsupportedError, check_name, flag
 from jounce.execution.backends import backend_of
+from jounce.integrate.marching.exact_numbers import ExactNumbers
 from jounce.integrate.marching.joint_events import JointEvent, JointEventDetector
 from jounce.integrate.marching.marching import Outcome, steps_between_looks
 from jounce.integrate.marching.robot_marching import STUCK, Progress, RobotProblem, RobotState, RobotSteps, march_robot
@@ -151,7 +152,7 @@ class _Run:
         self, problem: RobotProblem, tolerance: float, longest: float, order: int, detectors: list[JointEventDetector]
     ):
         self.problem, self.tolerance, self.longest, self.order = problem, tolerance, longest, order
-        self.events = EventLog(detectors)
+        self.events, self.exact = EventLog(detectors), ExactNumbers.of_parallel(problem.equations)
         numbers = (order + 2) * 2 * len(problem.scale)
         self.count = steps_between_looks(numbers, watched=bool(detectors))
         self.parts: list[RobotSteps] = []
@@ -192,7 +193,8 @@ class _Run:
     def _marched(self, current: Progress, begun: float, stop: float) -> Any:
         limits = (np.float64(x) for x in (begun, stop, self.tolerance, self.longest))
         try:
-            return march_robot(self.problem, current, *limits, order=self.order, count=self.count)
+            how: Any = {"order": self.order, "count": self.count, "exact": self.exact}
+            return march_robot(self.problem, current, *limits, **how)
         except TypeError as error:
             if "has no rule for Taylor series" not in str(error):
                 raise

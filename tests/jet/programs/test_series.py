@@ -25,7 +25,8 @@ def series(function, *paths):
 
         def body(k, carry):
             history, store = carry
-            found, history = recursion.advanced(history, k, [path[k] for path in paths])
+            found, newest = recursion.advanced(history, k, [path[k] for path in paths])
+            history = recursion.noted(history, k, newest)
             return history, jax.tree.map(lambda s, x: s.at[k].set(x), store, found)
 
         return jax.lax.fori_loop(1, len(paths[0]), body, (recursion.history, store))[1]
@@ -282,9 +283,10 @@ def test_coefficients_that_come_late_make_the_same_history():
 
     def step(at_once, late, k, now):
         recursion = Recursion(program, (x[0], y[0]), ORDER)
-        found, at_once = recursion.advanced(at_once, k, now)
-        without, late = recursion.advanced(late, k, (now[0], None))
-        late = recursion.corrected(late, (None, now[1]))
+        found, newest = recursion.advanced(at_once, k, now)
+        at_once = recursion.noted(at_once, k, newest)
+        without, newest = recursion.advanced(late, k, (now[0], None))
+        late = recursion.noted(late, k, recursion.corrected(newest, (None, now[1])))
         slope = jax.jvp(lambda y: program(x[0], y), (y[0],), (now[1],))[1]
         gaps = jax.tree.map(lambda a, b, c: jnp.max(jnp.abs(a - b - c)), found, without, slope)
         return at_once, late, (gaps, jax.tree.map(lambda a, b: jnp.max(jnp.abs(a - b)), at_once, late))

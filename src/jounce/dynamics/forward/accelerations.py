@@ -390,9 +390,10 @@ def expand(
     def level(k: Any, carry: Any) -> Any:
         history, now, series, rates = carry
         ticking = jnp.where(k == 1, jnp.ones_like(time), jnp.zeros_like(time))
-        (forces, second, attitude_rate), history = recursion.advanced(history, k, (*now, None, None, ticking))
+        (forces, second, attitude_rate), newest = recursion.advanced(history, k, (*now, None, None, ticking))
         acceleration, multipliers = solved(forces, second)
-        history = recursion.corrected(history, (None,) * 4 + (acceleration, multipliers, None))
+        newest = recursion.corrected(newest, (None,) * 4 + (acceleration, multipliers, None))
+        history = recursion.noted(history, k, newest)
         now = raised(now, acceleration, attitude_rate, k + 1)
         put = jax.lax.dynamic_update_index_in_dim
         series = State(*(put(s, c, k + 1, 0) for s, c in zip(series, now, strict=True)))

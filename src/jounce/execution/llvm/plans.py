@@ -86,7 +86,13 @@ def plan_of(program: Any, deferred: Collection[str], reading: Collection[str]) -
 
 
 def _written(
-    program: Any, names: dict[Any, Any], operations: list[Operation], constants: dict[Any, Any], *, whole: bool
+    program: Any,
+    names: dict[Any, Any],
+    operations: list[Operation],
+    constants: dict[Any, Any],
+    *,
+    whole: bool,
+    sparse: bool = False,
 ) -> list[Any]:
     """Add the operations of a program, those that it calls among them, and return its results.
 
@@ -98,6 +104,8 @@ def _written(
         other names each time.
     whole : bool
         Whether it is called by none.
+    sparse : bool, default False
+        Whether it is called by certain entries.
     """
 
     def name(variable: Any) -> Any:
@@ -105,19 +113,19 @@ def _written(
 
     for equation in program.eqns:
         given, result = [name(variable) for variable in equation.invars], list(equation.outvars)
+        here = sparse or is_by_certain_entries(equation)
         if equation.primitive.name in CALLS and not is_subroutine(equation):
             called, values = _called(equation)
             inner = dict(zip(called.invars, given, strict=True))
             for variable, value in zip(called.constvars, values, strict=True):
                 inner[variable] = Variable(variable.aval)
                 constants[inner[variable]] = value
-            names |= zip(result, _written(called, inner, operations, constants, whole=False), strict=True)
+            names |= zip(result, _written(called, inner, operations, constants, whole=False, sparse=here), strict=True)
             continue
         if not whole:
             result = [Variable(variable.aval) for variable in result]
             names |= zip(equation.outvars, result, strict=True)
-        sparse = is_by_certain_entries(equation)
-        operations.append(Operation(equation.primitive, equation.params, given, result, sparse))
+        operations.append(Operation(equation.primitive, equation.params, given, result, here))
     return [name(variable) for variable in program.outvars]
 
 

@@ -88,16 +88,18 @@ def translate(
         noted(variable, array)
     for variable, value in plan.constants.items():
         noted(variable, constants(code, value))
+    around = code.sparse
     with code.used(lambda region: read_last.get(region, -1) > now):
         for now, operation in enumerate(plan.operations):
             inputs = [read(variable) for variable in operation.invars]
-            before, code.sparse = len(code.taken), operation.sparse and code.large is None
+            before, code.sparse = len(code.taken), around or operation.sparse
             result = _results(code, operation, inputs, delayed=now in plan.delayed)
             for variable, values in zip(operation.outvars, result, strict=True):
                 noted(variable, _checked(values, variable.aval))
             if code.large is not None:
                 _give_back_but(code, code.taken[before:], result)
                 _let_go(code, known, plan.ends.get(now, ()))
+        code.sparse = around
         results = [read(variable) for variable in plan.results]
         return results if late else [stored(code, x) if isinstance(x, Deferred) else x for x in results]
 

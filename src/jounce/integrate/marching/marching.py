@@ -38,7 +38,7 @@ SMALLEST_STEP = FINEST / 8.0  # of the span, or of the time itself
 REFUSED = 0.45  # of a step that was refused is tried next: no power of two, or it would end where others have ended
 SHORT = 1.0 / 4.0  # of the longest step so far: shorter ones leave out as much less
 STUCK = 64  # steps that hardly move on, one after the other: a force that switches without end
-AT_LEAST, AT_MOST = 64, 256  # steps tried between two looks at progress and events,
+AT_LEAST, AT_MOST = 64, 512  # steps tried between two looks at progress and events,
 NUMBERS = 2**15  # of their polynomials: to make room for more takes longer than another call
 STUBBORN = 3  # steps refused one after the other: no series that is only too short for its step needs so many
 

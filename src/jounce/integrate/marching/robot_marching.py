@@ -8,16 +8,20 @@ from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from jounce.base.modules import Module
+from jounce.base.modules import Module, with_fields
 from jounce.base.shapes import Numbers
-from jounce.execution.compilation import compiled
+from jounce.execution.compilation import LARGE, compiled
+from jounce.execution.llvm.text.values import UnsupportedOperationError
+from jounce.integrate.marching.exact_numbers import ExactNumbers, forms_of
 from jounce.integrate.marching.marching import SHORT as UNUSUAL, Outcome
 from jounce.integrate.steps.lookahead import HARMLESS, NEAR, POINTS, RUN_POINTS, SHORTEST, finest, steps_counted
 from jounce.integrate.steps.methods import MARGIN, NEEDED, ROUNDING, Lanes, furthest
 from jounce.jet.programs.series import Recursion
-from jounce.robot.algorithms.motion_series import MotionSeries, motion_series
+from jounce.jet.programs.still_entries import Still
+from jounce.robot.algorithms.motion_series import MotionSeries, motion_series, still_motion
 from jounce.robot.algorithms.wrench_laws import WrenchLaws
 from jounce.robot.model.joint_laws import AbstractJointLaws
 from jounce.robot.recursions.tree_equations import TreeEquations, TreeState, Unknowns, free_base
@@ -103,13 +107,39 @@ class RobotProblem(Module):
         return Unknowns(forces, None if motion.base is None else jnp.zeros_like(motion.base.twist)), pushes
 
     def series(
-        self, state: RobotState, time: Float[Numbers, "1 batch"], order: int, *, reversible: bool = False
+        self,
+        state: RobotState,
+        time: Float[Numbers, "1 batch"],
+        order: int,
+        *,
+        reversible: bool = False,
+        still: Still | None = None,
     ) -> MotionSeries:
         """Return the series of the motion; the order is that of the accelerations."""
         ticking = jnp.concatenate([time[None], jnp.ones((1, *time.shape)), jnp.zeros((max(order - 1, 0), *time.shape))])
         driven = self._prescribed_accelerations(state, time, order)
         given = ticking[: order + 1], driven, order
-        return motion_series(self.equations, self.motion(state), self.applied, *given, reversible=reversible)
+        motion = self.motion(state)
+        return motion_series(self.equations, motion, self.applied, *given, reversible=reversible, still=still)
+
+    def made_for(self, exact: ExactNumbers) -> "RobotProblem":
+        """Return it with constants of a program in the place of some numbers."""
+        return with_fields(self, equations=exact.put(self.equations))
+
+    def still(self, exact: ExactNumbers) -> Still | None:
+        """Return what does not change in its motion if only some of its numbers are known; None where that fails."""
+        from jounce.execution.llvm.certain_numbers import certain_numbers
+
+        known = with_fields(forms_of(self), equations=exact.known(self.equations))
+        state, time = RobotState(*[np.full((len(self.scale), 1), np.nan)] * 2), np.full((1, 1), np.nan)
+        program, form = jax.make_jaxpr(RobotProblem.motion, return_shape=True)(known, state)
+        try:
+            now = certain_numbers(program, jax.tree.leaves((known, state)))
+            motion = jax.tree.unflatten(jax.tree.structure(form), now)
+            trial = Unknowns(state.rates, None)
+            return still_motion(lambda problem: (problem.equations, problem.applied), known, motion, trial, time)
+        except UnsupportedOperationError:
+            return None
 
     def prescribed_series(self, like: Any, time: Any, order: int) -> Any:
         """Return the series of the prescribed coordinates, zero for the others, (order + 1, n, batch)."""
@@ -123,8 +153,9 @@ class RobotProblem(Module):
         def level(k: Any, carry: Any) -> Any:
             history, coefficients = carry
             ticks = jnp.where(k == 1, jnp.ones_like(time), jnp.zeros_like(time))
-            newest, history = recursion.advanced(history, k, (ticks,))
-            return history, jax.lax.dynamic_update_index_in_dim(coefficients, newest, k, 0)
+            outputs, newest = recursion.advanced(history, k, (ticks,))
+            coefficients = jax.lax.dynamic_update_index_in_dim(coefficients, outputs, k, 0)
+            return recursion.noted(history, k, newest), coefficients
 
         first = recursion.history, start.at[0].set(recursion.outputs)
         return jax.lax.fori_loop(1, order + 1, level, first)[1]
@@ -191,10 +222,7 @@ class Progress(NamedTuple):
 
 def polynomial_of(series: MotionSeries) -> RobotState:
     """Return the coefficients of a series as those of a state."""
-    motion = series.motion
-    if motion.base is None:
-        return RobotState(motion.coordinates, motion.rates)
-    return RobotState(motion.coordinates, motion.rates, motion.base.position, motion.base.quaternion, motion.base.twist)
+    return RobotState(series.coordinates, series.rates, series.position, series.quaternion, series.twist)
 
 
 def at(polynomial: RobotState, since: Lanes) -> RobotState:
@@ -226,6 +254,18 @@ def _value(coefficients: Any, since: Any) -> Any:
     return jax.lax.fori_loop(0, count, added, jnp.zeros(shape))
 
 
+def _departures(problem: RobotProblem, polynomial: RobotState, time: Any, since: Any, *, one_by_one: bool) -> Any:
+    """Return what `RobotProblem.departures` gives at places on a step, for all at once or one after another."""
+
+    def at_places(since: Any) -> Any:
+        state, rates = at(polynomial, since), rates_at(polynomial, since)
+        return problem.departures(state, rates, (time + since)[None])
+
+    if not one_by_one:
+        return at_places(since)
+    return [jnp.moveaxis(x[..., 0], 0, -1) for x in jax.lax.map(at_places, since[:, None])]
+
+
 def _sizes(problem: RobotProblem, polynomial: RobotState) -> Any:
     """Return the sizes of the coefficients of places from order one on, rad or sizes of the robot."""
     levels = len(polynomial.rates)
@@ -241,7 +281,7 @@ def _sizes(problem: RobotProblem, polynomial: RobotState) -> Any:
     return jnp.concatenate([jnp.maximum(sizes[:-1], jnp.maximum(moved, turned)), sizes[-1:]])
 
 
-@compiled("order", "count", single=True)
+@compiled("order", "count", "exact", single=True, otherwise={"exact": None})
 def march_robot(
     problem: RobotProblem,
     current: Progress,
@@ -252,6 +292,7 @@ def march_robot(
     *,
     order: int,
     count: int,
+    exact: ExactNumbers | None = None,
 ) -> tuple[Progress, RobotSteps, Int[Numbers, ""]]:
     """Take up to `count` steps toward a time.
 
@@ -271,6 +312,8 @@ def march_robot(
         Of the series.
     count : int
         Steps at most.
+    exact : ExactNumbers, optional
+        Of the robot, for which the program is made.
 
     Returns
     -------
@@ -280,8 +323,12 @@ def march_robot(
     taken : int
         How many there are.
     """
+    problem, still = (problem, None) if exact is None else (problem.made_for(exact), problem.still(exact))
     duration = jnp.abs(stop - begun)
     points = SMOOTH_POINTS if problem.smooth else POINTS
+
+    small = 9 * problem.equations.tree.shape.bodies <= LARGE  # axes of all bodies, as single numbers
+    one_by_one = problem.smooth and exact is not None and small
 
     def look(polynomial: RobotState, time: Any, step: Any, first: Any, usual: Any) -> tuple[Any, Any]:
         """Return the error that a part of the places on a step shows, as part of what is allowed, and if it is finite.
@@ -291,8 +338,7 @@ def march_robot(
         """
         shares = jnp.concatenate([jnp.zeros(1), (first + jnp.arange(1.0, points + 1)) / _point_count(step)])
         since = jnp.minimum(shares, 1.0) * step
-        state, rates = at(polynomial, since), rates_at(polynomial, since)
-        gap, size = problem.departures(state, rates, (time + since)[None])
+        gap, size = _departures(problem, polynomial, time, since, one_by_one=one_by_one)
         rounding = NOISE * jnp.max(jnp.abs(gap[:, 0])) + ROUNDING * jnp.max(jnp.abs(size))
         largest = jnp.maximum(jnp.max(jnp.abs(gap[:, 1:])) - rounding, 0.0)
         local = largest * step**2 / (order * (order + 1.0)) / (MARGIN * tolerance)
@@ -323,7 +369,7 @@ def march_robot(
 
     def attempt(current: Progress) -> tuple[Progress, Any, Any]:
         time, left = current.time, stop - current.time[0] - current.rest[0]
-        whole = polynomial_of(problem.series(current.state, time[None], order))
+        whole = polynomial_of(problem.series(current.state, time[None], order, still=still))
         sizes = _sizes(problem, whole)
         known = jnp.all(jnp.isfinite(sizes[:NEEDED]))
         sizes = jnp.where(jnp.isfinite(sizes), sizes, jnp.inf)

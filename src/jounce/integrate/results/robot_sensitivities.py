@@ -243,4 +243,4 @@ def _marched(
     there = at(series(own, start[which]), since)
     expanded = problem.series(there, instants[None], levels, reversible=True)
     last = expanded.accelerations.joints[levels:] / ((levels + 1) * (levels + 2))
-    return jnp.concatenate([expanded.motion.coordinates[: levels + 2], last])
+    return jnp.concatenate([expanded.coordinates[: levels + 2], last])

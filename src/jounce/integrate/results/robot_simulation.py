@@ -276,12 +276,12 @@ def expanded_robot(
     state = at(polynomial, since)
     series = problem.series(state, time[None], order)
     last = series.accelerations.joints[order:] / ((order + 1) * (order + 2))
-    q = jnp.concatenate([series.motion.coordinates[: order + 2], last])
-    if series.motion.base is None:
+    q = jnp.concatenate([series.coordinates[: order + 2], last])
+    if series.twist is None:
         return state, q, None
     rate = series.accelerations.base
     assert rate is not None
-    return state, q, jnp.concatenate([series.motion.base.twist[: order + 1], rate[order:] / (order + 1)])
+    return state, q, jnp.concatenate([series.twist[: order + 1], rate[order:] / (order + 1)])
 
 
 @mapped(widths=WIDTHS)

@@ -10,8 +10,8 @@ with zero for the unknown, solve its linear equations, and add what the unknown 
 other products are of coefficients known before: one sum over the orders for all of them side by side.
 """
 
-import math
 from collections.abc import Callable, Sequence
+from contextlib import nullcontext
 from functools import reduce
 from itertools import accumulate
 from typing import Any, NamedTuple
@@ -21,6 +21,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax.extend.core import JaxprEqn
 
+from jounce.base.jax_internals import by_certain_entries, is_by_certain_entries
 from jounce.jet.coefficients import minus, plus, total
 from jounce.jet.programs.operations import (
     ADDITIVE,
@@ -33,9 +34,8 @@ from jounce.jet.programs.operations import (
     STEPWISE,
     times,
 )
+from jounce.jet.programs.product_history import ProductHistory
 from jounce.jet.programs.reader import ProgramReader, only_adds
-
-_BLOCK = 8  # terms of a sum taken at once
 
 
 class _Pair(NamedTuple):
@@ -53,6 +53,7 @@ class _Node(NamedTuple):
     operands: tuple[Any, ...]  # numbers of variables, or arrays that do not change in time
     pairs: list[_Pair]
     result: int
+    sparse: bool  # whether it is by certain entries
 
 
 class Recursion(ProgramReader):
@@ -71,13 +72,18 @@ class Recursion(ProgramReader):
         Whether loops are of known length, as JAX wants them for derivatives in reverse mode; they take longer then.
     unrolled : bool, default False
         Whether orders are whole numbers of Python, each with code of its own, which is faster where it is not too much.
+    still : Still, optional
+        Entries of the arguments, and of what is multiplied, that do not change in time.
 
     Attributes
     ----------
+    form : tuple
+        What tells the program from others: the operations that were read, the shapes of what is multiplied, and for
+        each product the places of its two factors among those.
     outputs
         Coefficients of order zero of the results, in the pytree that the function returns.
     history
-        Coefficients known so far of what is multiplied: what `advanced` takes and returns, a pytree of arrays.
+        Coefficients known so far of what is multiplied: what `advanced` takes and `noted` returns, a pytree of arrays.
 
     Raises
     ------
@@ -95,11 +101,13 @@ class Recursion(ProgramReader):
         *,
         reversible: bool = False,
         unrolled: bool = False,
+        still: Any = None,
     ):
-        self.order, self.reversible, self.unrolled = order, reversible, unrolled
         self._nodes: list[_Node] = []
         self._values: dict[int, Any] = {}  # of order zero, by number of the variable
         self._known: dict[Any, Any] = {}  # results of operations already read, which programs often repeat
+        self._names: list[str] = []  # of operations that were read
+        self._sparse = False  # whether what is read now is by certain entries
         self._pairs: dict[Any, Any] = {}  # sine and cosine, or their hyperbolic likes, of the same angle
         self._inputs = [self._variable(value) for value in values]
         program, shape = jax.make_jaxpr(function, return_shape=True)(*values)
@@ -109,12 +117,22 @@ class Recursion(ProgramReader):
         self._nodes = self._needed()
         self._products = list(dict.fromkeys(pair for node in self._nodes for pair in node.pairs))
         self._stored = list(dict.fromkeys(x for pair in self._products for x in pair[:2]))
-        self._width = sum(jnp.size(self._values[pair.left]) for pair in self._products)
-        left, right = ((), ()) if unrolled else (jnp.zeros((order + size * _BLOCK, self._width)) for size in (1, 2))
-        self.history = (left, right, tuple(self._values[x] for x in self._stored))
+        numbers = {x: k for k, x in enumerate(self._stored)}
+        pairs = [(numbers[pair.left], numbers[pair.right], pair.weighted) for pair in self._products]
+        shapes = [jnp.shape(self._values[x]) for x in self._stored]
+        self.form = self._names, shapes, pairs
+        self._still = still if still is not None and still.form == self.form else None
+        factors = None if self._still is None else self._still.factors
+        self._rows = ProductHistory(shapes, pairs, order, factors, reversible=reversible, unrolled=unrolled)
+        self.history = self._rows.begun
 
-    def advanced(self, history: Any, k: Any, coefficients: Sequence[Any]) -> tuple[Any, Any]:
-        """Return the coefficients of order k of the outputs, and the history with them.
+    @property
+    def uses_still(self) -> bool:
+        """Whether entries that do not change in time are left out: those given were found for this program."""
+        return self._still is not None
+
+    def advanced(self, history: Any, k: Any, coefficients: Sequence[Any]) -> tuple[Any, tuple[Any, ...]]:
+        """Return the coefficients of order k of the outputs, and those of what is multiplied, for `noted`.
 
         Parameters
         ----------
@@ -125,29 +143,45 @@ class Recursion(ProgramReader):
         coefficients : sequence of array or None
             Of order k, of the arguments; None is zero.
         """
-        left, right, newest = history
-        left, right = self._written(left, right, newest, k - 1)
-        now = self._swept(coefficients, self._sums(left, right, k))
+        if self._still is not None:
+            known = zip(self._still.given, coefficients, strict=True)
+            coefficients = [c if c is None else jnp.where(still, 0.0, c) for still, c in known]
+        return self.swept(coefficients, self._rows.sums(history, k))
+
+    def swept(self, coefficients: Sequence[Any], sums: Sequence[Any]) -> tuple[Any, tuple[Any, ...]]:
+        """Return the next coefficients of the outputs and of what is multiplied.
+
+        Parameters
+        ----------
+        coefficients : sequence of array or None
+            Next ones of the arguments; None is zero.
+        sums : sequence of array
+            Of the products of coefficients known before, in the order of `form`.
+        """
+        now = self._swept(coefficients, dict(zip(self._products, sums, strict=True)))
 
         def value_of(x: Any) -> Any:
             c = now[x] if isinstance(x, int) else None
             return jnp.zeros_like(self.value(x)) if c is None else c
 
-        return self._collected([value_of(x) for x in self._outputs]), (left, right, tuple(map(value_of, self._stored)))
+        return self._collected([value_of(x) for x in self._outputs]), tuple(map(value_of, self._stored))
 
-    def corrected(self, history: Any, changes: Sequence[Any]) -> Any:
-        """Return the history after a change of the newest coefficients of the arguments.
+    def corrected(self, newest: Sequence[Any], changes: Sequence[Any]) -> tuple[Any, ...]:
+        """Return the newest coefficients of what is multiplied after a change of those of the arguments.
 
         Parameters
         ----------
-        history
+        newest
             As `advanced` returned it.
         changes : sequence of array or None
-            To add to the coefficients of the order reached; None where there is no change.
+            To add to the newest coefficients of the arguments; None where there is no change.
         """
-        left, right, newest = history
         change = self._swept(changes, None)
-        return left, right, tuple(plus(c, change.get(x)) for x, c in zip(self._stored, newest, strict=True))
+        return tuple(plus(c, change.get(x)) for x, c in zip(self._stored, newest, strict=True))
+
+    def noted(self, history: Any, k: Any, newest: Sequence[Any]) -> Any:
+        """Return the history with the newest coefficients, of order k, of what is multiplied."""
+        return self._rows.noted(history, k, newest)
 
     def _swept(self, coefficients: Sequence[Any], sums: dict[_Pair, Any] | None) -> dict[int, Any]:
         """Return coefficients of order k of all variables, from those of the arguments; None is zero."""
@@ -155,7 +189,8 @@ class Recursion(ProgramReader):
         for node in self._nodes:
             parts = [now[x] if isinstance(x, int) else None for x in node.operands]
             swept = None if sums is None or not node.pairs else total(sums[pair] for pair in node.pairs)
-            now[node.result] = node.rule(parts, swept)
+            with by_certain_entries() if node.sparse else nullcontext():
+                now[node.result] = node.rule(parts, swept)
         return now
 
     # what is known of variables
@@ -182,56 +217,25 @@ class Recursion(ProgramReader):
                 waiting += [x for pair in node.pairs for x in pair[:2]]
         return [node for node in self._nodes if node.result in needed]
 
-    # histories: the factors of all products side by side, one row an order, so that one loop sums all products
-
-    def _written(self, left: Any, right: Any, newest: Sequence[Any], k: Any) -> tuple[Any, Any]:
-        """Write the coefficients of order k, in one piece a side: what is compiled is to stay small."""
-        if not self._products:
-            return left, right
-        rows = {x: jnp.ravel(c) for x, c in zip(self._stored, newest, strict=True)}
-        a, b = (jnp.concatenate([rows[pair[i]] for pair in self._products]) for i in (0, 1))
-        weighted = [pair.weighted for pair in self._products for _ in range(rows[pair.left].size)]
-        a = a * jnp.where(np.array(weighted), k, 1.0)
-        if self.unrolled:
-            return (*left, a), (*right, b)
-        left = jax.lax.dynamic_update_slice_in_dim(left, a[None], k, 0)
-        return left, jax.lax.dynamic_update_slice_in_dim(right, b[None], k + _BLOCK, 0)
-
-    def _sums(self, left: Any, right: Any, k: Any) -> dict[_Pair, Any]:
-        """Return the sums over the products of coefficients of orders 1 to k - 1, those of order k left out."""
-
-        def block(i: Any, products: Any) -> Any:
-            first = 1 + i * _BLOCK
-            a = jax.lax.dynamic_slice_in_dim(left, first, _BLOCK)
-            b = jax.lax.dynamic_slice_in_dim(right, k - first + 1, _BLOCK)
-            return products + total(a[j] * b[_BLOCK - 1 - j] for j in range(_BLOCK))
-
-        count = -(-self.order // _BLOCK) if self.reversible else (k + _BLOCK - 2) // _BLOCK  # what is beyond is zero
-        if self.unrolled:
-            products = total(left[j] * right[k - j] for j in range(1, k)) if k > 1 else jnp.zeros(self._width)
-        else:
-            products = jax.lax.fori_loop(0, count, block, jnp.zeros(self._width))
-        sums, place = {}, 0
-        for pair in self._products:
-            shape = jnp.shape(self._values[pair.left])
-            size = math.prod(shape)
-            part, place = products[place : place + size].reshape(shape), place + size
-            sums[pair] = part / k if pair.weighted else part
-        return sums
-
     # reading the program
 
     def results(self, equation: JaxprEqn, operands: list[Any]) -> list[Any]:
         """Return the results of one operation; what repeats is read once."""
-        key = self._key(equation, operands)
-        if key is None:
-            return self._read(equation, operands)
-        if key not in self._known:  # the operands stay alive with it, so that no other takes their place in memory
-            self._known[key] = self._read(equation, operands), operands
-        return self._known[key][0]
+        around, self._sparse = self._sparse, self._sparse or is_by_certain_entries(equation)
+        try:
+            with by_certain_entries() if self._sparse else nullcontext():
+                key = self._key(equation, operands)
+                if key is None:
+                    return self._read(equation, operands)
+                if key not in self._known:  # the operands stay alive with it: no other takes their place in memory
+                    self._known[key] = self._read(equation, operands), operands
+                return self._known[key][0]
+        finally:
+            self._sparse = around
 
     def _read(self, equation: JaxprEqn, operands: list[Any]) -> list[Any]:
         """Return the results of one operation; a loop that only adds is run as it is, at every order."""
+        self._names.append(equation.primitive.name)
         scanned = equation.primitive.name == "scan" and not self.is_constant(equation, operands)
         if not scanned or not only_adds(equation.params["jaxpr"].jaxpr):
             return super().results(equation, operands)
@@ -260,7 +264,7 @@ class Recursion(ProgramReader):
         names = [x if isinstance(x, int) else x.key() for x in operands]
         if equation.primitive.name in ("mul", "add", "add_any"):
             names.sort(key=str)
-        key = (equation.primitive.name, *sorted(equation.params.items()), *names)
+        key = (equation.primitive.name, self._sparse, *sorted(equation.params.items()), *names)
         try:
             hash(key)
         except TypeError:
@@ -328,7 +332,7 @@ class Recursion(ProgramReader):
 
     def _node(self, rule: Callable[..., Any], value: Any, operands: Sequence[Any], pairs: Sequence[_Pair] = ()) -> int:
         result = self._variable(value)
-        self._nodes.append(_Node(rule, tuple(operands), list(pairs), result))
+        self._nodes.append(_Node(rule, tuple(operands), list(pairs), result, self._sparse))
         return result
 
     def _linear(self, primitive: Any, parameters: dict, operands: list[Any]) -> int:

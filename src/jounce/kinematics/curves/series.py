@@ -199,14 +199,15 @@ def _differentiated(curve: _Curve, pose: Any, value: Any, factor: DenseFactor, o
 
     shift, turn, rate = parts(null)
     recursion = Recursion(program, (point, attitude, value), order)
-    _, history = recursion.advanced(recursion.history, 1, (shift, spun(turn), rate))
+    _, newest = recursion.advanced(recursion.history, 1, (shift, spun(turn), rate))
+    history = recursion.noted(recursion.history, 1, newest)
     series = tuple(begun_series([x, y], order) for x, y in ((point, shift), (attitude, spun(turn)), (value, rate)))
     turns, rates = begun_series([turn], order - 1), begun_series([tangent], order - 1)
 
     def level(k: Any, carry: Any) -> Any:
         history, series, turns, rates = carry
         trial = None if planar else _known_spin(series[1], turns, k)
-        residual, history = recursion.advanced(history, k, (None, trial, None))
+        residual, newest = recursion.advanced(history, k, (None, trial, None))
         right = jnp.concatenate([-residual[curve.rows], jnp.zeros((1, lanes))])
         solution = factor.solve(right)
         # x'[j] = (j + 1) x[j + 1], and the coefficient of order k - 1 of x'.x' vanishes
@@ -215,7 +216,7 @@ def _differentiated(curve: _Curve, pose: Any, value: Any, factor: DenseFactor, o
         solution = solution + null * lacking[None]
         shift, turn, rate = parts(solution)
         change = spun(turn)
-        history = recursion.corrected(history, (shift, change, rate))
+        history = recursion.noted(history, k, recursion.corrected(newest, (shift, change, rate)))
         now = shift, change if trial is None else trial + change, rate
         put = jax.lax.dynamic_update_index_in_dim
         series = tuple(put(x, y, k, 0) for x, y in zip(series, now, strict=True))

@@ -208,17 +208,16 @@ def _coefficients(equations: TreeEquations, arrays: tuple[Any, ...], reversible:
     motion = equations.motion(state[0], state[1], base)
     series = motion_series(equations, motion, applied, given, driven, order, reversible=reversible, unrolled=single)
     q, margin = coordinates_of(series, order), series.factor.margin[None]
-    moved, rates = series.motion.base, series.accelerations.base
-    if moved is None or rates is None:
+    rates = series.accelerations.base
+    if series.twist is None or rates is None:
         return q, margin
-    twist, last = moved.twist, rates[order:] / (order + 1)
-    return q, margin, jnp.concatenate([twist[: order + 1], last])
+    return q, margin, jnp.concatenate([series.twist[: order + 1], rates[order:] / (order + 1)])
 
 
 def coordinates_of(series: MotionSeries, order: int) -> Float[Numbers, "level coordinate batch"]:
     """Return the coefficients of the coordinates, two more than those of the accelerations."""
     last = series.accelerations.joints[order:] / ((order + 1) * (order + 2))
-    return jnp.concatenate([series.motion.coordinates[: order + 2], last])
+    return jnp.concatenate([series.coordinates[: order + 2], last])
 
 
 def _check_margins(robot: Robot, margin: Any, driven: np.ndarray) -> None:

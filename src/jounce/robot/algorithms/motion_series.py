@@ -1,12 +1,15 @@
 """The series of the motion of a tree under forces: order by order, by one factorization of its articulated inertias."""
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
 
+from jounce.execution.compilation import LARGE
 from jounce.jet.programs.series import Recursion
+from jounce.jet.programs.still_entries import Still, still_entries
 from jounce.robot.recursions.tree_equations import TreeEquations, TreeFactor, TreeState, Unknowns, Wrenches
 
 Series = Any
@@ -18,16 +21,22 @@ class MotionSeries(NamedTuple):
 
     Attributes
     ----------
-    motion : TreeState
-        To one order more than the accelerations.
+    coordinates, rates : array of shape (order + 2, coordinates, batch)
     accelerations : Unknowns
+        To the order, as all of a motion follows from them.
     factor : TreeFactor
         Of the inertias at order zero.
+    position, quaternion, twist : array of shape (order + 2, 3 or 4 or 6, batch), or None
+        Of a free base.
     """
 
-    motion: TreeState
+    coordinates: Any
+    rates: Any
     accelerations: Unknowns
     factor: TreeFactor
+    position: Any = None
+    quaternion: Any = None
+    twist: Any = None
 
 
 def motion_series(
@@ -40,6 +49,7 @@ def motion_series(
     *,
     reversible: bool = False,
     unrolled: bool = False,
+    still: Still | None = None,
 ) -> MotionSeries:
     """Return the series of the motion through a state.
 
@@ -61,6 +71,8 @@ def motion_series(
         Whether JAX may differentiate it in reverse mode.
     unrolled : bool, default False
         Whether each order has code of its own.
+    still : Still, optional
+        Of the equations, from `still_motion`.
     """
     factor = equations.factored(motion)
     start = jax.tree.map(lambda x: x[0], given)
@@ -68,56 +80,108 @@ def motion_series(
     base = None if motion.base is None else jnp.zeros((6, lanes))
     trial = Unknowns(jnp.broadcast_to(driven[0], motion.rates.shape), base)
 
-    def missing(motion: TreeState, accelerations: Unknowns, given: Any) -> Unknowns:
-        forces, wrenches = applied(motion, given)
-        return jax.tree.map(jnp.subtract, forces, equations.needed(motion, accelerations, wrenches))
-
-    change = factor.solve(missing(motion, trial, start))
+    change = factor.solve(_missing(equations, applied, motion, trial, start))
     solved = jax.tree.map(jnp.add, trial, change)
     rates = equations.motion_rates(motion, solved)
     if order == 0:
-        series = jax.tree.map(lambda a, b: jnp.stack([a, b]), motion, rates)
-        return MotionSeries(series, jax.tree.map(lambda x: x[None], solved), factor)
-    structure = jax.tree.structure((motion, solved, start))
-
-    def program(*leaves: Any) -> Any:
-        motion, accelerations, given = jax.tree.unflatten(structure, leaves)
-        return missing(motion, accelerations, given), equations.motion_rates(motion, accelerations)
-
+        accelerations, poses = jax.tree.map(lambda x: x[None], (solved, _poses(rates)))
+        return _integrated(motion, accelerations, poses, factor)
+    program = partial(_program, equations, applied, jax.tree.structure((motion, solved, start)))
     before, after = ([None] * len(jax.tree.leaves(part)) for part in (motion, start))  # of the unknowns
-    recursion = Recursion(
-        program, jax.tree.leaves((motion, solved, start)), order, reversible=reversible, unrolled=unrolled
-    )
-    put = jax.lax.dynamic_update_index_in_dim
+    known = jax.tree.leaves((motion, solved, start))
+    recursion = Recursion(program, known, order, reversible=reversible, unrolled=unrolled, still=still)
+
+    def room(first: Any) -> Any:
+        least = 0 if unrolled else LARGE // max(first.size, 1) + 1  # in memory, to write at a place that varies
+        return jnp.zeros((max(order + 1, least), *first.shape)).at[0].set(first)
+
+    def put(series: Any, newest: Any, k: Any) -> Any:
+        return jax.tree.map(lambda s, c: jax.lax.dynamic_update_index_in_dim(s, c, k, 0), series, newest)
 
     def level(k: Any, carry: Any) -> Any:
-        history, now, series, accelerations = carry
+        history, now, accelerations, poses = carry
         known = Unknowns(jnp.broadcast_to(driven[k], motion.rates.shape), base)
         inputs = jax.tree.leaves((now, known, jax.tree.map(lambda x: x[k], given)))
-        (gap, rates), history = recursion.advanced(history, k, inputs)
+        (gap, rates), newest = recursion.advanced(history, k, inputs)
         change = factor.solve(gap)
-        history = recursion.corrected(history, (*before, *jax.tree.leaves(change), *after))
+        history = recursion.noted(history, k, recursion.corrected(newest, (*before, *jax.tree.leaves(change), *after)))
         newest = jax.tree.map(jnp.add, known, change)
         rates = _with_accelerations(rates, newest)
         now = jax.tree.map(lambda x: x / (k + 1), rates)
-        series = jax.tree.map(lambda s, c: put(s, c, k + 1, 0), series, now)
-        return history, now, series, jax.tree.map(lambda s, c: put(s, c, k, 0), accelerations, newest)
+        return history, now, put(accelerations, newest, k), put(poses, _poses(rates), k)
 
-    def room(levels: int, *first: Any) -> Any:
-        def begun(*parts: Any) -> Any:
-            whole = jnp.stack(parts)
-            return jnp.pad(whole, ((0, levels - len(parts)), *((0, 0),) * (whole.ndim - 1)))
-
-        return jax.tree.map(begun, *first)
-
-    carry = recursion.history, rates, room(order + 2, motion, rates), room(order + 1, solved)
+    carry = recursion.history, rates, jax.tree.map(room, solved), jax.tree.map(room, _poses(rates))
     if unrolled:
         for k in range(1, order + 1):
             carry = level(k, carry)
     else:
         carry = jax.lax.fori_loop(1, order + 1, level, carry)
-    _, _, series, accelerations = carry
-    return MotionSeries(series, accelerations, factor)
+    accelerations, poses = jax.tree.map(lambda x: x[: order + 1], carry[2:])
+    return _integrated(motion, accelerations, poses, factor)
+
+
+def _integrated(motion: TreeState, accelerations: Unknowns, pose_rates: Any, factor: TreeFactor) -> MotionSeries:
+    """Return the series of a motion from those of its accelerations and of the rates of the pose of a free base."""
+    levels = jnp.arange(1.0, len(accelerations.joints) + 1)[:, None, None]
+
+    def integrated(start: Any, rates: Any) -> Any:
+        return jnp.concatenate([start[None], rates / levels])
+
+    rates = integrated(motion.rates, accelerations.joints)
+    series = MotionSeries(integrated(motion.coordinates, rates[:-1]), rates, accelerations, factor)
+    if motion.base is None:
+        return series
+    position, quaternion = map(integrated, _poses(motion), pose_rates)
+    twist = integrated(motion.base.twist, accelerations.base)
+    return series._replace(position=position, quaternion=quaternion, twist=twist)
+
+
+def _poses(motion: TreeState) -> Any:
+    """Return the pose of a free base, or its rates."""
+    return None if motion.base is None else (motion.base.position, motion.base.quaternion)
+
+
+def still_motion(
+    read: Callable[[Any], tuple[TreeEquations, Any]],
+    parameters: Any,
+    motion: TreeState,
+    accelerations: Unknowns,
+    given: Series,
+) -> Still:
+    """Return what does not change in the motion of a tree.
+
+    Parameters
+    ----------
+    read : callable
+        Returns the equations and the forces, as `motion_series` takes them, for parameters.
+    parameters : pytree of array
+        NaN where a number is not known beforehand.
+    motion, accelerations, given : pytree of array
+        A state and what forces depend on besides the motion, NaN where they are not known.
+    """
+    structure = jax.tree.structure((motion, accelerations, given))
+
+    def program(parameters: Any, *leaves: Any) -> Any:
+        return _program(*read(parameters), structure, *leaves)
+
+    form, first = jax.tree.structure(motion), len(jax.tree.leaves(accelerations))  # rates follow what is missing
+    numbers = jax.tree.unflatten(form, range(first, first + form.num_leaves))
+    rates = jax.tree.leaves(_with_accelerations(numbers, jax.tree.map(lambda _: -1, accelerations)))
+    values = jax.tree.leaves((motion, accelerations, given))
+    return still_entries(program, parameters, values, [*rates, *[-1] * (len(values) - len(rates))])
+
+
+def _missing(
+    equations: TreeEquations, applied: Any, motion: TreeState, accelerations: Unknowns, given: Any
+) -> Unknowns:
+    forces, wrenches = applied(motion, given)
+    return jax.tree.map(jnp.subtract, forces, equations.needed(motion, accelerations, wrenches))
+
+
+def _program(equations: TreeEquations, applied: Any, structure: Any, *leaves: Any) -> Any:
+    """Return the forces that are missing, and how the motion changes."""
+    motion, accelerations, given = jax.tree.unflatten(structure, leaves)
+    return _missing(equations, applied, motion, accelerations, given), equations.motion_rates(motion, accelerations)
 
 
 def _with_accelerations(rates: TreeState, accelerations: Unknowns) -> TreeState:

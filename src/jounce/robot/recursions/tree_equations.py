@@ -11,6 +11,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Float
 
+from jounce.base.jax_internals import by_certain_entries
 from jounce.base.modules import Module, field
 from jounce.base.shapes import Numbers
 from jounce.jet import Jet, cross
@@ -120,6 +121,7 @@ class TreeEquations(Module):
     global_axes: tuple[bool, ...] = field(static=True, default=())
     drives: bool = field(static=True, default=False)
 
+    @by_certain_entries()
     def motion(self, coordinates: Coordinates, rates: Coordinates, base: FreeBase | None = None) -> TreeState:
         """Return where all bodies are, from the coordinates."""
         tree, lanes = self.tree, coordinates.shape[-1]
@@ -141,6 +143,7 @@ class TreeEquations(Module):
         _, (axes, arm) = jax.lax.scan(outward, fill_slots(tree, start), bodies)
         return TreeState(coordinates, rates, jnp.moveaxis(axes, 0, 2), jnp.moveaxis(arm, 0, 1), base)
 
+    @by_certain_entries()
     def factored(self, motion: TreeState) -> "TreeFactor":
         """Return what gives accelerations for forces, at this position; made once for all orders."""
         tree = self.tree
@@ -174,6 +177,7 @@ class TreeEquations(Module):
         scale = 1.0 / jnp.sqrt(jnp.stack([matrix[k, k] for k in range(size)]))
         return DenseFactor.of(matrix * scale[:, None] * scale[None]), scale
 
+    @by_certain_entries()
     def needed(self, motion: TreeState, unknowns: Unknowns, wrenches: Wrenches = ()) -> Unknowns:
         """Return the forces that accelerations need: of the coordinates, and on a free base, in its axes."""
         tree, lanes, base = self.tree, motion.axes.shape[-1], motion.base
@@ -223,6 +227,7 @@ class TreeEquations(Module):
             base_force, base_moment = base_force - pushed[:3, -1], base_moment - pushed[3:, -1]
         return Unknowns(forces, jnp.concatenate([_local(base.axes, x) for x in (base_force, base_moment)]))
 
+    @by_certain_entries()
     def motion_rates(self, motion: TreeState, unknowns: Unknowns) -> TreeState:
         """Return how all that a motion consists of changes."""
         tree, base = self.tree, motion.base
@@ -329,6 +334,7 @@ class TreeFactor(Module):
             return self.bodies.margin
         return jnp.concatenate([self.bodies.margin, self.bodies.base[0].pivot_ratio()[None]])
 
+    @by_certain_entries()
     def solve(self, missing: Unknowns) -> Unknowns:
         """Return the accelerations that bring up forces which are missing; none of joints that are driven."""
         if self.bodies is None:
