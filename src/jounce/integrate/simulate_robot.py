@@ -13,7 +13,8 @@ from jounce.execution.backends import backend_of
 from jounce.integrate.marching.exact_numbers import ExactNumbers
 from jounce.integrate.marching.joint_events import JointEvent, JointEventDetector
 from jounce.integrate.marching.marching import Outcome, steps_between_looks
-from jounce.integrate.marching.robot_marching import STUCK, Progress, RobotProblem, RobotState, RobotSteps, march_robot
+from jounce.integrate.marching.robot_marching import STUCK, Progress, RobotProblem, RobotSteps, march_robot
+from jounce.integrate.marching.robot_state import RobotState
 from jounce.integrate.results.robot_simulation import RobotSimulation
 from jounce.integrate.steps.events import EventLog
 from jounce.integrate.steps.methods import AbstractMethod, Taylor

@@ -27,6 +27,7 @@ from jounce.execution.llvm.rules.operations import RULES
 from jounce.execution.llvm.subroutines import call_subroutine
 from jounce.execution.llvm.text.arrays import constants, filled
 from jounce.execution.llvm.text.code import Code
+from jounce.execution.llvm.text.lent_memory import among, give_back, give_back_but, let_go, regions_of
 from jounce.execution.llvm.text.stored import (
     any_lanes,
     is_large,
@@ -39,7 +40,7 @@ from jounce.execution.llvm.text.stored import (
     values_of,
 )
 from jounce.execution.llvm.text.values import NoRuleError, Region, UnsupportedOperationError, Value, kind_of
-from jounce.execution.llvm.text.views import Array, Deferred, InMemory, Stored, contiguous, further
+from jounce.execution.llvm.text.views import Array, Deferred, InMemory, contiguous, further
 
 MOST_UNROLLED = 4_000  # lines of a loop of known length that is written turn after turn
 MOST_UNROLLED_IN_MEMORY = 1_000  # where arrays may stay in memory
@@ -75,7 +76,7 @@ def translate(
 
     def noted(variable: Any, array: Array) -> None:
         known[variable] = array
-        for region in _regions([array]):
+        for region in regions_of([array]):
             read_last[region] = max(read_last.get(region, -1), plan.last.get(variable, -1))
 
     def read(variable: Any) -> Array:
@@ -97,32 +98,11 @@ def translate(
             for variable, values in zip(operation.outvars, result, strict=True):
                 noted(variable, _checked(values, variable.aval))
             if code.large is not None:
-                _give_back_but(code, code.taken[before:], result)
-                _let_go(code, known, plan.ends.get(now, ()))
+                give_back_but(code, code.taken[before:], result)
+                let_go(code, known, plan.ends.get(now, ()))
         code.sparse = around
         results = [read(variable) for variable in plan.results]
         return results if late else [stored(code, x) if isinstance(x, Deferred) else x for x in results]
-
-
-def _let_go(code: Code, known: dict[Any, Array], variables: Sequence[Any]) -> None:
-    """Forget variables that nobody reads any more, and give back what memory only they had."""
-    gone = [known.pop(variable, None) for variable in variables]
-    _give_back(code, [array for array in gone if array is not None])
-
-
-def _give_back(code: Code, arrays: Sequence[Array]) -> None:
-    """Give back the memory of arrays that nobody reads any more, where nobody reads it by another one."""
-    for region in _regions(arrays):
-        if code.is_unshared(region):
-            code.release(region)
-
-
-def _give_back_but(code: Code, taken: Sequence[Region], arrays: Sequence[Array]) -> None:
-    """Give back memory that was taken, but that of arrays."""
-    live = _regions(arrays)
-    for region in dict.fromkeys(taken):
-        if region not in live:
-            code.release(region)
 
 
 def _results(code: Code, equation: Any, given: Sequence[Array], *, delayed: bool) -> Sequence[Array]:
@@ -222,40 +202,25 @@ def _while(code: Code, equation: Any, given: Sequence[Array]) -> list[Array]:
         code.begin(head)
         with code.scope(), state.held():
             before = state.load()
-            with code.used(_among([*condition, *needed, *before])):
+            with code.used(among([*condition, *needed, *before])):
                 goes = code.among_here(_number(code, _closed(code, p["cond_jaxpr"], condition, before)[0]))
             if goes.lanes and not all(lanes):  # what a lane keeps that has left differs
                 return ([True] * len(lanes), invariants), []
             code.branch(code.anywhere(goes), body, end)
             code.begin(body)
             live = [*condition, *needed, *(before if goes.lanes else ())]
-            with code.scope(goes if goes.lanes else None), code.used(_among(live)), code.changing(state.regions):
+            with code.scope(goes if goes.lanes else None), code.used(among(live)), code.changing(state.regions):
                 after = _closed(code, p["body_jaxpr"], needed, before, late=True)
                 if goes.lanes:
                     after = chosen(code, goes, after, state.load(new=after))
                 state.store(after)
-                _give_back(code, after)
+                give_back(code, after)
             code.jump(head)
         code.begin(end)
         return (_in_lanes(after, lanes), [*map(still_invariant, invariants, after)]), state.load()
 
     avals = [variable.aval for variable in equation.outvars]
     return _until_settled(code, (_likely(code, start, avals), [invariants_of(code, x) for x in start]), attempt)
-
-
-def _among(arrays: Sequence[Array]) -> Callable[[Region], bool]:
-    """Return what tells the memory of some arrays."""
-    return _regions(arrays).__contains__
-
-
-def _regions(arrays: Sequence[Array]) -> dict[Region, None]:
-    """Return the memory of arrays, and of what they are computed from: each once, in their order.
-
-    A set has another order in each process, and memory that is given back in another order is taken so: then the same
-    program has another text, and another name in the store.
-    """
-    parts = [array.given if isinstance(array, Deferred) else [array] for array in arrays]
-    return dict.fromkeys(part.region for some in parts for part in some if isinstance(part, Stored))
 
 
 def _scan(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Array]:
@@ -310,7 +275,7 @@ def _rolled(
         code.begin(body)
         with (
             code.scope(),
-            code.used(_among([*needed, *homes])),
+            code.used(among([*needed, *homes])),
             state.held(),
             written.held(),
             code.changing(state.regions),
@@ -324,7 +289,7 @@ def _rolled(
                     put(code, contiguous(region, array.shape, further(code, 0, at, array.size)), array)
             written.note_rows(results[size:], p["length"])
             state.store(results[:size])  # after what may be a part of what was carried
-            _give_back(code, results)
+            give_back(code, results)
             code.store(counter, 0, code.arithmetic("add", count, code.constant(1, "l")))
             code.branch(code.operand(code.compare("lt", count, last), lanes=False), body, end)
         code.begin(end)
@@ -343,12 +308,12 @@ def _unrolled(
     It is given up early where the turns so far, of which the first are longer than the others, leave no hope.
     """
     p, mark, before = equation.params, code.mark(), len(code.lines)
-    size, result, live = len(start), {}, _regions([*needed, *rows])
+    size, result, live = len(start), {}, regions_of([*needed, *rows])
     for k in reversed(range(p["length"])) if p["reverse"] else range(p["length"]):
         with code.used(live.__contains__):
             results = _closed(code, p["jaxpr"], needed, start, [row(code, array, k) for array in rows])
         start, result[k] = results[:size], results[size:]
-        live |= _regions(result[k])
+        live |= regions_of(result[k])
         lines, left = len(code.lines) - before, p["length"] - len(result)
         if p["length"] > 1 and lines + lines / len(result) / HOPE * left > most:
             code.back_to(mark)
@@ -390,7 +355,7 @@ def _cond(code: Code, equation: Any, given: Sequence[Array]) -> list[Array]:
             code.begin(begin)
             with (
                 code.scope(here if here.lanes else None),
-                code.used(_among(inputs if k < len(ways) - 1 or here.lanes else [])),
+                code.used(among(inputs if k < len(ways) - 1 or here.lanes else [])),
             ):
                 every = _closed(code, way, inputs)
                 made = [every[k] for k in changing]

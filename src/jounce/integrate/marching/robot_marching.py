@@ -17,6 +17,7 @@ from jounce.execution.compilation import LARGE, compiled
 from jounce.execution.llvm.text.values import UnsupportedOperationError
 from jounce.integrate.marching.exact_numbers import ExactNumbers, forms_of
 from jounce.integrate.marching.marching import SHORT as UNUSUAL, Outcome
+from jounce.integrate.marching.robot_state import RobotState, at, polynomial_of, rates_at
 from jounce.integrate.steps.lookahead import HARMLESS, NEAR, POINTS, RUN_POINTS, SHORTEST, finest, steps_counted
 from jounce.integrate.steps.methods import MARGIN, NEEDED, ROUNDING, Lanes, furthest
 from jounce.jet.programs.series import Recursion
@@ -36,24 +37,6 @@ UNSEEN = (
     1e-12  # rad or sizes of the robot: what is overlooked on a step may move a joint by this; beside a jump by less
 )
 NOISE = 32.0  # times what the equations miss where the series begins is rounding on the way too
-
-
-class RobotState(NamedTuple):
-    """Where a robot is and how it moves, or the coefficients of that, order first; the batch is last.
-
-    Attributes
-    ----------
-    coordinates, rates : array of shape (n, batch)
-        rad or m, and by s.
-    position, quaternion, twist : array of shape (3 or 4 or 6, batch), or None
-        Of a free base, as in `BaseMotion`.
-    """
-
-    coordinates: Any
-    rates: Any
-    position: Any = None
-    quaternion: Any = None
-    twist: Any = None
 
 
 class RobotProblem(Module):
@@ -218,40 +201,6 @@ class Progress(NamedTuple):
     crossing: Int[Numbers, ""]  # steps over a jump one after the other
     rest: Lanes  # what the time is greater by than that number, which is rounded, s
     longest: Lanes  # step so far, s
-
-
-def polynomial_of(series: MotionSeries) -> RobotState:
-    """Return the coefficients of a series as those of a state."""
-    return RobotState(series.coordinates, series.rates, series.position, series.quaternion, series.twist)
-
-
-def at(polynomial: RobotState, since: Lanes) -> RobotState:
-    """Return the values of polynomials, with a quaternion of unit length, at times from their beginnings."""
-    state = jax.tree.map(lambda c: _value(c, since), polynomial)
-    if state.quaternion is None:
-        return state
-    return state._replace(quaternion=state.quaternion / jnp.sqrt(jnp.sum(state.quaternion**2, axis=0, keepdims=True)))
-
-
-def rates_at(polynomial: RobotState, since: Lanes) -> RobotState:
-    """Return the values of the derivatives of polynomials."""
-
-    def rate(c: Any) -> Any:
-        return _value(c[1:] * jnp.arange(1.0, len(c))[:, None, None], since)
-
-    return jax.tree.map(rate, polynomial)
-
-
-def _value(coefficients: Any, since: Any) -> Any:
-    """Return values of polynomials by a loop over the orders: what is compiled is to stay small."""
-    count = len(coefficients)
-    shape = (coefficients.shape[1], jnp.broadcast_shapes(coefficients.shape[2:], since.shape)[0])
-
-    def added(k: Any, value: Any) -> Any:
-        c = jax.lax.dynamic_index_in_dim(coefficients, count - 1 - k, 0, keepdims=False)
-        return value * since[None] + c
-
-    return jax.lax.fori_loop(0, count, added, jnp.zeros(shape))
 
 
 def _departures(problem: RobotProblem, polynomial: RobotState, time: Any, since: Any, *, one_by_one: bool) -> Any:

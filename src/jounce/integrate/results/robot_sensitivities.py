@@ -22,7 +22,8 @@ from jounce.base.modules import with_fields
 from jounce.base.shapes import is_traced
 from jounce.errors import UnsupportedError
 from jounce.execution.compilation import compiled
-from jounce.integrate.marching.robot_marching import RobotProblem, RobotState, at, polynomial_of
+from jounce.integrate.marching.robot_marching import RobotProblem
+from jounce.integrate.marching.robot_state import RobotState, at, polynomial_of
 from jounce.integrate.results.robot_simulation import RobotSimulation
 from jounce.integrate.steps.host_calls import recorded
 from jounce.rigid.inertia import Inertia, TracedInertia

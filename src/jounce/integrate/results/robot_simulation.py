@@ -19,7 +19,8 @@ from jounce.execution.chunks import in_chunks
 from jounce.execution.compilation import LARGE
 from jounce.execution.mapped import Mapped, mapped
 from jounce.execution.store.programs import is_wanted_soon
-from jounce.integrate.marching.robot_marching import RobotProblem, RobotState, RobotSteps, at
+from jounce.integrate.marching.robot_marching import RobotProblem, RobotSteps
+from jounce.integrate.marching.robot_state import RobotState, at
 from jounce.integrate.results.simulation import steps_of
 from jounce.integrate.steps.methods import Lanes
 from jounce.jet import Jet, compose

@@ -1,0 +1,61 @@
+"""Where a robot is and how it moves, as numbers and as polynomials in time."""
+
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+
+from jounce.integrate.steps.methods import Lanes
+from jounce.robot.algorithms.motion_series import MotionSeries
+
+
+class RobotState(NamedTuple):
+    """Where a robot is and how it moves, or the coefficients of that, order first; the batch is last.
+
+    Attributes
+    ----------
+    coordinates, rates : array of shape (n, batch)
+        rad or m, and by s.
+    position, quaternion, twist : array of shape (3 or 4 or 6, batch), or None
+        Of a free base, as in `BaseMotion`.
+    """
+
+    coordinates: Any
+    rates: Any
+    position: Any = None
+    quaternion: Any = None
+    twist: Any = None
+
+
+def polynomial_of(series: MotionSeries) -> RobotState:
+    """Return the coefficients of a series as those of a state."""
+    return RobotState(series.coordinates, series.rates, series.position, series.quaternion, series.twist)
+
+
+def at(polynomial: RobotState, since: Lanes) -> RobotState:
+    """Return the values of polynomials, with a quaternion of unit length, at times from their beginnings."""
+    state = jax.tree.map(lambda c: _value(c, since), polynomial)
+    if state.quaternion is None:
+        return state
+    return state._replace(quaternion=state.quaternion / jnp.sqrt(jnp.sum(state.quaternion**2, axis=0, keepdims=True)))
+
+
+def rates_at(polynomial: RobotState, since: Lanes) -> RobotState:
+    """Return the values of the derivatives of polynomials."""
+
+    def rate(c: Any) -> Any:
+        return _value(c[1:] * jnp.arange(1.0, len(c))[:, None, None], since)
+
+    return jax.tree.map(rate, polynomial)
+
+
+def _value(coefficients: Any, since: Any) -> Any:
+    """Return values of polynomials by a loop over the orders: what is compiled is to stay small."""
+    count = len(coefficients)
+    shape = (coefficients.shape[1], jnp.broadcast_shapes(coefficients.shape[2:], since.shape)[0])
+
+    def added(k: Any, value: Any) -> Any:
+        c = jax.lax.dynamic_index_in_dim(coefficients, count - 1 - k, 0, keepdims=False)
+        return value * since[None] + c
+
+    return jax.lax.fori_loop(0, count, added, jnp.zeros(shape))
