@@ -157,9 +157,14 @@ def test_rounds_are_a_loop_over_instants(monkeypatch, native):
         expected[..., lane] = 1.5 * expected[..., sources[lane]] + time[lane]
         before[lane] = before[sources[lane]] + 1
     lanes, results = ((position, label), time, example[2]), {"label": label, "position": position, "rest": None}
-    program.rounds(lanes, results, sources)(turns)
+    start = [np.copy(x[..., count:]) for x in lanes[0]]
+    program.rounds(lanes, results, sources, (1, 0))(turns)
     np.testing.assert_allclose(position, expected, rtol=1e-13)
     np.testing.assert_array_equal(label, before)
+    if program.width == 8:  # sources are lanes of the round before
+        lanes, results["label"], results["position"] = (tuple(start), *lanes[1:]), None, np.zeros((3, 2, count))
+        program.rounds(lanes, results, np.where(sources == count, 0, -1), (1, 0))(turns)
+        np.testing.assert_allclose(results["position"][..., :24], expected[..., :24], rtol=1e-13)
 
 
 @pytest.mark.parametrize("rows", [True, False])

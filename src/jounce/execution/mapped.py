@@ -64,7 +64,9 @@ class OnLlvm:
         """Return how many instants of so many numbers each are computed in a call where a loop gives them."""
         return (max(FEWEST_TOGETHER, min(MOST_TOGETHER, CACHED_ENTRIES // max(1, entries))),)
 
-    def rounds(self, lanes: tuple[Any, Any, Any], results: Any, sources: Int[np.ndarray, " time"]) -> Rounds:
+    def rounds(
+        self, lanes: tuple[Any, Any, Any], results: Any, sources: Int[np.ndarray, " time"], links: Sequence[int]
+    ) -> Rounds:
         """Return what solves instants in rounds, of which later ones start from the results of earlier ones.
 
         Parameters
@@ -73,13 +75,16 @@ class OnLlvm:
             The arguments of an instant in three parts, instants last: those that it takes from its source, those that
             are its own, and those that all have the same, of one instant. They are read as they are in each round.
         results : pytree
-            Arrays that the results are written to, those of the first part among them; None for what nobody wants.
+            Arrays that the results are written to, those of the first part among them unless all sources are beyond the
+            instants or in the round before; None for what nobody wants.
         sources : array of int, shape (time,)
-            Index of the source of each instant.
+            Index of the source of each instant; below zero if it is its lane of the round before.
+        links : sequence of int
+            Which leaf of the results each leaf of the first part is taken from.
         """
         leaves: Any = [[np.asarray(leaf) for leaf in jax.tree.leaves(group)] for group in lanes]
         stored = jax.tree.leaves(results, is_leaf=lambda x: x is None)
-        return self.machine_code.rounds(self.shared, leaves, stored, sources)
+        return self.machine_code.rounds(self.shared, leaves, stored, sources, links)
 
     @property
     def width(self) -> int:
@@ -170,28 +175,34 @@ class OnXla:
         # half of a large block at least is in use, so that no more than twice is computed
         return small if count <= small else middle[0] if middle and count <= large // 2 else large
 
-    def rounds(self, lanes: tuple[Any, Any, Any], results: Any, sources: Int[np.ndarray, " time"]) -> Rounds:
+    def rounds(
+        self, lanes: tuple[Any, Any, Any], results: Any, sources: Int[np.ndarray, " time"], links: Sequence[int]
+    ) -> Rounds:
         """Return what solves instants in rounds, as that of `OnLlvm`; the arrays are written when all are solved."""
         linked, own, held = map(jax.tree.leaves, lanes)
         stored = jax.tree.leaves(results, is_leaf=lambda x: x is None)
-        recorded = tuple(k for k, whole in enumerate(stored) if whole is not None)
-        wholes = [stored[k] for k in recorded]
-        links = tuple(next(k for k, whole in enumerate(wholes) if whole is part) for part in linked)
+        recorded = tuple(k for k, whole in enumerate(stored) if whole is not None or k in links)
+        wholes, known = [stored[k] for k in recorded], linked[0].shape[-1]
+        positions = tuple(recorded.index(k) for k in links)
 
         def run(targets: Int[np.ndarray, "round lane"]) -> None:
             order, total = targets.ravel(), self.width * _power(len(targets))
-            index = np.full(wholes[0].shape[-1], -1)
-            index[order[::-1]] = np.arange(len(order))[::-1]
+            index = np.full(known, -1)
+            if stored[links[0]] is linked[0]:
+                index[order[::-1]] = np.arange(len(order))[::-1]
             source = sources[order]
-            before = np.unique(source[index[source] < 0])  # those that are not solved here
-            source = np.where(index[source] < 0, total + np.searchsorted(before, source), index[source])
-            starts = [_filled(wholes[k][..., before], STARTS * _power(-(-len(before) // STARTS))) for k in links]
+            here = np.where(source < 0, np.arange(len(order)) - self.width, index[source])
+            before = np.unique(source[here < 0])  # those that are not solved here
+            source = np.where(here < 0, total + np.searchsorted(before, source), here)
+            room = STARTS * _power(-(-len(before) // STARTS))
+            starts = [_filled(x[..., before], room) for x in linked]
             given = [_filled(x[..., order], total) for x in own]
             order_of_rounds = _filled(source, total), np.asarray(len(targets))
-            how = links, recorded, self.width, self.form, self.how
+            how = positions, recorded, self.width, self.form, self.how
             result = self.mapped.in_rounds(self.shared, starts, (given, held), order_of_rounds, how)
             for whole, part in zip(wholes, result, strict=True):
-                whole[..., order] = np.asarray(part)[..., : len(order)]
+                if whole is not None:
+                    whole[..., order] = np.asarray(part)[..., : len(order)]
 
         return run
 

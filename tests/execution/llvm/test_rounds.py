@@ -31,13 +31,18 @@ def arrays(behind=1):
     return position, label, generator.normal(size=COUNT), sources
 
 
-def in_rounds(position, label, time, sources, found=None, late=None):
-    """Return what solves all instants, straight into the arrays unless others are given."""
+def in_rounds(position, label, time, sources, found=None, late=None, *, none=False):
+    """Return what solves all instants, straight into the arrays unless others are given, or labels into none."""
     lanes = (position, label), time, np.array([True])
     program = STEP.program(np.float64(0.5), ((np.zeros((3, 2, 1)), np.zeros(1, np.int64)), np.zeros(1), lanes[2]))
     assert isinstance(program, OnLlvm)
-    results = {"label": label, "late": late, "position": position if found is None else found, "rest": None}
-    return program.rounds(lanes, results, sources)
+    results = {
+        "label": None if none else label,
+        "late": late,
+        "position": position if found is None else found,
+        "rest": None,
+    }
+    return program.rounds(lanes, results, sources, (2, 0))
 
 
 def in_turn(position, label, time, sources):
@@ -92,6 +97,18 @@ def test_results_may_be_put_elsewhere():
     np.testing.assert_allclose(found, (1.5 * before)[..., :COUNT] + time, rtol=1e-14)
 
 
+def test_what_starts_from_the_round_before_needs_no_array_of_results():
+    """Some lanes of a round start from there, others from what is given."""
+    position, label, time, sources = arrays()
+    expected = in_turn(position, label, time, sources)
+    carried = np.where(np.arange(COUNT) % 3 == 0, COUNT, sources)
+    mixed = in_turn(position, label, time, carried)
+    for source, (positions, _) in ((sources, expected), (carried, mixed)):
+        found, starts = np.zeros((3, 2, COUNT)), np.where(source < COUNT, -1, 0)
+        in_rounds(position[..., COUNT:].copy(), label[COUNT:].copy(), time, starts, found, none=True)(rounds())
+        np.testing.assert_allclose(found, positions[..., :COUNT], atol=1e-14)
+
+
 @pytest.mark.parametrize(
     "change",
     [
@@ -100,7 +117,7 @@ def test_results_may_be_put_elsewhere():
         {"position": np.zeros((3, 2, COUNT + 1), np.float32)},
         {"position": np.zeros((3, 2, 2 * COUNT + 2))[..., ::2]},
         {"time": np.zeros(COUNT - 1)},
-        {"sources": np.arange(COUNT) - 1},
+        {"sources": np.arange(COUNT) + 2},
         {"sources": np.arange(COUNT).astype(np.int32)},
     ],
 )
@@ -116,6 +133,13 @@ def test_targets_beyond_the_grid_are_refused(targets):
         in_rounds(*arrays())(targets)
 
 
+def test_the_first_round_starts_from_none_before():
+    position, label, time, sources = arrays()
+    sources[1] = -1
+    with pytest.raises(ValueError, match="before the first"):
+        in_rounds(position, label, time, sources)(rounds())
+
+
 def test_truth_values_have_no_place_of_their_own():
     with pytest.raises(ValueError, match="bool"):
         in_rounds(*arrays(), late=np.zeros(COUNT, bool))
@@ -126,4 +150,4 @@ def test_programs_with_instants_along_the_first_axis_have_no_rounds():
     program = Mapped(lambda shared, x: x + shared, rows=True).program(np.float64(1.0), lanes)
     assert isinstance(program, OnLlvm)
     with pytest.raises(ValueError, match="first axis"):
-        program.rounds((lanes, (), ()), lanes, np.arange(3))
+        program.rounds((lanes, (), ()), lanes, np.arange(3), (0,))

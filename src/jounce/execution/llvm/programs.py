@@ -163,6 +163,7 @@ class Program:
         lanes: Sequence[Sequence[np.ndarray]],
         results: Sequence[np.ndarray | None],
         sources: np.ndarray,
+        links: Sequence[int],
     ) -> RoundRunner:
         """Return what solves instants in rounds, of which later ones start from the results of earlier ones.
 
@@ -175,8 +176,8 @@ class Program:
             those that all have the same; see `RoundRunner`.
         results : sequence of array
             Where the leaves of the results go; None for those that nobody wants.
-        sources : array of int
-            Index of the source of each instant.
+        sources, links : sequence of int
+            As `RoundRunner` has them.
         """
         if self._rows:
             raise ValueError("instants are along the first axis")
@@ -185,7 +186,7 @@ class Program:
         first, second = itertools.accumulate(map(len, lanes[:2]))
         outputs = [Column(*kind, x) for kind, x in zip(self._results, results, strict=True)]
         groups = columns[:first], columns[first:second], columns[second:], outputs
-        return RoundRunner(self._run.rounds, shared, *groups, sources, self.width)
+        return RoundRunner(self._run.rounds, shared, *groups, sources, links, self.width)
 
     def publish(self) -> None:
         """Make it known by its name to machine code, for `in_program`."""

@@ -2,7 +2,8 @@
 
 A round is as many instants as a vector has lanes. The machine code copies what they need from wherever their sources
 are in arrays of the caller, solves them, and copies what it finds to where they are themselves: no call, and no array,
-for each round, and Python's lock is not held for any of them.
+for each round, and Python's lock is not held for any of them. What starts from the round before may be copied from its
+results, a vector at a time, without any array of the caller.
 """
 
 import itertools
@@ -46,16 +47,22 @@ class Column(NamedTuple):
             indices = [index + k * step for index in indices for k in range(size)]
         return indices
 
+    @property
+    def size(self) -> int:
+        """How many numbers an instant has."""
+        return math.prod(self.shape)
+
     def room(self, width: int) -> int:
         """Return how many bytes the numbers of a round take, in whole lines of the cache."""
-        return -(-math.prod(self.shape) * width * self.dtype.itemsize // LINE) * LINE
+        return -(-self.size * width * self.dtype.itemsize // LINE) * LINE
 
 
 def rounds_text(width: int) -> str:
     """Return the text of a function `rounds`, which calls `run` for one round after another.
 
     Its arguments: the addresses for `run`; pairs of addresses, of a number of the first instant and of that of the
-    first lane, in the order in which they are copied; how many of these are read at sources, read at targets, and
+    first lane, in the order in which they are copied, and before these as many for what is read at sources, of the
+    result of the first lane and again of that which is given; how many are read at sources, read at targets, and
     written at targets; the sources of all instants, the targets of all rounds, and how many rounds there are.
 
     Parameters
@@ -75,18 +82,27 @@ def rounds_text(width: int) -> str:
         "%here = getelementptr i64, ptr %targets, i64 %first",
     ]
     for lane in range(width):
+        least = f"%least{lane - 1}" if lane else "0"
         lines += [
             f"%place{lane} = getelementptr i64, ptr %here, i64 {lane}",
             f"%target{lane} = load i64, ptr %place{lane}",
             f"%from{lane} = getelementptr i64, ptr %sources, i64 %target{lane}",
             f"%source{lane} = load i64, ptr %from{lane}",
+            f"%less{lane} = icmp slt i64 %source{lane}, {least}",
+            f"%least{lane} = select i1 %less{lane}, i64 %source{lane}, i64 {least}",
         ]
     lines += [
-        "%owns = add i64 %linked, %own",
+        "%firsts = add i64 %linked, %linked",
+        "%owns = add i64 %firsts, %own",
         "%ends = add i64 %owns, %kept",
-        "br label %at_source",
-        *_copies("at_source", ("round", "0", "%linked"), "at_target", _gathered("at_source", "source", width)),
-        *_copies("at_target", ("at_source", "%linked", "%owns"), "solve", _gathered("at_target", "target", width)),
+        f"%carries = icmp slt i64 %least{width - 1}, 0",
+        "br i1 %carries, label %carried, label %at_source",
+        *_copies("carried", ("round", "0", "%linked"), "lane0", _vector("carried", width)),
+        *(line for lane in range(width) for line in _started(lane, width)),
+        *_copies("at_source", ("round", "%linked", "%firsts"), "known", _gathered("at_source", "source", width)),
+        "known:",
+        "br label %at_target",
+        *_copies("at_target", ("known", "%firsts", "%owns"), "solve", _gathered("at_target", "target", width)),
         "solve:",
         f"call void @run(ptr %addresses, i64 {width})",
         "br label %found",
@@ -118,6 +134,32 @@ def _copies(name: str, limits: tuple[str, str, str], after: str, copy: Sequence[
         *copy,
         f"%{name}_next = add i64 %{name}_pair, 1",
         f"br label %{name}",
+    ]
+
+
+def _vector(name: str, width: int) -> list[str]:
+    """Return what copies a result of all lanes to where it is given to those of the next round."""
+    of = f"<{width} x i64>"
+    return [
+        f"%{name}_all = load {of}, ptr %{name}_whole, align 8",
+        f"store {of} %{name}_all, ptr %{name}_round, align 8",
+    ]
+
+
+def _started(lane: int, width: int) -> list[str]:
+    """Return what copies the numbers of the source of a lane, if it has one, and goes on to the next lane."""
+    name, after = f"start{lane}", f"lane{lane + 1}" if lane + 1 < width else "known"
+    copy = [
+        f"%{name}_from = getelementptr i64, ptr %{name}_whole, i64 %source{lane}",
+        f"%{name}_to = getelementptr i64, ptr %{name}_round, i64 {lane}",
+        f"%{name}_number = load i64, ptr %{name}_from",
+        f"store i64 %{name}_number, ptr %{name}_to",
+    ]
+    return [
+        f"lane{lane}:",
+        f"%starts{lane} = icmp sge i64 %source{lane}, 0",
+        f"br i1 %starts{lane}, label %{name}, label %{after}",
+        *_copies(name, (f"lane{lane}", "%linked", "%firsts"), after, copy),
     ]
 
 
@@ -162,7 +204,9 @@ class RoundRunner:
         The arguments of an instant in their order: those that it takes from its source, those that are its own, and
         those that all have the same, from arrays of one instant; and the results.
     sources : array of shape (time,)
-        Index of the source of each instant, in one piece.
+        Index of the source of each instant, in one piece; below zero if it is its lane of the round before.
+    links : sequence of int
+        Which of the results is the one that each of the linked arguments is taken from.
     width : int
         Lanes of a vector.
 
@@ -181,6 +225,7 @@ class RoundRunner:
         held: Sequence[Column],
         results: Sequence[Column],
         sources: Int[np.ndarray, " time"],
+        links: Sequence[int],
         width: int,
     ):
         columns = [*linked, *own, *held, *results]
@@ -197,9 +242,13 @@ class RoundRunner:
         for column, begin in zip(held, begins, strict=False):
             numbers = np.repeat(np.asarray(column.whole, column.dtype).reshape(*column.shape, 1), width, axis=-1)
             self._blank[begin : begin + numbers.nbytes] = numbers.ravel().view(np.uint8)
-        result = _pairs(results, begins, width, len(sources))
+        begins = list(begins)
+        result = _pairs(results, iter(begins), width, len(sources))
         self._counts = len(at_source), len(at_target), len(result)
-        self._pairs = np.array([*at_source, *at_target, *result], np.int64).reshape(-1, 2)
+        of = (begins[k] + width * ENTRY * n for k, x in zip(links, linked, strict=True) for n in range(x.size))
+        again = [(begin, given) for begin, (_, given) in zip(of, at_source, strict=True)]
+        self._pairs = np.array([*again, *at_source, *at_target, *result], np.int64).reshape(-1, 2)
+        self._within = np.array([[1, 1]] * len(again) + [[0, 1]] * (len(self._pairs) - len(again)))
 
     def __call__(self, targets: Int[np.ndarray, "round lane"]) -> None:
         """Solve instants by their indices; in several threads at once, if they have none of them in common.
@@ -210,6 +259,8 @@ class RoundRunner:
         self._check_sources()
         count, width = len(self._sources), self.width
         within = targets.min(initial=0) >= 0 and targets.max(initial=-1) < count
+        if within and self._sources[targets[:1]].min(initial=0) < 0:
+            raise ValueError("sources in a round before the first one")
         if targets.dtype != np.int64 or targets.shape[1:] != (width,) or not within:
             raise ValueError(f"targets that are not {width} indices below {count} for each round")
         targets = np.ascontiguousarray(targets)
@@ -217,15 +268,14 @@ class RoundRunner:
         first = -_address(memory) % LINE
         memory[first : first + len(self._blank)] = self._blank
         start = _address(memory) + first
-        addresses, pairs = np.concatenate([self._common, start + self._begins]), self._pairs + np.array([0, start])
+        addresses, pairs = np.concatenate([self._common, start + self._begins]), self._pairs + start * self._within
         indices = _address(self._sources), _address(targets)
         self._run(_address(addresses), _address(pairs), *self._counts, *indices, len(targets))
 
     def _check_sources(self) -> None:
         """Raise ValueError unless sources are indices of the arrays that are read at them."""
         result = self._sources
-        within = result.min(initial=0) >= 0 and result.max(initial=-1) < self._known
-        if result.dtype != np.int64 or not within or not result.flags.c_contiguous:
+        if result.dtype != np.int64 or result.max(initial=-1) >= self._known or not result.flags.c_contiguous:
             raise ValueError(f"sources that are no indices below {self._known}")
 
 

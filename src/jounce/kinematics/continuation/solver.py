@@ -81,7 +81,8 @@ class Solver:
 
     def rounds(
         self,
-        store: SolvedState,
+        known: SolvedState,
+        state: tuple[Any, Any, Any],
         step: Float[np.ndarray, " time"],
         instant: Float[np.ndarray, " time"],
         status: Int[np.ndarray, " time"],
@@ -92,22 +93,28 @@ class Solver:
 
         Parameters
         ----------
-        store : tuple
-            Jets of all instants, solved or to be solved, as an `StepResult` has them.
+        known : tuple
+            What predictions need of the instants of the sources, see `needed`.
+        state : tuple
+            Where jets of coordinates, by name, and of outputs, and the sign of all instants go; None for what nobody
+            wants.
         step, instant : array of shape (time,)
             Time from the source, and the time arrived at, s.
         status : array of int, shape (time,)
             What comes of each.
         sources : array of int, shape (time,)
-            From which of the store each instant is predicted.
+            From which of those known each instant is predicted; below zero if from its lane of the round before.
         own : dict of int to array
             The values of the design of each instant, if there are many (see `of_design`), else None.
         """
-        coordinates, outputs, sign = store
+        coordinates, outputs, sign = state
         nothing: dict[str, Any] = dict.fromkeys(StepResult._fields)
-        finite_order = {"coordinates": coordinates, "outputs": outputs, "status": status, "sign": sign}
-        lanes = self.needed(store), (step, instant, own), np.zeros(1, bool)
-        return self.program.rounds(lanes, StepResult(**(nothing | finite_order)), sources)
+        results = {"coordinates": coordinates, "outputs": outputs, "status": status, "sign": sign}
+        results = StepResult(**(nothing | results))
+        leaves, form = jax.tree.flatten(results, is_leaf=lambda x: x is None)
+        numbered: Any = jax.tree.unflatten(form, np.arange(len(leaves))[:, None])
+        links = [int(x[0]) for x in jax.tree.leaves(self.needed(numbered.state(slice(None))))]
+        return self.program.rounds((known, (step, instant, own), np.zeros(1, bool)), results, sources, links)
 
     def take_steps(self, run: StepState, grid: Float[np.ndarray, " time"], stop: float, smallest: float) -> TakenSteps:
         """Go on with a run and the next instants of a grid, as far as they fit; see `continuation_steps`."""

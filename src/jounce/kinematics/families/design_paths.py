@@ -58,14 +58,14 @@ class Anchors(NamedTuple):
         Index of the first anchor of each design, and behind them how many anchors there are.
     instant : array of shape (anchors,)
         s.
-    state : tuple
-        Anchors last.
+    known : tuple
+        What predictions need of them, anchors last.
     """
 
     designs: Indices
     begins: Int[np.ndarray, " design_and_one"]
     instant: Float[np.ndarray, " anchor"]
-    state: SolvedState
+    known: SolvedState
 
     @property
     def owner(self) -> Int[np.ndarray, " anchor"]:
@@ -77,8 +77,8 @@ class Anchors(NamedTuple):
         for k in range(0, len(self.designs), size):
             begins = self.begins[k : k + size + 1]
             some = slice(begins[0], begins[-1])
-            state = jax.tree.map(lambda x, some=some: x[..., some], self.state)
-            yield Anchors(self.designs[k : k + size], begins - begins[0], self.instant[some], state)
+            known = jax.tree.map(lambda x, some=some: x[..., some], self.known)
+            yield Anchors(self.designs[k : k + size], begins - begins[0], self.instant[some], known)
 
 
 class DesignPaths:
@@ -110,6 +110,7 @@ class DesignPaths:
             order = np.argsort(instants, axis=1, kind="stable")
             self._instants, self._rank = np.take_along_axis(instants, order, axis=1), np.argsort(order, axis=1)
         self._groups: list[Anchors] = []
+        self._arrival: Any = None  # any one, whose arrays have the shapes of all
 
     def follow(self, coordinates: Coordinates, plain: Bool[np.ndarray, " design"], threads: int) -> None:
         """Follow the designs from where they are assembled, those that are plain."""
@@ -122,7 +123,7 @@ class DesignPaths:
     def _followed(self, coordinates: Coordinates, lanes: Indices) -> Anchors:
         """Follow some designs, and return the anchors of those that are not left to be solved individually."""
         solver, (first, last) = self.solver, self._ends
-        steps: list[tuple[Indices, Lanes, SolvedState]] = []  # the designs, the instants and the states of the anchors
+        steps: list[tuple[Indices, Lanes, SolvedState]] = []  # designs and instants of the anchors, and what is known
         limits = StepLimits(np.asarray(last), np.asarray(SMALLEST_STEP * (last - first)))
         known, own = solver.still({name: x[..., lanes] for name, x in coordinates.items()}), self.designs.own(lanes)
         known = solver.needed(known)
@@ -138,15 +139,16 @@ class DesignPaths:
                 break
             away = control.target - control.expansion_point.instant
             arrival = solver.program((known, away, control.target, own, np.ones(len(lanes), bool)))
+            self._arrival = arrival
             there: Any = ExpansionPoint(control.target, arrival.safe_step, arrival.radius, arrival.det_rate)
             begins: Any = control.step == 0
             control, taken = decide((control, arrival.status, there))
             unlike = taken & ((arrival.status != Status.OK) | is_spoiled_outside(there, begins, last))
             ended = control.ending != StopReason.UNFINISHED
             self.individual[lanes[unlike | ended & (control.ending != StopReason.ARRIVED)]] = True
-            reached = arrival.state(slice(None) if taken.all() else taken)
+            reached = solver.needed(arrival.state(slice(None) if taken.all() else taken))
             steps.append((lanes[taken], there.instant[taken], reached))
-            known = solver.needed(reached) if taken.all() else _replaced(known, taken, solver.needed(reached))
+            known = reached if taken.all() else _replaced(known, taken, reached)
             if (left := ~(ended | unlike)).all():
                 continue
             lanes = lanes[left]
@@ -156,13 +158,13 @@ class DesignPaths:
 
     def _sorted(self, steps: Sequence[tuple[Indices, Lanes, SolvedState]]) -> Anchors:
         """Return the anchors of steps, without those of designs that are left to be solved individually."""
-        owners, instants, states = zip(*steps, strict=True)
+        owners, instants, known = zip(*steps, strict=True)
         owner = np.concatenate(owners)
         order = np.argsort(owner, kind="stable")  # of each design, the instants rise from step to step
         order = order[~self.individual[owner[order]]]
         designs, begins = np.unique(owner[order], return_index=True)
-        state = jax.tree.map(lambda *parts: np.take(np.concatenate(parts, axis=-1), order, axis=-1), *states)
-        return Anchors(designs, np.append(begins, len(order)), np.concatenate(instants)[order], state)
+        known = jax.tree.map(lambda *parts: np.take(np.concatenate(parts, axis=-1), order, axis=-1), *known)
+        return Anchors(designs, np.append(begins, len(order)), np.concatenate(instants)[order], known)
 
     def solved(self, threads: int) -> tuple[list[list[np.ndarray]], Int[np.ndarray, "design time"]]:
         """Return the outputs of all designs, and their status.
@@ -180,7 +182,7 @@ class DesignPaths:
         size = min(max(least, min(len(designs) // MOST_BLOCKS, LARGEST_BLOCK * least)), len(designs))
         size -= size % width if size > width else 0
         blocks = [block for group in self._groups for block in group.parts(size)]
-        most, like = max(len(block.instant) for block in blocks), blocks[0].state
+        most, like = max(len(block.instant) for block in blocks), self._arrival.state(slice(1))
         wholes = [np.empty((levels, *x.shape[1:-1], count, times)) for x in like[1]]
 
         def new() -> SolveBuffer:
@@ -216,26 +218,24 @@ class DesignPaths:
         """Load all instants of some designs; each starts from the one before, or from the nearest anchor."""
         instants = self._instants[block.designs]
         count, times = instants.shape
-        pieces = min(max(1, buffer.width // count), times)  # of a motion, so that lanes are in use
-        length = -(-times // pieces)
-        buffer.put_anchors([[leaf] for leaf in jax.tree.leaves(block.state)])
+        length = -(-times // max(1, buffer.width // count))  # of a piece of a motion, so that lanes are in use
+        buffer.put_anchors([[leaf] for leaf in jax.tree.leaves(block.known)])
         nearest = _nearest(block.owner, block.instant, instants, self._ends)
         to_anchor = instants - block.instant[nearest]
-        to_one_before = np.diff(instants, axis=1, prepend=np.inf)
-        to_one_before[:, ::length] = np.inf
+        to_one_before = np.empty(instants.shape)
+        np.subtract(instants[:, 1:], instants[:, :-1], out=to_one_before[:, 1:])
+        to_one_before[:, _begins(times, length)] = np.inf
         near = to_one_before <= np.abs(to_anchor)
-        before = np.arange(-1, count * times - 1).reshape(count, times)
-        source = np.where(near, before, buffer.size + nearest)
-        step = np.where(near, to_one_before, to_anchor)
-        own = {k: np.repeat(x, times, axis=-1) for k, x in self.designs.own(block.designs).items()}
-        buffer.load(instants.ravel(), (source.ravel(), step.ravel()), _rounds(count, times, length, buffer.width), own)
+        source, step = np.where(near, -1, nearest), np.where(near, to_one_before, to_anchor)
+        rounds = _rounds(count, times, length, buffer.width)
+        buffer.load(instants.ravel(), (source.ravel(), step.ravel()), rounds, self.designs.own(block.designs))
         return count * times
 
     def _count_turns(self, outputs: list[list[np.ndarray]], anchors: Anchors) -> None:
         """Give angles about axes the turns that they make along the anchors of their designs."""
         if not any(map(measures_angle, self.solver.model.system.outputs)):
             return
-        designs, owner, at, coordinates = anchors.designs, anchors.owner, anchors.instant, anchors.state[0]
+        designs, owner, at, coordinates = anchors.designs, anchors.owner, anchors.instant, anchors.known[0]
         system = self.designs.system(designs[owner])
         measuring = [(g, output) for g, output in zip(system.outputs, outputs, strict=True) if measures_angle(g)]
         series = np.nan_to_num(coordinates["quaternion"], nan=0.0, posinf=0.0, neginf=0.0)
@@ -266,14 +266,18 @@ class DesignPaths:
 def _rounds(count: int, times: int, length: int, width: int) -> Int[np.ndarray, "round lane"]:
     """Return the indices of the instants of designs in the order of solution.
 
-    A lane takes up a piece of a motion of this length, one instant after another. At its end, and where lanes are left
-    over, the last one is solved again.
+    A lane takes up a piece of a motion of this length, one instant after another. Where lanes are left over, the last
+    piece is solved again.
     """
-    first = (np.arange(count)[:, None] * times + np.arange(0, times, length)).ravel()
+    first = (np.arange(count)[:, None] * times + _begins(times, length)).ravel()
     first = first[np.minimum(np.arange(-(-len(first) // width) * width), len(first) - 1)]
-    last = first // times * times + times - 1
-    pieces = np.minimum(first[:, None] + np.arange(length), last[:, None])
+    pieces = first[:, None] + np.arange(length)
     return np.ascontiguousarray(pieces.reshape(-1, width, length).swapaxes(1, 2).reshape(-1, width))
+
+
+def _begins(times: int, length: int) -> Indices:
+    """Return where pieces of a motion begin; the last ones overlap, unless so many instants are whole pieces."""
+    return np.minimum(np.arange(0, times, length), times - length)
 
 
 def _nearest(

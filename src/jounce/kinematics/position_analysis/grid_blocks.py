@@ -122,7 +122,7 @@ def _begin(buffer: SolveBuffer, time: Float[np.ndarray, " time"], anchors: Seque
     nearest = nearest_instants(instants, time)
     to_neighbor, to_anchor = time - time[neighbor], time - instants[nearest]
     near = known & (np.abs(to_neighbor) <= np.abs(to_anchor))
-    sources = np.where(near, neighbor, buffer.size + nearest), np.where(near, to_neighbor, to_anchor)
+    sources = np.where(near, neighbor, buffer.first_anchor + nearest), np.where(near, to_neighbor, to_anchor)
     buffer.load(time, sources, rounds(len(time), stride, buffer.width))
 
 

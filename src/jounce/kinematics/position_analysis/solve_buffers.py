@@ -10,6 +10,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from jounce.execution.buffer_pool import acquire, arrays_in, bytes_needed, release
+from jounce.kinematics.continuation.correct_and_differentiate import SolvedState
 from jounce.kinematics.continuation.solver import Solver
 
 Item = TypeVar("Item")
@@ -18,46 +19,54 @@ Rounds = Int[np.ndarray, "round width"]
 
 
 class SolveBuffer:
-    """The memory of a thread, for some instants after others, with the anchors that they start from behind them.
+    """The memory of a thread, for some instants after others.
+
+    Of the instants of one motion all states are kept, as others start from them, and the anchors lie behind them. Of
+    many designs, whose instants start from anchors or from the round before, nothing is kept but outputs.
 
     Parameters
     ----------
     solver : Solver
         What solves the instants.
     like : tuple
-        The state of an anchor.
+        The state of an instant.
     size, anchors : int
         The most instants and anchors that it is for.
 
     Attributes
     ----------
+    first_anchor : int
+        Index of the first anchor among what instants may start from.
     state : tuple
-        Of all instants, and behind them of the anchors.
+        Jets of coordinates and outputs, and the sign, of all instants; None for what is not kept.
     status : array of int, shape (size,)
     """
 
-    def __init__(self, solver: Solver, like: Any, size: int, anchors: int):
-        leaves, form = jax.tree.flatten(like)
-        own = solver.own or {}
-        shapes = [(*leaf.shape[:-1], size + anchors) for leaf in leaves]
-        shapes += [*((*value.shape[:-1], size) for value in own.values()), *[(size,)] * 4]
-        self.block, self.size = acquire(bytes_needed(shapes)), size
+    def __init__(self, solver: Solver, like: SolvedState, size: int, anchors: int):
+        own, of_designs = solver.own or {}, solver.own is not None
+        self.first_anchor, outputs = (0, like[1]) if of_designs else (size, ())
+        known, form = jax.tree.flatten(solver.needed(like) if of_designs else like)
+        shapes = [(*leaf.shape[:-1], self.first_anchor + anchors) for leaf in known]
+        shapes += [*((*value.shape[:-1], size) for value in (*outputs, *own.values())), *[(size,)] * 4]
+        self.block = acquire(bytes_needed(shapes))
         kinds = [*[float] * (len(shapes) - 2), *[int] * 2]
-        arrays = arrays_in(self.block, shapes, kinds)
-        state, values = arrays[: len(leaves)], arrays[len(leaves) : -4]
-        self.time, self.step, self.status, self.source = arrays[-4:]
-        self.state = jax.tree.unflatten(form, state)
-        self.own = None if solver.own is None else dict(zip(own, values, strict=True))
+        arrays = iter(arrays_in(self.block, shapes, kinds))
+        self._known = jax.tree.unflatten(form, [next(arrays) for _ in known])
+        nowhere = dict.fromkeys(like[0]), tuple([next(arrays) for _ in outputs]), None
+        self.state: tuple[Any, Any, Any] = nowhere if of_designs else self._known
+        self.own = {k: next(arrays) for k in own} if of_designs else None
+        self.time, self.step, self.status, self.source = arrays
         self.source[:] = 0
         self.width = solver.program.width
-        self._run = solver.rounds(self.state, self.step, self.time, self.status, self.source, self.own)
+        needed = self._known if of_designs else solver.needed(self._known)
+        self._run = solver.rounds(needed, self.state, self.step, self.time, self.status, self.source, self.own)
         self.rounds: Rounds = np.zeros((0, self.width), np.int64)
 
     def put_anchors(self, parts: Iterable[Sequence[np.ndarray]]) -> None:
-        """Put anchors behind the instants: parts of each leaf of their state, anchors last."""
-        for whole, columns in zip(jax.tree.leaves(self.state), parts, strict=True):
+        """Put anchors to where instants start from: parts of each leaf of their state, anchors last."""
+        for whole, columns in zip(jax.tree.leaves(self._known), parts, strict=True):
             count = sum(x.shape[-1] for x in columns)
-            np.concatenate(columns, axis=-1, out=whole[..., self.size : self.size + count])
+            np.concatenate(columns, axis=-1, out=whole[..., self.first_anchor : self.first_anchor + count])
 
     def load(
         self,
@@ -73,18 +82,19 @@ class SolveBuffer:
         time : array of shape (time,)
             s.
         sources : tuple of array, shape (time,)
-            What each starts from, an instant, or the anchor whose index is so much over the size; and the time from
+            What each starts from, an instant, an anchor, or below zero its lane of the round before; and the time from
             there, s.
         rounds : array of int, shape (rounds, lanes)
             In which they are solved.
         own : dict of int to array, optional
-            The values of their designs, instants last.
+            The values of their designs, designs last; each has as many of the instants.
         """
         count = len(time)
         self.time[:count], self.rounds = time, rounds
         self.source[:count], self.step[:count] = sources
         for k, whole in (self.own or {}).items():
-            whole[..., :count] = own[k]
+            designs = own[k].shape[-1]
+            whole[..., :count].reshape(*whole.shape[:-1], designs, -1)[...] = own[k][..., None]
 
     def solve(self) -> None:
         """Solve the instants that were taken up last."""
