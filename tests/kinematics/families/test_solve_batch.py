@@ -110,7 +110,7 @@ def test_a_change_point_on_the_way_is_passed_as_alone():
 
 @pytest.mark.slow
 def test_more_designs_than_go_side_by_side(monkeypatch):
-    monkeypatch.setattr("jounce.kinematics.families.design_paths.TOGETHER", 16)
+    monkeypatch.setattr("jounce.kinematics.families.design_paths.MOST_TOGETHER", 16)
     parameters = {"BC": np.linspace(0.125, 0.16, 37)}
     family = jn.solve_batch(FOUR_BAR, parameters, TIME, order=1, threads=1)
     check(FOUR_BAR, parameters, family, TIME, 1)

@@ -39,7 +39,7 @@ from jounce.mechanism.transmissions.axis_angles import measures_angle, raw_angle
 from jounce.mechanism.transmissions.turn_counting import counted_along
 
 MOST_STEPS = 10_000  # of a design; one that needs more is left to be solved individually
-TOGETHER = 512  # designs that are followed together
+FEWEST_TOGETHER, MOST_TOGETHER = 512, 1024  # designs that are followed together, unless there are fewer
 MOST_BLOCKS = 16  # of a family: more of them, each with fewer designs, take longer, and fewer leave threads idle
 LARGEST_BLOCK = 4  # times as many instants as a span of a long grid has: each is read by the next one only
 
@@ -58,13 +58,16 @@ class Anchors(NamedTuple):
         Index of the first anchor of each design, and behind them how many anchors there are.
     instant : array of shape (anchors,)
         s.
+    order : array of shape (anchors,)
+        Where each is in what is known.
     known : tuple
-        What predictions need of them, anchors last.
+        What predictions need of all anchors of the group, in the order of its steps, anchors last.
     """
 
     designs: Indices
     begins: Int[np.ndarray, " design_and_one"]
     instant: Float[np.ndarray, " anchor"]
+    order: Int[np.ndarray, " anchor"]
     known: SolvedState
 
     @property
@@ -77,8 +80,8 @@ class Anchors(NamedTuple):
         for k in range(0, len(self.designs), size):
             begins = self.begins[k : k + size + 1]
             some = slice(begins[0], begins[-1])
-            known = jax.tree.map(lambda x, some=some: x[..., some], self.known)
-            yield Anchors(self.designs[k : k + size], begins - begins[0], self.instant[some], known)
+            those = self.instant[some], self.order[some], self.known
+            yield Anchors(self.designs[k : k + size], begins - begins[0], *those)
 
 
 class DesignPaths:
@@ -116,7 +119,8 @@ class DesignPaths:
         """Follow the designs from where they are assembled, those that are plain."""
         self.individual |= ~plain
         lanes = np.flatnonzero(plain)
-        groups = [lanes[k : k + TOGETHER] for k in range(0, len(lanes), TOGETHER)]
+        size = min(max(FEWEST_TOGETHER, -(-len(lanes) // threads)), MOST_TOGETHER)
+        groups = [lanes[k : k + size] for k in range(0, len(lanes), size)]
         with Threads(threads, compiled=self.solver.is_compiled) as pool:
             self._groups = list(pool.map(lambda group: self._followed(coordinates, group), groups))
 
@@ -163,8 +167,8 @@ class DesignPaths:
         order = np.argsort(owner, kind="stable")  # of each design, the instants rise from step to step
         order = order[~self.individual[owner[order]]]
         designs, begins = np.unique(owner[order], return_index=True)
-        known = jax.tree.map(lambda *parts: np.take(np.concatenate(parts, axis=-1), order, axis=-1), *known)
-        return Anchors(designs, np.append(begins, len(order)), np.concatenate(instants)[order], known)
+        known = jax.tree.map(lambda *parts: np.concatenate(parts, axis=-1), *known)
+        return Anchors(designs, np.append(begins, len(order)), np.concatenate(instants)[order], order, known)
 
     def solved(self, threads: int) -> tuple[list[list[np.ndarray]], Int[np.ndarray, "design time"]]:
         """Return the outputs of all designs, and their status.
@@ -188,12 +192,12 @@ class DesignPaths:
         def new() -> SolveBuffer:
             return SolveBuffer(self.solver, like, size * times, most)
 
-        def put(block: Anchors, state: SolvedState, outcome: Indices) -> None:
+        def put(block: Anchors, state: tuple[Any, tuple[np.ndarray, ...], Any], outcome: Indices) -> None:
             lanes = _slice_of(block.designs)
             status[lanes] = self._as_given(outcome.reshape(-1, times), block.designs)
             for whole, part in zip(wholes, state[1], strict=True):
                 with np.errstate(over="ignore"):  # of what failed
-                    derivatives = plain_derivatives(part[:levels])
+                    derivatives = plain_derivatives(part[:levels], out=part[:levels])
                 values = derivatives.reshape(*derivatives.shape[:-1], -1, times)
                 whole[..., lanes, :] = self._as_given(values, block.designs)
 
@@ -219,7 +223,7 @@ class DesignPaths:
         instants = self._instants[block.designs]
         count, times = instants.shape
         length = -(-times // max(1, buffer.width // count))  # of a piece of a motion, so that lanes are in use
-        buffer.put_anchors([[leaf] for leaf in jax.tree.leaves(block.known)])
+        buffer.put_anchors([[np.take(leaf, block.order, axis=-1)] for leaf in jax.tree.leaves(block.known)])
         nearest = _nearest(block.owner, block.instant, instants, self._ends)
         to_anchor = instants - block.instant[nearest]
         to_one_before = np.empty(instants.shape)
@@ -235,10 +239,10 @@ class DesignPaths:
         """Give angles about axes the turns that they make along the anchors of their designs."""
         if not any(map(measures_angle, self.solver.model.system.outputs)):
             return
-        designs, owner, at, coordinates = anchors.designs, anchors.owner, anchors.instant, anchors.known[0]
+        designs, owner, at = anchors.designs, anchors.owner, anchors.instant
         system = self.designs.system(designs[owner])
         measuring = [(g, output) for g, output in zip(system.outputs, outputs, strict=True) if measures_angle(g)]
-        series = np.nan_to_num(coordinates["quaternion"], nan=0.0, posinf=0.0, neginf=0.0)
+        series = np.nan_to_num(anchors.known[0]["quaternion"][..., anchors.order], nan=0.0, posinf=0.0, neginf=0.0)
         here = np.arange(len(owner))
         following = np.where(np.append(owner[1:] != owner[:-1], True), here, here + 1)  # or itself, the last one
 
