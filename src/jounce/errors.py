@@ -373,7 +373,7 @@ class IdleMotionWarning(_BoundedWarning):
 
 
 class MachineCodeWarning(_BoundedWarning):
-    """XLA computes what there is no machine code for: the same results in two to six times the time."""
+    """XLA computes what there is no machine code for: the same results in two to fifty times the time."""
 
 
 class ProgramFolderWarning(_BoundedWarning):

@@ -1,5 +1,7 @@
 """Machine code of functions of small arrays beside XLA's programs."""
 
+import threading
+
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -7,9 +9,9 @@ import pytest
 from scipy.special import digamma
 
 import jounce as jn
-from jounce.execution import backends, structure, translated
+from jounce.execution import background, backends, structure, translated
 from jounce.execution.compilation import Compiled, compiled
-from jounce.execution.llvm import self_test
+from jounce.execution.llvm import modules, self_test
 from jounce.execution.store import programs as store_
 from jounce.execution.translated import WhenMade
 from tests.execution.test_compilation import Shelf
@@ -89,6 +91,21 @@ def test_an_operation_without_code_is_left_to_xla(monkeypatch):
     with pytest.warns(jn.errors.MachineCodeWarning, match="digamma"):
         found = transformed(np.arange(1.0, 5.0))
     np.testing.assert_allclose(found, digamma(np.arange(1.0, 5.0)), rtol=1e-13)
+
+
+def test_a_program_that_is_too_long_is_left_to_xla_and_told_by_who_needs_it(monkeypatch):
+    monkeypatch.setattr(backends, "_warned", set())
+    monkeypatch.setattr(modules, "MOST_LINES", 20)
+    x = np.linspace(0.1, 0.9, 3)
+    run = Compiled(lambda x: sum(jnp.sin(k * x) for k in range(1, 40)), (), single=True)
+    job = threading.Thread(target=lambda: (background._queued.append(lambda: run(x)), background._took_up_next()))
+    job.start()
+    job.join()
+    assert len(run.machine_code) == 1
+    with pytest.warns(jn.errors.MachineCodeWarning, match="a program of more than 20 lines"):
+        found = run(x)
+    assert isinstance(found, jax.Array)
+    np.testing.assert_allclose(found, np.sin(np.arange(1, 40)[:, None] * x).sum(0), rtol=1e-13)
 
 
 def test_arrays_may_lie_in_any_way():

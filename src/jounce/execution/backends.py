@@ -9,6 +9,7 @@ import jax
 import numpy as np
 
 from jounce.errors import MachineCodeWarning
+from jounce.execution.background import is_ahead
 from jounce.execution.device import device_name, on_processor
 from jounce.execution.llvm import self_test
 
@@ -51,13 +52,16 @@ def joined(backends: Iterable[str]) -> str:
     return ", ".join(sorted(set(backends)))
 
 
-def tell_missing(operation: str) -> None:
-    """Warn, once for each operation, that XLA computes what has it, since there is no machine code for it."""
-    if operation in _warned:
+def tell_missing(what: str) -> None:
+    """Warn, once for each operation and each limit, that XLA computes what there is no machine code for.
+
+    What is made beforehand, and may not be needed, is told of when it is.
+    """
+    if what in _warned or is_ahead():
         return
-    _warned.add(operation)
+    _warned.add(what)
     message = (
-        f"there is no machine code for the operation {operation!r} of JAX: XLA computes the programs that contain it, "
-        "with the same results in two to six times the time; another form of that operation may be faster"
+        f"there is no machine code for {what}: XLA computes what needs it, with the same results in two to fifty times "
+        "the time; another form of the operation, or a lower order of a long program, may have machine code"
     )
     warnings.warn(message, MachineCodeWarning, stacklevel=2)

@@ -98,6 +98,11 @@ def prepare_later(job: Callable[[], Any], name: str, arguments: Any, *static: An
         _worker.start()
 
 
+def is_ahead() -> bool:
+    """Tell whether what this thread does is a job whose programs are made beforehand."""
+    return getattr(_thread, "busy", False)
+
+
 def is_compiling() -> bool:
     """Tell whether some thread still compiles what was to be there beforehand."""
     return _worker is not None and _worker.is_alive()
@@ -110,7 +115,7 @@ def _work() -> None:
 
 def _took_up_next() -> bool:
     """Do the next job that is queued; tell whether there was one, and this thread is not at one already."""
-    if getattr(_thread, "busy", False):
+    if is_ahead():
         return False
     try:
         job = _queued.popleft()

@@ -21,7 +21,6 @@ from jounce.execution.backends import LLVM, xla_backend
 from jounce.execution.compilation import Compiled
 from jounce.execution.device import on_processor
 from jounce.execution.llvm.programs import Program
-from jounce.execution.llvm.text.scalars import MOST_LINES
 from jounce.execution.threads import Threads
 from jounce.execution.translated import Translated, all_shaped
 from jounce.settings import under_own_settings
@@ -240,8 +239,6 @@ class Mapped:
         Whether arrays of many instants, those given and the results, have the instants along their first axis.
     made_of : tuple of callable, optional
         Functions of the package that say what it computes, where it is none of them itself.
-    most_lines : int, optional
-        Of machine code's text: what is longer takes too long to compile for what it gains.
     widths : tuple of int, optional
         Instants that XLA's programs are for, increasing.
     narrow : bool, default False
@@ -255,13 +252,12 @@ class Mapped:
         by_xla: Callable[..., Any] | None = None,
         rows: bool = False,
         made_of: tuple[Callable[..., Any], ...] = (),
-        most_lines: int = MOST_LINES,
         widths: tuple[int, ...] = WIDTHS,
         narrow: bool = False,
     ):
         self.function, self.rows, self.widths = function, rows, widths
         self._many, made_of = by_xla or function, made_of or (function,)
-        self.machine_code = Translated(function, made_of, rows=rows, most_lines=most_lines)
+        self.machine_code = Translated(function, made_of, rows=rows)
         of_many = made_of if by_xla is None else (*made_of, by_xla)
         block = Mapped._block_of_rows if rows else Mapped._block
         self.on_xla = Compiled(block.__get__(self), ("how",), (block, *of_many), narrow=narrow)

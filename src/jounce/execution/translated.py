@@ -21,8 +21,7 @@ from jounce.execution.backends import is_wanted, tell_missing
 from jounce.execution.background import ByKey
 from jounce.execution.llvm.modules import object_file
 from jounce.execution.llvm.programs import Program, Single
-from jounce.execution.llvm.text.scalars import MOST_LINES
-from jounce.execution.llvm.text.values import NoRuleError, UnsupportedOperationError
+from jounce.execution.llvm.text.values import UnsupportedOperationError
 from jounce.execution.store.programs import current_store, made_or_kept
 from jounce.execution.structure import UndescribedError, cache_key, settings
 
@@ -73,8 +72,6 @@ class Translated:
         Whether there is one instant only.
     rows : bool, default False
         Whether arrays of many instants, those given and the results, have the instants along their first axis.
-    most_lines : int, optional
-        Of LLVM's text: a longer one takes more time to compile than it saves.
     brief : bool, default False
         Whether it is called so seldom that, for small arguments, it is compiled with fewer optimizations.
     """
@@ -86,11 +83,10 @@ class Translated:
         *,
         single: bool = False,
         rows: bool = False,
-        most_lines: int = MOST_LINES,
         brief: bool = False,
     ):
         self.function, self.made_of = function, made_of
-        self._single, self._rows, self._most_lines, self._brief = single, rows, most_lines, brief
+        self._single, self._rows, self._brief = single, rows, brief
         self._programs = ByKey()
 
     def __len__(self) -> int:
@@ -158,19 +154,17 @@ class Translated:
     def _made(
         self, given: tuple[Any, Any], indices: Mapping[int, np.ndarray], how: dict[str, Any], static: Mapping[str, Any]
     ) -> Single | Program | str | None:
-        """Return a program from the store of programs, or one that is made; or the operation that has no code."""
+        """Return a program from the store of programs, or one that is made; or what there is no code for."""
         function = partial(self._traced, **static)
-        options: Any = how | {"most_lines": self._most_lines, "rows": self._rows, "single": self._single}
+        options: Any = how | {"rows": self._rows, "single": self._single}
         options["brief"] = self._brief and sum(leaf.size for leaf in jax.tree.leaves(given)) <= LITTLE
 
         def make() -> tuple[Any, ...]:
             try:
                 with compiling(self.function):
                     binary, results = object_file(function, *given, indices, **options)
-            except NoRuleError as missing:  # stored, too, as it takes long to find out
+            except UnsupportedOperationError as missing:  # stored, too, as it takes long to find out
                 return b"", str(missing), None
-            except UnsupportedOperationError:
-                return b"", None, None
             return binary, tuple(map(jax.tree.leaves, given)), results
 
         key = self._key(given, indices, dict(static) | how) if current_store() is not None else None

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 from jounce.execution.llvm import machine, modules, programs
-from jounce.execution.llvm.text.scalars import MOST_LINES
 
 COUNT = 17  # two whole vectors and a rest
 FEW = 3  # numbers of an array that is a single value each
@@ -37,7 +36,7 @@ def verified(text, **how):
     return machine.compiled(text, **how)
 
 
-def compiled(function, lanes, shared=(), known=(), width=8, most_lines=MOST_LINES, large=None):
+def compiled(function, lanes, shared=(), known=(), width=8, large=None):
     """Return what runs a function of one instant for many, by machine code for vectors of `width` lanes."""
     one = [jax.ShapeDtypeStruct((*x.shape[:-1], 1), x.dtype) for x in lanes]
     kinds = [jax.ShapeDtypeStruct(x.shape, x.dtype) for x in shared]
@@ -46,9 +45,7 @@ def compiled(function, lanes, shared=(), known=(), width=8, most_lines=MOST_LINE
         patch.setattr(modules, "vector_width", lambda: width)
         patch.setattr(programs, "vector_width", lambda: width)
         patch.setattr(modules, "compiled", verified)
-        binary, results = modules.object_file(
-            whole_function, kinds, one, {k: shared[k] for k in known}, most_lines=most_lines, large=large
-        )
+        binary, results = modules.object_file(whole_function, kinds, one, {k: shared[k] for k in known}, large=large)
         return programs.Program(binary, (kinds, one), results)
 
 

@@ -376,13 +376,24 @@ def test_what_there_is_no_code_for_is_refused(name):
 
 def test_what_is_too_long_or_takes_too_much_memory_is_refused(monkeypatch):
     monkeypatch.setattr(modules, "MOST_MEMORY", 10_000)
+    monkeypatch.setattr(modules, "MOST_LINES", 1000)
     for run in (
         lambda x: jnp.sin(jnp.arange(1.0, 2000.0) * x).sum()[None],
         lambda x: (jnp.sin(jnp.arange(50.0)[:, None] * x[0]) @ jnp.ones((1, 50))).sum()[None],
         lambda x: lax.while_loop(lambda s: s[0, 0] > 0.0, lambda s: s - 1.0, jnp.broadcast_to(x, (300, 1)))[0],
     ):
         with pytest.raises(UnsupportedOperationError):
-            compiled(run, (ordinary(),), most_lines=1000)
+            compiled(run, (ordinary(),), large=3000)
+
+
+def test_where_single_values_are_too_many_large_arrays_are_in_memory(monkeypatch):
+    def run(x):
+        table = jnp.sin(jnp.arange(1.0, 2000.0)[:, None] * x[None])
+        return jnp.stack([table.sum(0), (table * table).sum(0)])
+
+    monkeypatch.setattr(modules, "MOST_ALONE", 1000)
+    monkeypatch.setattr(modules, "MOST_LINES", 1000)
+    assert_agree(run, ordinary(), rtol=1e-10)
 
 
 def test_long_scans_within_scans_are_given_up_early(monkeypatch):

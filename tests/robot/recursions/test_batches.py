@@ -6,7 +6,11 @@ import numpy as np
 import pytest
 
 import jounce as jn
+from jounce.execution.background import ByKey
+from jounce.execution.llvm import modules
+from jounce.execution.llvm.programs import Program
 from jounce.jet.derivatives import plain_derivatives, taylor_coefficients
+from jounce.robot.algorithms import forward_dynamics as forward_dynamics_
 from jounce.robot.algorithms.inverse_dynamics import generalized_forces
 from jounce.robot.recursions.batches import WIDTHS
 from tests.problems.robots import random_robot
@@ -47,6 +51,18 @@ def test_shapes_of_batches_are_kept(torque, lead):
     assert jn.robot.operational_accelerations(ROBOT, q, LAST).shape == (*lead, 3, 6)
     assert jn.robot.center_of_mass(ROBOT, q).shape == (*lead, 4, 3)
     assert jn.robot.joint_wrenches(ROBOT, q).shape == (*lead, 2, 4, 6)
+
+
+def test_programs_that_are_too_long_with_single_values_have_arrays_in_memory(monkeypatch):
+    state, forces = Q[:40, :2], 30.0 * Q[40:80, 1:]
+    expected = jn.forward_dynamics(ROBOT, state, forces)
+    moved = forward_dynamics_._moved.mapped
+    monkeypatch.setattr(modules, "MOST_ALONE", 3000)
+    monkeypatch.setattr(moved.machine_code, "_programs", ByKey())
+    found = jn.forward_dynamics(ROBOT, state, forces)
+    (program,) = moved.machine_code._programs.values()
+    assert isinstance(program, Program)
+    np.testing.assert_allclose(found, expected, rtol=1e-10, atol=1e-12 * np.abs(expected).max())
 
 
 def compilations():

@@ -11,6 +11,7 @@ from typing import Any
 
 HASTE = ("-regalloc=fast", "-enable-misched=false")  # options of LLVM
 LONG = 10_000  # lines, for which another process is worth its start
+LONGEST = 120_000  # lines, beyond which haste is worth slower code
 _lock = threading.Lock()  # LLVM's state is one for the process
 _published: set[str] = set()
 
@@ -60,7 +61,9 @@ def compiled(text: str, *, hasty: bool = False, brief: bool = False) -> bytes:
     """
     if brief:
         return _compiled_here(text, 0)
-    elsewhere = hasty or (text.count("\n") > LONG and _cores() > 1)
+    lines = text.count("\n")
+    hasty = hasty or lines > LONGEST
+    elsewhere = hasty or (lines > LONG and _cores() > 1)
     result = _compiled_elsewhere(text, hasty) if elsewhere else None
     return _compiled_here(text) if result is None else result
 

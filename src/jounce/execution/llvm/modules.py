@@ -13,13 +13,14 @@ from jounce.execution.llvm.machine import compiled, vector_width
 from jounce.execution.llvm.rounds import rounds_text
 from jounce.execution.llvm.text.arrays import constants
 from jounce.execution.llvm.text.code import Code, flat
-from jounce.execution.llvm.text.scalars import MOST_LINES, TURNS
+from jounce.execution.llvm.text.scalars import MOST_ALONE, MOST_LINES, TURNS
 from jounce.execution.llvm.text.sine_cosine import sine_and_cosine
 from jounce.execution.llvm.text.stored import is_large, put, values_of
 from jounce.execution.llvm.text.values import Region, UnsupportedOperationError, kind_of
 from jounce.execution.llvm.text.views import Array, Stored, contiguous
 from jounce.execution.llvm.translation import translate
 
+LARGE = 64  # numbers of an array that stays in memory where code with single values alone was too long
 MOST_MEMORY = 2**20  # bytes of the stack: threads have little
 MOST_HEAP = 2**30  # bytes elsewhere
 ATTRIBUTES = """attributes #0 = { nounwind willreturn memory(none) }
@@ -35,7 +36,6 @@ def object_file(
     known: Mapping[int, np.ndarray],
     *,
     rows: bool = False,
-    most_lines: int = MOST_LINES,
     large: int | None = None,
     single: bool = False,
     hasty: bool = False,
@@ -54,11 +54,9 @@ def object_file(
         Leaves of `shared`, by their numbers, whose values are part of the program.
     rows : bool, default False
         Whether arrays of many instants, those given and the results, have the instants along their first axis.
-    most_lines : int, optional
-        Of LLVM's text.
     large : int, optional
         Arrays of more numbers stay in memory, and operations on them are loops: shorter code that takes longer. None
-        unless given.
+        unless given or, for lack of another code, `LARGE`.
     single : bool, default False
         Whether there is one instant only, all of whose arrays are in `shared`.
     hasty, brief : bool, default False
@@ -69,17 +67,27 @@ def object_file(
     UnsupportedOperationError
         Where there is no code for it, or too much; or a release of JAX that was not tried writes it otherwise.
     """
-    count, options = len(jax.tree.leaves(shared)), {"most_lines": most_lines, "large": large, "single": single}
+    count = len(jax.tree.leaves(shared))
     with uncollected():
         traced, results = jax.make_jaxpr(function, return_shape=True)(shared, lanes)
         closed = in_plain_operations(traced)
         try:
-            text = _text(closed, count, known, vector_width(), rows=rows, **options)
+            text = _written(closed, count, known, vector_width(), rows=rows, large=large, single=single)
         except (AttributeError, KeyError, TypeError) as failure:  # of what JAX says of an operation, under another name
             if is_tried():
                 raise
             raise UnsupportedOperationError(f"JAX {jax.__version__}, which was not tried: {failure!r}") from failure
     return compiled(text, hasty=hasty, brief=brief), results
+
+
+def _written(*program: Any, large: int | None, **how: Any) -> str:
+    """Return the text of a module; where single values are too many or have no code, with large arrays in memory."""
+    try:
+        return _text(*program, large=large, **how)
+    except UnsupportedOperationError:
+        if large is not None:
+            raise
+    return _text(*program, large=LARGE, **how)
 
 
 def _text(
@@ -89,12 +97,12 @@ def _text(
     width: int,
     *,
     rows: bool = False,
-    most_lines: int = MOST_LINES,
     large: int | None = None,
     single: bool = False,
 ) -> str:
     """Return the text of a module with a function `run` of the addresses of all arrays and the number of lanes."""
-    code, given = Code(width, most_lines, large=large, single=single), []
+    most = MOST_ALONE if large is None else MOST_LINES
+    code, given = Code(width, most, large=large, single=single), []
     for number, variable in enumerate(closed.jaxpr.invars):
         if number in known:
             given.append(constants(code, known[number]))
@@ -114,7 +122,7 @@ def _text(
     for number, array in enumerate(results, len(given)):
         _write(code, number, array, rows=rows)
     if code.memory > MOST_MEMORY or code.heap > MOST_HEAP:
-        raise UnsupportedOperationError(f"{code.memory} bytes of the stack, and {code.heap} elsewhere")
+        raise UnsupportedOperationError(f"a program with {code.memory + code.heap:,} bytes of memory of its own")
     borrowed, returned = [], []
     if code.heap:
         borrowed, returned = (

@@ -80,7 +80,7 @@ def _written(code: Code, program: Any, given: Sequence[Values], write: Write) ->
             if value.constant is None:
                 inner.store(region, k, value)
     if inner.heap:
-        raise UnsupportedOperationError(f"{inner.heap} bytes of a subroutine that are not on the stack")
+        raise UnsupportedOperationError(f"a subroutine with {inner.heap:,} bytes of memory of its own")
     code.memory += inner.memory
     name = f"@part{len(code.subroutines)}"
     head = f"define internal void {name}({', '.join(parameters)}) noinline #1 {{"

@@ -39,7 +39,7 @@ from jounce.execution.llvm.text.stored import (
     stored,
     values_of,
 )
-from jounce.execution.llvm.text.values import NoRuleError, Region, UnsupportedOperationError, Value, kind_of
+from jounce.execution.llvm.text.values import Region, UnsupportedOperationError, Value, kind_of
 from jounce.execution.llvm.text.views import Array, Deferred, InMemory, contiguous, further
 
 MOST_UNROLLED = 4_000  # lines of a loop of known length that is written turn after turn
@@ -117,7 +117,7 @@ def _results(code: Code, equation: Any, given: Sequence[Array], *, delayed: bool
         result = [settled(code, array) for array in rule(code, equation, given)]
         return [stored(code, x) if isinstance(x, Deferred) and not delayed else x for x in result]
     if (rule := RULES.get(name)) is None:
-        raise NoRuleError(name)
+        raise UnsupportedOperationError(f"the operation {name!r} of JAX")
     return rule(code, equation, [values_of(code, array) for array in given])
 
 

@@ -21,7 +21,6 @@ from jounce.robot.model.abstract_robot import AbstractRobot
 from jounce.settings import check_process
 
 LEAST_THREADED = 2**12  # samples of a thread: fewer are done before threads are started
-MOST_LINES = 40_000  # of machine code's text: it is compiled in four seconds, XLA's programs for all widths in as many
 WIDTHS = (8, SIDE_BY_SIDE, 16 * SIDE_BY_SIDE)  # sizes of blocks by XLA: each compiles once for a kind of robot
 
 
@@ -35,9 +34,7 @@ class Batched:
 
     def __init__(self, function: Callable[..., Any]):
         self.function = function
-        self.mapped = Mapped(
-            self._sample, rows=True, made_of=(Batched._sample, function), most_lines=MOST_LINES, widths=WIDTHS
-        )
+        self.mapped = Mapped(self._sample, rows=True, made_of=(Batched._sample, function), widths=WIDTHS)
         update_wrapper(self, function)
 
     @property

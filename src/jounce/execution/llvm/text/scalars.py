@@ -12,7 +12,8 @@ import numpy as np
 from jounce.execution.llvm.text import values
 from jounce.execution.llvm.text.values import DTYPES, SCALARS, UnsupportedOperationError, Value, kind_of, literal
 
-MOST_LINES = 500_000  # of text: LLVM makes some 10,000 to 20,000 of them into machine code in a second
+MOST_LINES = 500_000  # of text: LLVM makes some 5,000 to 20,000 of them into machine code in a second
+MOST_ALONE = 120_000  # where all numbers are single values, without loops: of more, LLVM takes minutes
 DOUBLES: dict[str, tuple[str, Any]] = {  # in LLVM, in Python
     "add": ("fadd contract", operator.add),
     "sub": ("fsub contract", operator.sub),
@@ -118,7 +119,7 @@ class Scalars:
             if (value := known.get(instruction)) is not None:
                 return value
         if len(self.lines) > self.most:
-            raise UnsupportedOperationError(f"more than {self.most} lines")
+            raise UnsupportedOperationError(f"a program of more than {self.most:,} lines")
         name = self.fresh()
         self.lines.append(f"{name} = {instruction}")
         value = self._known[-1][instruction] = Value(name, kind, lanes)

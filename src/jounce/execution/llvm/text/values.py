@@ -12,11 +12,7 @@ DTYPES = {kind: dtype for dtype, kind in KINDS.items()}
 
 
 class UnsupportedOperationError(Exception):
-    """An operation that this room has no code for."""
-
-
-class NoRuleError(UnsupportedOperationError):
-    """An operation of JAX, by its name, that this room does not know."""
+    """What this room has no code for, in the words of a warning: 'there is no machine code for ...'."""
 
 
 @dataclass(frozen=True, eq=False)
