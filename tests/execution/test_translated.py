@@ -9,7 +9,7 @@ import pytest
 from scipy.special import digamma
 
 import jounce as jn
-from jounce.execution import background, backends, structure, translated
+from jounce.execution import backends, background, structure, translated
 from jounce.execution.compilation import Compiled, compiled
 from jounce.execution.llvm import modules, self_test
 from jounce.execution.store import programs as store_

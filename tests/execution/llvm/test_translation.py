@@ -391,7 +391,7 @@ def test_where_single_values_are_too_many_large_arrays_are_in_memory(monkeypatch
         table = jnp.sin(jnp.arange(1.0, 2000.0)[:, None] * x[None])
         return jnp.stack([table.sum(0), (table * table).sum(0)])
 
-    monkeypatch.setattr(modules, "MOST_ALONE", 1000)
+    monkeypatch.setattr(modules, "MOST_LINES_WITHOUT_LOOPS", 1000)
     monkeypatch.setattr(modules, "MOST_LINES", 1000)
     assert_agree(run, ordinary(), rtol=1e-10)
 

@@ -13,7 +13,7 @@ from jounce.execution.llvm.machine import compiled, vector_width
 from jounce.execution.llvm.rounds import rounds_text
 from jounce.execution.llvm.text.arrays import constants
 from jounce.execution.llvm.text.code import Code, flat
-from jounce.execution.llvm.text.scalars import MOST_ALONE, MOST_LINES, TURNS
+from jounce.execution.llvm.text.scalars import MOST_LINES, MOST_LINES_WITHOUT_LOOPS, TURNS
 from jounce.execution.llvm.text.sine_cosine import sine_and_cosine
 from jounce.execution.llvm.text.stored import is_large, put, values_of
 from jounce.execution.llvm.text.values import Region, UnsupportedOperationError, kind_of
@@ -101,7 +101,7 @@ def _text(
     single: bool = False,
 ) -> str:
     """Return the text of a module with a function `run` of the addresses of all arrays and the number of lanes."""
-    most = MOST_ALONE if large is None else MOST_LINES
+    most = MOST_LINES_WITHOUT_LOOPS if large is None else MOST_LINES
     code, given = Code(width, most, large=large, single=single), []
     for number, variable in enumerate(closed.jaxpr.invars):
         if number in known:

@@ -13,7 +13,7 @@ from jounce.execution.llvm.text import values
 from jounce.execution.llvm.text.values import DTYPES, SCALARS, UnsupportedOperationError, Value, kind_of, literal
 
 MOST_LINES = 500_000  # of text: LLVM makes some 5,000 to 20,000 of them into machine code in a second
-MOST_ALONE = 120_000  # where all numbers are single values, without loops: of more, LLVM takes minutes
+MOST_LINES_WITHOUT_LOOPS = 120_000  # where all numbers are single values, without loops: of more, LLVM takes minutes
 DOUBLES: dict[str, tuple[str, Any]] = {  # in LLVM, in Python
     "add": ("fadd contract", operator.add),
     "sub": ("fsub contract", operator.sub),
