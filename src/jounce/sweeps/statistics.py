@@ -132,10 +132,16 @@ def statistics(
     >>> {name: value.tolist() for name, value in found.items() if name != "rms"}
     {'peak': [3.0], 'peak_time': [1.0], 'min': [-3.0], 'max': [2.0]}
     """
-    low, high = values.min(axis=1), values.max(axis=1)
-    size = np.abs(values)
-    at = np.argmax(size, axis=1)
-    peak = np.take_along_axis(size, at[:, None], axis=1)[:, 0]
+    series = np.moveaxis(values, (0, 1), (-2, -1))  # as families have them in memory, so that nothing is copied
+    low, high, size = series.min(axis=-1), series.max(axis=-1), np.abs(series)
+    at = np.argmax(size, axis=-1)
+    peak = np.take_along_axis(size, at[..., None], axis=-1)[..., 0]
+    scale = np.where(peak > 0, peak, 1.0)  # squares of large numbers would overflow
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RuntimeWarning)
+        size /= scale[..., None]
+        mean = np.einsum("t,...t,...t->...", _weights(instants), size, size)
+    low, high, at, peak, rms = (np.moveaxis(x, -1, 0) for x in (low, high, at, peak, scale * np.sqrt(mean)))
     unknown, when = np.isnan(peak), instants[at]
     if sides is not None and sides[0].shape[1]:
         more, their = sides
@@ -149,16 +155,10 @@ def statistics(
         peak = np.where(larger > peak, larger, peak)
     if pace is not None:
         when = instants[0] + (when - instants[0]) / pace.reshape(-1, *[1] * (when.ndim - 1))
-    weight = _weights(instants)
-    scale = np.where(peak > 0, peak, 1.0)  # squares of large numbers would overflow
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", RuntimeWarning)
-        size /= scale[:, None]
-        mean = np.einsum("t,dt...,dt...->d...", weight, size, size)
     return {
         "peak": peak,
         "peak_time": np.where(unknown, np.nan, when),
-        "rms": np.where(unknown, np.nan, scale * np.sqrt(mean)),
+        "rms": np.where(unknown, np.nan, rms),
         "min": low,
         "max": high,
     }
