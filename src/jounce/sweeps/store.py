@@ -8,6 +8,7 @@ Nothing in the folder is taken on trust: each file is compared with what it must
 something is written, and nothing is opened that is no regular file.
 """
 
+import asyncio
 import hashlib
 import json
 import os
@@ -15,6 +16,7 @@ import secrets
 import shutil
 import tempfile
 from collections.abc import Iterator, Mapping
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, suppress
 from functools import cached_property
 from pathlib import Path
@@ -55,6 +57,7 @@ class Store:
 
     def __init__(self, folder: Path):
         self.folder = folder
+        self._written: dict[str, Any] | None = None  # arrays over the designs, opened when they are first written
 
     @cached_property
     def manifest(self) -> dict[str, Any]:
@@ -92,15 +95,23 @@ class Store:
         OutputError
             The disk is full, or what else the system says.
         """
-        written = []
         with worded(self.folder):
-            for name, values in arrays.items():
-                self._arrays[name][start : start + len(values)] = values
-                written.append(self._part(name, chunk))
-            for path in written:
-                _sync(path)
+            with ThreadPoolExecutor(1) as pool:  # whose thread has no event loop yet, as that of a notebook has
+                pool.submit(asyncio.run, self._put(start, arrays)).result()
+            for name in arrays:
+                _sync(self._part(name, chunk))
             self._mark(chunk).parent.mkdir(exist_ok=True)
             put(self._mark(chunk), self._digest(chunk, arrays))
+
+    async def _put(self, start: int, arrays: Mapping[str, np.ndarray]) -> None:
+        """Put the arrays of a chunk to their files all at once: one after another takes twice as long."""
+        import zarr.api.asynchronous
+
+        if self._written is None:
+            group = await zarr.api.asynchronous.open_group(self.folder, mode="r+", use_consolidated=True)
+            self._written = {name: array async for name, array in group.arrays()}
+        whole = self._written
+        await asyncio.gather(*(whole[name].setitem(slice(start, start + len(x)), x) for name, x in arrays.items()))
 
     def is_done(self, chunk: int) -> bool:
         """Tell whether a chunk is on the disk."""
