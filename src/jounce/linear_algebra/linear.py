@@ -42,10 +42,10 @@ class DenseFactor(Module):
             matrix, free, order, pivots = carry
             column = at(matrix, k, 1, False)
             largest = _largest(jnp.where(free, jnp.abs(column), -1.0), rows)
-            row = jnp.take_along_axis(matrix, largest[None], axis=0)[0]
+            row = _rows(matrix, largest[None])[0]
             pivot, here, chosen = at(row, k, 0), rows == k, rows == largest
             # column k makes room for that of the identity; a pivot of zero leaves the others finite
-            row = jnp.where(here, 1.0, row) / jnp.where(pivot == 0, 1.0, pivot)
+            row = jnp.where(here, 1.0, row) * (1.0 / jnp.where(pivot == 0, 1.0, pivot))
             others = jnp.where(chosen[:, None] | here[None], 0.0, matrix)
             matrix = others - jnp.where(chosen, -1.0, column)[:, None] * row[None]
             return matrix, free & ~chosen, put(order, largest, k, 0), put(pivots, pivot, k, 0)
@@ -85,8 +85,8 @@ class DenseFactor(Module):
         """
 
         def product(right: Any) -> Any:
-            columns = jnp.take_along_axis(right, self.order, axis=0)
-            return jnp.take_along_axis(jnp.sum(self.eliminated * columns[None], axis=1), self.order, axis=0)
+            columns = _rows(right, self.order)
+            return _rows(jnp.sum(self.eliminated * columns[None], axis=1), self.order)
 
         solution = product(right)
         if not refined:
@@ -99,8 +99,8 @@ class DenseFactor(Module):
         rank = self._rank()
 
         def product(right: Any) -> Any:
-            rows = jnp.take_along_axis(right, rank, axis=0)
-            return jnp.take_along_axis(jnp.sum(self.eliminated * rows[:, None], axis=0), rank, axis=0)
+            rows = _rows(right, rank)
+            return _rows(jnp.sum(self.eliminated * rows[:, None], axis=0), rank)
 
         solution = product(right)
         rest = right - jnp.sum(self.matrix * solution[:, None], axis=0)
@@ -108,8 +108,8 @@ class DenseFactor(Module):
 
     def inverse(self) -> Matrices:
         """Return the inverse matrices, shape (rows, rows, batch), for many right-hand sides that come one by one."""
-        rows = jnp.take_along_axis(self.eliminated, self.order[:, None], axis=0)
-        return jnp.take_along_axis(rows, self._rank()[None], axis=1) * self._regular()[None]
+        rows = _rows(self.eliminated, self.order[:, None])
+        return jnp.take_along_axis(rows, self._rank()[None], axis=1, mode="promise_in_bounds") * self._regular()[None]
 
     def applied_inverse(self, matrix: Float[Numbers, "row column"]) -> Float[Numbers, "row column"]:
         """Return the products of the inverse of the first matrix with the columns of another, shape (rows, columns)."""
@@ -137,6 +137,11 @@ class DenseFactor(Module):
 
     def _regular(self) -> Float[Numbers, "1 batch"]:
         return jnp.where(jnp.all(self.pivots != 0, axis=0, keepdims=True), 1.0, jnp.nan)
+
+
+def _rows(matrix: Any, rows: Any) -> Any:
+    """Return rows by the indices that `order` holds, of which none is out of bounds."""
+    return jnp.take_along_axis(matrix, rows, axis=0, mode="promise_in_bounds")
 
 
 def _largest(sizes: Columns, rows: Int[Numbers, "row 1"]) -> Int[Numbers, "1 batch"]:

@@ -35,7 +35,10 @@ def _combined(code: Code, operation: str, values: Sequence[Value], kind: str) ->
     """Return the sum, product, or the like of numbers of one kind."""
     if not values:
         return code.constant(nothing(operation, kind), kind)
-    return reduce(combination(code, operation), values)
+    combined = combination(code, operation)
+    while operation in ("max", "min") and len(values) > 2:  # in any order: half of them at a time wait for no other
+        values = [*map(combined, values[::2], values[1::2]), *values[len(values) & ~1 :]]
+    return reduce(combined, values)
 
 
 def reduction(operation: str) -> Rule:
