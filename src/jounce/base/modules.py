@@ -133,7 +133,8 @@ def _getter(names: tuple[str, ...]) -> Callable[[Any], tuple[Any, ...]]:
     """Return a function that takes the values of several attributes."""
     if len(names) > 1:
         return operator.attrgetter(*names)
-    return lambda module: tuple(getattr(module, name) for name in names)
+    one = operator.attrgetter(*names) if names else None
+    return (lambda _: ()) if one is None else lambda module: (one(module),)
 
 
 class Module(metaclass=_ModuleType):

@@ -39,6 +39,8 @@ def in_chunks(
     filled : bool, default True
         Whether the last chunk is filled up; what a `Mapped` makes needs none of that, and returns arrays of its own.
     """
+    if not filled and count <= widths[-1]:
+        return function(np.arange(count))
     width = next((width for width in widths if count <= width), widths[-1])
 
     def computed(first: int) -> Any:
@@ -47,8 +49,6 @@ def in_chunks(
 
     with Threads(thread_count()) as threads:
         parts = list(threads.map(computed, range(0, count, width)))
-    if not filled and len(parts) == 1:
-        return parts[0]
 
     def whole(*arrays: np.ndarray) -> np.ndarray:
         joined = np.concatenate(arrays, axis)

@@ -226,8 +226,10 @@ def _agree(arrays: Sequence[Any], expected: Sequence[tuple[tuple[int, ...], Any]
 
 def _filled(x: np.ndarray, total: int, axis: int) -> np.ndarray:
     """Repeat the last instant until there are so many; zeros where there is none."""
-    x = np.moveaxis(x, axis, 0)
-    result = np.zeros((total, *x.shape[1:]), x.dtype)
-    if len(x):
-        result[: len(x)], result[len(x) :] = x, x[-1]
-    return np.moveaxis(result, 0, axis)
+    count = x.shape[axis]
+    result = np.zeros((total, *x.shape[1:]) if axis == 0 else (*x.shape[:-1], total), x.dtype)
+    if count and axis == 0:
+        result[:count], result[count:] = x, x[-1]
+    elif count:
+        result[..., :count], result[..., count:] = x, x[..., -1:]
+    return result

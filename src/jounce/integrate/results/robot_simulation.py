@@ -21,7 +21,7 @@ from jounce.execution.mapped import Mapped, mapped
 from jounce.execution.store.programs import is_wanted_soon
 from jounce.integrate.marching.robot_marching import RobotProblem, RobotSteps
 from jounce.integrate.marching.robot_state import RobotState, at
-from jounce.integrate.results.simulation import steps_of
+from jounce.integrate.results.simulation import at_steps, steps_of
 from jounce.integrate.steps.methods import Lanes
 from jounce.jet import Jet, compose
 from jounce.kinematics import Status
@@ -93,7 +93,7 @@ class RobotSimulation(Tabulated):
         levels = max(order - 2, 0)
 
         def lanes_of(lanes: np.ndarray) -> Any:
-            polynomial = jax.tree.map(lambda c: np.moveaxis(np.asarray(c)[chosen[lanes]], 0, -1), steps.polynomial)
+            polynomial = jax.tree.map(lambda c: at_steps(c, chosen[lanes]), steps.polynomial)
             return polynomial, since[lanes], instants[lanes]
 
         (state, q, twist), backend = self._at_instants(expanded_robot, lanes_of, order=levels)

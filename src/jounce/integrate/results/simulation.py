@@ -6,7 +6,7 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
 from jounce.base.shapes import Array, ArrayLike, Numbers, seconds
 from jounce.dynamics.energy.energies import body_energy
@@ -256,6 +256,14 @@ def steps_of(dense: DenseOutput | RobotSteps, instants: np.ndarray) -> tuple[np.
     return reached, np.clip(chosen, 0, len(dense.start) - 1)
 
 
+def at_steps(part: np.ndarray, chosen: Int[np.ndarray, " batch"]) -> np.ndarray:
+    """Return what chosen steps have along the first axis, along the last one."""
+    last = (*range(1, part.ndim), 0)
+    if len(chosen) < len(part):
+        return part[chosen].transpose(last)
+    return part.transpose(last).take(chosen, axis=-1)  # lies in one piece; to turn so many around takes longer
+
+
 def derivatives_of_motion(mechanism: Mechanism, order: int) -> int:
     """Return the highest derivative of the motion that outputs up to an order need."""
     return order + max([1, *(output.lost_orders for output in mechanism.outputs.values())])
@@ -273,7 +281,7 @@ def motion_at(
 
     def lanes_of(lanes: np.ndarray) -> Any:
         steps, now = chosen[lanes], instants[lanes]
-        polynomial = dense.polynomial.map(lambda part: part[steps].transpose(1, 2, 3, 0))
+        polynomial = dense.polynomial.map(lambda part: at_steps(part, steps))
         return tuple(part[steps].T for part in dense.angles), polynomial, now - dense.start[steps], now
 
     program, _ = expansion_program(equations, outputs, dense, order)
