@@ -193,8 +193,8 @@ def furthest(
     orders = np.arange(1.0, len(sizes) + 1)
     roots = -jnp.log(jnp.maximum(sizes, 1e-300)) / orders[:, None]  # logarithms: powers would cost far more
     cuts = np.arange(LOWEST_ORDER, len(sizes))[:, None]
-    counted = (orders >= (cuts + 1) // 2) & (orders <= cuts + 1)  # the upper half of what is kept, and the next
-    reaches = jnp.min(jnp.where(counted[:, :, None], roots[None], jnp.inf), axis=1)
+    counted = (slice((k + 1) // 2 - 1, k + 1) for k in cuts[:, 0])  # the upper half of what is kept, and the next
+    reaches = jnp.stack([jnp.min(roots[part], axis=0) for part in counted])
     steps = reaches + jnp.log(allowed)[None] / (cuts + 1.0)
     if duration is not None:
         highest = cuts.astype(float)
