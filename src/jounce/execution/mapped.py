@@ -18,9 +18,11 @@ from jaxtyping import Int
 
 from jounce.base.shapes import is_traced
 from jounce.execution.backends import LLVM, xla_backend
-from jounce.execution.compilation import Compiled
+from jounce.execution.chunks import in_chunks
+from jounce.execution.compilation import LARGE, Compiled
 from jounce.execution.device import on_processor
 from jounce.execution.llvm.programs import Program
+from jounce.execution.store.programs import is_wanted_soon
 from jounce.execution.threads import Threads
 from jounce.execution.translated import Translated, all_shaped
 from jounce.settings import under_own_settings
@@ -298,6 +300,28 @@ class Mapped:
             if code is not None:
                 return OnLlvm(code, arrays)
         return OnXla(self, shared, form, tuple(static.items()), 1 if width is None else width())
+
+    def at_instants(self, shared: Any, lanes_of: Callable[[np.ndarray], Any], count: int, **static: Any) -> Any:
+        """Return the results for so many instants, and the name of what computes them.
+
+        Parameters
+        ----------
+        shared : pytree
+            As `program` takes it.
+        lanes_of : callable
+            Returns the arguments of some instants, by their indices; of few, they are made once.
+        count : int
+            How many instants there are, at least one.
+        **static
+            Further arguments of the function.
+        """
+        few = count <= FEWEST_TOGETHER
+        lanes = lanes_of(np.arange(count if few else 1))
+        program = self.program(shared, lanes, large=LARGE, hasty=is_wanted_soon(), **static)
+        if few:
+            return program(lanes), program.backend
+        widths = program.together(sum(np.size(x) for x in jax.tree.leaves(lanes)))
+        return in_chunks(lambda some: program(lanes_of(some)), count, widths, filled=False), program.backend
 
     def _block(self, shared: Any, lanes: Any, how: tuple[tuple[str, Any], ...]) -> Any:
         return self._many(shared, lanes, **dict(how))

@@ -11,10 +11,12 @@ from jounce.dynamics.forward.accelerations import Equations
 from jounce.dynamics.forward.initial_state import at_rest, equations_of
 from jounce.dynamics.masses import gravity_of, required_masses
 from jounce.execution.background import prepare_later
+from jounce.execution.compilation import LARGE
+from jounce.execution.store.programs import is_wanted_soon
 from jounce.execution.threads import thread_count
 from jounce.integrate.marching.marching import IntegratorState, march, room_for_steps, steps_between_looks, unexpanded
 from jounce.integrate.marching.user_methods import integrator
-from jounce.integrate.results.simulation import derivatives_of_motion, expansion_program
+from jounce.integrate.results.simulation import derivatives_of_motion, expanded
 from jounce.integrate.steps.methods import AbstractMethod
 from jounce.kinematics.results.output_programs import prepare_outputs
 from jounce.mechanism import AbstractMotionOutput, Mechanism, Model
@@ -79,6 +81,10 @@ def prepare_run(
         equations = equations_of(free(), masses, gravity)
         return equations, unexpanded(equations, at_rest(free(), free().guess), instants[:1], order=length)
 
+    def one(part: Any, axes: int) -> jax.ShapeDtypeStruct:
+        """Return the form of what a step has, of an instant."""
+        return jax.ShapeDtypeStruct((*part.shape[1:axes], 1), float)
+
     def steps() -> None:
         if (beginning := begun()) is not None:
             arguments, named = march_arguments(*beginning, instants[-1], limits, method, watched=watched)
@@ -88,8 +94,10 @@ def prepare_run(
         if (beginning := begun()) is not None:
             equations, current = beginning
             like = jax.eval_shape(partial(room_for_steps, method, count=1), current)[0]
-            program, lanes = expansion_program(equations, free().system.outputs, like, motion_order)
-            program.prepare(lanes, len(instants))
+            polynomial, now = like.polynomial.map(lambda part: one(part, 4)), jax.ShapeDtypeStruct((1,), float)
+            lanes = tuple(one(part, 2) for part in like.angles), polynomial, now, now
+            how: Any = {"large": LARGE, "hasty": is_wanted_soon(), "order": motion_order}
+            expanded.program((equations, free().system.outputs), lanes, **how).prepare(lanes, len(instants))
 
     form = model.system, length, motion_order, method, watched
     prepare_later(steps, "march", *form)

@@ -3,7 +3,7 @@
 import dataclasses
 import itertools
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any
 
@@ -15,10 +15,7 @@ from jaxtyping import Float, Int
 from jounce.base.shapes import ArrayLike, Numbers, seconds
 from jounce.errors import RobotError
 from jounce.execution.backends import joined
-from jounce.execution.chunks import in_chunks
-from jounce.execution.compilation import LARGE
 from jounce.execution.mapped import Mapped, mapped
-from jounce.execution.store.programs import is_wanted_soon
 from jounce.integrate.marching.robot_marching import RobotProblem, RobotSteps
 from jounce.integrate.marching.robot_state import RobotState, at
 from jounce.integrate.results.simulation import at_steps, steps_of
@@ -96,7 +93,7 @@ class RobotSimulation(Tabulated):
             polynomial = jax.tree.map(lambda c: at_steps(c, chosen[lanes]), steps.polynomial)
             return polynomial, since[lanes], instants[lanes]
 
-        (state, q, twist), backend = self._at_instants(expanded_robot, lanes_of, order=levels)
+        (state, q, twist), backend = expanded_robot.at_instants(problem, lanes_of, len(instants), order=levels)
         self._state = state
         self.backend = joined({backend, *self._steps_backends})
         self.q = _derivatives(q)[:, : order + 1]
@@ -193,7 +190,7 @@ class RobotSimulation(Tabulated):
     @cached_property
     def applied(self) -> Float[np.ndarray, "time n"]:
         """Forces that the laws of the joints give, (time, n), N m or N; none of those that are driven."""
-        return np.where(self.status == Status.OK, self._at_instants(forces_at, self._states_of)[0], np.nan).T
+        return np.where(self.status == Status.OK, self._in_states(forces_at), np.nan).T
 
     @property
     def energy(self) -> Float[np.ndarray, " time"]:
@@ -207,20 +204,16 @@ class RobotSimulation(Tabulated):
 
     @cached_property
     def _energies(self) -> Float[np.ndarray, "2 time"]:
-        energies = np.stack(self._at_instants(energy_at, self._states_of)[0])
+        energies = np.stack(self._in_states(energy_at))
         return np.where(self.status == Status.OK, energies, np.nan)
 
-    def _states_of(self, lanes: np.ndarray) -> tuple[RobotState, np.ndarray]:
-        return jax.tree.map(lambda x: x[..., lanes], self._state), self.time[lanes]
+    def _in_states(self, function: Mapped) -> Any:
+        """Return what a function of the problem and of the state at an instant gives for all of them."""
 
-    def _at_instants(self, function: Mapped, lanes_of: Callable[[np.ndarray], Any], **static: Any) -> tuple[Any, str]:
-        """Return what a function of the problem and of an instant gives for all of them, and what computes it."""
-        example = lanes_of(np.zeros(1, int))
-        how: Any = {"large": LARGE, "hasty": is_wanted_soon(), **static}
-        program = function.program(self._problem, example, **how)
-        widths = program.together(sum(np.size(x) for x in jax.tree.leaves(example)))
-        values = in_chunks(lambda lanes: program(lanes_of(lanes)), len(self.time), widths, filled=False)
-        return values, program.backend
+        def states_of(lanes: np.ndarray) -> tuple[RobotState, np.ndarray]:
+            return jax.tree.map(lambda x: x[..., lanes], self._state), self.time[lanes]
+
+        return function.at_instants(self._problem, states_of, len(self.time))[0]
 
     def at(self, time: ArrayLike, order: int | None = None) -> "RobotSimulation":
         """Return the same simulation at other instants, without integrating again.
@@ -254,7 +247,7 @@ class RobotSimulation(Tabulated):
 def _derivatives(coefficients: np.ndarray) -> np.ndarray:
     """Return plain derivatives, the batch first, from Taylor coefficients, the batch last."""
     factorials = np.array([math.factorial(k) for k in range(len(coefficients))], float)
-    return np.moveaxis(np.asarray(coefficients) * factorials[:, None, None], -1, 0)
+    return (coefficients * factorials[:, None, None]).transpose(2, 0, 1)
 
 
 @mapped(widths=WIDTHS)

@@ -3,7 +3,6 @@
 from functools import cached_property
 from typing import Any
 
-import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float, Int
@@ -16,10 +15,8 @@ from jounce.dynamics.forward.initial_state import ConsistentStart
 from jounce.dynamics.motion_values import Coordinates, cut, pose_of
 from jounce.errors import MechanismError
 from jounce.execution.backends import joined
-from jounce.execution.chunks import in_chunks
-from jounce.execution.compilation import LARGE, compiled
-from jounce.execution.mapped import OnLlvm, OnXla, mapped
-from jounce.execution.store.programs import is_wanted_soon
+from jounce.execution.compilation import compiled
+from jounce.execution.mapped import mapped
 from jounce.integrate.marching.marching import DenseOutput
 from jounce.integrate.marching.robot_marching import RobotSteps
 from jounce.integrate.marching.smoothness_breaks import breaks
@@ -253,7 +250,7 @@ def steps_of(dense: DenseOutput | RobotSteps, instants: np.ndarray) -> tuple[np.
     rounding = 1e-14 * max(abs(dense.start[0]), abs(dense.end))
     reached = (direction * (instants - dense.start[0]) >= -rounding) & (direction * (instants - dense.end) <= rounding)
     chosen = np.searchsorted(direction * dense.start, direction * instants, side="right") - 1
-    return reached, np.clip(chosen, 0, len(dense.start) - 1)
+    return reached, np.maximum(np.minimum(chosen, len(dense.start) - 1), 0)
 
 
 def at_steps(part: np.ndarray, chosen: Int[np.ndarray, " batch"]) -> np.ndarray:
@@ -284,24 +281,7 @@ def motion_at(
         polynomial = dense.polynomial.map(lambda part: at_steps(part, steps))
         return tuple(part[steps].T for part in dense.angles), polynomial, now - dense.start[steps], now
 
-    program, _ = expansion_program(equations, outputs, dense, order)
-    widths = program.together(dense.polynomial.position[0].size + dense.polynomial.attitude[0].size)
-    values = in_chunks(lambda lanes: program(lanes_of(lanes)), len(instants), widths, filled=False)
-    return values, program.backend
-
-
-def expansion_program(
-    equations: Equations, outputs: tuple[Group, ...], dense: DenseOutput, order: int
-) -> tuple[OnLlvm | OnXla, Any]:
-    """Return what runs `expanded` at instants within steps of a form, and the form of the arguments of an instant."""
-
-    def one(part: Any, axes: slice) -> jax.ShapeDtypeStruct:
-        return jax.ShapeDtypeStruct((*part.shape[axes], 1), float)
-
-    polynomial, now = dense.polynomial.map(lambda part: one(part, slice(1, 4))), jax.ShapeDtypeStruct((1,), float)
-    lanes = tuple(one(part, slice(1, 2)) for part in dense.angles), polynomial, now, now
-    how: Any = {"large": LARGE, "hasty": is_wanted_soon(), "order": order}
-    return expanded.program((equations, outputs), lanes, **how), lanes
+    return expanded.at_instants((equations, outputs), lanes_of, len(instants), order=order)
 
 
 @mapped(widths=(FEW_INSTANTS, *WIDTHS), narrow=True)
