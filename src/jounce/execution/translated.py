@@ -38,7 +38,7 @@ def all_shaped(leaves: Sequence[Any]) -> list[Any]:
 
 
 def traces_one_instant() -> bool:
-    """Return whether this thread traces a program of a single instant, in which loops are not unrolled."""
+    """Return whether this thread traces a program of an instant, for which loops are not unrolled beforehand."""
     return getattr(_thread, "tracing", False)
 
 
@@ -143,11 +143,11 @@ class Translated:
         return (*(shape[1:] if self._rows else shape[:-1]), 1)
 
     def _traced(self, given: Any, lanes: Any, **static: Any) -> Any:
-        if not self._single:
-            return self.function(given, lanes, **static)
         _thread.tracing = True
         try:
-            return self.function(*given[0], **given[1], **static)
+            if self._single:
+                return self.function(*given[0], **given[1], **static)
+            return self.function(given, lanes, **static)
         finally:
             _thread.tracing = False
 

@@ -1,15 +1,23 @@
-"""In which order a program of JAX is written: calls within it are part of it, and numbers wanted once come late."""
+"""In which order a program of JAX is written: calls within it are part of it, and numbers wanted once come late.
+
+Where arrays may be in memory, what repeats is written once, and what nobody wants is not written: no one else would
+find out. Of single values, the text and LLVM do, and those that repeat need not be kept.
+"""
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
+import numpy as np
 from jax.extend.core import Literal
 
 from jounce.base.jax_internals import is_by_certain_entries, is_subroutine
 
 CALLS = ("jit", "pjit", "closed_call", "core_call", "custom_jvp_call", "custom_vjp_call", "checkpoint", "remat2")
 """Operations that call a program, which is written in their place unless it is a subroutine."""
+
+VIEWS = ("broadcast_in_dim", "reshape", "squeeze", "expand_dims", "transpose")
+"""Operations that repeat where they do: they are no work, and what is wanted once need not be in memory."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,7 +88,8 @@ def plan_of(program: Any, deferred: Collection[str], reading: Collection[str]) -
     """
     operations: list[Operation] = []
     constants: dict[Any, Any] = {}
-    results = _written(program, {}, operations, constants, whole=True)
+    results = _written(program, {}, operations, constants, {} if deferred else None, {}, whole=True)
+    operations = _needed(operations, results) if deferred else operations
     delayed = _delayed(operations, results, deferred, reading)
     return Plan(operations, results, constants, delayed, _last_reads(operations, results, delayed))
 
@@ -90,6 +99,8 @@ def _written(
     names: dict[Any, Any],
     operations: list[Operation],
     constants: dict[Any, Any],
+    known: dict[Any, list[Any]] | None,
+    alike: dict[Any, Any],
     *,
     whole: bool,
     sparse: bool = False,
@@ -102,6 +113,11 @@ def _written(
     names : dict
         Of its variables to those of the whole; what is not there has the same name. A program that is called twice has
         other names each time.
+    known : dict or None
+        Of what tells the operations so far from each other to their results: what repeats is there once. None where
+        each is written.
+    alike : dict
+        Of results to the first ones that are the same.
     whole : bool
         Whether it is called by none.
     sparse : bool, default False
@@ -120,13 +136,46 @@ def _written(
             for variable, value in zip(called.constvars, values, strict=True):
                 inner[variable] = Variable(variable.aval)
                 constants[inner[variable]] = value
-            names |= zip(result, _written(called, inner, operations, constants, whole=False, sparse=here), strict=True)
+            written = _written(called, inner, operations, constants, known, alike, whole=False, sparse=here)
+            names |= zip(result, written, strict=True)
+            continue
+        key = None if known is None else _key(equation, given, alike, here)
+        before = None if known is None else known.get(key)
+        if before is not None and equation.primitive.name not in VIEWS:
+            names |= zip(result, before, strict=True)
             continue
         if not whole:
             result = [Variable(variable.aval) for variable in result]
             names |= zip(equation.outvars, result, strict=True)
+        if known is not None and key is not None:
+            alike |= zip(result, before or result, strict=True)
+            known.setdefault(key, result)
         operations.append(Operation(equation.primitive, equation.params, given, result, here))
     return [name(variable) for variable in program.outvars]
+
+
+def _key(equation: Any, given: Sequence[Any], alike: Mapping[Any, Any], sparse: bool) -> Any:
+    """Return what tells an operation from others, None where that is not known."""
+
+    def number(x: Any) -> Any:
+        return (str(x.aval), np.asarray(x.val).tobytes()) if isinstance(x, Literal) else alike.get(x, x)
+
+    key = equation.primitive.name, sparse, *sorted(equation.params.items()), *map(number, given)
+    try:
+        hash(key)
+    except TypeError:
+        return None
+    return key
+
+
+def _needed(operations: Sequence[Operation], results: Sequence[Any]) -> list[Operation]:
+    """Return the operations on which results depend."""
+    read, needed = {x for x in results if not isinstance(x, Literal)}, []
+    for operation in reversed(operations):
+        if not read.isdisjoint(operation.outvars) or operation.primitive.name == "ffi_call":
+            read |= {x for x in operation.invars if not isinstance(x, Literal)}
+            needed.append(operation)
+    return needed[::-1]
 
 
 def _called(equation: Any) -> tuple[Any, Sequence[Any]]:

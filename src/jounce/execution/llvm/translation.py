@@ -43,7 +43,7 @@ from jounce.execution.llvm.text.values import Region, UnsupportedOperationError,
 from jounce.execution.llvm.text.views import Array, Deferred, InMemory, contiguous, further
 
 MOST_UNROLLED = 4_000  # lines of a loop of known length that is written turn after turn
-MOST_UNROLLED_IN_MEMORY = 1_000  # where arrays may stay in memory
+MOST_UNROLLED_IN_MEMORY = 250  # where arrays may stay in memory
 HOPE = 8  # times as many lines as in a later turn may be in one of the first, which later ones have in common with it
 
 

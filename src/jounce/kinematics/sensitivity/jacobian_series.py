@@ -70,7 +70,7 @@ def along_displacements(body: Any, changed: Callable[[Any], Any]) -> Slope:
 
     def along(direction: Any) -> Any:
         unit = jnp.broadcast_to(direction[:, None, None], (size, *shape))
-        shift, turn = (Jet.constant(part, order).dense() for part in (unit[: body.shifts], unit[body.shifts :]))
+        shift, turn = (Jet.constant(part, order) for part in (unit[: body.shifts], unit[body.shifts :]))
         return changed(jax.lax.optimization_barrier(movable(body.varied(shift, turn).truncate(order))))
 
     return jnp.moveaxis(jax.vmap(along)(jnp.eye(size)), 0, 1)
