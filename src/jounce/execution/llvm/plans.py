@@ -172,7 +172,8 @@ def _needed(operations: Sequence[Operation], results: Sequence[Any]) -> list[Ope
     """Return the operations on which results depend."""
     read, needed = {x for x in results if not isinstance(x, Literal)}, []
     for operation in reversed(operations):
-        if not read.isdisjoint(operation.outvars) or operation.primitive.name == "ffi_call":
+        acts = not operation.outvars or "call" in operation.primitive.name  # prints, or runs what is not seen here
+        if acts or not read.isdisjoint(operation.outvars):
             read |= {x for x in operation.invars if not isinstance(x, Literal)}
             needed.append(operation)
     return needed[::-1]
