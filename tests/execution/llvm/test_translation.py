@@ -11,7 +11,18 @@ from jounce.execution.llvm import machine, modules, translation
 from jounce.execution.llvm.text import code
 from jounce.execution.llvm.text.values import Region, UnsupportedOperationError
 from jounce.linear_algebra.reflections import ReflectedFactor
-from tests.execution.llvm.lanes import COUNT, TRUTH, assert_agree, assert_same, compiled, one_by_one, ordinary, whole
+from tests.execution.llvm.lanes import (
+    COUNT,
+    LONG,
+    TRUTH,
+    WHOLE,
+    assert_agree,
+    assert_same,
+    compiled,
+    one_by_one,
+    ordinary,
+    whole,
+)
 
 COUNTS = (1, 3, 8, COUNT)
 WIDTHS = (2, 4, 8)
@@ -341,6 +352,32 @@ def test_results_do_not_depend_on_the_lanes_beside():
         np.testing.assert_array_equal(program((), (n[k : k + 1], x[k : k + 1])), together[k : k + 1])
 
 
+def test_conversions_to_and_from_numbers_without_a_sign():
+    def run(shared, n, long, x):
+        a, b = n.astype(jnp.uint32), long.astype(jnp.uint32)
+        of_other_kinds = [a.astype(kind) for kind in (float, jnp.int64, jnp.int32, bool)]
+        whole = a.astype(jnp.int32) + n, n + n, a + a, jnp.stack([a, b]).max(0), shared[0] // shared[1] + a
+        return of_other_kinds, whole, jnp.abs(x).astype(jnp.uint32), (a > b).astype(jnp.uint32)
+
+    for known in ((), (0,)):
+        given = WHOLE[None], LONG[None], 1e3 * ordinary()
+        assert_agree(run, *given, shared=(np.array([2**31 + 5, 3], np.uint32),), known=known, counts=COUNTS)
+
+
+@pytest.mark.parametrize("large", [None, 3])
+def test_tables_that_jax_interpolates(large):
+    times = np.linspace(0.0, 2.0, 41)
+
+    def run(x):
+        return (
+            jnp.interp(x, times, jnp.sin(times)),
+            jnp.searchsorted(times, x),
+            jnp.searchsorted(times, x, side="right"),
+        )
+
+    assert_agree(run, np.linspace(-0.3, 2.3, COUNT)[None], counts=COUNTS, larges=(large,))
+
+
 def transformed(x):
     return jnp.fft.fft(x).real
 
@@ -349,7 +386,7 @@ UNSUPPORTED = {
     "numbers of 32 bits": lambda x: x.astype(jnp.float32).astype(jnp.float64),
     "constants of 32 bits": lambda x: x + jnp.sum(jnp.asarray([1.0, 2.0], jnp.float32)).astype(jnp.float64),
     "whole numbers of 8 bits": lambda x: x.astype(jnp.int8).astype(jnp.float64),
-    "unsigned numbers": lambda x: x.astype(jnp.uint32).astype(jnp.float64),
+    "unsigned numbers of 16 bits": lambda x: x.astype(jnp.uint16).astype(jnp.float64),
     "sorting many": lambda x: jnp.sort(jnp.arange(20.0) * x)[:1],
     "Fourier's transform": transformed,
     "complex numbers": lambda x: lax.real(lax.complex(x, x)),

@@ -16,7 +16,7 @@ UNARY = {
     "sin": lax.sin, "cos": lax.cos, "tan": lax.tan, "asin": lax.asin, "acos": lax.acos, "atan": lax.atan,
     "sinh": lax.sinh, "cosh": lax.cosh, "tanh": lax.tanh, "asinh": lax.asinh, "acosh": lax.acosh, "atanh": lax.atanh,
     "exp": lax.exp, "exp2": lax.exp2, "expm1": lax.expm1, "log": lax.log, "log1p": lax.log1p, "cbrt": lax.cbrt,
-    "erf": lax.erf, "erfc": lax.erfc, "sqrt": lax.sqrt,
+    "erf": lax.erf, "erfc": lax.erfc, "sqrt": lax.sqrt, "rsqrt": lax.rsqrt, "logistic": lax.logistic,
 }  # fmt: skip
 EXACT = {
     "neg": lax.neg, "abs": lax.abs, "sign": lax.sign, "square": lax.square, "floor": lax.floor, "ceil": lax.ceil,
@@ -50,15 +50,16 @@ def test_functions_of_one_number(width):
 
 @pytest.mark.parametrize("width", WIDTHS)
 def test_functions_of_two_numbers(width):
-    functions = PAIRS | {"atan2": lax.atan2, "pow": lax.pow}
+    in_total_order = {name: getattr(lax, name).bind for name in ("eq_to_p", "lt_to_p", "le_to_p")}
+    functions = PAIRS | in_total_order | {"atan2": lax.atan2, "pow": lax.pow}
     assert_agree(table(functions), *paired(SPECIAL), width=width, counts=(3, 289))
 
 
-@pytest.mark.parametrize("values", [WHOLE, LONG], ids=["32 bits", "64 bits"])
+@pytest.mark.parametrize("values", [WHOLE, LONG, WHOLE.astype(np.uint32)], ids=["32 bits", "64 bits", "without a sign"])
 @pytest.mark.parametrize("width", WIDTHS)
 def test_functions_of_whole_numbers(values, width):
     assert_agree(table(PAIRS | LOGIC), *paired(values), width=width, counts=(5, 289))
-    one = {"neg": lax.neg, "abs": lax.abs, "sign": lax.sign, "not": lax.bitwise_not, "square": lax.square}
+    one = {"neg": lax.neg, "abs": jnp.abs, "sign": lax.sign, "not": lax.bitwise_not, "square": lax.square}
     powers = {f"power {n}": (lambda x, n=n: lax.integer_pow(x, n)) for n in (0, 1, 2, 3, 7)}
     assert_agree(table(one | powers), values, width=width)
 

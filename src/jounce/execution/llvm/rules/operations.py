@@ -25,6 +25,21 @@ def _compare(operation: str) -> Rule:
     return lambda code, _, given: [each(lambda a, b: code.compare(operation, a, b), *given)]
 
 
+def _compare_in_total_order(operation: str) -> Rule:
+    return lambda code, _, given: [
+        each(lambda a, b: code.compare(operation, _position(code, a), _position(code, b)), *given)
+    ]
+
+
+def _position(code: Code, a: Value) -> Value:
+    """Return the position of a double in the total order of IEEE 754, by whole numbers; others as they are."""
+    if a.kind != "f":
+        return a
+    digits = code.digits(a)
+    below = code.compare("lt", digits, code.constant(0, "l"))
+    return code.select(below, code.logic("xor", digits, code.constant(2**63 - 1, "l")), digits)
+
+
 def _logic(operation: str) -> Rule:
     return lambda code, _, given: [each(lambda a, b: code.logic(operation, a, b), *given)]
 
@@ -53,6 +68,15 @@ def _sign(code: Code, a: Value) -> Value:
 
 def _square(code: Code, a: Value) -> Value:
     return code.arithmetic("mul", a, a)
+
+
+def _reciprocal_root(code: Code, a: Value) -> Value:
+    return code.arithmetic("div", code.constant(1.0), code.intrinsic("sqrt", a))
+
+
+def _logistic(code: Code, a: Value) -> Value:
+    one = code.constant(1.0)
+    return code.arithmetic("div", one, code.arithmetic("add", one, code.call("exp", code.negated(a))))
 
 
 def _finite(code: Code, a: Value) -> Value:
@@ -117,6 +141,7 @@ def _same(_: Code, __: Any, given: Sequence[Values]) -> Sequence[Values]:
 ELEMENTWISE: Mapping[str, Rule] = {
     **{name: _arithmetic(name) for name in ("add", "sub", "mul", "div", "max", "min", "rem")},
     **{name: _compare(name) for name in ("eq", "ne", "lt", "le", "gt", "ge")},
+    **{f"{name}_to": _compare_in_total_order(name) for name in ("eq", "lt", "le")},
     **{name: _logic(name) for name in ("and", "or", "xor")},
     **{name: _intrinsic(name) for name in ("sqrt", "floor", "ceil")},
     **{name: _function(name) for name in FUNCTIONS},
@@ -127,6 +152,8 @@ ELEMENTWISE: Mapping[str, Rule] = {
     "sign": _unary(_sign),
     "square": _unary(_square),
     "is_finite": _unary(_finite),
+    "logistic": _unary(_logistic),
+    "rsqrt": _unary(_reciprocal_root),
     "integer_pow": _integer_power,
     "pow": _power,
     "round": _round,

@@ -32,11 +32,12 @@ INTEGERS: dict[str, tuple[str, Any]] = {
     "max": ("smax", max),
     "min": ("smin", min),
 }
+UNSIGNED = {"sdiv": "udiv", "srem": "urem", "smax": "umax", "smin": "umin"}
 BOOLEANS = {"add": "or", "max": "or", "mul": "and", "min": "and"}
 COMMUTATIVE = frozenset("add mul max min".split())
 NEUTRAL = {"add": 0, "sub": 0, "mul": 1, "div": 1}
 TURNS = "sin", "cos"  # which of lanes are found together
-COMPARISONS: dict[str, tuple[str, str, str, Any]] = {  # of doubles, of whole numbers, of truth values, in Python
+COMPARISONS: dict[str, tuple[str, str, str, Any]] = {  # of doubles, of whole numbers, without a sign, in Python
     "eq": ("oeq", "eq", "eq", operator.eq),
     "ne": ("une", "ne", "ne", operator.ne),
     "lt": ("olt", "slt", "ult", operator.lt),
@@ -46,6 +47,7 @@ COMPARISONS: dict[str, tuple[str, str, str, Any]] = {  # of doubles, of whole nu
 }
 LOGIC = {"and": operator.and_, "or": operator.or_, "xor": operator.xor}
 CONVERSIONS = {"lf": "sitofp", "if": "sitofp", "bf": "uitofp", "li": "trunc", "il": "sext", "bi": "zext", "bl": "zext"}
+CONVERSIONS |= {"uf": "uitofp", "ul": "zext", "ui": "bitcast", "iu": "bitcast"}
 
 
 @dataclass
@@ -157,7 +159,7 @@ class Scalars:
 
     def constant(self, number: Any, kind: str | None = None) -> Value:
         """Return a constant, of the kind of its type unless one is given."""
-        scalar = np.asarray(number, None if kind is None else DTYPES[kind])[()]
+        scalar = (np.asarray(number) if kind is None else np.asarray(number).astype(DTYPES[kind]))[()]
         return Value("", kind or kind_of(scalar.dtype), False, scalar)
 
     # -- operations ---------------------------------------------------------------------------------------------------
@@ -169,6 +171,7 @@ class Scalars:
                 raise UnsupportedOperationError(f"{operation} of truth values")
             return self.logic(BOOLEANS[operation], a, b)
         word, python = (DOUBLES if a.kind == "f" else INTEGERS)[operation]
+        word = UNSIGNED.get(word, word) if a.kind == "u" else word
         if a.constant is not None and b.constant is not None:
             with np.errstate(all="ignore"):
                 return self.constant(python(a.constant, b.constant), a.kind)
@@ -187,7 +190,7 @@ class Scalars:
     def _pair(self, word: str, a: Value, b: Value) -> Value:
         lanes = a.lanes or b.lanes
         left, right = self.operand(a, lanes=lanes), self.operand(b, lanes=lanes)
-        if word in ("maximum", "minimum", "smax", "smin"):
+        if word in ("maximum", "minimum", "smax", "smin", "umax", "umin"):
             return self._called(word, a.kind, a.kind, (left, right), lanes=lanes)
         return self._emitted(f"{word} {self.type_of(a.kind, lanes=lanes)} {left}, {right}", a.kind, lanes=lanes)
 
@@ -197,17 +200,18 @@ class Scalars:
         if b.constant is None:  # of a lane that has not come here, it may be what LLVM takes for another one each time
             frozen = f"freeze {self.type_of(b.kind, lanes=b.lanes)} {b.name}"
             b = self._emitted(frozen, b.kind, lanes=b.lanes)
-        beyond = self.logic("and", self.compare("eq", a, least), self.compare("eq", b, self.constant(-1, a.kind)))
+        opposite = self.compare("eq", b, self.constant(-1, a.kind)) if a.kind != "u" else self.constant(False)
+        beyond = self.logic("and", self.compare("eq", a, least), opposite)
         nothing = self.compare("eq", b, self.constant(0, a.kind))
         result = self._pair(word, a, self.select(self.logic("or", nothing, beyond), one, b))
         return self.select(nothing, self.constant(-1, a.kind) if operation == "div" else a, result)
 
     def compare(self, operation: str, a: Value, b: Value) -> Value:
         """Return whether a comparison of two numbers holds."""
-        of_doubles, of_integers, of_booleans, python = COMPARISONS[operation]
+        of_doubles, of_integers, unsigned, python = COMPARISONS[operation]
         if a.constant is not None and b.constant is not None:
             return self.constant(python(a.constant, b.constant), "b")
-        word = {"f": f"fcmp {of_doubles}", "b": f"icmp {of_booleans}"}.get(a.kind, f"icmp {of_integers}")
+        word = f"fcmp {of_doubles}" if a.kind == "f" else f"icmp {unsigned if a.kind in 'bu' else of_integers}"
         lanes = a.lanes or b.lanes
         left, right = self.operand(a, lanes=lanes), self.operand(b, lanes=lanes)
         return self._emitted(f"{word} {self.type_of(a.kind, lanes=lanes)} {left}, {right}", "b", lanes=lanes)
@@ -238,6 +242,13 @@ class Scalars:
         if a.constant is not None:
             return self.constant(np.invert(a.constant))
         return self._pair("xor", a, self.constant(True if a.kind == "b" else -1, a.kind))
+
+    def digits(self, a: Value) -> Value:
+        """Return the binary digits of a double, as a whole number."""
+        if a.constant is not None:
+            return self.constant(a.constant.view(np.int64))
+        double, whole = self.type_of("f", lanes=a.lanes), self.type_of("l", lanes=a.lanes)
+        return self._emitted(f"bitcast {double} {a.name} to {whole}", "l", lanes=a.lanes)
 
     def select(self, choice: Value, a: Value, b: Value) -> Value:
         """Return the first of two numbers where a truth value holds, the second elsewhere."""
@@ -278,12 +289,14 @@ class Scalars:
         if a.kind == to:
             return a
         if a.constant is not None:
-            exact = a.kind != "f" or to not in "li"
+            exact = a.kind != "f" or to not in "liu"
             return self.constant(a.constant.astype(DTYPES[to]) if exact else values.nearest(a.constant, DTYPES[to]), to)
         if to == "b":
             return self.compare("ne", a, self.constant(0, a.kind))
         if a.kind == "f":  # `fptosi` gives poison where a number does not fit
-            return self._called("fptosi.sat", to, to + "f", (a.name,), lanes=a.lanes)
+            return self._called("fptoui.sat" if to == "u" else "fptosi.sat", to, to + "f", (a.name,), lanes=a.lanes)
+        if to == "u" and a.kind != "i":  # by another kind, as no two instructions of different results are the same
+            return self.converted(self.converted(a, "i"), "u")
         kind, expected = self.type_of(a.kind, lanes=a.lanes), self.type_of(to, lanes=a.lanes)
         return self._emitted(f"{CONVERSIONS[a.kind + to]} {kind} {a.name} to {expected}", to, lanes=a.lanes)
 

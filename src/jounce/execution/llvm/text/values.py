@@ -5,10 +5,10 @@ from typing import Any
 
 import numpy as np
 
-SCALARS = {"f": "double", "l": "i64", "i": "i32", "b": "i1"}
+SCALARS = {"f": "double", "l": "i64", "i": "i32", "u": "i32", "b": "i1"}
 IN_MEMORY = SCALARS | {"b": "i8"}
-KINDS = {np.dtype(float): "f", np.dtype(np.int64): "l", np.dtype(np.int32): "i", np.dtype(bool): "b"}
-DTYPES = {kind: dtype for dtype, kind in KINDS.items()}
+DTYPES = {kind: np.dtype(of) for kind, of in zip("fliub", (float, np.int64, np.int32, np.uint32, bool), strict=True)}
+KINDS = {dtype: kind for kind, dtype in DTYPES.items()}
 
 
 class UnsupportedOperationError(Exception):
@@ -53,7 +53,8 @@ def literal(value: Value) -> str:
     """Return a constant as LLVM reads it."""
     if value.kind == "f":
         return f"0x{value.constant.view(np.uint64):016X}"
-    return str(bool(value.constant)).lower() if value.kind == "b" else str(int(value.constant))
+    number = value.constant.astype(np.int32) if value.kind == "u" else value.constant  # LLVM reads signed numbers
+    return str(bool(number)).lower() if value.kind == "b" else str(int(number))
 
 
 def nearest(number: Any, dtype: Any) -> int:
