@@ -7,8 +7,9 @@ import numpy as np
 
 SCALARS = {"f": "double", "l": "i64", "i": "i32", "u": "i32", "b": "i1"}
 IN_MEMORY = SCALARS | {"b": "i8"}
-DTYPES = {kind: np.dtype(of) for kind, of in zip("fliub", (float, np.int64, np.int32, np.uint32, bool), strict=True)}
-KINDS = {dtype: kind for kind, dtype in DTYPES.items()}
+KINDS = {np.dtype(float): "f", np.dtype(np.int64): "l", np.dtype(np.int32): "i", np.dtype(bool): "b"}
+KINDS |= {np.dtype(np.uint32): "u"}
+DTYPES = {kind: dtype for dtype, kind in KINDS.items()}
 
 
 class UnsupportedOperationError(Exception):
