@@ -12,7 +12,7 @@ import pytest
 import jounce as jn
 from jounce import io
 from jounce.cli import main
-from jounce.execution.backends import is_wanted
+from jounce.execution.backends import uses_machine_code
 
 FOUR_BAR = "examples/four_bar.yaml"
 
@@ -141,7 +141,7 @@ def test_the_option_goes_before_the_file_and_json_stays_in_si(tmp_path, capsys):
     assert main(["run", str(file), "--order", "1", "--json", "--no-refine"]) == 0
     found = json.loads(capsys.readouterr().out)
     assert {peak["unit"] for peak in found["peaks"]} == {"rad", "rad/s", "m", "m/s"}
-    assert found["backend"] == ("llvm" if is_wanted() else "xla")
+    assert found["backend"] == ("llvm" if uses_machine_code() else "xla")
     assert main(["inspect", "examples/robots/scara.urdf", "--units", "angle=deg"]) == 2
     assert "--units: is for mechanism files" in capsys.readouterr().err
     file.write_text(text.replace("rev", "mm", 1))

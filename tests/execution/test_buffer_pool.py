@@ -10,7 +10,7 @@ import pytest
 
 import jounce as jn
 from jounce.execution import buffer_pool
-from jounce.execution.backends import is_wanted
+from jounce.execution.backends import uses_machine_code
 from jounce.execution.buffer_pool import LENT, LINE, MOST_RETURNED, acquire, arrays_in, bytes_needed, lend, release
 from jounce.execution.compilation import Compiled
 from tests.problems.small import four_bar
@@ -140,4 +140,4 @@ def test_motions_are_their_own_beside_others_that_borrow_the_same_memory(kept):
         thread.join()
     for k, values in found.items():
         np.testing.assert_array_equal(values, wanted[k % 3])
-    assert bool(kept) == is_wanted()  # it is machine code that borrows
+    assert bool(kept) == uses_machine_code()  # it is machine code that borrows

@@ -166,7 +166,7 @@ def test_brief_programs_are_not_optimized_for_a_command_about_few_instants(shelf
 
 
 def test_all_programs_are_optimized_but_for_a_command(shelf):
-    assert not store_.is_wanted_soon()
+    assert not store_.is_in_haste()
 
 
 @pytest.mark.parametrize("unknown", ["xla_cpu_use_fusion_emitters", "xla_backend_optimization_level", "everything"])

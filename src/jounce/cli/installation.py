@@ -67,14 +67,14 @@ def _versions() -> dict[str, str]:
 
 
 def _machine_code() -> dict[str, str]:
-    from jounce.execution.backends import is_wanted
+    from jounce.execution.backends import uses_machine_code
     from jounce.execution.llvm.self_test import is_usable
 
     if os.environ.get("JOUNCE_NATIVE") == "0":
         return {"machine code": "not used: JOUNCE_NATIVE=0; XLA computes"}
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
-        usable = is_usable() and is_wanted()
+        usable = is_usable() and uses_machine_code()
     if usable:
         return {"machine code": "used"}
     why = str(caught[0].message) if caught else "llvmlite is not installed, or an accelerator computes"

@@ -18,7 +18,7 @@ LLVM, XLA = "llvm", "xla"
 _warned: set[str] = set()
 
 
-def is_wanted() -> bool:
+def uses_machine_code() -> bool:
     """Tell whether there is to be machine code: there is a compiler, and nothing forbids it."""
     return os.environ.get(VARIABLE, "") != "0" and self_test.is_usable() and on_processor()
 

@@ -25,7 +25,7 @@ from jounce.base.jax_internals import description_reader, runs_at_once, without_
 from jounce.base.shapes import only_arrays
 from jounce.execution.background import ByKey
 from jounce.execution.device import on_processor
-from jounce.execution.store.programs import Descriptions, Store, current_store, is_wanted_soon, packed, unpacked
+from jounce.execution.store.programs import Descriptions, Store, current_store, is_in_haste, packed, unpacked
 from jounce.execution.structure import UndescribedError, cache_key, settings
 from jounce.execution.translated import Translated, all_shaped
 from jounce.settings import check_process, under_own_settings
@@ -209,7 +209,7 @@ class Compiled:
         if not (suits if isinstance(suits, bool) else suits(*arguments, **keywords, **static)):
             return None
         nothing = (), _NOTHING
-        return self.machine_code.program((arrays, tree), nothing, static, large=LARGE, hasty=is_wanted_soon())
+        return self.machine_code.program((arrays, tree), nothing, static, large=LARGE, hasty=is_in_haste())
 
     def _by_xla(
         self, arguments: Any, keywords: Any, static: Mapping[str, Any], leaves: list[Any], tree: Any
@@ -224,7 +224,7 @@ class Compiled:
 
     def _level(self) -> int | None:
         """Return how much LLVM is to optimize, where that is less than it does otherwise."""
-        hasty = self.brief and is_wanted_soon() and on_processor() and not _level_is_set()
+        hasty = self.brief and is_in_haste() and on_processor() and not _level_is_set()
         return 0 if hasty and "xla_backend_optimization_level" in _known_options() else None
 
     def _made(

@@ -22,7 +22,7 @@ from jounce.execution.chunks import in_chunks
 from jounce.execution.compilation import LARGE, Compiled
 from jounce.execution.device import on_processor
 from jounce.execution.llvm.programs import Program
-from jounce.execution.store.programs import is_wanted_soon
+from jounce.execution.store.programs import is_in_haste
 from jounce.execution.threads import Threads
 from jounce.execution.translated import Translated, all_shaped
 from jounce.settings import under_own_settings
@@ -317,7 +317,7 @@ class Mapped:
         """
         few = count <= FEWEST_TOGETHER
         lanes = lanes_of(np.arange(count if few else 1))
-        program = self.program(shared, lanes, large=LARGE, hasty=is_wanted_soon(), **static)
+        program = self.program(shared, lanes, large=LARGE, hasty=is_in_haste(), **static)
         if few:
             return program(lanes), program.backend
         widths = program.together(sum(np.size(x) for x in jax.tree.leaves(lanes)))

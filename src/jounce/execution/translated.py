@@ -17,7 +17,7 @@ import numpy as np
 
 from jounce.base.activity import compiling
 from jounce.base.shapes import only_arrays
-from jounce.execution.backends import is_wanted, tell_missing
+from jounce.execution.backends import tell_missing, uses_machine_code
 from jounce.execution.background import ByKey
 from jounce.execution.llvm.modules import object_file
 from jounce.execution.llvm.programs import Program, Single
@@ -111,7 +111,7 @@ class Translated:
         hasty : bool, default False
             Whether a short compilation matters more than a fast program.
         """
-        if not is_wanted():
+        if not uses_machine_code():
             return None
         (arrays, structure), (few, form) = shared, lanes
         kinds = tuple([(x.shape, x.dtype) for x in arrays])

@@ -14,7 +14,7 @@ import numpy as np
 from jounce.design.tolerances.design_space import Grid, Sobol
 from jounce.design.tolerances.variations import Values
 from jounce.errors import OutputError, shortened
-from jounce.execution.backends import is_wanted
+from jounce.execution.backends import uses_machine_code
 from jounce.execution.device import on_processor
 from jounce.sweeps.fingerprints import fingerprint
 
@@ -120,7 +120,7 @@ def arithmetic() -> dict[str, str]:
     chosen: Any = jax.config.values["jax_default_device"]
     device = jax.devices()[0] if chosen is None else chosen
     kind = getattr(device, "device_kind", str(device))
-    code = f"llvmlite {importlib.metadata.version('llvmlite')}" if is_wanted() else "not used"
+    code = f"llvmlite {importlib.metadata.version('llvmlite')}" if uses_machine_code() else "not used"
     return {"machine code": code, "device": "cpu" if on_processor() else kind}
 
 

@@ -28,7 +28,7 @@ from jounce.dynamics.masses import Gravity, Masses
 from jounce.dynamics.motion_values import Coordinates, in_small_chunks, part_of, pose_of
 from jounce.execution.compilation import compiled
 from jounce.execution.mapped import Mapped, OnLlvm
-from jounce.execution.store.programs import is_wanted_soon
+from jounce.execution.store.programs import is_in_haste
 from jounce.jet import Jet, cross
 from jounce.jet.algebra import stacked, total
 from jounce.kinematics.sensitivity.jacobian_series import along_displacements, slopes
@@ -195,7 +195,7 @@ def without_constraints(system: System, forces: tuple[Group, ...]) -> System:
 
 def balance_of_instant(shared: Any, lanes: Any, pose_type: type[Pose]) -> OnLlvm | None:
     """Return machine code for `_balanced`, or None if there is none; any instant serves as an example."""
-    program = _balanced.program(shared, lanes, large=LARGE, hasty=is_wanted_soon(), pose_type=pose_type)
+    program = _balanced.program(shared, lanes, large=LARGE, hasty=is_in_haste(), pose_type=pose_type)
     return program if isinstance(program, OnLlvm) else None  # XLA's programs are those of each kind of joint
 
 

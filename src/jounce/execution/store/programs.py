@@ -119,7 +119,7 @@ def run_one_command() -> None:
     _soon = True
 
 
-def is_wanted_soon() -> bool:
+def is_in_haste() -> bool:
     """Tell whether code is compiled for one command, whose user waits for it, of few instants."""
     return _soon and not _many
 
