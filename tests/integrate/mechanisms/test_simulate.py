@@ -42,6 +42,14 @@ def test_a_short_run_calls_few_programs(monkeypatch):
     assert called == [*start, "march", *instants]
 
 
+@pytest.mark.parametrize("time", [[], [[0.0, 1.0]]])
+def test_instants_that_are_no_list_of_at_least_one_are_refused(time):
+    slider = jn.Robot("r", [jn.Link("base"), jn.Link("a", jn.Inertia(1.0))], [jn.Joint("x", "base", "a", "prismatic")])
+    for found in (jn.simulate(simple_pendulum(0.3, 0.0), [0.0, 1e-3]), jn.simulate(slider, [0.0, 1e-3])):
+        with pytest.raises(jn.errors.JounceError, match="time: must be an instant, or a list of at least one"):
+            found.at(time)
+
+
 @pytest.mark.slow
 def test_derivatives_obey_the_equation_of_motion(swing):
     found = swing.outputs["angle"]

@@ -12,13 +12,13 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float, Int
 
-from jounce.base.shapes import ArrayLike, Numbers, seconds
+from jounce.base.shapes import ArrayLike, Numbers
 from jounce.errors import RobotError
 from jounce.execution.backends import joined
 from jounce.execution.mapped import Mapped, mapped
 from jounce.integrate.marching.robot_marching import RobotProblem, RobotSteps
 from jounce.integrate.marching.robot_state import RobotState, at
-from jounce.integrate.results.simulation import at_steps, steps_of
+from jounce.integrate.results.simulation import at_steps, chosen_instants, steps_of
 from jounce.integrate.steps.methods import Lanes
 from jounce.jet import Jet, compose
 from jounce.kinematics import Status
@@ -225,7 +225,7 @@ class RobotSimulation(Tabulated):
         order : int, optional
             Highest derivative; that of this simulation unless given.
         """
-        instants = np.atleast_1d(seconds("time", time, RobotError))
+        instants = chosen_instants(time, RobotError)
         order = self.order if order is None else order
         outcome = self._ending, self.events, self._wrenches, self._steps_backends
         return RobotSimulation(self.robot, self._problem, self.steps, instants, order, *outcome)

@@ -13,7 +13,7 @@ from jounce.dynamics.energy.potential import energy_of_forces
 from jounce.dynamics.forward.accelerations import Equations, Instants, Lanes, State, expand
 from jounce.dynamics.forward.initial_state import ConsistentStart
 from jounce.dynamics.motion_values import Coordinates, cut, pose_of
-from jounce.errors import MechanismError
+from jounce.errors import JounceError, MechanismError
 from jounce.execution.backends import joined
 from jounce.execution.compilation import compiled
 from jounce.execution.mapped import mapped
@@ -169,7 +169,7 @@ class Simulation(Motion):
         order : int, optional
             Highest derivative; that of this simulation unless given.
         """
-        instants = np.atleast_1d(seconds("time", time, MechanismError))
+        instants = chosen_instants(time, MechanismError)
         order = self.order if order is None else order
         outcome = self._ending, self.events, self.steps_backend
         return Simulation(self.mechanism, self._start, self.dense_output, instants, order, *outcome)
@@ -242,6 +242,14 @@ class Simulation(Motion):
         equations = self._start.equations.near(self._angles)
         checks = _checks(equations, cut(coordinates, 1), self.time[None], pose_type)
         return [np.where(self.status == Status.OK, part, np.nan) for part in checks]
+
+
+def chosen_instants(time: ArrayLike, error: type[JounceError]) -> Float[np.ndarray, " time"]:
+    """Return the instants at which a simulation is evaluated again, s; raise the error unless there is one at least."""
+    instants = np.atleast_1d(seconds("time", time, error))
+    if instants.ndim != 1 or not instants.size:
+        raise error("must be an instant, or a list of at least one", name="time", value=time)
+    return instants
 
 
 def steps_of(dense: DenseOutput | RobotSteps, instants: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
