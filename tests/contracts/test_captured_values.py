@@ -755,7 +755,7 @@ class Kept:
 
 MODES = [
     (True, True),
-    (False, False),
+    pytest.param(False, False, marks=pytest.mark.slow),
     pytest.param(True, False, marks=pytest.mark.slow),
     pytest.param(False, True, marks=pytest.mark.slow),
 ]

@@ -39,7 +39,9 @@ def pair(law="3*t", load="-10", friction=None, *, ring=False, ratio=False, **val
     )
 
 
-@pytest.mark.parametrize("kind", [{}, {"ring": True}, {"ratio": True}, {"pressure_angle": 0.35}])
+@pytest.mark.parametrize(
+    "kind", [{}, pytest.param({"ring": True}, marks=pytest.mark.slow), {"ratio": True}, {"pressure_angle": 0.35}]
+)
 def test_power_that_leaves_is_power_that_enters_times_the_efficiency(kind):
     """Both directions of turning and of power; the loads of weights vary, those of inertia are none at one speed."""
     mechanism, ratio = pair("speed*t", "load", **kind), 0.5 if kind.get("ring") else -0.5

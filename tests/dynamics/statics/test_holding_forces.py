@@ -264,7 +264,7 @@ def test_gears_hold_between_slow_motions_also_with_friction_in_their_bearings(lo
     np.testing.assert_allclose(found[1], held(frictionless, "turn")[1], rtol=1e-12)
 
 
-@pytest.mark.parametrize("weight", [30.0, -30.0])
+@pytest.mark.parametrize("weight", [30.0, pytest.param(-30.0, marks=pytest.mark.slow)])
 def test_a_rack_and_a_belt_hold_between_their_efficiencies(weight):
     """A rack on a disc of 0.05 m, which a belt turns from a pulley of a third of its size: 0.5 N m at the disc."""
     o, loss = [0, 0], {"speed": 1.0, "efficiency": 0.8, "backward": 0.7}

@@ -67,7 +67,10 @@ def single(model, data, q, v, *_):
     return np.sum(alone, axis=0)
 
 
-@pytest.mark.parametrize("name", NAMES)
+SLOW = "floating_solo12"
+
+
+@pytest.mark.parametrize("name", [pytest.param(n, marks=pytest.mark.slow) if n == SLOW else n for n in NAMES])
 def test_mass_matrix_and_bias(name):
     pair = pair_named(name)
     q = random_states(pair.robot)

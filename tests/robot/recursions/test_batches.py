@@ -53,6 +53,7 @@ def test_shapes_of_batches_are_kept(torque, lead):
     assert jn.robot.joint_wrenches(ROBOT, q).shape == (*lead, 2, 4, 6)
 
 
+@pytest.mark.slow
 def test_programs_that_are_too_long_with_single_values_have_arrays_in_memory(monkeypatch):
     state, forces = Q[:40, :2], 30.0 * Q[40:80, 1:]
     expected = jn.forward_dynamics(ROBOT, state, forces)

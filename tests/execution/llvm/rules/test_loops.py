@@ -36,7 +36,7 @@ def test_numbers_one_after_another(size):
     assert_agree(run, ordinary(size))
 
 
-@pytest.mark.parametrize("shape", [(3, 8), (9, 2), (1, 17)])
+@pytest.mark.parametrize("shape", [(3, 8), pytest.param((9, 2), marks=pytest.mark.slow), (1, 17)])
 def test_reductions(shape):
     def run(x):
         found = []
