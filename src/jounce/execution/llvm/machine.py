@@ -11,7 +11,7 @@ from typing import Any
 
 HASTE = ("-regalloc=fast", "-enable-misched=false")  # options of LLVM
 LONG = 10_000  # lines, for which another process is worth its start
-LONGEST = 120_000  # lines, beyond which haste is worth slower code
+LONGEST = 60_000  # lines, beyond which haste is worth slower code
 _lock = threading.Lock()  # LLVM's state is one for the process
 _published: set[str] = set()
 
