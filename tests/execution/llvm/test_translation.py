@@ -396,7 +396,7 @@ UNSUPPORTED = {
     "a key of random numbers": lambda x: x + jax.random.uniform(jax.random.key(0), x.shape, jnp.float64),
     "factors": lambda x: jnp.linalg.cholesky(jnp.broadcast_to(x, (2, 2)) + 3.0 * jnp.eye(2))[0, :1],
     "a solution": lambda x: jnp.linalg.solve(jnp.eye(2) * x[0], jnp.ones(2))[:1],
-    "indices that differ": lambda x: x.at[(x[0] > 0.0).astype(jnp.int64)].set(1.0),
+    "indices that differ": lambda x: jnp.eye(2).at[(x[0] > 0.0).astype(int), (x[0] < 0.0).astype(int)].set(x[0])[:1, 0],
     "the largest of some": lambda x: x.at[jnp.array([0])].max(0.0),
     "digits": lambda x: lax.shift_left(x.astype(jnp.int64), jnp.ones_like(x, jnp.int64)),
     "in a loop": lambda x: lax.while_loop(lambda s: s[0] > 0.0, lambda s: transformed(s) - 1.0, x),

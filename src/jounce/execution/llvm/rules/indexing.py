@@ -229,14 +229,27 @@ def _positions(
     return np.where(fits, result, -1) if drop else result
 
 
-def gather(code: Code, equation: Any, given: Sequence[Values]) -> Sequence[Values]:
-    """Return parts of an array at indices."""
-    array, indices = given
-    p, numbers, dtype = equation.params, equation.params["dimension_numbers"], equation.outvars[0].aval.dtype
+def _known(indices: Values) -> tuple[np.ndarray, int | None]:
+    """Return indices as numbers, zero where they are not known, and which of the columns has such ones, if one has."""
     known = np.vectorize(lambda value: 0 if value.constant is None else int(value.constant), otypes=[int])(indices)
     moving = [k for k in range(indices.shape[-1]) if any(value.constant is None for value in flat(indices[..., k]))]
     if len(moving) > 1:
         raise UnsupportedOperationError("indices of which more than one are not known")
+    return known, moving[0] if moving else None
+
+
+def _with_column(indices: np.ndarray, column: int, number: int) -> np.ndarray:
+    """Return indices with one number in a column."""
+    result = indices.copy()
+    result[..., column] = number
+    return result
+
+
+def gather(code: Code, equation: Any, given: Sequence[Values]) -> Sequence[Values]:
+    """Return parts of an array at indices."""
+    array, indices = given
+    p, numbers, dtype = equation.params, equation.params["dimension_numbers"], equation.outvars[0].aval.dtype
+    known, axis = _known(indices)
     drop, batches = p["mode"] == GatherScatterMode.FILL_OR_DROP, indices.ndim - 1
     batching = dict(zip(numbers.operand_batching_dims, numbers.start_indices_batching_dims, strict=True))
     left_out = tuple(batches + axis for axis in (*numbers.collapsed_slice_dims, *numbers.operand_batching_dims))
@@ -247,17 +260,13 @@ def gather(code: Code, equation: Any, given: Sequence[Values]) -> Sequence[Value
         return np.moveaxis(result, range(batches, result.ndim), numbers.offset_dims)
 
     values = [*flat(array), code.constant(filler(p, dtype), kind_of(dtype))]
-    if not moving:
+    if axis is None:
         return [_taken(values, at(known))]
-    (axis,) = moving
     along = numbers.start_index_map[axis]
     size, width = array.shape[along], p["slice_sizes"][along]
     # one beyond each end, too; or while all of a part is inside, so that numbers in memory need not be copied
     least, most = (-1, size) if drop else (0, size - width)
-    tables = []
-    for k in range(least, most + 1):
-        known[..., axis] = k
-        tables.append(at(known))
+    tables = [at(_with_column(known, axis, k)) for k in range(least, most + 1)]
     result = np.empty(tables[0].shape, object)
     which = [k for k in range(result.ndim) if k not in numbers.offset_dims]
     for position in np.ndindex(result.shape):
@@ -285,8 +294,7 @@ def filler(params: Mapping[str, Any], dtype: Any) -> Any:
 def scatter(code: Code, equation: Any, given: Sequence[Values]) -> Sequence[Values]:
     """Put numbers at indices, or add them to what is there."""
     array, indices, updates = given
-    if any(value.constant is None for value in flat(indices)):
-        raise UnsupportedOperationError("changing an array at indices that are not known")
+    known, moving = _known(indices)
     if not updates.size or not array.size:
         return [array]
     p, add = equation.params, equation.primitive.name == "scatter-add"
@@ -295,13 +303,32 @@ def scatter(code: Code, equation: Any, given: Sequence[Values]) -> Sequence[Valu
     left_out = (*numbers.inserted_window_dims, *numbers.operand_batching_dims)
     remaining = dict(zip((axis for axis in range(array.ndim) if axis not in left_out), windows, strict=True))
     sizes = [updates.shape[remaining[axis]] if axis in remaining else 1 for axis in range(array.ndim)]
-    table = np.vectorize(lambda value: int(value.constant), otypes=[int])(indices)
     drop = p["mode"] == GatherScatterMode.FILL_OR_DROP
-    positions = _positions(table, array.shape, numbers.scatter_dims_to_operand_dims, batching, sizes, drop=drop)
-    positions = positions.squeeze(tuple(batches + axis for axis in left_out))
-    positions = np.moveaxis(positions, range(batches, positions.ndim), windows)
+
+    def at(table: np.ndarray) -> np.ndarray:
+        result = _positions(table, array.shape, numbers.scatter_dims_to_operand_dims, batching, sizes, drop=drop)
+        result = result.squeeze(tuple(batches + axis for axis in left_out))
+        return np.moveaxis(result, range(batches, result.ndim), windows)
+
     result = flat(array)
-    for index, value in zip(positions.ravel().tolist(), flat(updates), strict=True):
+
+    def put(index: int, value: Value, here: Value) -> None:
         if index >= 0:
-            result[index] = code.arithmetic("add", result[index], value) if add else value
+            new = code.arithmetic("add", result[index], value) if add else value
+            result[index] = code.select(here, new, result[index])
+
+    if moving is None:
+        for index, value in zip(at(known).ravel().tolist(), flat(updates), strict=True):
+            put(index, value, code.constant(True))
+        return [filled(array.shape, result)]
+    along = numbers.scatter_dims_to_operand_dims[moving]
+    starts = range(array.shape[along] - sizes[along] + 1)
+    tables = [at(_with_column(known, moving, start)) for start in starts]
+    which = [k for k in range(updates.ndim) if k not in windows]
+    for position in np.ndindex(updates.shape):
+        index = indices[(*(position[k] for k in which), moving)]
+        index = index if drop else within(code, index, starts[0], starts[-1])
+        for start, table in zip(starts, tables, strict=True):
+            here = code.compare("eq", index, code.constant(start, index.kind))
+            put(int(table[position]), updates[position], here)
     return [filled(array.shape, result)]
