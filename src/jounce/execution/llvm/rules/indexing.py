@@ -330,5 +330,5 @@ def scatter(code: Code, equation: Any, given: Sequence[Values]) -> Sequence[Valu
         index = index if drop else within(code, index, starts[0], starts[-1])
         for start, table in zip(starts, tables, strict=True):
             here = code.compare("eq", index, code.constant(start, index.kind))
-            put(int(table[position]), updates[position], here)
+            put(int(table[position]), updates.item(position), here)
     return [filled(array.shape, result)]
