@@ -120,13 +120,13 @@ def _forget_programs(memory):
 
 def _memory():
     """Return how many bytes this process holds, where Linux tells."""
-    told = pathlib.Path("/proc/self/statm")
-    return int(told.read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE") if told.exists() else 0
+    file = pathlib.Path("/proc/self/statm")
+    return int(file.read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE") if file.exists() else 0
 
 
 def _memory_maps():
-    told = pathlib.Path("/proc/self/maps")
-    return told.read_text().count("\n") if told.exists() else 0
+    file = pathlib.Path("/proc/self/maps")
+    return file.read_text().count("\n") if file.exists() else 0
 
 
 @pytest.fixture

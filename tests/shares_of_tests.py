@@ -73,8 +73,8 @@ def pytest_collection_modifyitems(config, items):
     left_out = slow & elsewhere(slow, which, count)
     if left_out and (commit := config.getoption("changed_since")):
         files = {item.path for item in slow}
-        wanted = most_changed(changed_lines(config.rootpath, commit), files, config.rootpath, count)
-        left_out = {item for item in left_out if item.path not in wanted}
+        changed = most_changed(changed_lines(config.rootpath, commit), files, config.rootpath, count)
+        left_out = {item for item in left_out if item.path not in changed}
     if left_out:
         config.hook.pytest_deselected(items=list(left_out))
         items[:] = [item for item in items if item not in left_out]
@@ -103,12 +103,12 @@ def covered(file):
 
 def changed_lines(root, commit):
     """Return how many lines of each file changed since a commit."""
-    told = subprocess.run(
+    done = subprocess.run(
         ["git", "diff", "--numstat", "--no-renames", commit, "--", "src", "tests"],
         cwd=root,
         capture_output=True,
         text=True,
         check=True,
     )
-    rows = (line.split("\t") for line in told.stdout.splitlines())
+    rows = (line.split("\t") for line in done.stdout.splitlines())
     return Counter({name: int(added) + int(removed) for added, removed, name in rows if added != "-"})

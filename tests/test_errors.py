@@ -101,9 +101,9 @@ def test_messages_are_bounded_whatever_a_file_says():
         JounceError(did_you_mean(long, [f"{long}{k}" for k in range(3)])),
     ):
         assert len(str(error)) < 12_000
-    with pytest.warns(RobotWarning) as told:
+    with pytest.warns(RobotWarning) as caught:
         warnings.warn(long, RobotWarning, stacklevel=1)
-    assert len(str(told[0].message)) < 5000
+    assert len(str(caught[0].message)) < 5000
 
 
 def test_of_very_many_names_none_is_likened():

@@ -151,9 +151,9 @@ def test_commands_that_compute_nothing_do_not_import_the_libraries(arguments):
 import io, sys
 sys.argv[0] = "jounce"
 from jounce.cli import main
-sys.stdout, told = io.StringIO(), sys.stdout
+sys.stdout, output = io.StringIO(), sys.stdout
 main()
-print([name for name in {HEAVY} if name in sys.modules], file=told)"""
+print([name for name in {HEAVY} if name in sys.modules], file=output)"""
     assert printed(code, *arguments) == "[]\n"
 
 

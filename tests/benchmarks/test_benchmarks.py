@@ -21,8 +21,8 @@ ROOT = Path(__file__).parents[2]
 
 def costing(name, *seconds, **more):
     """A contestant that tells what it takes, round after round, the run before the first round included."""
-    told = iter(seconds)
-    return Contestant(name, ready(lambda: Told(next(told), seconds[0])), **more)
+    durations = iter(seconds)
+    return Contestant(name, ready(lambda: Told(next(durations), seconds[0])), **more)
 
 
 def rows(*contestants, **more):
@@ -49,7 +49,7 @@ def test_the_first_time_can_be_what_is_measured():
     assert peer["ratio"] == [2, 2, 2]
 
 
-def test_a_peer_that_is_not_installed_is_told_with_the_extra_that_brings_it():
+def test_a_peer_that_is_not_installed_is_reported_with_the_extra_that_brings_it():
     ours, peer = rows(costing("ours", 1, 1, 1, 1), costing("peer", 1, needs="no_such_package", extra="bench"))
     assert ours["left out"] == ""
     assert peer["left out"] == "no_such_package is not installed; the extra `bench` brings it"
@@ -58,7 +58,7 @@ def test_a_peer_that_is_not_installed_is_told_with_the_extra_that_brings_it():
     assert "no_such_package" in line[2]
 
 
-def test_a_peer_that_fails_is_told_and_the_others_run():
+def test_a_peer_that_fails_is_reported_and_the_others_run():
     def without_compiler():
         raise CannotRunError("there is no C compiler")
 
@@ -126,26 +126,26 @@ def command(*words):
 
 
 def test_the_command_lists_what_there_is():
-    told = command("--list")
-    assert told.returncode == 0, told.stderr
-    assert [line.split()[0] for line in told.stdout.splitlines()] == list(benchmarks.BENCHMARKS)
+    printed = command("--list")
+    assert printed.returncode == 0, printed.stderr
+    assert [line.split()[0] for line in printed.stdout.splitlines()] == list(benchmarks.BENCHMARKS)
 
 
 @pytest.mark.slow
 def test_the_command_measures_one(tmp_path):
     before = datetime.now(UTC)
-    told = command("--only", "files", "--quick", "--out", str(tmp_path))
-    assert told.returncode == 0, told.stderr
+    printed = command("--only", "files", "--quick", "--out", str(tmp_path))
+    assert printed.returncode == 0, printed.stderr
     found = json.loads((tmp_path / "table.json").read_text())
     assert "quick" in found["circumstances"]["sizes"]
     days = {moment.date().isoformat() for moment in (before, datetime.now(UTC))}
     assert all(row["day"] in days for row in found["rows"])
     assert {row["contestant"] for row in found["rows"]} >= {"jounce", "ruamel.yaml alone, safe loader"}
     assert all(row["cost"][1] > 0 for row in found["rows"])
-    assert "four_bar.yaml" in told.stdout
+    assert "four_bar.yaml" in printed.stdout
 
 
-def test_a_benchmark_that_breaks_is_told(monkeypatch, tmp_path):
+def test_a_benchmark_that_breaks_is_reported(monkeypatch, tmp_path):
     from benchmarks import __main__ as program
 
     monkeypatch.setattr(program, "BENCHMARKS", {"broken": benchmarks.Benchmark("no_such_module", "Nothing")})

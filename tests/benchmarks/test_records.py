@@ -35,14 +35,14 @@ def row(benchmark, day, *, cost=1.0, case="work", about=ABOUT, **more):
     } | more
 
 
-def told(rows):
+def listed(rows):
     return [(row["benchmark"], row["day"], row["case"]) for row in rows]
 
 
 def test_rows_take_the_place_of_their_own_benchmark_and_others_keep_their_days():
-    kept = [row("rsur", "2026-01-01"), row("start", "2026-01-02", case="old"), row("start", "2026-01-02", case="gone")]
+    old = [row("rsur", "2026-01-01"), row("start", "2026-01-02", case="old"), row("start", "2026-01-02", case="gone")]
     new = [row("start", "2026-02-03", case="b"), row("start", "2026-02-03", case="a"), row("four-bar", "2026-02-03")]
-    assert told(records.merged(kept, new)) == [
+    assert listed(records.merged(old, new)) == [
         ("four-bar", "2026-02-03", "work"),
         ("rsur", "2026-01-01", "work"),
         ("start", "2026-02-03", "b"),
@@ -51,11 +51,11 @@ def test_rows_take_the_place_of_their_own_benchmark_and_others_keep_their_days()
 
 
 def test_a_benchmark_that_failed_replaces_nothing():
-    kept = [row("start", "2026-01-01", case="a"), row("start", "2026-01-01", case="b")]
+    old = [row("start", "2026-01-01", case="a"), row("start", "2026-01-01", case="b")]
     parts = [row("start", "2026-02-02", case="a"), row("view", "2026-02-02")]
-    assert told(records.merged(kept, parts, failed=["start", "view"])) == [
+    assert listed(records.merged(old, parts, failed=["start", "view"])) == [
         ("view", "2026-02-02", "work"),
-        *told(kept),
+        *listed(old),
     ]
 
 
@@ -69,7 +69,7 @@ def test_rows_are_read_as_they_were_written_and_the_file_tells_once_what_most_ha
     assert [line.get("circumstances") for line in whole["rows"]] == [None, None, {"processor": "two", "sizes": "small"}]
 
 
-def test_what_one_row_does_not_tell_is_not_told_of_all(tmp_path):
+def test_what_one_row_does_not_tell_is_not_reported_all(tmp_path):
     small = ABOUT | {"sizes": "small"}
     rows = [row("rsur", "2026-01-01"), *(row("start", "2026-02-02", about=small, case=case) for case in "ab")]
     records.write(rows, tmp_path)
@@ -207,7 +207,7 @@ def test_the_command_replaces_what_it_measured_and_keeps_the_rest(run, tmp_path)
 def test_the_command_without_names_replaces_everything(run, tmp_path):
     put(tmp_path, "damaged")
     assert run([measured_now("view"), measured_now("start")]) == 0
-    assert told(records.read(tmp_path)) == [("view", "2026-02-02", "work"), ("start", "2026-02-02", "work")]
+    assert listed(records.read(tmp_path)) == [("view", "2026-02-02", "work"), ("start", "2026-02-02", "work")]
 
 
 def test_the_command_keeps_the_table_where_nothing_was_measured(run, tmp_path, capsys):
@@ -218,7 +218,7 @@ def test_the_command_keeps_the_table_where_nothing_was_measured(run, tmp_path, c
     assert "its rows in the table stay as they were" in capsys.readouterr().err
 
 
-def test_a_damaged_table_is_told_before_anything_is_measured(run, tmp_path, capsys):
+def test_a_damaged_table_is_reported_before_anything_is_measured(run, tmp_path, capsys):
     put(tmp_path, "damaged")
     with pytest.raises(SystemExit) as caught:
         run([], "--only", "start")

@@ -144,7 +144,7 @@ def test_set_takes_units_and_changes_the_motion(run):
         ("BC=-1", "greater than zero"),
     ],
 )
-def test_bad_set_is_told(run, assignment, part):
+def test_bad_set_is_reported(run, assignment, part):
     status, out, err = run("run", FOUR_BAR, "--set", assignment)
     assert (status, out) == (2, "")
     assert part in err
@@ -191,7 +191,7 @@ def test_import_brings_in_own_joints(run, tmp_path):
         ("exit(3)", "SystemExit"),
     ],
 )
-def test_import_of_a_file_that_fails_is_told(run, tmp_path, text, part):
+def test_import_of_a_file_that_fails_is_reported(run, tmp_path, text, part):
     own = tmp_path / "own.py"
     own.write_text(text)
     status, out, err = run("run", FOUR_BAR, "--import", own)
@@ -402,8 +402,8 @@ def test_a_cache_that_cannot_be_made_does_no_harm(tmp_path):
     folder = tmp_path / "file" / "cache"
     done = process("run", "none.yaml", cwd=tmp_path, JOUNCE_CACHE_DIR=str(folder))
     assert done.returncode == 2
-    told, error = done.stderr.splitlines()
-    assert told == f"compiled programs are not kept: {folder}: cannot be used: Not a directory"
+    warning, error = done.stderr.splitlines()
+    assert warning == f"compiled programs are not kept: {folder}: cannot be used: Not a directory"
     assert error == "error: none.yaml: file not found"
 
 

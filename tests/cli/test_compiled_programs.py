@@ -74,15 +74,15 @@ def test_a_folder_that_others_may_write_is_not_used_and_said_once(tmp_path, mode
 @pytest.mark.slow
 def test_two_commands_with_a_cold_cache_and_one_with_a_damaged_one(tmp_path):
     both = [started(str(tmp_path)) for _ in range(2)]
-    told = [process.communicate(timeout=300) for process in both]
+    printed = [process.communicate(timeout=300) for process in both]
     assert [process.returncode for process in both] == [0, 0]
-    assert told[0] == (told[0][0], "") == told[1]
+    assert printed[0] == (printed[0][0], "") == printed[1]
     good = {file: file.read_bytes() for file in tmp_path.iterdir()}
     assert good
     for file, damage in zip(good, itertools.cycle(["empty", "cut short", "garbage", "a bit"]), strict=False):
         DAMAGES[damage](file)
     process = started(str(tmp_path))
-    assert process.communicate(timeout=300) == told[0]
+    assert process.communicate(timeout=300) == printed[0]
     assert process.returncode == 0
     kept = {file: file.read_bytes() for file in tmp_path.iterdir()}  # but those that compile too fast to be kept
     assert kept

@@ -87,7 +87,7 @@ def test_words_for_a_person(run):
     assert "\x1b" not in out
 
 
-def test_what_cannot_be_put_together_is_told_with_all_the_rest(run, facts):
+def test_what_cannot_be_put_together_is_reported_with_all_the_rest(run, facts):
     status, data, _ = facts("inspect", FOUR_BAR, "--set", "BC=60 cm")
     assert status == 1
     assert not data["ok"]
@@ -138,8 +138,8 @@ def test_initial_conditions_place_the_bodies(facts):
     _, data, _ = facts("inspect", EXAMPLES / "simple_pendulum.yaml")
     mechanism = jn.load(EXAMPLES / "simple_pendulum.yaml")
     law = next(iter(mechanism.initial.values())).motion
-    wanted = jn.laws.Expression(getattr(law, "text", str(law))).evaluate(mechanism.parameter_values | {"t": 0.0})
-    assert data["bodies"][0]["pose"]["angle"] == pytest.approx(float(wanted), abs=1e-12)
+    expected = jn.laws.Expression(getattr(law, "text", str(law))).evaluate(mechanism.parameter_values | {"t": 0.0})
+    assert data["bodies"][0]["pose"]["angle"] == pytest.approx(float(expected), abs=1e-12)
 
 
 @pytest.mark.parametrize("path", sorted(EXAMPLES.glob("*.yaml")), ids=lambda p: p.stem)
@@ -350,7 +350,7 @@ def test_the_nearest_name_is_suggested(run, arguments, part):
 
 
 @pytest.mark.slow
-def test_mobility_is_told_in_words_and_as_data(facts, run):
+def test_mobility_is_reported_in_words_and_as_data(facts, run):
     status, data, _ = facts("inspect", EXAMPLES / "sarrus.yaml")
     assert (status, data["ok"]) == (0, True)
     mobility = data["mobility"]
@@ -363,13 +363,13 @@ def test_mobility_is_told_in_words_and_as_data(facts, run):
 
 
 @pytest.mark.slow
-def test_reactions_that_are_not_unique_are_nan_and_told(run, tmp_path):
+def test_reactions_that_are_not_unique_are_nan_and_reported(run, tmp_path):
     path, out = EXAMPLES / "four_bar_in_space.yaml", tmp_path / "a.csv"
     for choice, open_ in (("unique", True), ("least_norm", False)):
-        status, told, _ = run("run", path, "--order", 2, "--redundant-reactions", choice, "--out", out, "--overwrite")
+        status, shown, _ = run("run", path, "--order", 2, "--redundant-reactions", choice, "--out", out, "--overwrite")
         assert status == 0
         assert (
-            "bearing: not unique, as constraints are redundant: joint D repeats 3" in " ".join(told.split())
+            "bearing: not unique, as constraints are redundant: joint D repeats 3" in " ".join(shown.split())
         ) == open_
         header, *lines = out.read_text().splitlines()
         assert len(lines) == 201

@@ -1,4 +1,4 @@
-"""`jounce run` on a grid of several stretches: what it says and writes is as if it were one."""
+"""`jounce run` on a grid of several chunks: what it says and writes is as if it were one."""
 
 import json
 
@@ -35,23 +35,23 @@ def file(tmp_path):
 @pytest.mark.slow
 @pytest.mark.parametrize("motion, status", [(WHOLE, 0), (ENDS, 1)])
 @pytest.mark.parametrize("suffix", ["nc", "csv"])
-def test_stretches_change_nothing(run, file, tmp_path, monkeypatch, motion, status, suffix):
+def test_chunks_change_nothing(run, file, tmp_path, monkeypatch, motion, status, suffix):
     path, out = file(motion), tmp_path / f"motion.{suffix}"
-    told, written = [], []
+    printed, written = [], []
     monkeypatch.setattr("jounce.kinematics.position_analysis.grid_storage.CHUNK", 1100)
     for streams in (False, True):
         monkeypatch.setattr("jounce.kinematics.needs_chunks", lambda _, streams=streams: streams)
-        told.append([run("run", path, "--order", "1", "--out", out), run("run", path, "--order", "1", "--json")])
+        printed.append([run("run", path, "--order", "1", "--out", out), run("run", path, "--order", "1", "--json")])
         written.append(read(out))
         out.unlink()
-    assert told[0] == told[1]
-    assert told[0][0][0] == status
-    assert json.loads(told[1][1][1])["time"]["count"] == 2501
+    assert printed[0] == printed[1]
+    assert printed[0][0][0] == status
+    assert json.loads(printed[1][1][1])["time"]["count"] == 2501
     xarray.testing.assert_identical(*written)
 
 
 @pytest.mark.slow
-def test_an_interrupt_between_stretches_leaves_no_file(run, file, tmp_path, monkeypatch):
+def test_an_interrupt_between_chunks_leaves_no_file(run, file, tmp_path, monkeypatch):
     monkeypatch.setattr("jounce.kinematics.position_analysis.grid_storage.CHUNK", 1100)
     path, seen = file(WHOLE), []
 
@@ -67,7 +67,7 @@ def test_an_interrupt_between_stretches_leaves_no_file(run, file, tmp_path, monk
 
 
 @pytest.mark.slow
-def test_a_result_that_cannot_be_written_is_told(run, file, tmp_path, monkeypatch):
+def test_a_result_that_cannot_be_written_is_reported(run, file, tmp_path, monkeypatch):
     monkeypatch.setattr("jounce.kinematics.position_analysis.grid_storage.CHUNK", 1100)
 
     def full(*_):

@@ -173,7 +173,7 @@ def test_a_file_is_written_though_nobody_reads_the_table(tmp_path, cache):
 
 
 @pytest.mark.slow
-def test_bad_input_is_2_though_nobody_can_be_told():
+def test_bad_input_is_2_though_nobody_can_read_it():
     assert shell("jounce run none.yaml 2>/dev/full").returncode == 2
     assert shell("jounce run none.yaml 2>&-").returncode == 2
 

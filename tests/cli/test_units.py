@@ -53,9 +53,9 @@ def test_figures_peaks_and_the_view_are_in_the_units_of_the_file(four_bar):
     assert any("mm" in label for label in labels)
     assert "mm" in hodograph(motion, "C", 1).axes[0].get_xlabel()
     assert "(deg)" in phase_portrait(motion, "psi").axes[0].get_xlabel()
-    told = {(x.output, x.derivative): x for x in shown_peaks(peaks(motion, refine=False), mechanism.shown_units)}
-    assert told["C_x", "velocity"].unit == "mm/s"
-    assert told["C_x", "velocity"].maximum == pytest.approx(1e3 * motion.outputs["C"][:, 1, 0].max())
+    by_name = {(x.output, x.derivative): x for x in shown_peaks(peaks(motion, refine=False), mechanism.shown_units)}
+    assert by_name["C_x", "velocity"].unit == "mm/s"
+    assert by_name["C_x", "velocity"].maximum == pytest.approx(1e3 * motion.outputs["C"][:, 1, 0].max())
     seen = recorded(motion).quantities()
     assert (seen["psi"].unit, seen["C"].unit) == ("deg", "mm")
     np.testing.assert_allclose(seen["psi"].values[:, 0, 0], np.degrees(motion.outputs["psi"][:, 0]), rtol=1e-15)
@@ -80,8 +80,8 @@ def test_headings_say_units_where_they_are_not_si(four_bar, tmp_path):
         (shown, False, None),
     ):
         io.write(dataset, path, header_units=asked)
-        wanted = names if units is None else [f"{name} [{unit}]" for name, unit in zip(names, units, strict=True)]
-        assert heading(path) == wanted
+        expected = names if units is None else [f"{name} [{unit}]" for name, unit in zip(names, units, strict=True)]
+        assert heading(path) == expected
 
 
 SAMPLED = """
@@ -135,9 +135,9 @@ def test_the_option_goes_before_the_file_and_json_stays_in_si(tmp_path, capsys):
     file = tmp_path / "four_bar.yaml"
     file.write_text(text)
     assert main(["run", str(file), "--order", "1", "--units", "angle=deg", "--no-refine"]) == 0
-    told = capsys.readouterr().out
-    assert " deg/s " in told
-    assert " cm/s " in told
+    printed = capsys.readouterr().out
+    assert " deg/s " in printed
+    assert " cm/s " in printed
     assert main(["run", str(file), "--order", "1", "--json", "--no-refine"]) == 0
     found = json.loads(capsys.readouterr().out)
     assert {peak["unit"] for peak in found["peaks"]} == {"rad", "rad/s", "m", "m/s"}

@@ -83,8 +83,8 @@ def test_a_bead_driven_along_an_ellipse_has_the_closed_form_of_place_parameter_a
         turn = mp.mpf("0.4") + 2 * mp.pi * t + mp.mpf("0.3") * mp.sin(t)
         n, c = (mp.cos(p), 2 * mp.sin(p)), (-mp.sin(turn), mp.cos(turn))
         a = [mp.diff(lambda u, f=f: f(parameter(u)), t, 2) for f in (lambda p: 2 * mp.cos(p), mp.sin)]
-        wanted = mp.matrix([MASS * a[0], MASS * (a[1] + mp.mpf("9.81"))])
-        share = mp.lu_solve(mp.matrix([[n[0], c[0]], [n[1], c[1]]]), wanted)
+        expected = mp.matrix([MASS * a[0], MASS * (a[1] + mp.mpf("9.81"))])
+        share = mp.lu_solve(mp.matrix([[n[0], c[0]], [n[1], c[1]]]), expected)
         return share[0] * n[0]
 
     with mp.workdps(30):
@@ -224,7 +224,7 @@ class TestEnds:
         found = jn.solve(made, [0.0, 1.0, 2.1, 3.1], order=2, strict=False)
         assert found.status.tolist() == [0, 0, int(Status.END_OF_CURVE), int(Status.NOT_REACHED)]
 
-    def test_a_start_beyond_an_end_is_told_before_anything_is_computed(self):
+    def test_a_start_beyond_an_end_is_reported_before_anything_is_computed(self):
         with pytest.raises(jn.errors.MechanismError, match="between the ends of the curve, -1 and 1") as caught:
             jn.solve(bead(HILL, [0.5, 0.02], law="0.5", start=3.0), [0.0, 1.0])
         assert caught.value.name == "joints.track.start"

@@ -49,7 +49,7 @@ def test_a_class_defined_again_takes_its_own_place():
     assert own(space="planar", name="Other", role="driver") is catalogue("planar", "driver")["mine"]
 
 
-def test_a_space_or_role_that_does_not_exist_is_told():
+def test_a_space_or_role_that_does_not_exist_is_reported():
     with pytest.raises(jn.errors.MechanismError, match="did you mean 'planar'"):
         own(space="plannar")
     with pytest.raises(jn.errors.MechanismError, match="did you mean 'driver'"):

@@ -153,8 +153,8 @@ def test_a_batch_has_each_ride():
     bicycle, time = jn.load("examples/bicycle.yaml"), [0.0, 0.4]
     found = jn.simulate_batch(bicycle, {"speed": [3.0, 5.0]}, time, order=2)
     for k, speed in enumerate((3.0, 5.0)):
-        alone = jn.simulate(bicycle.with_parameters(speed=speed), time, order=2)
-        np.testing.assert_allclose(found.outputs["seat"][k], alone.outputs["seat"], rtol=0, atol=1e-10)
+        single = jn.simulate(bicycle.with_parameters(speed=speed), time, order=2)
+        np.testing.assert_allclose(found.outputs["seat"][k], single.outputs["seat"], rtol=0, atol=1e-10)
 
 
 @pytest.mark.slow

@@ -123,10 +123,10 @@ class Walk:
                         walk.function(part, kind)
 
     def node_of(self, function):
-        wanted = function.__code__.co_firstlineno
+        first_line = function.__code__.co_firstlineno
         for node in ast.walk(self.tree):
             named = isinstance(node, ast.FunctionDef) and node.name == function.__name__
-            if named and wanted in (node.lineno, *(d.lineno for d in node.decorator_list)):
+            if named and first_line in (node.lineno, *(d.lineno for d in node.decorator_list)):
                 return node
         return None
 

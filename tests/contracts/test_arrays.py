@@ -171,7 +171,7 @@ def test_numbers_of_every_kind_are_taken(read):
         assert found.tolist() == [1.0, 2.0]
 
 
-def test_a_missing_duration_is_told():
+def test_a_missing_duration_is_reported():
     with pytest.raises(jn.errors.MechanismError, match="or is missing"):
         jn.solve(MECHANISM, np.array([0, "NaT"], "timedelta64[s]"), order=0)
 

@@ -43,5 +43,4 @@ def test_copies_and_files_hold_the_same_joint(case):
 
 
 def test_machine_code_and_xla_agree(case):
-    pytest.importorskip("llvmlite", reason="the compiler is an extra")
     assert not checked(case, "back ends")

@@ -697,8 +697,8 @@ def forms_of(element):
 @pytest.mark.parametrize("space", ["planar", "spatial"])
 def test_every_joint_driver_force_and_output_has_its_frames_drawn_otherwise(space):
     """What is added to the catalogue, or to the outputs of files, must come into a mechanism here, in all its forms."""
-    wanted = [kind for role in ROLES for kind in catalogue(space, role).values()]
-    missing = {kind: forms(kind) for kind in (*wanted, *(kind for _, kind in output_types(space).values()))}
+    kinds = [kind for role in ROLES for kind in catalogue(space, role).values()]
+    missing = {kind: forms(kind) for kind in (*kinds, *(kind for _, kind in output_types(space).values()))}
     for mechanism in (with_all_outputs(kind()) for kind in MECHANISMS.values()):
         for elements in mechanism.elements.values() if mechanism.space == space else ():
             for element in elements.values():

@@ -89,9 +89,9 @@ def usual(models):
 @pytest.mark.parametrize("name", SETTINGS)
 def test_numbers_do_not_depend_on_what_the_host_sets(name, models, usual):
     with SETTINGS[name]():
-        told = np.geterr()
+        settings = np.geterr()
         found = numbers(models)
-        assert np.geterr() == told
+        assert np.geterr() == settings
     for key, values in usual.items():
         assert np.array_equal(found[key], values), key
 
@@ -154,9 +154,11 @@ def test_settings_of_the_environment_do_not_reach_the_command(models):
     done = run("-m", "jounce", "run", "examples/four_bar.yaml", "--json", JOUNCE_CACHE_DIR="", **SET_BY_THE_SHELL)
     assert not done.returncode, done.stderr
     assert done.stderr == ""
-    told = {peak["derivative"]: peak["maximum"] for peak in json.loads(done.stdout)["peaks"] if peak["output"] == "psi"}
+    peaks = {
+        peak["derivative"]: peak["maximum"] for peak in json.loads(done.stdout)["peaks"] if peak["output"] == "psi"
+    }
     psi = jn.solve(models[0], order=4).outputs["psi"]
-    assert np.allclose([told["velocity"], told["jounce"]], psi[:, [1, 4]].max(axis=0), rtol=1e-2, atol=0)
+    assert np.allclose([peaks["velocity"], peaks["jounce"]], psi[:, [1, 4]].max(axis=0), rtol=1e-2, atol=0)
 
 
 def run(*arguments, **environment):

@@ -111,29 +111,29 @@ def numbers():
     return {name: [np.asarray(x).tolist() for x in jax.tree.leaves(values)] for name, values in found.items()}
 
 
-told = []
+results = []
 for setting in (False, True, False) if sys.argv[1] == "before" else (None,):
     if setting is not None:
         jax.config.update("jax_enable_x64", setting)
-    told.append(numbers())
+    results.append(numbers())
     assert jax.config.jax_enable_x64 is bool(setting), setting
     assert jnp.sin(0.1).dtype == (np.float64 if setting else np.float32)
-print(json.dumps(told))
+print(json.dumps(results))
 """
 
 
 @pytest.mark.slow
 def test_numbers_do_not_depend_on_the_setting():
     """Switched off before the import, on and off after it, and never touched: the same numbers, to the last bit."""
-    told = []
+    results = []
     for when in ("before", "never"):
         done = subprocess.run([sys.executable, "-c", CALLS, when], capture_output=True, text=True, check=False)
         assert not done.returncode, done.stderr
-        told += json.loads(done.stdout)
-    assert len(told) == 4
-    for name, first in told[0].items():
-        assert all(one[name] == first for one in told), name
-    assert np.isclose(told[0]["jet"][0][1], 0.4, rtol=0, atol=1e-16)
+        results += json.loads(done.stdout)
+    assert len(results) == 4
+    for name, first in results[0].items():
+        assert all(one[name] == first for one in results), name
+    assert np.isclose(results[0]["jet"][0][1], 0.4, rtol=0, atol=1e-16)
 
 
 TRANSFORMED = {

@@ -50,8 +50,8 @@ def test_constraints_pin_every_direct_dependency_by_version_alone():
     pinned = {normal(line.split("==")[0]) for line in lines}
     project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
     extras = project["optional-dependencies"]
-    wanted = project["dependencies"] + extras["test"] + extras["docs"] + extras["bench"]
-    assert {normal(re.split(r"[\[<>=~!; ]", entry)[0]) for entry in wanted} <= pinned
+    required = project["dependencies"] + extras["test"] + extras["docs"] + extras["bench"]
+    assert {normal(re.split(r"[\[<>=~!; ]", entry)[0]) for entry in required} <= pinned
 
 
 def normal(name):

@@ -107,6 +107,6 @@ def test_all_that_a_notebook_shows_is_made_here():
 
 def test_a_report_of_limits_says_what_is_nearest():
     worst = made("LimitReport").worst
-    told = f"{worst.quantity} of {worst.joint} takes {worst.ratio:.6g} of its limit at t = {worst.time:.6g} s"
-    assert told in repr(made("LimitReport"))
+    words = f"{worst.quantity} of {worst.joint} takes {worst.ratio:.6g} of its limit at t = {worst.time:.6g} s"
+    assert words in repr(made("LimitReport"))
     assert "<table>" in made("LimitReport")._repr_html_()

@@ -24,18 +24,18 @@ calls = {
     "dynamics.applied_force": ("spring",), "energy.power_balance": (),
     "energy.potential_energy": (),
 }
-told = {}
+errors = {}
 for name, arguments in calls.items():
     for other in (jn.load("examples/four_bar.yaml"), "arm.urdf", None):
         try:
             functools.reduce(getattr, name.split("."), jn)(other, *arguments)
         except jn.JounceError as error:
-            told.setdefault(name, set()).add(str(error).partition(", got ")[0])
+            errors.setdefault(name, set()).add(str(error).partition(", got ")[0])
 try:
     jn.bias_forces(jn.load_robot("examples/robots/ur5.urdf"), np.zeros((2, 6)), parts=None)
 except jn.errors.RobotError as error:
-    told["parts"] = {str(error)}
-print(json.dumps({name: sorted(words) for name, words in told.items()}))
+    errors["parts"] = {str(error)}
+print(json.dumps({name: sorted(words) for name, words in errors.items()}))
 """
 OF_MOTIONS = {
     "driver_force",
@@ -52,12 +52,12 @@ def test_robots_and_motions_are_asked_for():
     """In a process of its own: the tests check annotations, which nothing does in use."""
     done = subprocess.run([sys.executable, "-c", CALLS], capture_output=True, text=True, check=False)
     assert not done.returncode, done.stderr
-    told = json.loads(done.stdout)
-    (words,) = told.pop("parts")
+    record = json.loads(done.stdout)
+    (words,) = record.pop("parts")
     assert words.startswith("parts: ")
     assert words.endswith("valid: centrifugal, coriolis, gravity")
-    assert len(told) == 18
-    for name, words in told.items():
+    assert len(record) == 18
+    for name, words in record.items():
         argument, kind, source = ("motion", "jn.Motion", "jn.solve") if name in OF_MOTIONS else OF_ROBOTS
         (words_for_all,) = words
         assert words_for_all.startswith(f"{argument}: "), name

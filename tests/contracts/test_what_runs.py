@@ -47,9 +47,9 @@ def test_the_table_is_complete_and_names_nothing_else():
         PAGE.read_text(encoding="utf-8").partition("## What runs code or writes elsewhere")[2].partition("\n## ")[0]
     )
     first = [line.split("|")[1] for line in section.splitlines() if line.startswith("| `")]
-    told = set(re.findall(r"`([\w/]+\.py)`", " ".join(first)))
-    assert {name: found[name] for name in found.keys() - told} == {}
-    assert told - found.keys() == set()
+    listed = set(re.findall(r"`([\w/]+\.py)`", " ".join(first)))
+    assert {name: found[name] for name in found.keys() - listed} == {}
+    assert listed - found.keys() == set()
 
 
 def test_nothing_is_evaluated_and_no_shell_is_started():

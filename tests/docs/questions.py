@@ -336,7 +336,7 @@ def two_blocks_two_pulleys():
 @answers(19)
 def atwood():
     down = [0.0, -1.0]
-    told = []
+    results = []
     for light, heavy in ((4.0, 5.0), (1.0, 2.0)):
         found = hung(
             {"light": ([-0.1, -1.0], light), "heavy": ([0.1, -1.0], heavy)},
@@ -345,8 +345,8 @@ def atwood():
             {"rest": drivers.CoordinateDriver(("ground", "light"), "y", "-1")},
             {"light": down, "heavy": down},
         )
-        told += [float(found["light"][0, 2, 1]), float(found["tension"][0, 0])]
-    return told
+        results += [float(found["light"][0, 2, 1]), float(found["tension"][0, 0])]
+    return results
 
 
 def belt(radii, distance, *, crossed=False):
@@ -358,8 +358,8 @@ def belt(radii, distance, *, crossed=False):
     }
     bodies = {"first": (O2,), "second": ([distance, 0.0],)}
     made = plane(bodies, joints, {"motor": turn("first", "t")}, {"second": jn.outputs.AngleOutput("second")})
-    (told,) = line_facts(StartingState(made, build(made), 0.0))
-    return told, float(jn.solve(made, [0.0], order=1).outputs["second"][0, 1])
+    (facts,) = line_facts(StartingState(made, build(made), 0.0))
+    return facts, float(jn.solve(made, [0.0], order=1).outputs["second"][0, 1])
 
 
 @answers(20)
@@ -369,8 +369,8 @@ def belt_of_12_meters():
 
 @answers(21)
 def belt_of_1_meter():
-    told, ratio = belt([0.1, 0.15], 1.0)
-    return [told["length"], float(np.degrees(told["wraps"][0])), 400 * ratio]
+    facts, ratio = belt([0.1, 0.15], 1.0)
+    return [facts["length"], float(np.degrees(facts["wraps"][0])), 400 * ratio]
 
 
 @answers(22)

@@ -92,9 +92,9 @@ def test_error_is_proportional_to_the_residual():
 
     slope = off(1e-7)[0] / 1e-7
     ratios = []
-    for wanted in (1e-4, 1e-6, 1e-8):
-        residual, error = off(wanted / slope)
-        assert residual == pytest.approx(wanted, rel=0.05)
+    for expected in (1e-4, 1e-6, 1e-8):
+        residual, error = off(expected / slope)
+        assert residual == pytest.approx(expected, rel=0.05)
         ratios.append(error / residual)
     assert ", ".join(f"{r:.1e}" for r in ratios[:2]) + f" and {ratios[2]:.1e}" in text
     assert max(ratios) / min(ratios) < 1.1

@@ -63,9 +63,9 @@ def test_the_listing_of_the_start_page_is_what_the_command_prints(capsys, monkey
     (listing,) = (text for _, text in blocks(ROOT / "docs" / "start.md", "text") if text.startswith("Planar four-bar"))
     assert main(["run", "examples/four_bar.yaml"]) == 0
     # of two peaks that are equal but for rounding either may be told
-    shown, told = ([line.split()[:-3] + line.split()[-2:-1] for line in x.splitlines()] for x in
+    shown, printed = ([line.split()[:-3] + line.split()[-2:-1] for line in x.splitlines()] for x in
                    (listing, capsys.readouterr().out))  # fmt: skip
-    assert shown == told
+    assert shown == printed
 
 
 ELSEWHERE = ("python3", ".venv/bin/python", "bash", "jounce reproduce")  # set-up, scripts and papers have own checks

@@ -653,5 +653,5 @@ def marked(key):
 @pytest.mark.parametrize("section, there", [marked((section, there)) for section, there, _ in rows()])
 def test_rows_hold(section, there, request):
     check = HELD[section, there]
-    wanted = check.__code__.co_varnames[: check.__code__.co_argcount]
-    check(*(request.getfixturevalue(name) for name in wanted))
+    names = check.__code__.co_varnames[: check.__code__.co_argcount]
+    check(*(request.getfixturevalue(name) for name in names))

@@ -20,7 +20,7 @@ def test_there_are_thirty_questions_each_with_its_source():
 @pytest.mark.slow
 @pytest.mark.parametrize("number", ANSWERS)
 def test_the_answer_on_the_page_is_that_of_jounce(number):
-    told, found = NUMBER.findall(ROWS[number][3]), ANSWERS[number]()
-    for text, value in zip(told, found, strict=True):
+    stated, found = NUMBER.findall(ROWS[number][3]), ANSWERS[number]()
+    for text, value in zip(stated, found, strict=True):
         digits = len(text.partition(".")[2])
         assert abs(float(text) - value) <= 0.51 * 10.0**-digits, ROWS[number][1]

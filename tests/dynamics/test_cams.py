@@ -133,10 +133,10 @@ def test_cams_in_space_know_angles_about_hinges(tmp_path, leader):
 
     force, torque = expected(smooth, instants)
     with mpmath.workdps(80):
-        told, added = (
+        turned, added = (
             np.array([[mpmath.diff(f, x, k) for k in range(5)] for x in instants], float) for f in (turning, more)
         )
-    for name, exact in zip(("contact", "turning", "torque"), (force, told, torque + added), strict=True):
+    for name, exact in zip(("contact", "turning", "torque"), (force, turned, torque + added), strict=True):
         sizes = np.abs(exact).max(axis=0)
         np.testing.assert_allclose(motion.outputs[name] / sizes, exact / sizes, rtol=0, atol=1e-10, err_msg=name)
     bearing = jn.joint_reaction(motion, "swing", body="shaft", point=[0, 0, 0])
@@ -281,7 +281,7 @@ def test_a_flat_face_has_no_path_and_is_named(tmp_path):
         load(tmp_path, text=ROLLER.replace("CAM", "indexing_rocker.yaml"))
 
 
-def test_a_driver_is_told_what_follows_it_as_a_signal(tmp_path):
+def test_a_driver_is_reported_what_follows_it_as_a_signal(tmp_path):
     (follows,) = (line for line in FILE.splitlines() if line.startswith("  cam:"))
     text = FILE.replace(f"{follows}\n", "").replace("drivers:", f"drivers:\n{follows}")
     text = text.replace("joint: cam, quantity: contact", "driver: cam, quantity: force")

@@ -186,7 +186,7 @@ def test_dry_friction_that_has_no_value_at_rest_is_refused_by_name():
 
 
 @pytest.mark.slow
-def test_a_spring_that_only_pushes_is_told_of_where_it_just_touches():
+def test_a_spring_that_only_pushes_is_reported_where_it_just_touches():
     block = jn.Mechanism(
         space="planar",
         bodies={"block": jn.Body([1.0, 0.0], mass=1.0, inertia=1.0)},
@@ -211,7 +211,7 @@ def test_a_simulation_from_the_placed_mechanism_stays_there():
 
 
 @pytest.mark.slow
-def test_a_change_point_is_told_as_singular_and_not_linearized():
+def test_a_change_point_is_reported_as_singular_and_not_linearized():
     # a parallelogram that hangs along its base, where it may turn into its crossed form
     body = {"mass": 1.0, "inertia": 0.1}
     place = [np.cos(0.7), np.sin(0.7)]

@@ -69,15 +69,15 @@ def test_a_planetary_gear_loads_its_pins_and_bearings_as_its_free_bodies_say():
         )
         found = jn.driver_force(motion, "m").values[k]
         np.testing.assert_allclose(found, rates(lambda t: 2 * tooth(t) * mpmath.mpf("0.012"), t), rtol=1e-11)
-        for name, body, wanted in (("S", "sun", bearing), ("P", "planet", pin)):
+        for name, body, exact in (("S", "sun", bearing), ("P", "planet", pin)):
             force = jn.joint_reaction(motion, name, body).force.values[k]
             size = np.abs(force).max(axis=1, keepdims=True)
-            expected = np.stack([rates(part, t) for part in wanted], axis=1)
+            expected = np.stack([rates(part, t) for part in exact], axis=1)
             assert (np.abs(force - expected) <= 1e-10 * size).all(), (name, force, expected)
 
 
 @pytest.mark.slow
-def test_where_the_load_passes_zero_rates_of_what_the_teeth_press_apart_are_not_told():
+def test_where_the_load_passes_zero_rates_of_what_the_teeth_press_apart_are_not_reported():
     motion = jn.solve(planetary("-7 + 20*t"), [0.0, 0.35, 0.7], ORDER)
     reaction = jn.joint_reaction(motion, "S", "sun").force
     radial = {}
@@ -128,7 +128,7 @@ def test_a_rack_presses_its_pinion_away_whichever_way_it_is_loaded(load):
     np.testing.assert_allclose(jn.driver_force(motion, "motor").values[:, 0], 0.05 * load, rtol=1e-12)
 
 
-def test_a_pinion_off_the_pitch_line_of_its_rack_is_told_with_how_far():
+def test_a_pinion_off_the_pitch_line_of_its_rack_is_reported_with_how_far():
     with pytest.raises(jn.errors.MechanismError, match=r"-0\.052 m to the left of the line.*-0\.05 m"):
         jn.driver_force(jn.solve(rack("100", height=0.052), [0.0], 3), "motor")
 
@@ -175,7 +175,7 @@ def test_gradients_by_pitch_radii_count_all_turns():
     assert float(jax.grad(ring)(0.0)) == pytest.approx(float(slope) * (600 + 5 * math.sin(80)), rel=1e-9)
 
 
-def test_centers_that_are_not_at_the_sum_of_radii_are_told_with_the_gap():
+def test_centers_that_are_not_at_the_sum_of_radii_are_reported_with_the_gap():
     gears = planetary("1")
     wide = dataclasses.replace(gears.joints["sp"], radius_j=0.019)
     for change, words in (
@@ -238,7 +238,7 @@ def test_a_worm_needs_its_axes_and_its_ratio_alone():
 
 
 @pytest.mark.slow
-def test_what_carries_shafts_is_told_where_it_does_not():
+def test_what_carries_shafts_is_reported_where_it_does_not():
     for mechanism, words in (
         (
             worm(mesh=spatial.Gear(("worm", "wheel", "ground"), Z, Y, 0.5)),

@@ -88,7 +88,7 @@ def test_a_ratio_acts_on_the_housing():
         jn.joint_reaction(motion, "cut", "ground")
 
 
-def test_gears_without_load_are_not_told_of():
+def test_gears_without_load_are_not_reported():
     idle = gears(0.0, (0.0, -3.0), bearing=jn.outputs.JointForceOutput("a"))
     assert "comment" not in jn.solve(idle, INSTANTS, order=2).dataset["bearing"].attrs
 

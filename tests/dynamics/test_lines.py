@@ -136,7 +136,7 @@ def test_strands_of_a_belt_give_alike_where_its_centers_part():
         same_rates(motion.angle("wheel").values, wheel, time)
 
 
-def test_what_a_belt_cannot_do_is_told():
+def test_what_a_belt_cannot_do_is_reported():
     for mechanism, words in (
         (arm(radii=(0.2, 0.15)), r"0.3 m apart on 'arm', and the pulleys overlap below 0.35 m"),
         (sliding(second=0.0598), "nearly the same need one body that carries both"),
@@ -184,7 +184,7 @@ def test_atwoods_machine():
 
 
 @pytest.mark.slow
-def test_a_rope_that_would_have_to_push_is_told_as_slack_with_its_instants():
+def test_a_rope_that_would_have_to_push_is_reported_as_slack_with_its_instants():
     """Weight a is thrown: where it goes down faster than weight b would fall up, the rope would have to push."""
     drive = {"throw": drivers.CoordinateDriver(("ground", "a"), "y", "-0.5 + 0.05*sin(20*t)")}
     time = np.linspace(0.0, 0.3, 31)
@@ -356,7 +356,7 @@ def crank(length, points=((1, 0), (0.2, 0)), bodies=("ground", "crank"), **joint
         (crank(math.nan), "must be finite"),
     ],
 )
-def test_ropes_that_cannot_be_are_told_before_anything_is_solved(mechanism, words):
+def test_ropes_that_cannot_be_are_reported_before_anything_is_solved(mechanism, words):
     with pytest.raises(jn.errors.MechanismError, match=words):
         jn.solve(mechanism, [0.0], 1)
 
@@ -376,7 +376,7 @@ def test_a_rope_joins_bodies(bodies):
         jn.joints.Rope(bodies, [ZERO] * len(bodies), 1.0)
 
 
-def test_lines_are_told_and_drawn():
+def test_lines_are_reported_and_drawn():
     facts = inspected(arm())
     (belt,) = facts["lines"]
     assert belt["carrier"] == "arm"
@@ -413,7 +413,7 @@ def test_the_view_shows_strands_where_they_are():
 
 
 @pytest.mark.parametrize("push, word", [(30.0, "undetermined"), (10.0, "held")])
-def test_an_equilibrium_on_a_rope_that_would_have_to_push_is_told(push, word):
+def test_an_equilibrium_on_a_rope_that_would_have_to_push_is_reported(push, word):
     """2 kg weigh 19.62 N: pushed up with 30 N they do not hang on the rope."""
     joints = {
         "guide": planar.Prismatic(("ground", "load"), [0, 0], [0, 0], [0, 1], [0, 1]),

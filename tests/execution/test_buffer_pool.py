@@ -127,7 +127,7 @@ def test_motions_are_their_own_beside_others_that_borrow_the_same_memory(kept):
     """What one motion has found is not what the next writes, in several threads as in one."""
     lengths = [0.038, 0.039, 0.04]
     grid = np.linspace(0.0, 2.0, 3001)
-    wanted = [jn.solve(four_bar(AB=x), grid, threads=1).outputs["psi"].copy() for x in lengths]
+    expected = [jn.solve(four_bar(AB=x), grid, threads=1).outputs["psi"].copy() for x in lengths]
     found = {}
 
     def solve(k):
@@ -139,5 +139,5 @@ def test_motions_are_their_own_beside_others_that_borrow_the_same_memory(kept):
     for thread in threads:
         thread.join()
     for k, values in found.items():
-        np.testing.assert_array_equal(values, wanted[k % 3])
+        np.testing.assert_array_equal(values, expected[k % 3])
     assert bool(kept) == uses_machine_code()  # it is machine code that borrows

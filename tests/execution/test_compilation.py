@@ -68,9 +68,9 @@ def test_what_differs_has_a_program_of_its_own(shelf):
         ((x, 1), {}), ((x, np.float64(1)), {}),
     ]  # fmt: skip
     for arguments, keywords in calls * 2:
-        found, wanted = anew()(*arguments, **keywords), example(*arguments, **keywords)
-        assert jax.tree.structure(found) == jax.tree.structure(wanted)
-        jax.tree.map(np.testing.assert_array_equal, found, wanted)
+        found, expected = anew()(*arguments, **keywords), example(*arguments, **keywords)
+        assert jax.tree.structure(found) == jax.tree.structure(expected)
+        jax.tree.map(np.testing.assert_array_equal, found, expected)
     assert len(shelf) == len(calls)
 
 

@@ -97,7 +97,7 @@ def test_there_is_none_for_what_is_traced():
     jax.jit(traced)(2.0)
 
 
-def test_what_has_no_rule_is_left_to_xla_and_told_once(monkeypatch):
+def test_what_has_no_rule_is_left_to_xla_with_one_warning(monkeypatch):
     def transformed(shared, lanes):
         return jax.lax.digamma(lanes[0]) * shared[0][:, None]
 

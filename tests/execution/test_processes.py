@@ -21,7 +21,7 @@ mechanism = jn.load({str(EXAMPLES / "four_bar.yaml")!r})
 def job(_=None):
     return jn.solve(mechanism, [0.0, 0.1], order=1).outputs["psi"].tolist()
 
-def told(_=None):
+def result_or_error(_=None):
     try:
         return job()
     except jn.JounceError as error:
@@ -94,8 +94,8 @@ def test_a_fork_of_a_process_that_computed_is_refused(tmp_path):
     program = """
 job()
 with multiprocessing.get_context("fork").Pool(2) as pool:
-    print(set(pool.map(told, range(4))))
-print(told() == job())
+    print(set(pool.map(result_or_error, range(4))))
+print(result_or_error() == job())
 """
     assert ended(tmp_path, program) == "{'UnsupportedError'}\nTrue\n"
 
@@ -105,7 +105,7 @@ print(told() == job())
 def test_a_fork_before_the_first_computation_computes(tmp_path):
     program = """
 with multiprocessing.get_context("fork").Pool(2) as pool:
-    found = pool.map(told, range(4))
+    found = pool.map(result_or_error, range(4))
 print(all(one == job() for one in found))
 """
     assert ended(tmp_path, program) == "True\n"
@@ -118,7 +118,7 @@ def test_new_processes_compute_after_the_parent_has(tmp_path, method):
 if __name__ == "__main__":
     expected = job()
     with multiprocessing.get_context(sys.argv[1]).Pool(2) as pool:
-        print(all(one == expected for one in pool.map(told, range(4))))
+        print(all(one == expected for one in pool.map(result_or_error, range(4))))
 """
     assert ended(tmp_path, program, method) == "True\n"
 

@@ -27,9 +27,9 @@ DIFFERENT = [
 ]  # fmt: skip
 
 
-def test_what_is_different_is_told_apart():
-    told = list(map(description, DIFFERENT))
-    assert len(set(told)) == len(told)
+def test_what_is_different_is_distinguished():
+    descriptions = list(map(description, DIFFERENT))
+    assert len(set(descriptions)) == len(descriptions)
 
 
 def test_what_jax_is_not_to_see_is_left_out():
@@ -77,17 +77,17 @@ def structure(law):
 
 def test_the_structure_of_a_mechanism_has_its_laws_in_its_name():
     laws = ["-2*x", "-3*x", "-2*v", "-2*sin(x)"]
-    told = [tree_description(structure(jn.forces.ExpressionLaw(law))) for law in laws]
+    descriptions = [tree_description(structure(jn.forces.ExpressionLaw(law))) for law in laws]
     again = [tree_description(structure(jn.forces.ExpressionLaw(law))) for law in laws]
-    assert told == again
-    assert len(set(told)) == len(laws)
+    assert descriptions == again
+    assert len(set(descriptions)) == len(laws)
 
 
 def test_a_function_has_what_it_computes_in_its_name():
     functions = [lambda x, v, t: -2.0 * x, lambda x, v, t: -3.0 * x, lambda x, v, t: -2.0 * v, lambda x, v, t: x / 2.0]
-    told = [tree_description(structure(jn.forces.FunctionLaw(function))) for function in functions]
-    assert told[0] == told[1]  # the numbers are arguments
-    assert len(set(told)) == 3
+    descriptions = [tree_description(structure(jn.forces.FunctionLaw(function))) for function in functions]
+    assert descriptions[0] == descriptions[1]  # the numbers are arguments
+    assert len(set(descriptions)) == 3
 
     def of_python(x, v, t):
         said = jax.ShapeDtypeStruct(x.shape, float)
@@ -99,7 +99,7 @@ def test_a_function_has_what_it_computes_in_its_name():
 
 def test_a_program_is_named_by_all_that_it_depends_on():
     tree, leaves = jax.tree.structure((1, {"a": 2})), (((3,), "float64", False), ("float",))
-    told = {
+    keys = {
         cache_key((function,), tree, kinds, static)
         for function, kinds, static in itertools.product(
             (advance, tree_description),
@@ -107,9 +107,9 @@ def test_a_program_is_named_by_all_that_it_depends_on():
             ({"order": 4}, {"order": 5}, {"pose_type": PlanarPose}),
         )
     }
-    assert len(told) == 18
+    assert len(keys) == 18
     with jax.default_matmul_precision("float32"):
-        assert cache_key((advance,), tree, leaves, {"order": 4}) not in told
+        assert cache_key((advance,), tree, leaves, {"order": 4}) not in keys
 
 
 @pytest.mark.slow

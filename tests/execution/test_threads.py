@@ -29,14 +29,14 @@ def test_results_do_not_depend_on_the_number_of_threads(mechanism):
 
 def test_several_threads_may_call_at_once():
     lengths = [0.12, 0.13, 0.14, 0.15]
-    alone = [results(jn.solve(four_bar(BC=length), LONG, threads=1)) for length in lengths]
+    single = [results(jn.solve(four_bar(BC=length), LONG, threads=1)) for length in lengths]
     with ThreadPoolExecutor(4) as callers:
         together = callers.map(lambda length: results(jn.solve(four_bar(BC=length), LONG, threads=2)), lengths)
-        for found, expected in zip(together, alone, strict=True):
+        for found, expected in zip(together, single, strict=True):
             np.testing.assert_array_equal(found, expected)
 
 
-def test_progress_is_told_in_the_thread_that_asked_and_may_interrupt():
+def test_progress_is_reported_in_the_thread_that_asked_and_may_interrupt():
     def interrupt(done, total):
         raise KeyboardInterrupt
 
@@ -50,13 +50,13 @@ def test_programs_of_long_grids_hold_no_lapack(monkeypatch, name):
     """JAX waits for batches of LAPACK in the threads that they need: two callers would wait for each other."""
     texts, call = {}, Compiled.__call__
 
-    def told(self, *arguments, **keywords):
+    def recorded(self, *arguments, **keywords):
         if self.__name__ not in texts:
             plain = {name: None if name == "native" else value for name, value in keywords.items()}  # without code
             texts[self.__name__] = self.jitted.lower(*arguments, **plain).as_text()
         return call(self, *arguments, **keywords)
 
-    monkeypatch.setattr(Compiled, "__call__", told)
+    monkeypatch.setattr(Compiled, "__call__", recorded)
     monkeypatch.setenv("JOUNCE_NATIVE", "0")  # machine code calls no library of the kind
     jn.solve(jn.load(f"examples/{name}.yaml"), LONG[:1100], strict=False)
     assert {"take_steps", "_in_rounds"} <= texts.keys()

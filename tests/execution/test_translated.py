@@ -54,8 +54,8 @@ def expected(x, count, rate=3.5, power=1):
     return x, history
 
 
-def check(found, wanted):
-    (result, total), (x, history) = found, wanted
+def check(found, exact):
+    (result, total), (x, history) = found, exact
     np.testing.assert_allclose(result["last"], x, rtol=1e-13)
     np.testing.assert_allclose(result["history"], history, rtol=1e-13)
     np.testing.assert_allclose(total, history[:, 0].sum(), rtol=1e-13)
@@ -93,7 +93,7 @@ def test_an_operation_without_code_is_left_to_xla(monkeypatch):
     np.testing.assert_allclose(found, digamma(np.arange(1.0, 5.0)), rtol=1e-13)
 
 
-def test_a_program_that_is_too_long_is_left_to_xla_and_told_by_who_needs_it(monkeypatch):
+def test_a_program_that_is_too_long_is_left_to_xla_with_a_warning_when_it_is_needed(monkeypatch):
     monkeypatch.setattr(backends, "_warned", set())
     monkeypatch.setattr(modules, "MOST_LINES", 20)
     x = np.linspace(0.1, 0.9, 3)

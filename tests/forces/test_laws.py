@@ -152,13 +152,13 @@ def test_values_that_are_allowed():
     slide = built(forces.SlideSpring(BOTH, *LINE, [1, 0], stiffness=0.0, length=-2.0))
     assert [float(x.item()) for x in (slide.stiffness, slide.length)] == [0.0, -2.0]
     x, v, t = (jn.Jet([jnp.array([[[a]], [[b]]])]) for a, b in ((0.3, 0.4), (1.5, -2.5), (0.7, 0.7)))
-    for law, wanted in (
+    for law, expected in (
         (np.array([1.0, 2.0]), [1.0, 2.0]),
         (lambda x, v, t: -v, [-1.5, 2.5]),
         ([jn.laws.FunctionMotion(jnp.sin), "t"], [np.sin(0.7), 0.7]),
     ):
         force = built(forces.PointForce("a", [0, 0], law)).force(x, v, t[0])
-        np.testing.assert_allclose(np.ravel(force.coefficients[0]), wanted, rtol=1e-15)
+        np.testing.assert_allclose(np.ravel(force.coefficients[0]), expected, rtol=1e-15)
 
 
 def test_a_parameter_may_not_hide_a_variable_of_a_law():

@@ -84,14 +84,14 @@ def run(name: str, seed: int, count: int, seconds: float, failures: dict) -> col
             assert process.stdout is not None
             at = first
             for line in process.stdout:
-                told = json.loads(line)
-                at = told.get("index", at)
-                for kind, number in told.get("tally", {}).items():
+                record = json.loads(line)
+                at = record.get("index", at)
+                for kind, number in record.get("tally", {}).items():
                     tally[kind] += number
-                if told.get("done"):
+                if record.get("done"):
                     return tally
-                if "place" in told:
-                    known = failures.setdefault(told["place"], {**told, "count": 0, "reader": name})
+                if "place" in record:
+                    known = failures.setdefault(record["place"], {**record, "count": 0, "reader": name})
                     known["count"] += 1
                 if time.monotonic() > end:
                     process.terminate()

@@ -178,7 +178,7 @@ def _limited(seconds: float) -> Iterator[None]:
 
 def shrunk(reader: str, content: bytes, folder: pathlib.Path, seconds: float = 5.0) -> bytes:
     """Return a shorter text that fails in the same place: lines, then characters are left out while it does."""
-    wanted, end = judged(reader, content, folder).place, time.monotonic() + seconds
+    place, end = judged(reader, content, folder).place, time.monotonic() + seconds
     for joint in (b"\n", b""):
         parts = content.split(joint) if joint else [content[k : k + 1] for k in range(len(content))]
         size = max(1, len(parts) // 2)
@@ -186,7 +186,7 @@ def shrunk(reader: str, content: bytes, folder: pathlib.Path, seconds: float = 5
             start = 0
             while start < len(parts) and time.monotonic() < end:
                 fewer = parts[:start] + parts[start + size :]
-                if judged(reader, joint.join(fewer), folder).place == wanted:
+                if judged(reader, joint.join(fewer), folder).place == place:
                     parts = fewer
                 else:
                     start += size

@@ -106,23 +106,23 @@ def read_sweep(path: pathlib.Path) -> None:
         _compare(folder, checksum)
 
 
-def grown_sweep(told: pathlib.Path) -> tuple[pathlib.Path, Callable[[pathlib.Path], object]]:
+def grown_sweep(text: pathlib.Path) -> tuple[pathlib.Path, Callable[[pathlib.Path], object]]:
     """Make a sweep as a text says: so many chunks, so many other files, or a comment; return it, and what reads it."""
-    wanted = json.loads(told.read_text())
-    folder, vary = told.with_suffix(".zarr"), {"size": list(range(2 * wanted.get("chunks", 2))), "phase": [0.25]}
+    request = json.loads(text.read_text())
+    folder, vary = text.with_suffix(".zarr"), {"size": list(range(2 * request.get("chunks", 2))), "phase": [0.25]}
     swept(folder, vary)
-    for k in range(wanted.get("files", 0)):
+    for k in range(request.get("files", 0)):
         (folder / "chunks/digest/c" / f"{k}.old").write_bytes(b"")
     root = json.loads((folder / ROOT).read_text())
-    root["attributes"] |= {"comment": wanted.get("comment", "")}
+    root["attributes"] |= {"comment": request.get("comment", "")}
     (folder / ROOT).write_text(json.dumps(root))
     return folder, lambda path: swept(path, vary)
 
 
 def _compare(folder: pathlib.Path, checksum: str) -> None:
     """Check that a folder holds what it held."""
-    _, _, wanted, files, said = _whole()
-    assert checksum == wanted, "another checksum"
+    _, _, expected, files, said = _whole()
+    assert checksum == expected, "another checksum"
     there: dict[str, Any] = {name: (folder / name).read_bytes() for name in files}
     there |= {name: json.loads(content) for name, content in there.items() if name.endswith(ROOT)}
     own, others = files[ROOT]["attributes"], there[ROOT]["attributes"]
@@ -195,14 +195,14 @@ def _bytes(content: bytes, kind: str, given: list[Any]) -> bytes:
 def _set(path: pathlib.Path, kind: str, at: float, value: Any, sign: bool) -> None:
     """Set a value somewhere in a description; in the manifest also as one who knows how its digest is computed."""
     content = json.loads(path.read_text())
-    told = json.loads(content["attributes"]["manifest"]) if kind == "manifest" else content
-    places = list(_places(told))
+    record = json.loads(content["attributes"]["manifest"]) if kind == "manifest" else content
+    places = list(_places(record))
     holder, key = places[int(at * len(places))]
     holder[key] = value
     if kind == "manifest":
         if sign:
-            told["identity"] = manifest._identity(told)
-        content["attributes"]["manifest"] = json.dumps(told)
+            record["identity"] = manifest._identity(record)
+        content["attributes"]["manifest"] = json.dumps(record)
     path.write_text(json.dumps(content))
 
 

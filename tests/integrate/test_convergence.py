@@ -50,16 +50,16 @@ def exact(space, stop):
 @pytest.mark.parametrize("name, space", CASES)
 def test_measured_order_is_that_of_theory(name, space):
     method, steps = METHODS[name]
-    wanted = int(name.split()[1])
+    expected = int(name.split()[1])
     # forward, errors of the highest orders reach rounding before the leading term stands alone; backward, the motion is
     # livelier, and those from the eighth order on shrink somewhat faster still than they will
-    for stop in (0.5, -0.5) if wanted <= 8 else (-0.5,):
+    for stop in (0.5, -0.5) if expected <= 8 else (-0.5,):
         front, _ = marched(ready(space), method, stop, LENIENT, steps, lanes=len(steps))
         errors = np.max(np.abs(ends(front) - exact(space, stop)), axis=0)
         found = orders(errors, steps)
         assert errors[-1] > 3e-14, errors  # clear of rounding
-        assert np.all(found > wanted - 0.3), (stop, errors, found)
-        assert np.all(found < wanted + (1.5 if wanted >= 8 and stop < 0 else 0.5)), (stop, errors, found)
+        assert np.all(found > expected - 0.3), (stop, errors, found)
+        assert np.all(found < expected + (1.5 if expected >= 8 and stop < 0 else 0.5)), (stop, errors, found)
 
 
 @pytest.mark.slow
@@ -68,10 +68,10 @@ def test_the_exact_runs_are_exact():
     ready = consistent_start(dynamics.double_pendulum(), 0.0)
     front, _ = marched(ready, jn.Taylor(20), float(time[0]), 1e-15, longest=0.05)
     found = front.expansion.state.attitude[:, 0, :, 0]
-    wanted = np.array([kinds["angles"][name][0] for name in "ab"]).T
-    offset = np.round((wanted[0] - found[0]) / (np.pi / 2)) * np.pi / 2  # the judge counts from the vertical
-    assert np.allclose(found[0], wanted[0] - offset, rtol=0, atol=3e-14)
-    assert np.allclose(found[1], wanted[1], rtol=3e-14)
+    expected = np.array([kinds["angles"][name][0] for name in "ab"]).T
+    offset = np.round((expected[0] - found[0]) / (np.pi / 2)) * np.pi / 2  # the judge counts from the vertical
+    assert np.allclose(found[0], expected[0] - offset, rtol=0, atol=3e-14)
+    assert np.allclose(found[1], expected[1], rtol=3e-14)
 
 
 @pytest.mark.slow
@@ -95,17 +95,17 @@ def test_the_trap_of_a_double_pendulum_at_horizontal_rest():
     angles, rates = ([motion.outputs[name][1, k] for name in "ab"] for k in (0, 1))
     time, kinds = dynamics.dynamic_reference("double_pendulum")
     assert time[-1] == 10
-    wanted = np.array([kinds["angles"][name][-1, :2] for name in "ab"])
-    turns = (wanted[:, 0] - angles) / (np.pi / 2)
-    assert np.allclose(wanted[:, 0] - np.round(turns) * np.pi / 2, angles, rtol=0, atol=1e-9)
-    assert np.allclose(rates, wanted[:, 1], rtol=0, atol=1e-8)
+    expected = np.array([kinds["angles"][name][-1, :2] for name in "ab"])
+    turns = (expected[:, 0] - angles) / (np.pi / 2)
+    assert np.allclose(expected[:, 0] - np.round(turns) * np.pi / 2, angles, rtol=0, atol=1e-9)
+    assert np.allclose(rates, expected[:, 1], rtol=0, atol=1e-8)
 
 
 @pytest.mark.slow
 def test_a_polynomial_motion_is_exact_in_one_step():
     falling = consistent_start(dynamics.thrown_stone(), 0.0)
-    wanted = [1 + 2 * 3, 2 + 5 * 3 - 9.81 * 9 / 2, 0.5 - 9, 2, 5 - 9.81 * 3, -3]
+    expected = [1 + 2 * 3, 2 + 5 * 3 - 9.81 * 9 / 2, 0.5 - 9, 2, 5 - 9.81 * 3, -3]
     for method in (jn.Taylor(), jn.Obreshkov(4)):
         front, tried = marched(falling, method, 3.0, 1e-12)
         assert tried == 1
-        assert np.allclose(ends(front)[:, 0], wanted, rtol=1e-15, atol=1e-14)
+        assert np.allclose(ends(front)[:, 0], expected, rtol=1e-15, atol=1e-14)

@@ -42,8 +42,8 @@ def test_a_run_of_diffrax_agrees_with_taylor_series():
     instants = np.array([0.0, 0.35, STOP])
     solution = solved(equation.term, equation.state, equation.equations, jnp.asarray(instants))
     motion = equation.motion(solution.ts, solution.ys, order=3)
-    wanted = jn.simulate(mechanism, instants, order=3)
-    for name, values in wanted.outputs.items():
+    expected = jn.simulate(mechanism, instants, order=3)
+    for name, values in expected.outputs.items():
         found = motion.outputs[name]
         assert found.shape == values.shape
         size = np.max(np.abs(values), axis=0)
@@ -70,8 +70,8 @@ def test_states_and_values_may_be_batched_and_differentiated():
 
     spins = jnp.array([-0.1, 0.0, 0.1])
     together = jax.jit(jax.vmap(lambda s: end(s, 9.81)))(spins)
-    alone = [end(s, jnp.asarray(9.81)) for s in spins]
-    assert np.allclose(together, alone, rtol=0, atol=1e-10)
+    single = [end(s, jnp.asarray(9.81)) for s in spins]
+    assert np.allclose(together, single, rtol=0, atol=1e-10)
     _, slope = jax.jvp(lambda g: end(0.0, g), (jnp.asarray(9.81),), (jnp.asarray(1.0),))
     beside = [end(0.0, jnp.asarray(9.81 + d)) for d in (-1e-4, 1e-4)]
     assert abs(slope - (beside[1] - beside[0]) / 2e-4) < 1e-6 * abs(slope)

@@ -48,8 +48,8 @@ def wheels_on_and_off(t, push=1.0):
 @pytest.mark.slow
 def test_a_load_that_reverses_is_passed_on_by_either_efficiency():
     simulated = jn.simulate(pair(torque="push*cos(3*t)"), TIME)
-    wanted = [wheels_on_and_off(t) for t in TIME]
-    np.testing.assert_allclose(simulated.outputs["first"][:, 1], wanted, rtol=0, atol=1e-11)
+    expected = [wheels_on_and_off(t) for t in TIME]
+    np.testing.assert_allclose(simulated.outputs["first"][:, 1], expected, rtol=0, atol=1e-11)
     assert len(simulated.dense_output.start) < 60  # kinks, where the load reverses, are no obstacle
 
 
@@ -57,8 +57,8 @@ def test_a_load_that_reverses_is_passed_on_by_either_efficiency():
 def test_a_batch_has_the_speeds_of_its_motors():
     found = jn.simulate_batch(pair(torque="push*cos(3*t)"), {"push": [0.5, 1.0]}, TIME)
     for k, push in enumerate((0.5, 1.0)):
-        wanted = [wheels_on_and_off(t, push) for t in TIME]
-        np.testing.assert_allclose(found.outputs["first"][k, :, 1], wanted, rtol=0, atol=1e-11)
+        expected = [wheels_on_and_off(t, push) for t in TIME]
+        np.testing.assert_allclose(found.outputs["first"][k, :, 1], expected, rtol=0, atol=1e-11)
 
 
 @pytest.mark.slow
@@ -83,7 +83,7 @@ def test_gears_that_lock_themselves_slow_down_under_the_load_that_pushes_them():
 
 
 @pytest.mark.slow
-def test_gears_that_jam_with_what_is_behind_them_are_told_with_the_instant():
+def test_gears_that_jam_with_what_is_behind_them_are_reported_with_the_instant():
     with pytest.raises(jn.errors.SolveError, match=r"friction locks at t = 0 s: joints\.mesh"):
         jn.simulate(pair(0.5, -2.3, load="-3"), TIME)
 

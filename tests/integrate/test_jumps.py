@@ -68,8 +68,8 @@ def test_dry_friction_at_turning_points():
     np.testing.assert_allclose([when for when, _ in motion.kinks], turns[turns < 40.0], rtol=0, atol=1e-12)
     count = np.searchsorted(turns, motion.time)  # turns so far
     size = radius - 0.1 * count  # the center leaps by twice 0.05 at each
-    wanted = np.where(count % 2 == 0, -0.05, 0.05) + size * np.cos(motion.time - phase)
-    assert np.abs(motion.outputs["x"][:, 0, 0] - wanted).max() < 1e-11
+    expected = np.where(count % 2 == 0, -0.05, 0.05) + size * np.cos(motion.time - phase)
+    assert np.abs(motion.outputs["x"][:, 0, 0] - expected).max() < 1e-11
 
 
 @pytest.mark.slow
@@ -77,8 +77,8 @@ def test_a_jump_in_time_costs_no_digits():
     time = np.linspace(0.0, 3.0, 7)
     motion = jn.simulate(sled("K*(t - 1.1)/abs(t - 1.1)"), time, 1)
     after = np.maximum(time - 1.1, 0.0)
-    wanted = 1 - STRENGTH * time**2 / 2 + STRENGTH * after**2
-    np.testing.assert_allclose(motion.outputs["x"][:, 0, 0], wanted, rtol=0, atol=1e-12 * np.abs(wanted).max())
+    expected = 1 - STRENGTH * time**2 / 2 + STRENGTH * after**2
+    np.testing.assert_allclose(motion.outputs["x"][:, 0, 0], expected, rtol=0, atol=1e-12 * np.abs(expected).max())
     assert motion.kinks[0][0] == pytest.approx(1.1, abs=1e-13)
 
 

@@ -26,22 +26,22 @@ def both_ways(mechanism, times, monkeypatch, **given):
     assert len(set(called)) == 2
     called.clear()
     monkeypatch.setenv("JOUNCE_NATIVE", "0")
-    wanted = jn.simulate(mechanism, times, **given)
+    expected = jn.simulate(mechanism, times, **given)
     assert not called
-    assert (found.backend, wanted.backend) == ("llvm", "xla")
-    return found, wanted
+    assert (found.backend, expected.backend) == ("llvm", "xla")
+    return found, expected
 
 
-def agree(found, wanted, tolerance):
-    np.testing.assert_array_equal(found.status, wanted.status)
-    assert len(found.events) == len(wanted.events)
-    for one, other in zip(found.events, wanted.events, strict=True):
+def agree(found, expected, tolerance):
+    np.testing.assert_array_equal(found.status, expected.status)
+    assert len(found.events) == len(expected.events)
+    for one, other in zip(found.events, expected.events, strict=True):
         np.testing.assert_allclose(one, other, rtol=tolerance)
-    for name, values in wanted.outputs.items():
+    for name, values in expected.outputs.items():
         others = tuple(axis for axis in range(values.ndim) if axis != 1)  # the peak of each derivative
         scale = 1e-12 + np.nanmax(np.abs(values), axis=others, keepdims=True)
         np.testing.assert_allclose(found.outputs[name] / scale, values / scale, rtol=0, atol=tolerance)
-    np.testing.assert_allclose(found.energy, wanted.energy, rtol=tolerance, atol=tolerance)
+    np.testing.assert_allclose(found.energy, expected.energy, rtol=tolerance, atol=tolerance)
 
 
 @pytest.mark.parametrize(

@@ -31,10 +31,10 @@ def test_each_run_is_what_it_is_alone():
     for run in range(3):
         loaded = one.with_inertia("b", mass=given["b.mass"][run])
         state = [[0.3, given["k"][run]], [given["j.rate"][run], 0.0]]
-        alone = jn.simulate(loaded, TIME, 3, state=state, torque={"k": "0.2*sin(t)"})
-        np.testing.assert_array_equal(np.stack(list(batch.outputs.values()), axis=-1)[run], alone.q)
-        np.testing.assert_array_equal(batch.status[run], alone.status)
-        assert batch.steps[run] == len(alone.steps.start)
+        single = jn.simulate(loaded, TIME, 3, state=state, torque={"k": "0.2*sin(t)"})
+        np.testing.assert_array_equal(np.stack(list(batch.outputs.values()), axis=-1)[run], single.q)
+        np.testing.assert_array_equal(batch.status[run], single.status)
+        assert batch.steps[run] == len(single.steps.start)
 
 
 def test_masses_and_springs_swing_in_closed_form():

@@ -178,7 +178,7 @@ def test_free_base_keeps_its_momenta_and_energy():
     assert np.abs(again.base.position[-1]).max() <= 1e-9
 
 
-def test_bad_input_is_told():
+def test_bad_input_is_reported():
     robot = slider()
     with pytest.raises(jn.errors.RobotError, match="torque: no moving joint has this name"):
         jn.simulate(robot, TIME, torque={"slider": 1.0})

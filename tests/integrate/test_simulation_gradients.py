@@ -163,7 +163,7 @@ def test_what_is_not_reached_is_nan_within_compiled_programs():
     np.testing.assert_array_equal(np.isfinite(found[0]).all(axis=1), [True, True, False])
 
 
-def test_what_cannot_be_traced_is_told():
+def test_what_cannot_be_traced_is_reported():
     def by_formulas(m):
         return jn.simulate(PENDULUM.with_parameters(m=m), TIME, method=jn.Obreshkov()).outputs["angle"][-1, 0]
 

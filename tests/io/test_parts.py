@@ -150,7 +150,7 @@ for name in ("x.nc", "x.csv"):
 
 
 @pytest.mark.slow
-def test_a_full_disk_is_told_before_the_second_part_is_asked_for(tmp_path):
+def test_a_full_disk_is_reported_before_the_second_part_is_asked_for(tmp_path):
     environment = {**os.environ, "PYTHONPATH": str(ROOT / "src")}
     done = subprocess.run(
         [sys.executable, "-c", FULL], capture_output=True, text=True, env=environment, timeout=120, cwd=tmp_path

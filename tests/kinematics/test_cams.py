@@ -113,7 +113,7 @@ def test_handbook_formulas_of_rollers_and_faces():
 
 
 @pytest.mark.slow
-def test_undercut_is_told_with_the_angle_and_what_is_lost():
+def test_undercut_is_reported_with_the_angle_and_what_is_lost():
     law = jn.laws.SegmentedMotion([
         jn.laws.Segment("cycloidal", 0.9, to=0.02), jn.laws.Segment("cycloidal", 0.9, to=0.0),
         jn.laws.Segment("dwell", 2 * math.pi - 1.8)])  # fmt: skip

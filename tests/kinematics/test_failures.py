@@ -217,29 +217,29 @@ def wiper(**joints):
 
 
 def test_a_joint_that_was_forgotten_is_asked_for():
-    with pytest.raises(jn.errors.MobilityError) as told:
+    with pytest.raises(jn.errors.MobilityError) as caught:
         jn.solve(wiper(F=None), [0.0])
-    words = str(told.value)
+    words = str(caught.value)
     assert "2 degrees of freedom are left" in words
     assert re.search("tie (is held )?by E alone", words)
     assert re.search("right (is held )?by G alone", words)
     assert "is a revolute joint missing between them, bodies: [" in words
     with pytest.raises(jn.errors.MobilityError, match=r"right (is held )?by no joint.*is a joint missing"):
         jn.solve(wiper(F=None, G=None), [0.0])
-    with pytest.raises(jn.errors.MobilityError) as told:  # a driver is missing of the crank, and no joint
+    with pytest.raises(jn.errors.MobilityError) as caught:  # a driver is missing of the crank, and no joint
         jn.solve(dataclasses.replace(wiper(), drivers={}), [0.0])
-    assert "missing" not in str(told.value)
+    assert "missing" not in str(caught.value)
 
 
-def test_constraints_that_contradict_each_other_are_told_in_one_sentence():
+def test_constraints_that_contradict_each_other_are_reported_in_one_sentence():
     extra = jn.planar.Revolute(("ground", "tie"), [0.3, 0.0], [0, 0])
-    with pytest.raises(jn.errors.AssemblyError) as told:
+    with pytest.raises(jn.errors.AssemblyError) as caught:
         jn.solve(wiper(extra=extra), [0.0])
-    words = str(told.value)
+    words = str(caught.value)
     assert words.startswith("over-constrained at t = 0 s: joints.")
     assert words.endswith("; correct lengths, or take out a joint")
     assert len(words) < 200
-    assert "2 equations more than coordinates" in told.value.details
+    assert "2 equations more than coordinates" in caught.value.details
 
 
 @pytest.mark.slow
@@ -263,8 +263,8 @@ def test_a_law_that_ends_or_grows_beyond_all_bounds(law, stop, count, end, statu
     assert (motion.status[before] == Status.OK).all()
     assert set(motion.status[~before].tolist()) == status | {Status.NOT_REACHED}
     assert np.isnan(motion.outputs["angle"][~before, 1]).all()
-    told = motion.faults.get(int(np.argmin(before)) + (law == "sqrt(1 - t)"), "")
-    assert "turn" in told
+    message = motion.faults.get(int(np.argmin(before)) + (law == "sqrt(1 - t)"), "")
+    assert "turn" in message
 
 
 @pytest.mark.parametrize("order", [-1, 1.5, "4", None, True, 31])

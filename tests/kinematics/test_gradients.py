@@ -46,8 +46,8 @@ def differences(name, parameter, order, count):
 def errors(name, parameters, order, count=3):
     """Return the largest error of derivatives by parameters, for each order, over the size of that derivative."""
     mechanism = jn.load(example(name))
-    told = {parameter: differences(name, parameter, order, count) for parameter in parameters}
-    times = told[parameters[0]][0]
+    references = {parameter: differences(name, parameter, order, count) for parameter in parameters}
+    times = references[parameters[0]][0]
 
     def outputs(values):
         changed = mechanism.with_parameters(**dict(zip(parameters, values, strict=True)))
@@ -56,7 +56,7 @@ def errors(name, parameters, order, count=3):
     point = jnp.array([mechanism.parameter_values[parameter] for parameter in parameters])
     found, worst = jax.jit(jax.jacfwd(outputs))(point), np.zeros(order + 1)
     for k, parameter in enumerate(parameters):
-        for output, truth in told[parameter][1].items():
+        for output, truth in references[parameter][1].items():
             got = np.asarray(found[output])[..., k]
             got = got[:, None] if got.ndim == 2 else np.moveaxis(got, -1, 1)
             size = np.abs(truth).max(axis=(0, 1))
@@ -208,14 +208,14 @@ def test_a_design_that_locks_on_the_way_is_not_a_number_from_there_on():
     assert float(total) == pytest.approx(float(slopes[~locked].sum()), rel=1e-10)
 
 
-def test_what_is_not_traced_is_told():
-    with pytest.raises(jn.errors.UnsupportedError, match="next time derivative") as told:
+def test_what_is_not_traced_is_reported():
+    with pytest.raises(jn.errors.UnsupportedError, match="next time derivative") as caught:
         jax.grad(lambda t: jounce(BC, [0.0, t]))(0.4)
-    assert told.value.name == "time[1]"
+    assert caught.value.name == "time[1]"
     grid = jn.TimeGrid(start=0, stop="tau", count=3)
-    with pytest.raises(jn.errors.UnsupportedError, match="instants depend on values") as told:
+    with pytest.raises(jn.errors.UnsupportedError, match="instants depend on values") as caught:
         jax.grad(lambda tau: jn.solve(FOUR_BAR.with_parameters(tau=tau), grid).outputs["psi"][-1, 1])(2.0)
-    assert told.value.name == "time"
+    assert caught.value.name == "time"
 
 
 @pytest.mark.slow

@@ -29,12 +29,12 @@ def _wanted(monkeypatch):
 def agree(one, other, tolerance=1e-11):
     """Compare two motions: outcomes, and outputs by the peak of each derivative."""
     np.testing.assert_array_equal(one.status, other.status)
-    for name, wanted in other.outputs.items():
-        peak = np.nanmax(np.abs(wanted), axis=0)
+    for name, expected in other.outputs.items():
+        peak = np.nanmax(np.abs(expected), axis=0)
         scale = np.where(peak > 1e-9 * np.max(peak), peak, 1.0 + np.max(peak)) + 1e3 * (
             np.max(peak) < 1e-6
         )  # or rounding
-        np.testing.assert_allclose(one.outputs[name] / scale, wanted / scale, rtol=0, atol=tolerance)
+        np.testing.assert_allclose(one.outputs[name] / scale, expected / scale, rtol=0, atol=tolerance)
 
 
 def both_ways(mechanism, times, monkeypatch, **given):
@@ -47,9 +47,9 @@ def both_ways(mechanism, times, monkeypatch, **given):
 @pytest.mark.parametrize("count", [1, 40, 1500])
 @pytest.mark.parametrize("mechanism", [four_bar, slider_crank])
 def test_motions_are_those_of_xla(mechanism, count, monkeypatch):
-    found, wanted = both_ways(mechanism(), np.linspace(0, 2, count), monkeypatch)
-    agree(found, wanted)
-    assert (found.backend, wanted.backend) == ("llvm", "xla")
+    found, expected = both_ways(mechanism(), np.linspace(0, 2, count), monkeypatch)
+    agree(found, expected)
+    assert (found.backend, expected.backend) == ("llvm", "xla")
 
 
 @pytest.mark.parametrize("samples", [25, pytest.param(301, marks=pytest.mark.slow)])
@@ -61,9 +61,9 @@ def test_motions_by_laws_through_samples_are_those_of_xla(samples, monkeypatch):
     )
     instants = np.linspace(0, 2, samples)
     law = jn.trajectory.SplineMotion(instants, 0.5 + np.sin(np.pi * instants), 7)
-    found, wanted = both_ways(four_bar(motion=law), np.linspace(0, 2, 1500), monkeypatch)
+    found, expected = both_ways(four_bar(motion=law), np.linspace(0, 2, 1500), monkeypatch)
     assert made[0]
-    agree(found, wanted, tolerance=1e-12)
+    agree(found, expected, tolerance=1e-12)
 
 
 @pytest.mark.slow
@@ -90,16 +90,16 @@ def test_other_orders(order, monkeypatch):
 
 def test_instants_that_fail_are_the_same(monkeypatch):
     mechanism = four_bar(motion="30*deg + 3*t", AB=0.12)  # a rocker, which comes to a dead point
-    found, wanted = both_ways(mechanism, np.linspace(0, 2, 1500), monkeypatch, strict=False)
+    found, expected = both_ways(mechanism, np.linspace(0, 2, 1500), monkeypatch, strict=False)
     assert {int(Status.OK), int(Status.NOT_REACHED)} < set(found.status.tolist())
-    agree(found, wanted, tolerance=1e-8)
-    assert found.faults == wanted.faults
+    agree(found, expected, tolerance=1e-8)
+    assert found.faults == expected.faults
 
 
 def test_unrefined_positions(monkeypatch):
     times = np.linspace(0, 2, 1100)
-    found, wanted = both_ways(four_bar(), times, monkeypatch, refine=False, tolerance=1e-6)
-    np.testing.assert_allclose(found.outputs["psi"][:, 0], wanted.outputs["psi"][:, 0], atol=1e-6)
+    found, expected = both_ways(four_bar(), times, monkeypatch, refine=False, tolerance=1e-6)
+    np.testing.assert_allclose(found.outputs["psi"][:, 0], expected.outputs["psi"][:, 0], atol=1e-6)
 
 
 def test_results_depend_neither_on_threads_nor_on_neighbors():
@@ -113,15 +113,15 @@ def test_a_leg_without_code_of_its_own_is_left_to_xla_whole(monkeypatch):
     """XLA cannot call the machine code of an instant."""
     grid = np.linspace(0.0, 2.0, 5)
     expected = jn.solve(four_bar(), grid)
-    wanted = []
+    programs = []
 
     def program(shared, lanes, static, **how):
-        wanted.append(static["native"])
+        programs.append(static["native"])
 
     monkeypatch.setattr(continuation_steps.take_steps.machine_code, "program", program)
     found = jn.solve(four_bar(), grid)
-    assert wanted
-    assert None not in wanted
+    assert programs
+    assert None not in programs
     assert found.backend == "xla"
     agree(found, expected)
     assert jn.solve(four_bar(), np.linspace(0.0, 2.0, 1100)).backend == "llvm, xla"  # by its steps, and its instants

@@ -65,7 +65,7 @@ def test_a_loose_tolerance_does_not_hide_it(tolerance):
         jn.solve(four_bar(FLAT, guess=(0.8, 1.7)), TIME, tolerance=tolerance)
 
 
-def test_a_large_mechanism_is_told_it_too(monkeypatch):
+def test_a_large_mechanism_is_reported_too(monkeypatch):
     monkeypatch.setattr(host_jacobian, "MOST_DENSE", 4)
     with pytest.raises(jn.errors.MobilityError, match="singular position"):
         jn.solve(four_bar(FLAT, guess=(0.8, 1.7)), TIME)

@@ -58,8 +58,8 @@ def test_half_a_turn_at_once_is_counted_whatever_the_order(order, miss):
 def test_designs_count_as_they_do_alone():
     misses = np.array([0.3, 0.1, 0.05, 0.01, 1e-4])
     family = jn.solve_batch(gimbals(), {"miss": misses}, TIME, order=8)
-    wanted = [expected(miss) for miss in misses]
-    np.testing.assert_allclose(family["angle"].values[..., 0], wanted, rtol=0, atol=1e-8)
+    exact = [expected(miss) for miss in misses]
+    np.testing.assert_allclose(family["angle"].values[..., 0], exact, rtol=0, atol=1e-8)
 
 
 @pytest.mark.slow
@@ -76,6 +76,6 @@ def test_simulations_count_them_forward_and_backward_alone_and_side_by_side():
     for time in (TIME, -TIME):
         together = jn.simulate_batch(ball, {"miss": misses}, time, order=2).outputs["angle"]
         for miss, beside in zip(misses, together, strict=True):
-            alone = jn.simulate(ball.with_parameters(miss=miss), time, order=2).outputs["angle"]
-            for found in (alone, beside):
+            single = jn.simulate(ball.with_parameters(miss=miss), time, order=2).outputs["angle"]
+            for found in (single, beside):
                 np.testing.assert_allclose(found[:, 0], swept(RATE * time, miss), rtol=0, atol=1e-8)

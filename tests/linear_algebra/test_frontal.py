@@ -93,7 +93,7 @@ def test_signs_are_those_of_the_determinants_or_all_turned_round(square):
     assert np.abs(product.sum()) == LANES
 
 
-def test_what_is_singular_is_told():
+def test_what_is_singular_is_reported():
     bodies, places = np.array([[0, 1]] * 3), np.stack([np.arange(9).reshape(3, 3), np.full((3, 3), 9)], axis=1)
     singular, regular = np.array([[1.0, 2, 3], [2, 4, 6], [1, 1, 1]]), np.eye(3)
     entries = jnp.asarray(np.stack([singular.ravel(), regular.ravel()], axis=-1))
@@ -143,7 +143,7 @@ def cost(request, monkeypatch):
 
 
 @pytest.mark.slow
-def test_a_dead_point_is_told_whichever_way_the_jacobian_is_eliminated(cost):
+def test_a_dead_point_is_reported_whichever_way_the_jacobian_is_eliminated(cost):
     rocker = four_bar("60*deg", "150*deg", "60*deg + t", AD=0.2, AB=0.2, BC=0.15, CD=0.1)
     assert (build(rocker).system.fronts is None) == bool(cost)
     motion = jn.solve(rocker, np.linspace(0, 2, 21), order=1, strict=False)

@@ -87,7 +87,7 @@ def test_only_what_is_large_and_regular_is_called_so():
         assert not is_clearly_regular(np.diag([1.0, 1.0, size]), 1e-12)
 
 
-def test_degrees_of_freedom_of_a_long_chain_are_told_by_body():
+def test_degrees_of_freedom_of_a_long_chain_are_reported_by_body():
     whole = chain(40)
     drivers = {name: driver for name, driver in whole.drivers.items() if name != "turn39"}
     one_free = jn.Mechanism(space="planar", bodies=whole.bodies, joints=whole.joints, drivers=drivers)
@@ -95,19 +95,19 @@ def test_degrees_of_freedom_of_a_long_chain_are_told_by_body():
         jn.solve(one_free, [0.0])
 
 
-def test_redundant_joints_of_a_long_chain_are_told_by_name():
+def test_redundant_joints_of_a_long_chain_are_reported_by_name():
     whole = chain(40)
     again = jn.planar.Revolute(("link19", "link20"), [0.1, 0], [0, 0])
     drivers = {name: driver for name, driver in whole.drivers.items() if name != "turn39"}
     redundant = jn.Mechanism(
         space="planar", bodies=whole.bodies, joints={**whole.joints, "again": again}, drivers=drivers
     )
-    told = r"121 equations, 119 of .* with which link39 can .*; joint again repeats 2 equations of pin20"
-    with pytest.raises(jn.errors.MobilityError, match=told):
+    message = r"121 equations, 119 of .* with which link39 can .*; joint again repeats 2 equations of pin20"
+    with pytest.raises(jn.errors.MobilityError, match=message):
         jn.solve(redundant, [0.0])
 
 
-def test_a_long_chain_that_cannot_close_is_told_by_joint():
+def test_a_long_chain_that_cannot_close_is_reported_by_joint():
     whole = chain(40)
     points = [jn.Body([0.1 * k, 0.0]) for k in range(40)]
     far = jn.planar.DoubleRevolute(("ground", "link39"), [0, 0], [0.1, 0], 5.0)

@@ -60,16 +60,16 @@ def test_residuals_are_rounding_however_ill_conditioned(condition, transposed):
     generator = np.random.default_rng(3)
     turns = [np.linalg.qr(generator.normal(size=(12, 12)))[0] for _ in range(2)]
     matrix = (turns[0] * np.logspace(0, -np.log10(condition), 12)) @ turns[1]
-    wanted = matrix.T if transposed else matrix
-    right = wanted @ generator.normal(size=12)
+    system = matrix.T if transposed else matrix
+    right = system @ generator.normal(size=12)
     factor = DenseFactor.of(jnp.asarray(matrix[..., None]))
     solve = factor.solve_transposed if transposed else factor.solve
     solution = np.asarray(solve(jnp.asarray(right[:, None])))[:, 0]
-    scale = np.abs(wanted) @ np.abs(solution) + np.abs(right)
-    assert (np.abs(wanted @ solution - right) <= 1e-15 * scale).all()
+    scale = np.abs(system) @ np.abs(solution) + np.abs(right)
+    assert (np.abs(system @ solution - right) <= 1e-15 * scale).all()
 
 
-def test_singular_matrices_are_told_and_leave_their_neighbors_alone():
+def test_singular_matrices_are_reported_and_leave_their_neighbors_alone():
     matrices = MATRIX.copy()
     matrices[:, :, 1] = 1.0
     matrices[2, 3, 3] = np.nan
@@ -121,15 +121,15 @@ def test_no_operation_is_left_to_lapack():
 
 
 @pytest.mark.parametrize("departure", [1e-6, 1e-9])
-def test_factors_of_a_near_matrix_are_off_by_the_square_of_what_is_told(departure):
+def test_factors_of_a_near_matrix_are_off_by_the_square_of_what_is_reported(departure):
     random = np.random.default_rng(5)
     matrix = random.normal(size=(12, 12, 7))
     near = matrix + departure * random.normal(size=matrix.shape)
     known = random.normal(size=(12, 7))
     right = np.einsum("rcb,cb->rb", near, known)
-    kept = DenseFactor.of(matrix).refining(near)
-    told = np.asarray(kept.defect())
-    off = np.abs(np.asarray(kept.solve(right, refined=False)) - known).max(axis=0)
-    assert ((off < 30 * told) & (told < 30 * off)).all()
+    factors = DenseFactor.of(matrix).refining(near)
+    stated = np.asarray(factors.defect())
+    off = np.abs(np.asarray(factors.solve(right, refined=False)) - known).max(axis=0)
+    assert ((off < 30 * stated) & (stated < 30 * off)).all()
     condition = np.array([np.linalg.cond(near[..., k]) for k in range(7)])
-    assert (np.abs(np.asarray(kept.solve(right)) - known).max(axis=0) < 1e3 * told**2 + 1e-15 * condition).all()
+    assert (np.abs(np.asarray(factors.solve(right)) - known).max(axis=0) < 1e3 * stated**2 + 1e-15 * condition).all()

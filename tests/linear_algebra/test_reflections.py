@@ -24,17 +24,17 @@ def test_solutions_and_signs_are_those_of_numpy(size, shuffled):
     matrix, right = matrices(size, 7), np.random.default_rng(1).standard_normal((size, 7))
     factor = factored(matrix, order)
     by_lane = np.moveaxis(matrix, -1, 0)
-    wanted = np.linalg.solve(by_lane, right.T[..., None])[..., 0].T
+    expected = np.linalg.solve(by_lane, right.T[..., None])[..., 0].T
     for refined in (False, True):
-        np.testing.assert_allclose(factor.solve(jnp.asarray(right), refined=refined), wanted, rtol=1e-10, atol=1e-12)
+        np.testing.assert_allclose(factor.solve(jnp.asarray(right), refined=refined), expected, rtol=1e-10, atol=1e-12)
     np.testing.assert_array_equal(factor.sign(), np.linalg.slogdet(by_lane).sign)
 
 
 def test_the_triangle_has_the_size_of_the_determinant():
     matrix = matrices(6, 5)
     pivots = factored(matrix).pivots
-    wanted = np.linalg.slogdet(np.moveaxis(matrix, -1, 0)).logabsdet
-    np.testing.assert_allclose(np.sum(np.log(np.abs(pivots)), axis=0), wanted, rtol=1e-12)
+    expected = np.linalg.slogdet(np.moveaxis(matrix, -1, 0)).logabsdet
+    np.testing.assert_allclose(np.sum(np.log(np.abs(pivots)), axis=0), expected, rtol=1e-12)
 
 
 def test_a_zero_in_the_first_place_is_no_obstacle():
@@ -44,7 +44,7 @@ def test_a_zero_in_the_first_place_is_no_obstacle():
     assert factor.sign() == -1
 
 
-def test_a_singular_matrix_is_told():
+def test_a_singular_matrix_is_reported():
     matrix = matrices(4, 2)
     matrix[3, :, 1] = matrix[0, :, 1] - 2 * matrix[2, :, 1]
     matrix[:, 2, 0] = 0.0
@@ -67,9 +67,9 @@ def test_factors_serve_a_matrix_nearby():
     near = matrix + 1e-7 * matrices(5, 3, seed=3)
     order = (3, 0, 4, 1, 2), (1, 4, 2, 0, 3)
     factor = factored(matrix, order).refining(jnp.asarray(near))
-    wanted = np.linalg.solve(np.moveaxis(near, -1, 0), right.T[..., None])[..., 0].T
-    unrefined = np.max(np.abs(factor.solve(jnp.asarray(right), refined=False) - wanted), axis=0)
-    refined = np.max(np.abs(factor.solve(jnp.asarray(right)) - wanted), axis=0)
+    expected = np.linalg.solve(np.moveaxis(near, -1, 0), right.T[..., None])[..., 0].T
+    unrefined = np.max(np.abs(factor.solve(jnp.asarray(right), refined=False) - expected), axis=0)
+    refined = np.max(np.abs(factor.solve(jnp.asarray(right)) - expected), axis=0)
     assert (unrefined > 1e-9).all()
     assert (refined < 1e-10).all()
     assert (factor.defect() > 1e-9).all()

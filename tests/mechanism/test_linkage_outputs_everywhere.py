@@ -44,9 +44,9 @@ def test_batches_and_gradients_have_them():
     lengths = [0.14, 0.145]
     found = jn.solve_batch(four_bar(), {"BC": lengths}, TIMES, order=2)
     for k, length in enumerate(lengths):
-        alone = jn.solve(four_bar(BC=length), TIMES, order=2)
+        single = jn.solve(four_bar(BC=length), TIMES, order=2)
         for name in OUTPUTS:
-            np.testing.assert_allclose(found[name][k], alone.outputs[name], rtol=1e-9, atol=1e-10)
+            np.testing.assert_allclose(found[name][k], single.outputs[name], rtol=1e-9, atol=1e-10)
 
     def last(length):
         return jn.solve(four_bar(BC=length), jnp.array(TIMES), order=2).outputs["second"][-1]
@@ -98,7 +98,7 @@ def test_free_simulations_have_them_one_by_one_and_side_by_side():
 
 def test_a_family_that_leaves_outputs_out_keeps_what_a_derivative_is_of():
     made = four_bar()
-    alone = dataclasses.replace(made, outputs={"ratio": made.outputs["ratio"]})
-    assert jn.solve(alone, TIMES, order=1).outputs["ratio"].shape == (3, 2)
+    single = dataclasses.replace(made, outputs={"ratio": made.outputs["ratio"]})
+    assert jn.solve(single, TIMES, order=1).outputs["ratio"].shape == (3, 2)
     other = dataclasses.replace(made, outputs={**made.outputs, "psi": jn.outputs.AngleOutput("crank")})
     np.testing.assert_allclose(jn.solve(other, TIMES, order=1).outputs["ratio"], [[1, 0]] * 3, atol=1e-12)

@@ -280,7 +280,7 @@ class TestTimeGrid:
         assert "last one" in last_step_words(instants)
 
     @pytest.mark.parametrize("step", [0.1, 1e-3, 1 / 3, 0.7 / 7, 5.0, 1.0])
-    def test_nothing_is_told_of_steps_that_are_alike(self, step):
+    def test_nothing_is_reported_steps_that_are_alike(self, step):
         assert last_step_words(time_grid(jn.TimeGrid(0, 1, step), {})) == ""
 
     @pytest.mark.parametrize(

@@ -125,8 +125,8 @@ class State:
         self.z, self.rate = z, full(self.tangent, du, 0.0)
         self.bend = full(np.zeros_like(self.x), ddu, 0.0)
 
-    def steps(self, wanted):
-        """Return steps no longer than wanted, and how far about their linear predictions one solution is proved."""
+    def steps(self, longest):
+        """Return steps of at most a length, and how far about their linear predictions one solution is proved."""
         n = self.x.shape[1]
         g = np.einsum("lij,ljkm->likm", self.inverse, self.forms)
         with_rate, with_z = np.einsum("likm,lk->lim", g, self.rate), np.einsum("likm,lk->lim", g, self.z)
@@ -143,7 +143,7 @@ class State:
         weight = np.concatenate([speed, np.ones((len(speed), 2)), np.zeros((len(speed), 1))], axis=1)
         slope = (2 * np.einsum("likm,lk,lm->li", size[:, :, :n], speed, weight) / speed).max(axis=1)
         second, third, fourth, offset = ((term / speed).max(axis=1) for term in (second, third, fourth, offset))
-        step = np.minimum(0.8 * CONTRACTION / slope, np.abs(wanted))
+        step = np.minimum(0.8 * CONTRACTION / slope, np.abs(longest))
         step = np.where(np.isfinite(step), step, 0.0)
         for _ in range(60):
             radius = (offset + (second + (third + fourth * step) * step) * step**2) / (1 - CONTRACTION)
@@ -152,7 +152,7 @@ class State:
                 break
             step = np.where(refused, 0.7 * step, step)
         step[step < SMALLEST_STEP] = 0.0
-        return np.copysign(step, wanted), radius[:, None] * speed
+        return np.copysign(step, longest), radius[:, None] * speed
 
     def to_dead_point(self):
         """Return the way to the dead point ahead, where the square of the determinant vanishes with a finite slope."""

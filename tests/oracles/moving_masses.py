@@ -101,15 +101,15 @@ def energy(robot, q):
         kinetic += mass * dot(rates, rates) / 2 + dot(spin, spin_momentum(spin, rotation, tensor)) / 2
         potential -= mass * link.gravity * (path @ robot.gravity)
     for joint in robot.moving_joints:
-        rate, stretch = values[joint.name][:, 1:], values[joint.name].copy()
-        stretch[:, 0] -= joint.spring_reference
+        rate, elongation = values[joint.name][:, 1:], values[joint.name].copy()
+        elongation[:, 0] -= joint.spring_reference
         kinetic += joint.armature * product(rate, rate) / 2
-        potential += joint.stiffness * product(stretch, stretch) / 2
+        potential += joint.stiffness * product(elongation, elongation) / 2
     for line, length in lengths(robot, values):
-        stretch = length.copy()
-        stretch[:, 0] -= line.rest
+        elongation = length.copy()
+        elongation[:, 0] -= line.rest
         kinetic += line.armature * product(length[:, 1:], length[:, 1:]) / 2
-        potential += line.stiffness * product(stretch, stretch) / 2
+        potential += line.stiffness * product(elongation, elongation) / 2
     for ball in robot.couplings.values():
         if isinstance(ball, jn.robot.BallDrive):
             spin = relative_spin(robot, ball, q)

@@ -263,15 +263,15 @@ class Problem:
             (w, [(i, s) for i, s in enumerate(slope) if not is_zero(s)])
             for (w, _), (_, slope) in zip(self.inertias, terms, strict=False)
         ]
-        wanted = [*self.q, *self.watched, *self.multipliers, *self.constraints, *self.balance]
-        wanted += [s for slope in self.slopes for s in slope]
-        wanted += [s for _, slope in self.mass for _, s in slope]
-        self._order(wanted)
+        series = [*self.q, *self.watched, *self.multipliers, *self.constraints, *self.balance]
+        series += [s for slope in self.slopes for s in slope]
+        series += [s for _, slope in self.mass for _, s in slope]
+        self._order(series)
         return self
 
-    def _order(self, wanted):
+    def _order(self, series):
         """Keep the nodes that are needed, inputs before what is made of them, and tell how far each lags behind q."""
-        waiting, needed = list(wanted), set()
+        waiting, needed = list(series), set()
         while waiting:
             n = waiting.pop()
             if n not in needed:

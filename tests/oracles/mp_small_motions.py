@@ -48,10 +48,12 @@ class SprungFourBar:
         weight = sum(m * mp.mpf(self.gravity) * y for m, _, _, y, _ in self.centers_at(crank))
         half = mp.mpf(self.lengths["AB"]) / 2
         x, y = (mp.mpf(c) - half * f(crank) for c, f in zip(self.spring["anchor"], (mp.cos, mp.sin), strict=True))
-        stretch = mp.sqrt(x * x + y * y) - mp.mpf(self.spring["length"])
+        elongation = mp.sqrt(x * x + y * y) - mp.mpf(self.spring["length"])
         turned = self.angles(crank)[1] - mp.mpf(self.turn["angle"])
         return (
-            weight + mp.mpf(self.spring["stiffness"]) * stretch**2 / 2 + mp.mpf(self.turn["stiffness"]) * turned**2 / 2
+            weight
+            + mp.mpf(self.spring["stiffness"]) * elongation**2 / 2
+            + mp.mpf(self.turn["stiffness"]) * turned**2 / 2
         )
 
     def mass(self, crank):

@@ -233,8 +233,8 @@ def test_reference_agrees_with_closed_form_to_thirty_digits(name):
         for n, instant in enumerate(stored["time"]):
             t = Series([mpf(float(instant)), mpf(1), *[mpf(0)] * ORDER])
             for output, closed in CLOSED_FORMS[name](t).items():
-                for component, wanted in enumerate(closed if isinstance(closed, list) else [closed]):
-                    for k, d in enumerate(wanted.derivatives()[: ORDER + 1]):
+                for component, expected in enumerate(closed if isinstance(closed, list) else [closed]):
+                    for k, d in enumerate(expected.derivatives()[: ORDER + 1]):
                         found = mpf(stored["outputs"][output][n][component][k])
                         assert abs(found - d) <= mpf("1e-29") * abs(d) + mpf("1e-30"), (output, instant, component, k)
 
@@ -274,8 +274,8 @@ def test_solver_makes_the_four_bar_reference_again():
     times, found = solve_file(example("four_bar"), order=4, digits=40, count=3)
     with mp.workdps(DIGITS):
         for n, instant in enumerate(times):
-            wanted = four_bar(Series([mpf(instant), mpf(1), *[mpf(0)] * 3]))["psi"].derivatives()
-            for got, d in zip(found["psi"][n][0], wanted, strict=True):
+            expected = four_bar(Series([mpf(instant), mpf(1), *[mpf(0)] * 3]))["psi"].derivatives()
+            for got, d in zip(found["psi"][n][0], expected, strict=True):
                 assert abs(got - d) < mpf("1e-32") * (1 + abs(d))
 
 

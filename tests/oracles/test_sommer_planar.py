@@ -36,11 +36,11 @@ class Case:
 
 def assert_rows(case, constraint, blocks, bodies, rights, first=1):
     """Check Phi_q q^(k) - rhs = d^k Phi / dt^k for the orders that `rights` holds, one body per block of Phi_q."""
-    wanted = derivatives(constraint)
+    expected = derivatives(constraint)
     for k, right in enumerate(rights, start=first):
         left = sum(block @ np.append(body.r[k], body.phi[k]) for block, body in zip(blocks, bodies, strict=True))
         scale = 1 + abs(left) + abs(right)
-        assert abs(left - right - wanted[k]) < 2e-13 * scale, f"order {k}"
+        assert abs(left - right - expected[k]) < 2e-13 * scale, f"order {k}"
 
 
 @pytest.mark.parametrize("seed", SEEDS)

@@ -37,18 +37,18 @@ class Case:
 
 def defects(case, constraint, positions, rotations, rights):
     """Return Phi_q q^(k) - rhs - d^k Phi / dt^k, k = 1..4, relative to the size of its terms."""
-    wanted, out = derivatives(constraint), []
+    expected, out = derivatives(constraint), []
     for k, right in enumerate(rights, start=1):
         left = sum(
             p @ body.r[k] + q @ body.w[k - 1] for p, q, body in zip(positions, rotations, (case.i, case.j), strict=True)
         )
-        out.append(abs(left - right - wanted[k]) / (1 + abs(left) + abs(right)))
+        out.append(abs(left - right - expected[k]) / (1 + abs(left) + abs(right)))
     return out
 
 
 def close(found, series, k):
-    wanted = np.array([derivatives(x)[k] for x in series])
-    np.testing.assert_allclose(found, wanted, rtol=0, atol=2e-13 * (1 + abs(wanted).max()))
+    expected = np.array([derivatives(x)[k] for x in series])
+    np.testing.assert_allclose(found, expected, rtol=0, atol=2e-13 * (1 + abs(expected).max()))
 
 
 @pytest.mark.parametrize("seed", SEEDS)
@@ -74,8 +74,8 @@ def test_points_and_relative_vectors(seed):
 @pytest.mark.parametrize("seed", SEEDS)
 def test_relative_acceleration_as_printed_fails(seed):
     case = Case(seed)
-    wanted = np.array([derivatives(x)[2] for x in case.gap])
-    assert abs(spatial.equation_069_printed(*case.two) - wanted).max() > 0.1
+    expected = np.array([derivatives(x)[2] for x in case.gap])
+    assert abs(spatial.equation_069_printed(*case.two) - expected).max() > 0.1
     still = case.i._replace(w=np.zeros((4, 3)))
     np.testing.assert_allclose(
         spatial.equation_069_printed(still, *case.two[1:]), spatial.equation_069(still, *case.two[1:]), atol=1e-13
@@ -180,11 +180,11 @@ def test_fixed_revolute_rotation_driver(theta):
     body, pose = spatial_body(rng, p, np.outer(rates, u))
     scalar, along = pose.p[0], joints.dot(u.tolist(), pose.p[1:])
     constraint = 2 * joints.atan2(along, scalar) - series_of(f)
-    wanted, (position, rotation) = derivatives(constraint), spatial.equation_102(u)
-    assert spatial.equation_101(p, u, f) == pytest.approx(wanted[0], abs=1e-14)
+    expected, (position, rotation) = derivatives(constraint), spatial.equation_102(u)
+    assert spatial.equation_101(p, u, f) == pytest.approx(expected[0], abs=1e-14)
     assert spatial.equation_101(p, u, f) == pytest.approx(theta - f[0], abs=1e-14)
     for k, right in enumerate(spatial.equation_103(f), start=1):
-        assert position @ body.r[k] + rotation @ body.w[k - 1] - right == pytest.approx(wanted[k], abs=1e-12)
+        assert position @ body.r[k] + rotation @ body.w[k - 1] - right == pytest.approx(expected[k], abs=1e-12)
     printed = spatial.equation_101_printed(p, u, f)
     assert printed == pytest.approx(abs(theta) - f[0], abs=1e-14)
-    assert (abs(printed - wanted[0]) > 0.5) == (theta < 0)
+    assert (abs(printed - expected[0]) > 0.5) == (theta < 0)

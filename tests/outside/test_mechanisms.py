@@ -163,7 +163,7 @@ def test_a_flat_parallelogram_is_singular(crank):
         jn.solve(made, np.linspace(0.0, 0.1, 5))
 
 
-def test_a_crank_driven_past_its_dead_point_is_told():
+def test_a_crank_driven_past_its_dead_point_is_reported():
     """solidworks_urdf_exporter2 pull request 96: past the toggle the loop has no solution, and a solver diverges.
 
     Non-Grashof bars 1, 0.9, 0.4, 0.6: the crank reaches its limit where coupler and rocker are in line:

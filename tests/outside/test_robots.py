@@ -173,15 +173,15 @@ def test_the_speed_of_a_free_base_does_not_accelerate_a_frame(load):
         '<force_element name="f"/>',
     ],
 )
-def test_what_a_file_says_and_is_not_modeled_is_told(load, part):
+def test_what_a_file_says_and_is_not_modeled_is_reported(load, part):
     """Files of Gazebo and Drake users: rotors by nobody's rule and forces beside a tree of links.
 
     Whatever changes forces or motion and is left out is told, once for a file, and an error with `strict`.
     """
     parts = [link("rod", "0.1 0 0"), joint("pin", "base", "rod", limit(-1, 1), axis="0 1 0"), part]
-    with pytest.warns(jn.errors.RobotWarning) as told:
+    with pytest.warns(jn.errors.RobotWarning) as caught:
         load(*parts)
-    assert len(told) == 1
+    assert len(caught) == 1
     with pytest.raises(jn.errors.RobotFileError):
         load(*parts, strict=True)
 

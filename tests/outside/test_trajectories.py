@@ -131,7 +131,7 @@ def test_the_last_hundredth_of_a_second_is_looked_at(files, capsys):
     assert "2.4" in json.dumps(rows)
 
 
-def test_degrees_where_radians_are_meant_are_told(files, capsys):
+def test_degrees_where_radians_are_meant_are_reported(files, capsys):
     """scikit-robot pull 150, dm_control issue 331: joint angles in degrees, used as radians.
 
     -90 for a joint is 14 turns.

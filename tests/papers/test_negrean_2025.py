@@ -209,9 +209,9 @@ def test_tangential_readings_with_a_radius(tmp_path, gravity, even):
     size = np.abs(acceleration).max()
     np.testing.assert_allclose(found.accelerations, acceleration, rtol=0, atol=(1e-6 if gravity else 1e-13) * size)
     np.testing.assert_allclose(found.motion.coefficients[0], angle[:-1], rtol=0, atol=1e-6)
-    told = measured_data.summary({"fast": found}, samples, link, remove_gravity=gravity)
-    assert ("Gravity is taken off" in told) == gravity
-    assert ("--remove-gravity" in told) != gravity
+    words = measured_data.summary({"fast": found}, samples, link, remove_gravity=gravity)
+    assert ("Gravity is taken off" in words) == gravity
+    assert ("--remove-gravity" in words) != gravity
 
 
 def test_gravity_is_taken_off_tangential_readings_alone(tmp_path, run):

@@ -67,9 +67,9 @@ def test_an_angular_velocity_starts_with_velocities(rsur):
     grid = panels(draw(rsur, ["psi", "coupler_spin"]))
     assert grid[0, 1].get_ylabel() == "velocity\n(rad/s)"
     assert [axes.axison for axes in grid[:, 1]] == [True, True, True, True, False]
-    alone = panels(draw(rsur, ["coupler_spin"]))
-    assert alone.shape == (4, 1)
-    assert alone[0, 0].get_ylabel() == "velocity\n(rad/s)"
+    single = panels(draw(rsur, ["coupler_spin"]))
+    assert single.shape == (4, 1)
+    assert single[0, 0].get_ylabel() == "velocity\n(rad/s)"
 
 
 def test_columns_leave_few_places_empty():
@@ -144,7 +144,7 @@ def test_the_file_has_ink_in_every_column(example, outputs, request, tmp_path):
 
 
 @pytest.mark.slow
-def test_unknown_outputs_and_none_at_all_are_told(four_bar):
+def test_unknown_outputs_and_none_at_all_are_reported(four_bar):
     import dataclasses
 
     with pytest.raises(jn.errors.MechanismError, match="did you mean 'psi'"):

@@ -107,7 +107,7 @@ def test_power_that_friction_takes():
 
 
 @pytest.mark.slow
-def test_what_has_no_forces_is_told(lift):
+def test_what_has_no_forces_is_reported(lift):
     bare = jn.solve(jn.load(ROOT / "examples" / "four_bar.yaml"), [0.0, 0.1], order=2)
     for figure in (draw_reactions, draw_energy, draw_power):
         with pytest.raises(jn.errors.MechanismError, match="mass"):

@@ -106,7 +106,7 @@ def test_names_cannot_break_the_page(tmp_path, name):
     assert [body["name"] for body in data_of(path)["bodies"]] == [name]
 
 
-def test_instants_that_failed_are_told(tmp_path):
+def test_instants_that_failed_are_reported(tmp_path):
     mechanism = jn.load(ROOT / "examples" / "four_bar.yaml").with_parameters(BC=0.11)
     motion = jn.solve(mechanism, np.linspace(0.0, 2.0, 21), order=1, strict=False)
     report(motion, tmp_path / "page.html")
@@ -117,7 +117,7 @@ def test_instants_that_failed_are_told(tmp_path):
     assert data["outputs"][0]["values"][0][0][data["solved"].index(False)] is None
 
 
-def test_a_page_that_cannot_be_written_is_told(four_bar, tmp_path):
+def test_a_page_that_cannot_be_written_is_reported(four_bar, tmp_path):
     with pytest.raises(jn.errors.OutputError, match=r"valid: \.html"):
         report(four_bar, tmp_path / "page.pdf")
     with pytest.raises(jn.errors.OutputError, match="does not exist"):
@@ -224,9 +224,9 @@ def test_names_are_nearest_to_their_own_places(written, name):
         x, y = points[min(frame, len(points) - 1)] * data["scene"]["step"]
         places[label["text"]] = wide / 2 + scale * (x - (left + right) / 2), tall / 2 - scale * (y - (low + high) / 2)
     led = {label["text"]: label["places"][wide > 490][3] for label in data["scene"]["labels"]}
-    told = {text: (x, y, width) for canvas, text, x, y, width in texts if canvas == "sketch" and text in places}
-    assert set(told) == set(places)
-    for text, (x, y, width) in told.items():
+    drawn = {text: (x, y, width) for canvas, text, x, y, width in texts if canvas == "sketch" and text in places}
+    assert set(drawn) == set(places)
+    for text, (x, y, width) in drawn.items():
         gap = {
             other: np.hypot(max(abs(x - u) - width / 2, 0.0), max(abs(y - v) - 8.0, 0.0))
             for other, (u, v) in places.items()

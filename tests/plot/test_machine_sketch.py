@@ -89,12 +89,12 @@ def names_in(figure):
 
 def test_names_are_all_there_and_none_covers_another(four_bar):
     andrews = sketch(jn.load(ROOT / "examples" / "andrews.yaml"))
-    for figure, wanted in (
+    for figure, expected in (
         (sketch(four_bar), {"crank", "rocker", "A", "D", "BC", "C"}),
         (andrews, {"K1", "K7", "O", "P6"}),
     ):
         texts = names_in(figure)
-        assert wanted <= {text.get_text() for text in texts}
+        assert expected <= {text.get_text() for text in texts}
         figure.draw_without_rendering()
         boxes = [text.get_window_extent() for text in texts]
         for first, second in itertools.combinations(boxes, 2):
@@ -149,7 +149,7 @@ def test_a_joint_of_ones_own_has_a_symbol():
     assert [s.kind for s in scene.shapes if s.owner == "joints.roller"].count("area") == 2
 
 
-def test_what_cannot_be_drawn_is_told(four_bar):
+def test_what_cannot_be_drawn_is_reported(four_bar):
     with pytest.raises(jn.errors.MechanismError, match="did you mean 'bodies'"):
         sketch(four_bar, names="bodys")
     with pytest.raises(jn.errors.MechanismError, match=r"position of a point.*'psi'.*valid: C"):
@@ -233,7 +233,7 @@ def test_an_mp4_has_its_frames(four_bar, tmp_path):
     assert seconds == pytest.approx(21 / 5, abs=0.01)
 
 
-def test_a_film_that_cannot_be_written_is_told_before(four_bar, tmp_path, monkeypatch):
+def test_a_film_that_cannot_be_written_is_reported_before(four_bar, tmp_path, monkeypatch):
     with pytest.raises(jn.errors.OutputError, match=r"\.gif, \.mp4"):
         animate(four_bar, tmp_path / "film.avi")
     with pytest.raises(jn.errors.OutputError, match="does not exist"):

@@ -232,7 +232,7 @@ def _holder(mechanism, it, key):
 
 
 def acted_on(mechanism, output):
-    """Return the name of the body on which a joint or driver acts with the force or torque that is wanted."""
+    """Return the name of the body on which a joint or driver acts with the force or torque that is asked for."""
     bodies = {**mechanism.joints, **mechanism.drivers, **mechanism.forces}[output.joint].bodies
     return output.body or bodies[1]
 
@@ -446,11 +446,11 @@ def matrices(output, values):
     return np.moveaxis(np.array(found.derivatives()), (0, 1, 2, 3), (1, 2, 3, 0))
 
 
-def weight(mechanism, alone):
+def weight(mechanism, single):
     """Return the weight of one body, or of all, N, which is what potential energy changes by with the origin."""
     values = mechanism.parameter_values
     masses = [
-        body.mass for name, body in mechanism.rigid_bodies.items() if alone in (None, name) and body.mass is not None
+        body.mass for name, body in mechanism.rigid_bodies.items() if single in (None, name) and body.mass is not None
     ]
     return sum(resolve(mass, values) for mass in masses) * np.asarray(resolve(mechanism.gravity, values))
 

@@ -58,8 +58,8 @@ class Pair:
     @property
     def named(self):
         """Names of links and joints in the warning, but for those of what is left out."""
-        told = [str(warning.message).partition("what follows is left out")[0] for warning in self.warnings]
-        return {name for message in told for name in re.findall(r"(\S+) \(line \d+\)", message)}
+        messages = [str(warning.message).partition("what follows is left out")[0] for warning in self.warnings]
+        return {name for message in messages for name in re.findall(r"(\S+) \(line \d+\)", message)}
 
     def torques(self, q):
         """Return torques by Pinocchio, (samples, 1, n), and on a fixed base their rates, (samples, 2, n)."""

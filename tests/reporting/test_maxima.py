@@ -28,5 +28,5 @@ def test_stretches_have_the_maxima_of_the_whole(cuts, seed):
     for k in range(5):
         at, size, around = brute_force(time, curves[:, k])
         assert (found.times[k], found.sizes[k]) == (at, size)
-        wanted = (around + around[:1])[:2]  # where there is one only, it stands twice
-        assert [(low[j, k], high[j, k]) for j in range(2)] == wanted
+        expected = (around + around[:1])[:2]  # where there is one only, it stands twice
+        assert [(low[j, k], high[j, k]) for j in range(2)] == expected

@@ -130,9 +130,9 @@ def test_instants_are_solved_together_or_one_by_one(monkeypatch):
 def test_a_peak_on_an_instant_keeps_its_time():
     (position, velocity) = peaks(jn.solve(CRANK, [0.0, 0.1], order=1))
     assert (velocity.maximum_at, position.minimum_at, position.minimum) == (0.0, 0.0, 0.0)
-    (alone,) = peaks(jn.solve(CRANK, [0.3], order=0))
-    assert alone.maximum == alone.minimum
-    assert alone.maximum_at == 0.3
+    (single,) = peaks(jn.solve(CRANK, [0.3], order=0))
+    assert single.maximum == single.minimum
+    assert single.maximum_at == 0.3
 
 
 def test_peaks_of_a_motion_that_ends_early():
@@ -205,6 +205,6 @@ def test_peaks_at_the_instants_only(run, tmp_path):
         assert peak.maximum_at == time[law.argmax()]
     path = tmp_path / "crank.yaml"
     jn.write_mechanism(dataclasses.replace(CRANK, time=jn.TimeGrid(start=0.0, stop=4.0, count=8)), path)
-    status, told, _ = run("run", path, "--order", 2, "--no-refine", "--json")
+    status, printed, _ = run("run", path, "--order", 2, "--no-refine", "--json")
     assert status == 0
-    assert [row["maximum"] for row in json.loads(told)["peaks"]] == [peak.maximum for peak in found]
+    assert [row["maximum"] for row in json.loads(printed)["peaks"]] == [peak.maximum for peak in found]

@@ -51,8 +51,8 @@ def test_a_terminal_gets_a_colored_table(capsys, monkeypatch):
 def test_a_line_of_progress_is_shown_on_a_terminal_and_for_long_work_only(capsys, monkeypatch):
     monkeypatch.setattr(sys.stderr, "isatty", lambda: True, raising=False)
     monkeypatch.setenv("TERM", "xterm-256color")
-    told = []
-    with Display("solve") as shown, Count("solving", report=lambda *call: told.append(call)) as count:
+    reports = []
+    with Display("solve") as shown, Count("solving", report=lambda *call: reports.append(call)) as count:
         count(3, 5)
         shown._look()
     assert capsys.readouterr().err == ""
@@ -65,7 +65,7 @@ def test_a_line_of_progress_is_shown_on_a_terminal_and_for_long_work_only(capsys
         say("words")  # take the line away
         assert shown._line is None
     assert capsys.readouterr().out == "words\n"
-    assert told == [(3, 5)]
+    assert reports == [(3, 5)]
 
 
 def test_what_is_compiled_is_said_until_something_is_done():

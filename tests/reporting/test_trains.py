@@ -27,8 +27,8 @@ def test_a_bevel_differential_on_an_axle_that_leans():
     }
 
 
-def test_what_carries_planets_is_told():
+def test_what_carries_planets_is_reported():
     """24/(24 + 84) of the sun, and planets that turn by (1 + 24/30) 2/9 - 24/30 in all."""
-    told = ratios(jn.load("examples/planetary_train.yaml"))
-    assert told["motor", "carrier"] == "2/9"
-    assert told["motor", "planet3"] == "-2/5"
+    fractions = ratios(jn.load("examples/planetary_train.yaml"))
+    assert fractions["motor", "carrier"] == "2/9"
+    assert fractions["motor", "planet3"] == "-2/5"

@@ -40,7 +40,7 @@ def parallelogram(law):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("order", [1, 4])
-def test_a_pole_at_a_change_point_is_told_whatever_the_order(order):
+def test_a_pole_at_a_change_point_is_reported_whatever_the_order(order):
     motion = jn.solve(parallelogram("0.5 + t + t**2/2"), np.linspace(0.0, 2.9, 59), order=order)
     (remark,) = motion_facts(motion)["remarks"]
     assert remark.startswith("force: ")  # and of no other output
@@ -49,7 +49,7 @@ def test_a_pole_at_a_change_point_is_told_whatever_the_order(order):
 
 
 @pytest.mark.slow
-def test_a_force_that_stays_finite_there_is_not_told_of():
+def test_a_force_that_stays_finite_there_is_not_reported():
     motion = jn.solve(parallelogram("0.5 + 2*t"), np.linspace(0.0, 2.9, 59), order=1)
     assert motion.change_points.size
     assert not motion_facts(motion)["remarks"]

@@ -48,7 +48,7 @@ def test_pseudo_inertia_tells_the_body(seed):
     same(jn.Inertia.from_pseudo((homogeneous.T * masses) @ homogeneous), jn.Inertia(*of_cloud(masses, points)), 1e-13)
 
 
-def test_a_solid_is_centered_in_its_frame_unless_told():
+def test_a_solid_is_centered_in_its_frame_by_default():
     assert jn.Inertia.solid("sphere", radius=0.1, mass=2.0).center_of_mass.tolist() == [0, 0, 0]
 
 

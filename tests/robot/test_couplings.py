@@ -127,12 +127,12 @@ def test_the_mechanism_moves_as_the_robot():
     one = given.changed(joints=joints, couplings=[ball])
     state = {"j": 0.1, "z": 0.2, "y": -0.3, "x": 0.4, "s": 0.05}
     times = np.linspace(0, 0.3, 4)
-    alone = jn.simulate(one, times, state=state)
+    single = jn.simulate(one, times, state=state)
     outputs = {name: name for name in ("j", "s")}
     whole = jn.simulate(one.mechanism(list(state.values()), outputs=outputs), times)
     for name in outputs:
         column = one.joint_names.index(name)
-        np.testing.assert_allclose(whole.outputs[name][:, 0], np.asarray(alone.q)[:, 0, column], atol=1e-9)
+        np.testing.assert_allclose(whole.outputs[name][:, 0], np.asarray(single.q)[:, 0, column], atol=1e-9)
 
 
 def test_couplings_without_a_counterpart_in_a_mechanism_are_refused():

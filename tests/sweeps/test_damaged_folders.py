@@ -265,11 +265,11 @@ def test_what_others_say_about_the_whole_sweep_stays(copy, whole):
 def manifest_edited(folder, edit, *, sign=False):
     path = folder / ROOT
     content = json.loads(path.read_text())
-    told = json.loads(content["attributes"]["manifest"])
-    told = edit(told) or told
+    record = json.loads(content["attributes"]["manifest"])
+    record = edit(record) or record
     if sign:
-        told["identity"] = manifest._identity(told)
-    content["attributes"]["manifest"] = json.dumps(told)
+        record["identity"] = manifest._identity(record)
+    content["attributes"]["manifest"] = json.dumps(record)
     path.write_text(json.dumps(content))
 
 
@@ -281,14 +281,16 @@ KEYS = ("format", "title", "files", "model", "vary", "sample", "designs", "time"
 @pytest.mark.parametrize("key", KEYS)
 def test_a_manifest_that_was_changed_is_refused(copy, whole, key):
     before = (copy / ROOT).read_text()
-    manifest_edited(copy, lambda told: told.pop(key) and None)
+    manifest_edited(copy, lambda entries: entries.pop(key) and None)
     assert_refused(copy, "manifest was changed since it was written")
     (copy / ROOT).write_text(before)
     for value in WRONG:
         if (value is None and key == "sample") or (value == {} and key == "files"):  # as it was
             continue
         for sign in (False, True):  # also by one who knows how the digest is computed
-            manifest_edited(copy, lambda told, value=value: told.update({key: value}), sign=sign and key != "identity")
+            manifest_edited(
+                copy, lambda entries, value=value: entries.update({key: value}), sign=sign and key != "identity"
+            )
             assert_refused(copy, "changed since it was written|another sweep is there|another release")
             (copy / ROOT).write_text(before)
     assert swept(copy) == whole[1]
@@ -296,7 +298,7 @@ def test_a_manifest_that_was_changed_is_refused(copy, whole, key):
 
 @pytest.mark.parametrize("chunk", [0, -2, 2.0, 2**21, "2", None, True, [2], 10**400])
 def test_a_size_of_chunks_that_cannot_be_is_refused(copy, chunk):
-    manifest_edited(copy, lambda told: told["options"].update(chunk=chunk), sign=True)
+    manifest_edited(copy, lambda entries: entries["options"].update(chunk=chunk), sign=True)
     with pytest.raises(OutputError, match=r"manifest was changed|another sweep is there"):
         swept(copy, chunk=None)
 
@@ -312,7 +314,7 @@ def test_a_manifest_that_is_none_is_refused(copy, text):
 def test_a_checksum_of_any_kind_is_written_again(copy, whole):
     for value in ("", 5, [1], {"a": 1}):
         set_in("attributes", "checksum", to=value)(copy / ROOT)
-        manifest_edited(copy, lambda told, value=value: told.update(checksum=value))
+        manifest_edited(copy, lambda entries, value=value: entries.update(checksum=value))
         assert swept(copy) == whole[1]
         assert_same(copy, whole)
 
@@ -351,7 +353,7 @@ def test_folders_that_may_not_be_entered_are_refused(stranger, name):
         swept(stranger)
 
 
-def test_a_folder_that_may_only_be_read_is_checked_and_told(stranger, whole):
+def test_a_folder_that_may_only_be_read_is_checked_and_reported(stranger, whole):
     for path in (stranger, *stranger.rglob("*")):
         path.chmod(0o555 if path.is_dir() else 0o444)
     assert swept(stranger) == whole[1]

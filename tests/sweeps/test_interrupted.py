@@ -31,9 +31,9 @@ def started(command, folder):
     return subprocess.Popen(command, env=surroundings, start_new_session=True, **pipes)
 
 
-def wait_until(told, process=None):
+def wait_until(condition, process=None):
     stop = time.monotonic() + 240
-    while not told():
+    while not condition():
         assert process is None or process.poll() is None
         assert time.monotonic() < stop
         time.sleep(0.05)
@@ -78,10 +78,10 @@ def test_nothing_is_left_and_nothing_is_said(folder, name, send, when):
         wait_until(lambda: workers_of(process), process)
     assert any(out.glob(".scratch-*"))
     getattr(os, send)(process.pid, number)
-    printed, told = process.communicate(timeout=60)
+    printed, messages = process.communicate(timeout=60)
     wait_until(lambda: not are_left(process.pid))  # its workers, too
     assert process.returncode == (-number if name == "SIGKILL" else 128 + number)
-    assert (printed, told) == ("", "")
+    assert (printed, messages) == ("", "")
     assert not any((folder / "tmp").iterdir())
     assert any(out.glob(".scratch-*")) == (name == "SIGKILL")
     if name == "SIGKILL":  # what nobody could remove the next run does, though it is stopped, too
@@ -102,13 +102,13 @@ def test_a_script_that_is_interrupted_leaves_no_more_than_its_own_folder(folder,
     process = started([sys.executable, str(script), str(FILE), str(out)], folder)
     wait_until(lambda: any(out.glob("chunks/digest/c/[0-9]*")), process)
     os.killpg(process.pid, getattr(signal, name))
-    _, told = process.communicate(timeout=60)
+    _, printed = process.communicate(timeout=60)
     wait_until(lambda: not are_left(process.pid))
     assert process.returncode == -getattr(signal, name)
     assert not any((folder / "tmp").iterdir())
     if name == "SIGTERM":
-        assert told == ""
+        assert printed == ""
     else:
-        assert told.endswith("KeyboardInterrupt\n")
-        assert "semaphore" not in told
+        assert printed.endswith("KeyboardInterrupt\n")
+        assert "semaphore" not in printed
     assert name == "SIGTERM" or not any(out.glob(".scratch-*"))

@@ -35,9 +35,9 @@ def swept(out, model=FILE, vary=VARY, **changed):
 def done(tmp_path_factory):
     """A sweep in which a few designs cannot be assembled or lock."""
     folder = tmp_path_factory.mktemp("done") / "sweep.zarr"
-    told = []
-    found = swept(folder, histories=True, progress=lambda *x: told.append(x))
-    assert told == [(16, COUNT), (27, COUNT)]
+    reports = []
+    found = swept(folder, histories=True, progress=lambda *x: reports.append(x))
+    assert reports == [(16, COUNT), (27, COUNT)]
     return folder, found
 
 
@@ -86,11 +86,11 @@ def test_it_opens_lazily_and_says_what_it_is(done):
     found = xarray.open_zarr(folder)
     assert found["psi_peak"].chunks is not None
     assert dict(found["C"].sizes) == {"design": COUNT, "time": 9, "derivative": 3, "component": 2}
-    told = json.loads(found.attrs["manifest"])
-    assert told["checksum"] == found.attrs["checksum"]
-    assert told["designs"] == COUNT
-    assert list(told["files"]) == ["four_bar.yaml"]
-    assert told["options"]["order"] == 2
+    record = json.loads(found.attrs["manifest"])
+    assert record["checksum"] == found.attrs["checksum"]
+    assert record["designs"] == COUNT
+    assert list(record["files"]) == ["four_bar.yaml"]
+    assert record["options"]["order"] == 2
 
 
 def test_only_what_is_missing_is_computed_again_to_the_same_bits(done, tmp_path):
@@ -98,18 +98,18 @@ def test_only_what_is_missing_is_computed_again_to_the_same_bits(done, tmp_path)
     assert whole != done[1].attrs["checksum"]  # which keeps histories, too
     (marks(tmp_path / "a.zarr") / "1").unlink()
     before = (tmp_path / "a.zarr" / "psi_peak" / "c" / "0" / "0").stat().st_mtime_ns
-    told = []
-    again = swept(tmp_path / "a.zarr", progress=lambda *x: told.append(x))
-    assert told == [(16, COUNT), (27, COUNT)]
+    reports = []
+    again = swept(tmp_path / "a.zarr", progress=lambda *x: reports.append(x))
+    assert reports == [(16, COUNT), (27, COUNT)]
     assert again.attrs["checksum"] == whole
     assert (tmp_path / "a.zarr" / "psi_peak" / "c" / "0" / "0").stat().st_mtime_ns == before
-    told.clear()
-    assert swept(tmp_path / "a.zarr", progress=lambda *x: told.append(x)).attrs["checksum"] == whole
-    assert told == [(27, COUNT)]
+    reports.clear()
+    assert swept(tmp_path / "a.zarr", progress=lambda *x: reports.append(x)).attrs["checksum"] == whole
+    assert reports == [(27, COUNT)]
 
 
 @pytest.mark.parametrize("damage", ["lost", "changed", "broken"])
-def test_what_was_lost_or_changed_on_the_disk_is_told_and_computed_again(done, tmp_path, damage):
+def test_what_was_lost_or_changed_on_the_disk_is_reported_and_computed_again(done, tmp_path, damage):
     folder = tmp_path / "a.zarr"
     shutil.copytree(done[0], folder)
     part = folder / "psi_peak" / "c" / "1" / "0"
@@ -365,11 +365,11 @@ def test_torques_are_linear_in_loads_and_drives_and_follow_the_speed(tmp_path):
         q = np.zeros((len(trajectory.times), 4, len(robot.joint_names)))
         columns = [robot.joint_names.index(name) for name in trajectory.names]
         q[:, :, columns] = trajectory.derivatives(trajectory.times, 3) * (speed ** np.arange(4))[:, None]
-        wanted = jn.inverse_dynamics(changed, q, drives=True)
+        expected = jn.inverse_dynamics(changed, q, drives=True)
         for n, name in enumerate(robot.joint_names):
-            assert np.allclose(found[name][k], wanted[..., n], rtol=1e-11, atol=1e-11 * np.abs(wanted).max())
+            assert np.allclose(found[name][k], expected[..., n], rtol=1e-11, atol=1e-11 * np.abs(expected).max())
         start = trajectory.times[0]
-        when = start + (trajectory.times[np.abs(wanted[:, 0, 0]).argmax()] - start) / speed
+        when = start + (trajectory.times[np.abs(expected[:, 0, 0]).argmax()] - start) / speed
         assert float(found[f"{joint}_peak_time"][k, 0]) == pytest.approx(when)
     with pytest.raises(JounceError, match="speed: must be above zero"):
         Torques(robot, trajectory).histories({"speed": np.array([1.0, 0.0])}, 1)
@@ -492,6 +492,6 @@ def test_torque_rates_at_the_knots_of_a_law_are_kept(tmp_path):
 
     histories = swept_torques.histories({"speed": np.array([1.0, 2.0])}, 1)
     beside = histories.sides.values["pin"], histories.sides.instants
-    told = statistics(histories.values["pin"], swept_torques.instants, histories.pace, beside)
-    np.testing.assert_allclose(told["peak"][:, 1], 24 * knot / 3 * np.array([1.0, 2.0**3]), rtol=1e-9)
-    np.testing.assert_allclose(told["peak_time"][:, 1], [knot, knot / 2], rtol=1e-12)
+    result = statistics(histories.values["pin"], swept_torques.instants, histories.pace, beside)
+    np.testing.assert_allclose(result["peak"][:, 1], 24 * knot / 3 * np.array([1.0, 2.0**3]), rtol=1e-9)
+    np.testing.assert_allclose(result["peak_time"][:, 1], [knot, knot / 2], rtol=1e-12)

@@ -59,7 +59,7 @@ def test_a_worker_of_another_release_computes_nothing(plan, monkeypatch):
         sent.compute(0)
 
 
-def test_what_a_worker_cannot_load_is_told():
+def test_what_a_worker_cannot_load_is_reported():
     class Mine:
         pass
 
@@ -91,10 +91,13 @@ class Client:
 
     def __init__(self, **workers):
         client = {"packages": dict.fromkeys(manifest.versions(), "1.0")}
-        self.told = {"client": client, "workers": {name: {"packages": packages} for name, packages in workers.items()}}
+        self.answer = {
+            "client": client,
+            "workers": {name: {"packages": packages} for name, packages in workers.items()},
+        }
 
     def sync(self, *_, **__):
-        return self.told
+        return self.answer
 
 
 @pytest.mark.parametrize("name", ["jounce", "jax", "numpy"])
@@ -113,16 +116,16 @@ def scheduler(tmp_path):
     """A cluster of one worker, as others start one."""
     surroundings = os.environ | {"TMPDIR": str(tmp_path)}
     quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL, "env": surroundings}
-    told = tmp_path / "scheduler.json"
+    file = tmp_path / "scheduler.json"
     place = ["--no-dashboard", "--dashboard-address", "127.0.0.1:0"]
-    command = [sys.executable, "-m", "distributed.cli.dask_scheduler", "--port", "0", "--scheduler-file", str(told)]
+    command = [sys.executable, "-m", "distributed.cli.dask_scheduler", "--port", "0", "--scheduler-file", str(file)]
     running = [subprocess.Popen([*command, *place], **quiet)]
     try:
         stop = time.monotonic() + 120
-        while not told.exists():
+        while not file.exists():
             assert time.monotonic() < stop
             time.sleep(0.1)
-        address = json.loads(told.read_text())["address"]
+        address = json.loads(file.read_text())["address"]
         command = [sys.executable, "-m", "distributed.cli.dask_worker", address, "--nthreads", "1", "--no-dashboard"]
         running.append(subprocess.Popen([*command, "--local-directory", str(tmp_path / "worker")], **quiet))
         yield address

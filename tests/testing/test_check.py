@@ -140,10 +140,10 @@ def test_a_joint_of_ones_own_is_held_to_all_of_them():
     names = ("jacobian", "rank", "facts", "equilibrium")
     report = check_joint(Fork, space="planar", order=2, values={"side": "right"}, contracts=names)
     assert report == JointReport(Fork, names, {})
-    told = check_joint(Global, space="planar", contracts=["frames", "expressions", "files"], relative=False)
-    assert not told.held
-    assert [*told.left_out] == ["frames", "expressions", "files"]
-    assert "files: it has no type name for files" in str(told)
+    found = check_joint(Global, space="planar", contracts=["frames", "expressions", "files"], relative=False)
+    assert not found.held
+    assert [*found.left_out] == ["frames", "expressions", "files"]
+    assert "files: it has no type name for files" in str(found)
 
 
 @pytest.mark.parametrize(

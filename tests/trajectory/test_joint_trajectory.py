@@ -60,8 +60,8 @@ def test_each_law_as_if_alone():
     assert trajectory.names == tuple(laws)
     assert found.shape == (4, 5, 12)
     for column, law in enumerate(trajectory.laws.values()):
-        alone = np.array(law(Jet.variable(at, 4)).derivatives())
-        np.testing.assert_allclose(found[:, :, column].T, alone, rtol=1e-13, atol=1e-13)
+        single = np.array(law(Jet.variable(at, 4)).derivatives())
+        np.testing.assert_allclose(found[:, :, column].T, single, rtol=1e-13, atol=1e-13)
     chosen = trajectory.derivatives(at, 4, names=["k", "a"])
     np.testing.assert_allclose(chosen, found[:, :, [10, 0]], rtol=1e-14, atol=1e-14)
 

@@ -316,8 +316,8 @@ def test_a_parameter_of_another_dimension_is_refused_with_its_place(tmp_path, mo
 
 def test_new_values_take_units_and_are_checked(tmp_path):
     known = brake(tmp_path, "5 Nm", "-M")
-    told = known.with_parameters(M="2 kNm").parameter_values
-    assert told == {**known.parameter_values, "M": 2000, "twice": 4000, "half": 2000}
+    changed = known.with_parameters(M="2 kNm").parameter_values
+    assert changed == {**known.parameter_values, "M": 2000, "twice": 4000, "half": 2000}
     assert known.with_parameters(M="3", arm="twice/1e3").parameter_values["arm"] == 0.006
     assert known.with_parameters(M=7.0).parameter_values["M"] == 7.0
     for wrong in ({"M": "2 N"}, {"arm": "3 deg"}, {"arm": "2 MM"}, {"half": "arm"}, {"M": "arm + half"}):

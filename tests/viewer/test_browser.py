@@ -144,16 +144,16 @@ def test_exports_arrive(opened, browser, tmp_path):
     assert (image.std(axis=-1) > 0.08).mean() > 0.01
 
     exported(page, "Animation (HTML)").save_as(tmp_path / "animation.html")
-    alone = browser.new_page(viewport={"width": 800, "height": 600})
+    offline = browser.new_page(viewport={"width": 800, "height": 600})
     asked = []
-    alone.on("request", lambda request: asked.append(request.url))
-    alone.goto(f"file://{tmp_path / 'animation.html'}")
-    alone.wait_for_timeout(6000)
-    first = alone.screenshot()
-    alone.wait_for_timeout(1200)
-    assert alone.screenshot() != first  # it plays by itself
+    offline.on("request", lambda request: asked.append(request.url))
+    offline.goto(f"file://{tmp_path / 'animation.html'}")
+    offline.wait_for_timeout(6000)
+    first = offline.screenshot()
+    offline.wait_for_timeout(1200)
+    assert offline.screenshot() != first  # it plays by itself
     assert [address for address in asked if address.startswith(("http", "ws"))] == []
-    alone.close()
+    offline.close()
 
 
 def test_a_title_is_text_and_no_markup(browser):

@@ -71,7 +71,7 @@ def test_the_regressor_is_that_of_pinocchio():
     for level, row in zip(given, q, strict=True):
         for joint in robot.joint_names:
             level[model.joints[model.getJointId(joint)].idx_v] = row[robot.joint_names.index(joint)]
-    wanted = pinocchio.computeJointTorqueRegressor(model, model.createData(), *given)
+    expected = pinocchio.computeJointTorqueRegressor(model, model.createData(), *given)
     places = {label: k for k, label in enumerate(code["PARAMETERS"])}
     found = code["regressor"](q)[0]
     order = ("m", "mx", "my", "mz", "Ixx", "Ixy", "Iyy", "Ixz", "Iyz", "Izz")
@@ -81,7 +81,7 @@ def test_the_regressor_is_that_of_pinocchio():
         for k, word in enumerate(order):
             column = found[columns[:7], places[f"{links[name]}.{word}"]]
             np.testing.assert_allclose(
-                column, wanted[[model.joints[model.getJointId(x)].idx_v for x in names[:7]], first + k], atol=1e-13
+                column, expected[[model.joints[model.getJointId(x)].idx_v for x in names[:7]], first + k], atol=1e-13
             )
 
 

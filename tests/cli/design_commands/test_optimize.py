@@ -34,16 +34,16 @@ def file(tmp_path):
 
 def shown(capsys, *arguments):
     status = main(["optimize", *map(str, arguments)])
-    told = capsys.readouterr()
-    return status, told.out, told.err
+    printed = capsys.readouterr()
+    return status, printed.out, printed.err
 
 
 @pytest.mark.slow
-def test_a_better_design_is_told_and_written_in_the_units_of_the_file(capsys, file):
+def test_a_better_design_is_reported_and_written_in_the_units_of_the_file(capsys, file):
     out = file.with_name("better.yaml")
-    status, told, _ = shown(capsys, file, "--minimize", "peak(angle)", *VARY, "--starts", 1, "--out", out, "--json")
+    status, printed, _ = shown(capsys, file, "--minimize", "peak(angle)", *VARY, "--starts", 1, "--out", out, "--json")
     assert status == 0
-    found = json.loads(told)
+    found = json.loads(printed)
     Draft202012Validator(result_schema()).validate(found)
     assert (found["command"], found["status"]) == ("optimize", "optimal")
     assert found["objective"] == pytest.approx(0.25, abs=1e-9)
@@ -63,10 +63,10 @@ def test_points_of_a_file_are_gone_through(capsys, file):
     )
     points.write_text(f"tip_x,tip_y\n{rows}")
     arguments = ("--vary", "r=100mm:1m", "--curve", f"ring={points}", "--starts", 1)
-    status, told, _ = shown(capsys, file, "--minimize", "path_error(tip, ring)", *arguments)
+    status, printed, _ = shown(capsys, file, "--minimize", "path_error(tip, ring)", *arguments)
     assert status == 0
-    assert "optimal" in told
-    assert f"{radii.mean():.7g}" in told
+    assert "optimal" in printed
+    assert f"{radii.mean():.7g}" in printed
 
 
 @pytest.mark.parametrize(
@@ -85,16 +85,16 @@ def test_points_of_a_file_are_gone_through(capsys, file):
         (("--minimize", "peak(angle)", *VARY, "--out", "better.csv"), "better.csv"),
     ],
 )
-def test_bad_input_is_told_by_the_option(capsys, file, arguments, words):
-    status, _, told = shown(capsys, file, *arguments)
+def test_bad_input_is_reported_by_the_option(capsys, file, arguments, words):
+    status, _, message = shown(capsys, file, *arguments)
     assert status == 2
-    assert words in told
+    assert words in message
 
 
 def test_the_file_that_is_read_is_not_replaced_unasked(capsys, file):
-    status, _, told = shown(capsys, file, "--minimize", "peak(angle)", *VARY, "--out", file)
+    status, _, message = shown(capsys, file, "--minimize", "peak(angle)", *VARY, "--out", file)
     assert status == 2
-    assert "--overwrite" in told
+    assert "--overwrite" in message
     assert pathlib.Path(file).read_text() == TEXT
 
 

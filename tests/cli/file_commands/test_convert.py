@@ -40,7 +40,7 @@ def test_formats_turn_into_each_other_with_values_as_written(call):
         previous = name
 
 
-def test_comments_that_are_lost_are_told(call):
+def test_comments_that_are_lost_are_reported(call):
     status, _, err = call(ROOT / "examples" / "press.yaml", "press.toml")
     assert status == 0
     assert err.startswith("warning: the comments of ")
@@ -156,7 +156,7 @@ def test_a_robot_becomes_a_mechanism_with_the_torques_of_inverse_dynamics(call):
         np.testing.assert_allclose(found[:, :2], tau[..., k], rtol=1e-9, atol=1e-10)
 
 
-def test_names_that_files_do_not_take_are_changed_and_told(call):
+def test_names_that_files_do_not_take_are_changed_and_reported(call):
     text = (ROBOTS / "scara.urdf").read_text().replace('"elbow"', '"elbow joint"').replace('"wrist"', '"time"')
     pathlib.Path("odd.urdf").write_text(text)
     status, out, err = call("odd.urdf", "odd.yaml")

@@ -60,7 +60,7 @@ def test_a_law_file_is_written_to_its_stop_though_its_step_does_not_divide_the_t
         (("--format", "ros", "--joints", "elbow", "--out", "x.yaml"), "elbow"),
     ],
 )
-def test_bad_input_is_told(run, files, tmp_path, monkeypatch, options, words):
+def test_bad_input_is_reported(run, files, tmp_path, monkeypatch, options, words):
     monkeypatch.chdir(tmp_path)
     status, _, message = run(*files, *options)
     assert status == 2

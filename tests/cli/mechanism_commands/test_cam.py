@@ -37,26 +37,26 @@ def test_the_table_has_the_units_of_the_file_and_reads_back_as_samples(tmp_path,
 
 
 @pytest.mark.slow
-def test_an_undercut_cam_is_told_and_the_status_says_so(capsys):
+def test_an_undercut_cam_is_reported_and_the_status_says_so(capsys):
     assert main(["cam", INTAKE, "--set", "roller=25 mm", "--json"]) == 1
-    told = json.loads(capsys.readouterr().out)
-    assert told["undercut"]
-    assert told["least_radius"]["value"] < 0
-    assert all(math.radians(120) < part["angle"] < math.radians(240) for part in told["undercuts"])
-    assert told["continuous_to"] == 3
+    record = json.loads(capsys.readouterr().out)
+    assert record["undercut"]
+    assert record["least_radius"]["value"] < 0
+    assert all(math.radians(120) < part["angle"] < math.radians(240) for part in record["undercuts"])
+    assert record["continuous_to"] == 3
     assert main(["cam", INTAKE, "--set", "roller=25 mm", "--units", "angle=rad"]) == 1
     assert "UNDERCUT from 2." in capsys.readouterr().out
 
 
 @pytest.mark.slow
-def test_a_flat_face_is_pressed_straight_and_no_rounding_is_told(tmp_path, capsys):
+def test_a_flat_face_is_pressed_straight_and_no_rounding_is_reported(tmp_path, capsys):
     text = pathlib.Path(INTAKE).read_text().replace("shape: roller, radius: roller, offset: -2 mm", "shape: flat_face")
     file = tmp_path / "flat.yaml"
     file.write_text(text)
     main(["cam", str(file), "--set", "lift=1 mm"])
-    told = capsys.readouterr().out
-    assert "largest pressure angle: zero throughout" in told
-    assert re.search(r"jounce jumps by 698\.\d+ mm/rad\^4 at 120 deg", told)  # a ninth of that of 9 mm
+    printed = capsys.readouterr().out
+    assert "largest pressure angle: zero throughout" in printed
+    assert re.search(r"jounce jumps by 698\.\d+ mm/rad\^4 at 120 deg", printed)  # a ninth of that of 9 mm
 
 
 @pytest.mark.parametrize(
@@ -94,7 +94,7 @@ def test_what_is_wrong_is_named_with_its_line(tmp_path, old, new, name, words):
     assert caught.value.name == name
 
 
-def test_files_of_other_kinds_are_told(capsys):
+def test_files_of_other_kinds_are_reported(capsys):
     assert main(["run", INTAKE]) == 2
     assert f"jounce cam {INTAKE}" in capsys.readouterr().err
     assert main(["cam", "examples/four_bar.yaml"]) == 2

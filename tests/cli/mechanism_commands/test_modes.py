@@ -71,7 +71,7 @@ def test_a_robot_hangs_and_swings(run):
 
 @pytest.mark.slow
 def test_bad_input_is_named(run):
-    for arguments, told in (
+    for arguments, message in (
         ((EXAMPLES / "press.yaml",), "release it (motor)"),
         ((EXAMPLES / "four_bar.yaml",), "no body has one"),
         ((PENDULUM, "--without", "motor"), "--without"),
@@ -85,4 +85,4 @@ def test_bad_input_is_named(run):
     ):
         status, _, err = run("modes", *arguments)
         assert status == 2, arguments
-        assert told in err
+        assert message in err

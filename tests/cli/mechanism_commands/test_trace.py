@@ -13,8 +13,8 @@ FILE, STROKE = "examples/four_bar.yaml", ("--set", "AB=15 cm")
 
 def shown(capsys, *arguments):
     status = main([*map(str, arguments)])
-    told = capsys.readouterr()
-    return status, told.out, told.err
+    printed = capsys.readouterr()
+    return status, printed.out, printed.err
 
 
 @pytest.mark.slow

@@ -109,13 +109,13 @@ def test_the_last_instant_counts_though_the_step_does_not_divide_the_time(run, f
     assert "t = 0 s to 1 s" in out
     assert "the step of 0.03 s does not divide the time: the last one is 0.01 s" in out
     status, out, _ = run(robot, law, "--json")
-    told = json.loads(out)
-    assert told["time"]["stop"] == 1.0
-    (position,) = (row for row in told["limits"] if row["quantity"] == "position")
+    record = json.loads(out)
+    assert record["time"]["stop"] == 1.0
+    (position,) = (row for row in record["limits"] if row["quantity"] == "position")
     assert (position["worst"], position["at"], position["broken"]) == (1.05, 1.0, True)
 
 
-def test_what_is_infinite_by_a_jump_is_told_printed_drawn_and_null_in_json(run, files, tmp_path):
+def test_what_is_infinite_by_a_jump_is_reported_printed_drawn_and_null_in_json(run, files, tmp_path):
     law = "joints: {pin: 0.1*abs(t - 0.98765)}\ntime: {stop: 2, step: 0.1}"
     limits = "joints: {pin: {acceleration: 5 rad/s^2, velocity: 1 rad/s}}"
     robot, trajectory, bounds = files(pendulum_urdf=PENDULUM, corner_yaml=law, limits_yaml=limits)
@@ -139,7 +139,7 @@ def test_the_text_is_plain_and_fits_80_columns(run):
         assert "\x1b" not in out
 
 
-def test_what_has_no_limit_and_what_stands_still_is_told(run):
+def test_what_has_no_limit_and_what_stands_still_is_reported(run):
     status, out, _ = run(PANDA, WAVE)
     assert status == 1
     assert "without a limit: acceleration, jerk, torque rate, force rate" in out

@@ -31,9 +31,9 @@ def files(tmp_path):
 def test_the_file_holds_motors_and_springs(run, files, tmp_path):
     robot, law, drives = files
     out = tmp_path / "ff.csv"
-    status, told, _ = run(robot, law, "--drives", drives, "--out", out)
+    status, printed, _ = run(robot, law, "--drives", drives, "--out", out)
     assert status == 0
-    assert "pin" in told
+    assert "pin" in printed
     found = io.read(out)
     t = found["time"].values
     tau = closed_form(t)[:, 0]
@@ -45,19 +45,19 @@ def test_the_file_holds_motors_and_springs(run, files, tmp_path):
     np.testing.assert_allclose(inertia, 1e-4 * 40 * found["pin_motor_acceleration"].values, rtol=0, atol=1e-12)
 
 
-def test_a_broken_limit_is_told_and_the_status_is_1(run, files):
+def test_a_broken_limit_is_reported_and_the_status_is_1(run, files):
     robot, law, drives = files
     drives.write_text(DRIVES % "1 mrad")
-    status, told, _ = run(robot, law, "--drives", drives)
+    status, printed, _ = run(robot, law, "--drives", drives)
     assert status == 1
-    assert "1 of 1 limit broken" in told
-    assert "pin deflection" in told
+    assert "1 of 1 limit broken" in printed
+    assert "pin deflection" in printed
 
 
 def test_json(run, files):
     robot, law, drives = files
-    status, told, _ = run(robot, law, "--drives", drives, "--json")
-    record = json.loads(told)
+    status, printed, _ = run(robot, law, "--drives", drives, "--json")
+    record = json.loads(printed)
     Draft202012Validator(result_schema()).validate(record)
     assert (status, record["command"], record["kept"], record["simulated"]) == (0, "feedforward", True, None)
     assert record["drives"][0]["expansion_errors"] == [0.0, 0.0, 0.0]
@@ -68,7 +68,7 @@ def test_json(run, files):
 
 def test_bad_input(run, files, tmp_path):
     robot, law, drives = files
-    for words, told in (
+    for words, message in (
         ((robot, "--drives", drives), ("trajectory",)),
         ((robot, law), ("--drives",)),
         ((robot, law, "--drives", drives, "--rates", -1), ("--rates", "-1")),
@@ -80,15 +80,15 @@ def test_bad_input(run, files, tmp_path):
     ):
         status, printed, complaint = run(*words)
         assert (status, printed) == (2, "")
-        assert all(word in complaint for word in told), complaint
+        assert all(word in complaint for word in message), complaint
 
 
 @pytest.mark.slow
 def test_it_simulates_and_draws(run, files, tmp_path):
     robot, law, drives = files
     picture = tmp_path / "elastic.png"
-    status, told, _ = run(robot, law, "--drives", drives, "--figure", picture, "--json")
-    (link,) = json.loads(told)["simulated"]
+    status, printed, _ = run(robot, law, "--drives", drives, "--figure", picture, "--json")
+    (link,) = json.loads(printed)["simulated"]
     assert (status, link["name"], link["unit"]) == (0, "pin", "rad")
     assert link["error"] < 1e-12 < 1e-6 < link["error_without_springs"]
     assert picture.stat().st_size > 10_000

@@ -19,9 +19,9 @@ LIMITS = "examples/limits/franka_panda.yaml"
 def test_a_trajectory_that_breaks_limits_comes_back_as_one_that_passes_check(run, tmp_path, options):
     out, figure = tmp_path / "fast.csv", tmp_path / "fast.png"
     given = ("--limits", LIMITS, "--out", out, "--figure", figure, "--json", *options)
-    status, told, _ = run("retime", PANDA, TOO_FAST, *given)
+    status, printed, _ = run("retime", PANDA, TOO_FAST, *given)
     assert status == 0
-    result = json.loads(told)
+    result = json.loads(printed)
     Draft202012Validator(result_schema()["$defs"]["retime"]).validate(result)
     assert result["kept"]
     assert result["before"] == 0.2
@@ -38,18 +38,18 @@ def test_a_load_is_carried_from_retiming_to_the_file_of_a_controller(run, tmp_pa
     pinocchio = pytest.importorskip("pinocchio")
     fast, exported = tmp_path / "fast.csv", tmp_path / "franka.csv"
     asked = ("--limits", LIMITS, "--out", fast, "--payload", "panda_hand=2 kg@30 %:70 %", "--json")
-    status, told, _ = run("retime", PANDA, TOO_FAST, *asked)
+    status, printed, _ = run("retime", PANDA, TOO_FAST, *asked)
     assert status == 0
-    loads = json.loads(told)["loads"]
+    loads = json.loads(printed)["loads"]
     assert [x["masses"] for x in loads] == [{"panda_hand": 2.0}, {"panda_hand": -2.0}]
     carried = ("--payload", f"panda_hand=2 kg@{loads[0]['time']:.12g} s:{loads[1]['time']:.12g} s")
-    status, told, _ = run("check", PANDA, fast, "--limits", LIMITS, *carried, "--json")
-    result = json.loads(told)
+    status, printed, _ = run("check", PANDA, fast, "--limits", LIMITS, *carried, "--json")
+    result = json.loads(printed)
     assert status == 0
     assert [x["time"] for x in result["loads"]] == pytest.approx([x["time"] for x in loads], rel=1e-9)
     rounded = ("--payload", f"panda_hand=2 kg@{loads[0]['time']:.6g} s:{loads[1]['time']:.6g} s")  # as it is printed
-    told = run("check", PANDA, fast, "--limits", LIMITS, *rounded)[1]
-    assert told.count("at rest; torques step there") == 2
+    printed = run("check", PANDA, fast, "--limits", LIMITS, *rounded)[1]
+    assert printed.count("at rest; torques step there") == 2
     assert run("torques", PANDA, fast, *carried, "--out", tmp_path / "torques.csv")[0] == 0
     assert run("export", PANDA, fast, "--format", "franka", "--torques", *carried, "--out", exported)[0] == 0
     rows = np.genfromtxt(exported, delimiter=",", names=True)
@@ -69,14 +69,14 @@ def test_a_load_is_carried_from_retiming_to_the_file_of_a_controller(run, tmp_pa
         state[:, :7] = [[row[f"{q}_{k}"] for k in range(7)] for q in ("q_d", "dq_d", "ddq_d")]
         expected = pinocchio.rnea(own, own.createData(), *state)[:7]
         weight = pinocchio.computeGeneralizedGravity(own, own.createData(), state[0])[:7]
-        told = [row[f"tau_J_d_{k}"] for k in range(7)]  # without gravity, for which the controller provides
-        np.testing.assert_allclose(told, expected - weight, atol=1e-6)
+        printed = [row[f"tau_J_d_{k}"] for k in range(7)]  # without gravity, for which the controller provides
+        np.testing.assert_allclose(printed, expected - weight, atol=1e-6)
         damped = expected + model.damping[:7] * state[1, :7]
         np.testing.assert_allclose(whole[:, round(1000 * row["time"])], damped, atol=1e-6)
     assert steps == pytest.approx(1000 * (loads[1]["time"] - loads[0]["time"]), abs=1)
 
 
-def test_bad_input_is_told(run, tmp_path):
+def test_bad_input_is_reported(run, tmp_path):
     for given, message in (
         ((PANDA,), "a robot needs a path"),
         (("examples/press.yaml",), "--limits"),
@@ -122,8 +122,8 @@ def cart(tmp_path):
 
 def test_a_duration_is_written_in_whole_periods(run, cart, tmp_path):
     out, figure = tmp_path / "slow.csv", tmp_path / "slow.png"
-    status, told, _ = run("retime", *cart, "--duration", "4s", "--out", out, "--figure", figure, "--json")
-    assert (status, json.loads(told)["duration"]) == (0, pytest.approx(4.0, rel=1e-12))
+    status, printed, _ = run("retime", *cart, "--duration", "4s", "--out", out, "--figure", figure, "--json")
+    assert (status, json.loads(printed)["duration"]) == (0, pytest.approx(4.0, rel=1e-12))
     rows = io.read(out)
     assert len(rows["time"]) == 4001
     assert abs(float(rows["slide"].values[-1, 0]) - 2) < 1e-9
@@ -146,8 +146,8 @@ def test_from_a_running_trajectory(run, cart, tmp_path):
     out = tmp_path / "new.csv"
     robot, _, *limits = cart
     asked = (robot, back, *limits, "--running", running, "--at", "1s")
-    status, told, _ = run("retime", *asked, "--duration", "5s", "--out", out, "--json")
-    result = json.loads(told)
+    status, printed, _ = run("retime", *asked, "--duration", "5s", "--out", out, "--json")
+    result = json.loads(printed)
     assert (status, result["kept"]) == (0, True)
     assert "from the running state onto the path" in result["path"]
     rows = io.read(out)["slide"].values
@@ -172,7 +172,7 @@ def test_from_a_running_trajectory(run, cart, tmp_path):
         ("velocity: [-1 N, 2]", "the unit is that of a force"),
     ],
 )
-def test_bad_limits_by_direction_are_told_by_line(run, cart, tmp_path, text, message):
+def test_bad_limits_by_direction_are_reported_by_line(run, cart, tmp_path, text, message):
     (tmp_path / "limits.yaml").write_text(f"joints:\n  slide:\n    {text}\n")
     status, _, error = run("retime", *cart)
     assert status == 2

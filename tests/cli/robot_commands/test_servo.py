@@ -51,11 +51,11 @@ def test_the_last_row_is_the_end_of_the_motion_whatever_the_rate(tmp_path, capsy
 @pytest.mark.slow
 def test_json_is_in_si_and_tells_the_continuity(capsys):
     assert main(["servo", PRESS, "--rate", "100", "--units", "angle=deg", "--json"]) == 0
-    told = json.loads(capsys.readouterr().out)
-    assert told["rate"] == 100.0
-    assert [peak["unit"] for peak in told["peaks"]] == ["rad", "rad/s", "rad/s^2", "rad/s^3"]
-    assert told["laws"][0]["of"] == "ram_y"
-    assert told["laws"][0]["continuous_to"] == 3
+    record = json.loads(capsys.readouterr().out)
+    assert record["rate"] == 100.0
+    assert [peak["unit"] for peak in record["peaks"]] == ["rad", "rad/s", "rad/s^2", "rad/s^3"]
+    assert record["laws"][0]["of"] == "ram_y"
+    assert record["laws"][0]["continuous_to"] == 3
 
 
 @pytest.mark.parametrize(
@@ -69,6 +69,6 @@ def test_json_is_in_si_and_tells_the_continuity(capsys):
         (["--header-units", "--plain-header"], "--plain-header: cannot be given together with --header-units"),
     ],
 )
-def test_what_is_wrong_is_told_with_the_option(capsys, options, words):
+def test_what_is_wrong_is_reported_with_the_option(capsys, options, words):
     assert main(["servo", PRESS, *options]) == 2
     assert words in capsys.readouterr().err

@@ -26,8 +26,8 @@ def run(run, tmp_path):
 def test_a_pendulum_swings_with_its_energy(run, tmp_path):
     out = tmp_path / "motion.csv"
     options = ("--until", "500 ms", "--instants", 6, "--start", "pin=30 deg", "--order", 2, "--out", out, "--json")
-    status, told, _ = run(*options)
-    record = json.loads(told)
+    status, printed, _ = run(*options)
+    record = json.loads(printed)
     Draft202012Validator(result_schema()).validate(record)
     assert (status, record["command"], record["robot"], record["ok"]) == (0, "simulate", "pendulum", True)
     weight = -2 * 9.81 * 0.5
@@ -40,8 +40,8 @@ def test_a_pendulum_swings_with_its_energy(run, tmp_path):
 
 
 def test_torques_by_name(run):
-    status, told, _ = run("--until", "0.1", "--torque", "pin=-9.81*sin(-pin) + 2", "--order", 2, "--json")
-    (peak,) = [x for x in json.loads(told)["peaks"] if x["unit"] == "rad/s^2"]
+    status, printed, _ = run("--until", "0.1", "--torque", "pin=-9.81*sin(-pin) + 2", "--order", 2, "--json")
+    (peak,) = [x for x in json.loads(printed)["peaks"] if x["unit"] == "rad/s^2"]
     assert status == 0
     np.testing.assert_allclose([peak["minimum"], peak["maximum"]], 2 / INERTIA, rtol=1e-9)  # weight is held
 
@@ -59,6 +59,6 @@ def test_torques_by_name(run):
     ],
 )
 def test_bad_input(run, options, says):
-    status, _, told = run(*options)
+    status, _, printed = run(*options)
     assert status == 2
-    assert says in told
+    assert says in printed

@@ -34,7 +34,7 @@ def test_a_log_is_smoothed_written_and_read(tmp_path, capsys):
         assert "--deviation: must be an angle, such as 0.1deg: all joints turn, got '0.1mm'" in capsys.readouterr().err
 
 
-def test_a_smoothed_log_is_told_as_json_and_drawn(tmp_path, capsys):
+def test_a_smoothed_log_is_reported_as_json_and_drawn(tmp_path, capsys):
     times = np.linspace(0, 3, 601)
     u = np.clip(times - 1, 0, 1)
     values = u**4 * (35 - 84 * u + 70 * u**2 - 20 * u**3) + 2e-5 * np.random.default_rng(5).normal(size=601)

@@ -38,10 +38,10 @@ def closed_form(t):
 @pytest.mark.parametrize("suffix", [".csv", ".nc"])
 def test_the_file_holds_torques_and_rates(run, files, tmp_path, suffix):
     out = tmp_path / f"tau{suffix}"
-    status, told, _ = run(*files, "--rates", 1, "--out", out)
+    status, printed, _ = run(*files, "--rates", 1, "--out", out)
     assert status == 0
-    assert "pin" in told
-    assert "torque rate" in told
+    assert "pin" in printed
+    assert "torque rate" in printed
     found = io.read(out)
     np.testing.assert_allclose(found["time"], np.linspace(0, 1, 11), rtol=0, atol=1e-15)
     np.testing.assert_allclose(found["pin"].values, closed_form(found["time"].values), rtol=0, atol=1e-12)
@@ -63,9 +63,9 @@ def test_a_payload_adds_its_weight(run, files, tmp_path):
 
 def test_a_payload_is_carried_for_a_part_of_the_motion(run, files, tmp_path):
     out = tmp_path / "tau.csv"
-    status, told, _ = run(*files, "--rates", 0, "--out", out, "--payload", "tip=3 kg@0.35 s:750 ms")
+    status, printed, _ = run(*files, "--rates", 0, "--out", out, "--payload", "tip=3 kg@0.35 s:750 ms")
     assert status == 0
-    assert "tip carries 3 kg from 0.35 s to 0.75 s" in told
+    assert "tip carries 3 kg from 0.35 s to 0.75 s" in printed
     found = io.read(out)
     t = found["time"].values
     q, a, carried = 0.5 * np.sin(2 * t), -2 * np.sin(2 * t), 3.0 * ((t > 0.35) & (t < 0.75))
@@ -74,8 +74,8 @@ def test_a_payload_is_carried_for_a_part_of_the_motion(run, files, tmp_path):
 
 
 def test_json(run, files):
-    status, told, _ = run(*files, "--json")
-    record = json.loads(told)
+    status, printed, _ = run(*files, "--json")
+    record = json.loads(printed)
     Draft202012Validator(result_schema()).validate(record)
     assert (status, record["command"], record["rates"], record["held"]) == (0, "torques", 2, [])
     first = record["peaks"][0]
@@ -93,8 +93,8 @@ def test_json(run, files):
     ],
 )
 def test_bad_options(run, files, change, words):
-    status, told, complaint = run(*files, *change)
-    assert (status, told) == (2, "")
+    status, printed, complaint = run(*files, *change)
+    assert (status, printed) == (2, "")
     assert all(word in complaint for word in words)
 
 

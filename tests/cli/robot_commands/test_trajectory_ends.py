@@ -35,7 +35,7 @@ def result(command, text):
     return found
 
 
-def test_a_jump_from_rest_is_told_and_not_kept_unless_it_is_handed_over(run, files):
+def test_a_jump_from_rest_is_reported_and_not_kept_unless_it_is_handed_over(run, files):
     status, out, _ = run("check", *files)
     assert status == 1
     assert "all limits kept" not in out.lower()
@@ -46,38 +46,38 @@ def test_a_jump_from_rest_is_told_and_not_kept_unless_it_is_handed_over(run, fil
     assert status == 0
     assert STARTS in out
     status, out, _ = run("check", *files, "--json")
-    told = result("check", out)
-    assert (status, told["kept"], told["broken"], told["hand_over"]) == (1, False, 0, False)
-    start = told["ends"][0]
+    record = result("check", out)
+    assert (status, record["kept"], record["broken"], record["hand_over"]) == (1, False, 0, False)
+    start = record["ends"][0]
     assert (start["at_rest"], start["velocities"]) == (False, {"pin": pytest.approx(0.8)})
     assert start["breaks"] == [{"name": "pin", "quantity": "torque"}]
-    assert told["between"]["words"] == ALONE
+    assert record["between"]["words"] == ALONE
 
 
 def test_torques_and_exports_tell_the_same(run, files, tmp_path):
     _, out, _ = run("torques", *files)
     assert all(line in out for line in (ALONE, STARTS, STOPS))
     _, text, _ = run("torques", *files, "--json")
-    told = result("torques", text)
-    assert told["ends"][1]["velocities"] == {"pin": pytest.approx(0.8)}
-    assert told["between"]["words"] == ALONE
+    record = result("torques", text)
+    assert record["ends"][1]["velocities"] == {"pin": pytest.approx(0.8)}
+    assert record["between"]["words"] == ALONE
     _, out, _ = run("export", *files, "--format", "ros", "--out", tmp_path / "out.yaml")
     assert all(line in out for line in (ALONE, STARTS, STOPS))
 
 
-def test_how_far_splines_are_from_straight_lines_is_told(run, files, tmp_path):
+def test_how_far_splines_are_from_straight_lines_is_reported(run, files, tmp_path):
     few = tmp_path / "few.csv"
     few.write_text("time,pin\n" + "".join(f"{t},{x}\n" for t, x in enumerate([0, 0, 0, 0.5, 0.5, 0.5])))
     _, text, _ = run("check", files[0], few, "--json")
-    told = json.loads(text)["between"]
+    record = json.loads(text)["between"]
     t = np.linspace(0, 5, 20001)
     q = np.polyval(np.polyfit(np.arange(6), [0, 0, 0, 0.5, 0.5, 0.5], 5), t)
-    assert told["deviation"] == pytest.approx(max(-q.min(), q.max() - 0.5), rel=1e-2)
+    assert record["deviation"] == pytest.approx(max(-q.min(), q.max() - 0.5), rel=1e-2)
     _, out, _ = run("check", files[0], few)
-    assert f"at most {told['deviation']:.2g} rad or m from straight lines, pin" in out
+    assert f"at most {record['deviation']:.2g} rad or m from straight lines, pin" in out
 
 
-def test_a_path_of_samples_keeps_its_deviation_and_what_is_told_as_kept_is_kept(run, files, tmp_path):
+def test_a_path_of_samples_keeps_its_deviation_and_what_is_reported_as_kept_is_kept(run, files, tmp_path):
     limits, given, out = tmp_path / "limits.yaml", tmp_path / "dwells.csv", tmp_path / "fast.csv"
     limits.write_text("joints: {pin: {velocity: 2, acceleration: 10, jerk: 500}}")
     t = np.linspace(0.0, 4.0, 201)
@@ -87,10 +87,10 @@ def test_a_path_of_samples_keeps_its_deviation_and_what_is_told_as_kept_is_kept(
     status, text, _ = run(
         "retime", files[0], given, "--limits", limits, "--out", out, "--deviation", "0.02deg", "--json"
     )
-    told = result("retime", text)
-    assert (status, told["kept"]) == (0, True)
-    assert told["deviation"] <= told["deviation_allowed"] == pytest.approx(np.radians(0.02))
-    assert told["path"].startswith("within 0.000349 rad or m of each of 201 samples")
+    record = result("retime", text)
+    assert (status, record["kept"]) == (0, True)
+    assert record["deviation"] <= record["deviation_allowed"] == pytest.approx(np.radians(0.02))
+    assert record["path"].startswith("within 0.000349 rad or m of each of 201 samples")
     q = np.loadtxt(out, delimiter=",", skiprows=1)[:, 1]
     assert (q[0], q[-1]) == (pytest.approx(0.0, abs=1e-12), pytest.approx(0.9, abs=1e-12))
     assert (np.diff(q) >= -1e-12).all()
@@ -100,7 +100,7 @@ def test_a_path_of_samples_keeps_its_deviation_and_what_is_told_as_kept_is_kept(
 @pytest.mark.parametrize(
     "text, words", [("0", "greater than zero"), ("3 s", "an angle or a length"), ("x", "--deviation")]
 )
-def test_a_deviation_that_is_none_is_told(run, files, text, words):
+def test_a_deviation_that_is_none_is_reported(run, files, text, words):
     status, _, error = run("retime", *files, "--deviation", text)
     assert status == 2
     assert words in error

@@ -27,11 +27,11 @@ def test_conditions_are_read_with_units(text, sides):
     found = parsed_relations(text)
     assert [relation.equal for relation in found] == [equal for *_, equal in sides]
     for relation, (left, right, _) in zip(found, sides, strict=True):
-        for node, wanted in ((relation.left, left), (relation.right, right)):
-            if isinstance(wanted, str):
-                assert node.text == wanted
-            elif wanted is not None:
-                assert node.word == pytest.approx(wanted, rel=1e-15)
+        for node, expected in ((relation.left, left), (relation.right, right)):
+            if isinstance(expected, str):
+                assert node.text == expected
+            elif expected is not None:
+                assert node.word == pytest.approx(expected, rel=1e-15)
 
 
 def test_of_a_lower_bound_the_sides_are_turned():
@@ -64,7 +64,7 @@ def test_of_a_lower_bound_the_sides_are_turned():
         ("__import__('os')", [], ExpressionError, "a string is not allowed|unknown function"),
     ],
 )
-def test_what_cannot_be_read_is_told_before_anything_is_solved(minimize, subject_to, kind, words):
+def test_what_cannot_be_read_is_reported_before_anything_is_solved(minimize, subject_to, kind, words):
     with pytest.raises(kind, match=words):
         jn.optimize(FOUR_BAR, minimize, LENGTHS, subject_to)
 

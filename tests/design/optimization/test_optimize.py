@@ -82,7 +82,7 @@ def test_a_condition_is_kept_and_its_multiplier_is_the_slope_of_the_optimum():
 
 
 @pytest.mark.slow
-def test_conditions_that_cannot_be_met_are_told_with_how_far_they_are():
+def test_conditions_that_cannot_be_met_are_reported_with_how_far_they_are():
     with pytest.raises(jn.errors.DesignError, match=r"'at\(angle, 1, 1\) == 12': .*9 .* 12, .*3 ") as error:
         jn.optimize(CRANK, "mean(angle**2)", CUBIC, ["at(angle, 1, 1) == 12"], starts=1, iterations=4)
     assert error.value.design.status == "infeasible"
@@ -210,8 +210,8 @@ def test_designs_that_lock_are_kept_away_from(four_bar):
     assert found.success
     assert found.smallest_singular_value > 0.01
     assert "cannot be assembled, or lock" in found.notes[0]
-    alone = jn.solve(four_bar.with_parameters(**found.parameters), np.linspace(0.0, 2.0, 4001))
-    sampled = np.abs(alone.outputs["psi"][:, 4]).max()  # the peak lies between two of the instants
+    single = jn.solve(four_bar.with_parameters(**found.parameters), np.linspace(0.0, 2.0, 4001))
+    sampled = np.abs(single.outputs["psi"][:, 4]).max()  # the peak lies between two of the instants
     assert found.objective * (1 - 1e-5) < sampled < found.objective * (1 + 1e-9)
     for change in (-1e-4, 1e-4):
         other = jn.solve(four_bar.with_parameters(BC=found.parameters["BC"] + change), np.linspace(0.0, 2.0, 4001))
@@ -221,7 +221,7 @@ def test_designs_that_lock_are_kept_away_from(four_bar):
 
 
 @pytest.mark.slow
-def test_where_friction_locks_in_all_designs_that_is_what_is_told():
+def test_where_friction_locks_in_all_designs_that_is_what_is_reported():
     words = r"friction locks in all 2 designs .*joints\.wall\.friction: friction locks at t = 0 s.*smaller coefficient"
     made, bounds = ladder().with_parameters(mu=2.5), {"mu": (2.0, 3.0)}
     with pytest.raises(jn.errors.DesignError, match=words):

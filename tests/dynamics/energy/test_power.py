@@ -38,9 +38,9 @@ def test_power_that_grows_evenly_balances_at_every_order(share):
     balance = jn.energy.power_balance(jn.solve(disc(share), TIME, order=6))
     assert (abs(balance["residual"]) <= 1e-14 * balance["scale"]).all()
     acceleration = -share * 9.81 * math.sin(SLOPE) * 2 / 3
-    wanted = 1.5 * MASS * acceleration**2 * TIME  # of kinetic energy: 3/4 m v^2
-    np.testing.assert_allclose(balance["kinetic"][:, 0], wanted, rtol=1e-14)
-    np.testing.assert_allclose(balance["kinetic"][:, 1], wanted[2], rtol=1e-13)
+    expected = 1.5 * MASS * acceleration**2 * TIME  # of kinetic energy: 3/4 m v^2
+    np.testing.assert_allclose(balance["kinetic"][:, 0], expected, rtol=1e-14)
+    np.testing.assert_allclose(balance["kinetic"][:, 1], expected[2], rtol=1e-13)
 
 
 @pytest.mark.slow

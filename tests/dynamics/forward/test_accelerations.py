@@ -43,12 +43,12 @@ def derivatives(coefficients):
     return coefficients * factorial(orders)
 
 
-def close(found, wanted, tolerance):
+def close(found, expected, tolerance):
     """Assert that derivatives agree, order first, by the size of each order, or of its neighbors where it vanishes."""
-    found, wanted = (np.asarray(x, float).reshape(len(x), -1) for x in (found, wanted))
-    size = np.max(np.abs(wanted), axis=1)
+    found, expected = (np.asarray(x, float).reshape(len(x), -1) for x in (found, expected))
+    size = np.max(np.abs(expected), axis=1)
     growth = np.maximum.accumulate(size)  # derivatives grow from order to order
-    errors = np.max(np.abs(found - wanted), axis=1) / growth
+    errors = np.max(np.abs(found - expected), axis=1) / growth
     assert np.max(errors) < tolerance, errors
 
 
@@ -60,10 +60,10 @@ def test_double_pendulum_at_random_states(seed):
     with mp.workdps(40):
         quarter = mp.pi / 2
         problem = mp_benchmarks.double_pendulum().start(0, (a + quarter, b + quarter), (u, v)).solve(8)
-        wanted = np.array(problem.derivatives(*problem.q), float).T
-    wanted[0] -= np.pi / 2
-    close(derivatives(found.state.attitude[:, 0, :, 0]), wanted, 2e-14)
-    close(derivatives(found.state.spin[:-1, 0, :, 0]), wanted[1:], 2e-14)
+        expected = np.array(problem.derivatives(*problem.q), float).T
+    expected[0] -= np.pi / 2
+    close(derivatives(found.state.attitude[:, 0, :, 0]), expected, 2e-14)
+    close(derivatives(found.state.spin[:-1, 0, :, 0]), expected[1:], 2e-14)
 
 
 def swinging_plates(values):
@@ -105,10 +105,10 @@ def test_multipliers_and_rates_in_the_plane():
         guess = [*first.at(*state[0][:, 0], a), *second.at(*state[0][:, 1], b)]
         position, velocity = problem.consistent(guess, [0, 0, u, 0, 0, v], fixed=(2, 5))
         problem.start(0, position, velocity).solve(7)
-        wanted = np.array(problem.derivatives(*problem.multipliers), float).T
+        expected = np.array(problem.derivatives(*problem.multipliers), float).T
         angles = np.array(problem.derivatives(first.angle, second.angle), float).T
     # rows stand group by group: x of both pins, then y of both
-    close(true_multipliers(ready, found)[:, [0, 2, 1, 3]], wanted[:6], 2e-13)
+    close(true_multipliers(ready, found)[:, [0, 2, 1, 3]], expected[:6], 2e-13)
     close(derivatives(found.state.attitude[:, 0, :, 0]), angles[:7], 2e-13)
 
 
@@ -146,9 +146,9 @@ def test_multipliers_and_rates_in_space():
         place, velocity = (rotated(e, x) for x in (arm, crossed(w, arm)))
         position = [mp.mpf(x) + r for x, r in zip(("0.1", "0.2", "0.3"), place, strict=True)]
         problem.start(0, [*position, *e], [*velocity, *rate]).solve(7)
-        wanted = np.array(problem.derivatives(*problem.multipliers[1:]), float).T
+        expected = np.array(problem.derivatives(*problem.multipliers[1:]), float).T
         quaternion = np.array(problem.derivatives(*body.coordinates[3:]), float).T
-    close(true_multipliers(ready, found), wanted[:6], 5e-13)  # 1.3e-13 measured, from small moments of inertia
+    close(true_multipliers(ready, found), expected[:6], 5e-13)  # 1.3e-13 measured, from small moments of inertia
     close(derivatives(found.state.attitude[..., 0, 0]), quaternion[:7], 1e-13)
 
 
@@ -175,9 +175,9 @@ def test_spatial_double_pendulum_at_a_random_state():
     with mp.workdps(40):
         problem, tip = mp_benchmarks.spatial_double_pendulum()
         problem.start(0, [mp.mpf(str(x)) for x in angles], [mp.mpf(str(x)) for x in rates]).solve(4)
-        wanted = np.array(problem.derivatives(*problem.q), float)
+        expected = np.array(problem.derivatives(*problem.q), float)
         place = np.array(problem.derivatives(*tip), float).T
-    for name, values in zip(("first", "second"), wanted, strict=True):
+    for name, values in zip(("first", "second"), expected, strict=True):
         close(motion.outputs[name][0], values, 1e-13)
     close(motion.outputs["tip"][0], place, 1e-13)
     acceleration, jerk = pinocchio_rates(angles, rates)
@@ -213,7 +213,7 @@ def test_inverse_after_forward_returns_the_applied_torque_and_its_rates():
         forces={"motor": forces.Torque(bodies, "2.5*sin(7*t + 0.4)")},
         initial={"start": drivers.CoordinateDriver(bodies, "angle", "1 + 3*t")},
     )
-    wanted = [2.5 * 7**k * np.sin(0.4 + k * np.pi / 2) for k in range(order - 1)]
+    expected = [2.5 * 7**k * np.sin(0.4 + k * np.pi / 2) for k in range(order - 1)]
     moved = jn.simulate(free, [0.0], order=order).outputs["crank"][0]
     names = [f"c{k}" for k in range(order + 1)]
     series = " + ".join(f"{name}*t**{k}" for k, name in enumerate(names))
@@ -221,8 +221,8 @@ def test_inverse_after_forward_returns_the_applied_torque_and_its_rates():
     driver = drivers.CoordinateDriver(bodies, "angle", law)
     driven = dataclasses.replace(free, forces={}, initial={}, drivers={"motor": driver})
     found = np.asarray(jn.driver_force(jn.solve(driven, [0.0], order=order), "motor"))[0]
-    for k, (value, exact) in enumerate(zip(found, wanted, strict=True)):
-        assert abs(value - exact) < 1e-11 * max(abs(exact), abs(wanted[max(k - 1, 0)])), k
+    for k, (value, exact) in enumerate(zip(found, expected, strict=True)):
+        assert abs(value - exact) < 1e-11 * max(abs(exact), abs(expected[max(k - 1, 0)])), k
 
 
 @pytest.mark.slow
@@ -264,8 +264,8 @@ def test_lanes_of_a_batch_are_runs_of_their_own():
     single = [expansion(dynamics.double_pendulum(a, -a, 1.0, a), 6) for a in (0.2, 0.9, 2.0)]
     states = State(*(np.concatenate(parts, axis=-1) for parts in zip(*(r.state for r, _ in single), strict=True)))
     together = expanded(single[0][0].equations, states, np.zeros((1, 3)), order=6)
-    for lane, (_, alone) in enumerate(single):
-        for a, b in zip(jax.tree.leaves(alone), jax.tree.leaves(together), strict=True):
+    for lane, (_, one) in enumerate(single):
+        for a, b in zip(jax.tree.leaves(one), jax.tree.leaves(together), strict=True):
             assert np.allclose(a[..., 0], b[..., lane], rtol=1e-13, atol=1e-13 * np.abs(a).max())
 
 

@@ -94,8 +94,8 @@ def test_velocities_left_open_are_those_of_least_kinetic_energy():
     )
     spin = consistent_start(rods, 0.0).state.spin[0, :, 0]
     mass = np.array([[0.5 + 2 * 0.25 + 1.0, 0.5], [0.5, 0.2 + 0.25]])
-    wanted = np.linalg.solve(mass, [1.0, 1.0])
-    assert np.allclose(spin, 3.0 * wanted / wanted.sum(), rtol=1e-13)
+    expected = np.linalg.solve(mass, [1.0, 1.0])
+    assert np.allclose(spin, 3.0 * expected / expected.sum(), rtol=1e-13)
 
 
 def two_rods(**initial):
@@ -123,8 +123,8 @@ def test_a_speed_in_the_limit_of_a_reach_is_refused():
     refused(jn.errors.MobilityError, words, two_rods(r=reach("1.8")))
     near = consistent_start(two_rods(r=reach("1.8 - 1e-8 - 0.3*t")), 0.0).state
     bend = np.sqrt(2e-8 * 1.8 / 0.8)  # 1.8^2 - r^2 = 2 * 0.8 (1 - cos bend)
-    wanted = 0.3 * 1.8 / (0.8 * np.sin(bend))
-    assert abs(near.spin[0, 1, 0] - near.spin[0, 0, 0]) == pytest.approx(wanted, rel=1e-6)
+    expected = 0.3 * 1.8 / (0.8 * np.sin(bend))
+    assert abs(near.spin[0, 1, 0] - near.spin[0, 0, 0]) == pytest.approx(expected, rel=1e-6)
 
 
 def refused(kind, words, mechanism):
@@ -280,7 +280,7 @@ def test_options_are_checked_before_any_computing(keywords, words, monkeypatch):
 
 
 @pytest.mark.slow
-def test_gears_of_a_high_ratio_start_at_the_rates_told():
+def test_gears_of_a_high_ratio_start_at_the_given_rates():
     pin, ratio = jn.planar.Revolute, 1e7
     mechanism = jn.Mechanism(
         space="planar",

@@ -83,8 +83,8 @@ def test_products_through_fronts_are_those_with_the_inverse_of_the_whole_matrix(
 def test_expansions_are_those_of_dense_elimination(name, monkeypatch):
     start = start_in_fronts(name, monkeypatch)
     dense = dataclasses.replace(start.equations, saddle=None)
-    found, wanted = (expanded(e, start.state, CLOCK, order=4) for e in (start.equations, dense))
-    for x, y in zip(jax.tree.leaves(found), jax.tree.leaves(wanted), strict=True):
+    found, expected = (expanded(e, start.state, CLOCK, order=4) for e in (start.equations, dense))
+    for x, y in zip(jax.tree.leaves(found), jax.tree.leaves(expected), strict=True):
         np.testing.assert_allclose(x, y, atol=1e-11 * max(1.0, np.abs(y).max()))
 
 

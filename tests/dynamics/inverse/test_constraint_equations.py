@@ -183,13 +183,13 @@ def test_a_state_of_a_motion_has_the_equations_of_the_motion(linkage_motion):
     still = jn.constraint_equations(LINKAGE, state, 0.5)
     assert list(still.right_side.derivative.values) == list(range(9))
     for name in ("residual", "jacobian", "right_side", "velocities", "position", "angle", "mass_matrix", "multipliers"):
-        wanted, found = moving[name], still[name]
-        if "derivative" in wanted.dims:
+        expected, found = moving[name], still[name]
+        if "derivative" in expected.dims:
             count = 5 if name == "multipliers" else 7
             some = range(count) if name == "multipliers" else range(1, count + 1)
-            wanted, found = wanted.sel(derivative=some), found.sel(derivative=some)
-        scale = 1 + np.abs(wanted).max().item()
-        np.testing.assert_allclose(found.values, wanted.values, rtol=0, atol=1e-12 * scale, err_msg=name)
+            expected, found = expected.sel(derivative=some), found.sel(derivative=some)
+        scale = 1 + np.abs(expected).max().item()
+        np.testing.assert_allclose(found.values, expected.values, rtol=0, atol=1e-12 * scale, err_msg=name)
 
 
 @pytest.mark.slow

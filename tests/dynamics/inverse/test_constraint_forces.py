@@ -87,8 +87,8 @@ def test_slopes_do_not_depend_on_the_laws_that_are_left_out(case):
         return slopes(group.element, poses, Jet.variable(np.full((1, 1), 0.3), 3), slot)
 
     for slot in range(len(group.bodies)):
-        found, wanted = slope(bare, slot), slope(group, slot)
-        np.testing.assert_allclose(found, wanted, rtol=1e-14, atol=1e-14 * np.abs(wanted).max())
+        found, expected = slope(bare, slot), slope(group, slot)
+        np.testing.assert_allclose(found, expected, rtol=1e-14, atol=1e-14 * np.abs(expected).max())
 
 
 class Stretched(jn.drivers.CoordinateDriver):
@@ -105,8 +105,8 @@ def test_a_law_that_slopes_may_depend_on_is_kept():
     driver = plain.drivers["turn"]
     own = dataclasses.replace(plain, drivers={"turn": Stretched(driver.bodies, driver.coordinate, driver.motion)})
     time = np.linspace(0.0, 1.0, 5)
-    found, wanted = (jn.driver_force(jn.solve(mechanism, time), "turn").values for mechanism in (own, plain))
-    np.testing.assert_allclose(found, wanted, rtol=1e-12, atol=1e-12 * np.abs(wanted).max())
+    found, expected = (jn.driver_force(jn.solve(mechanism, time), "turn").values for mechanism in (own, plain))
+    np.testing.assert_allclose(found, expected, rtol=1e-12, atol=1e-12 * np.abs(expected).max())
 
 
 class Renamed(jn.drivers.DistanceDriver):

@@ -28,16 +28,16 @@ def both_ways(motion, monkeypatch):
     assert called
     called.clear()
     monkeypatch.setenv("JOUNCE_NATIVE", "0")
-    wanted = MotionForces(motion).multipliers
+    expected = MotionForces(motion).multipliers
     assert not called
-    return found, wanted
+    return found, expected
 
 
-def agree(found, wanted, tolerance=1e-12):
-    assert found.shape == wanted.shape
-    assert np.abs(wanted).max() > 0
-    scale = 1e-300 + np.abs(wanted).max(axis=(1, 2), keepdims=True)  # of each derivative
-    np.testing.assert_allclose(found / scale, wanted / scale, rtol=0, atol=tolerance)
+def agree(found, expected, tolerance=1e-12):
+    assert found.shape == expected.shape
+    assert np.abs(expected).max() > 0
+    scale = 1e-300 + np.abs(expected).max(axis=(1, 2), keepdims=True)  # of each derivative
+    np.testing.assert_allclose(found / scale, expected / scale, rtol=0, atol=tolerance)
 
 
 def turning_door():
@@ -68,8 +68,8 @@ def test_multipliers_of_driven_mechanisms(name, monkeypatch):
 
 @pytest.mark.slow
 def test_angles_with_their_turns(monkeypatch):
-    found, wanted = both_ways(jn.solve(turning_door()), monkeypatch)
-    agree(found, wanted)
+    found, expected = both_ways(jn.solve(turning_door()), monkeypatch)
+    agree(found, expected)
     spring = 3.0 * 9.0 * np.sin(np.linspace(0.0, 1.5, 40))  # N m, beyond one turn
     assert np.abs(spring).max() > 6 * np.pi
 

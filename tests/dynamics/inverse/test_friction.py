@@ -35,9 +35,9 @@ def slider_crank(mu=None, *, speed=0.02, outputs=None):
 @pytest.mark.parametrize("instant", [0.033, 0.21])
 def test_driver_torque_and_rates_against_balances_by_hand(instant):
     motion = jn.solve(slider_crank(0.1), [instant], order=4)
-    found, wanted = motion.outputs["torque"][0], by_hand.driver_torque(instant, 4)
-    scale = np.maximum(np.abs(wanted), np.abs(wanted[0]) * 20.0 ** np.arange(5))
-    np.testing.assert_array_less(np.abs(found - wanted) / scale, 1e-10)
+    found, expected = motion.outputs["torque"][0], by_hand.driver_torque(instant, 4)
+    scale = np.maximum(np.abs(expected), np.abs(expected[0]) * 20.0 ** np.arange(5))
+    np.testing.assert_array_less(np.abs(found - expected) / scale, 1e-10)
 
 
 @pytest.mark.slow
@@ -115,7 +115,7 @@ def test_a_wedge_needs_the_force_of_the_closed_form(mu):
 
 
 @pytest.mark.parametrize("mu", [2.0, 2.5, 40.0])
-def test_friction_that_locks_is_told(mu):
+def test_friction_that_locks_is_reported(mu):
     with pytest.raises(jn.errors.SolveError, match=r"friction locks at t = 0 s: no force of the drivers"):
         _ = jn.solve(wedge(mu), [0.0, 1.0], order=1).outputs["force"]
 
@@ -216,8 +216,8 @@ def test_a_ball_and_a_sleeve_resist_along_their_slip():
                 size = mp.sqrt(slip[0] ** 2 + slip[1] ** 2)
                 return 0.2 * 20 * mp.tanh(size / 0.5) * slip[part] / size
 
-            wanted = {"turn": turn, "roll": lambda t: 0.05 * sleeve(t, 1), "push": lambda t: 0.4 + sleeve(t, 0)}
-            for name, law in wanted.items():
+            expected = {"turn": turn, "roll": lambda t: 0.05 * sleeve(t, 1), "push": lambda t: 0.4 + sleeve(t, 0)}
+            for name, law in expected.items():
                 rates = [float(x) for x in mp.diffs(law, mp.mpf(t), 2)]
                 np.testing.assert_allclose(found[name][k], rates, rtol=1e-12, atol=1e-12, err_msg=name)
 
@@ -250,9 +250,9 @@ def test_designs_and_instants_whose_friction_locks_fail_alone_with_their_status(
     expected = np.where(slope > mu[:, None], -30.0 / (slope - mu[:, None]), np.nan)
     np.testing.assert_allclose(found["force"][..., 0], expected, rtol=1e-10)
     motion = jn.solve(made.with_parameters(mu=1.0), time, order=2)
-    with pytest.raises(jn.errors.SolveError, match="friction locks at t = 0 s") as told:
+    with pytest.raises(jn.errors.SolveError, match="friction locks at t = 0 s") as caught:
         motion.outputs["force"]
-    assert (told.value.status, told.value.motion.status.tolist()) == (12, [12, 12, 0])
+    assert (caught.value.status, caught.value.motion.status.tolist()) == (12, [12, 12, 0])
 
 
 def test_a_sweep_keeps_which_designs_lock_and_the_statistics_of_the_others(tmp_path):

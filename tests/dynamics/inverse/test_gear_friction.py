@@ -51,8 +51,8 @@ def test_power_that_leaves_is_power_that_enters_times_the_efficiency(kind):
         moment = 3.0 * 9.81 * (-0.02 * np.cos(angle) - 0.05 * np.sin(angle))  # of the weight of the second
         power = (load - moment) * ratio * speed  # that the load puts in
         own = 1.0 * 9.81 * (0.03 * np.cos(first) - 0.01 * np.sin(first)) * speed
-        wanted = np.where(power < 0, -power / 0.9, -power * 0.8) + own
-        np.testing.assert_allclose(motion.outputs["torque"][:, 0] * speed, wanted, rtol=1e-12)
+        expected = np.where(power < 0, -power / 0.9, -power * 0.8) + own
+        np.testing.assert_allclose(motion.outputs["torque"][:, 0] * speed, expected, rtol=1e-12)
 
 
 @pytest.mark.slow
@@ -62,9 +62,9 @@ def test_torque_and_rates_against_balances_by_hand(instant, kind):
     friction = jn.joints.GearFriction(speed=2.0, efficiency=0.9, backward=0.7)  # rates have a share of the smoothing
     motion = jn.solve(pair(by_hand.LAW, "-4 + 6*sin(5*t)", friction, ring=kind == "ring"), [instant], order=4)
     found = motion.outputs["torque"][0]
-    wanted = by_hand.driver_torque(mpf(instant), 4, ring=kind == "ring")
-    scale = np.maximum(np.abs(wanted), np.abs(wanted[0]) * 9.0 ** np.arange(5))
-    np.testing.assert_array_less(np.abs(found - wanted) / scale, 1e-10)
+    expected = by_hand.driver_torque(mpf(instant), 4, ring=kind == "ring")
+    scale = np.maximum(np.abs(expected), np.abs(expected[0]) * 9.0 ** np.arange(5))
+    np.testing.assert_array_less(np.abs(found - expected) / scale, 1e-10)
 
 
 @pytest.mark.parametrize("forward, backward", [(1.0, 0.8), (0.9, 1.0), (1.0, 1.0)])
@@ -137,8 +137,8 @@ def test_a_pinion_drives_its_rack_and_is_driven_by_it_with_their_efficiencies():
         rate = motion.outputs["place"][1, 1, 0]
         assert abs(rate) == pytest.approx(0.15)
         power = load * rate  # that the load puts in
-        wanted = np.where(power < 0, -power / 0.95, -power * 0.85)
-        np.testing.assert_allclose(motion.outputs["torque"][:, 0] * speed, wanted, rtol=1e-12)
+        expected = np.where(power < 0, -power / 0.95, -power * 0.85)
+        np.testing.assert_allclose(motion.outputs["torque"][:, 0] * speed, expected, rtol=1e-12)
         whole = sum(jn.joint_reaction(motion, name, "ground").force.values for name in ("axle", "guide"))
         np.testing.assert_allclose(whole[:, 0], [[load, 0.0]] * 2, atol=1e-11)
 
@@ -165,8 +165,8 @@ def test_a_pinion_in_space_drives_its_rack_and_is_driven_by_it_with_their_effici
         rate = motion.outputs["place"][1, 1, 0]
         assert abs(rate) == pytest.approx(0.15)
         power = load * rate  # that the load puts in
-        wanted = np.where(power < 0, -power / 0.95, -power * 0.85)
-        np.testing.assert_allclose(motion.outputs["torque"][:, 0] * speed, wanted, rtol=1e-11)
+        expected = np.where(power < 0, -power / 0.95, -power * 0.85)
+        np.testing.assert_allclose(motion.outputs["torque"][:, 0] * speed, expected, rtol=1e-11)
 
 
 BASIC = [(0.97, 0.95), (1.0, 0.9), (0.6, 0.7)]
@@ -223,10 +223,10 @@ def torques_of_mueller(basic, fixed, driven, load, speed=3.0, sun=0.03, planet=0
 def test_a_planetary_train_has_the_efficiency_of_mueller(fixed, driven):
     train = planetary(fixed, driven)
     for (one, two), load in itertools.product(BASIC, (5.0, -5.0)):
-        wanted = torques_of_mueller(one * two, fixed, driven, load)
+        expected = torques_of_mueller(one * two, fixed, driven, load)
         found = jn.solve(train.with_parameters(one=one, two=two, load=load), [0.0, 0.3], order=1).outputs
         for name in (fixed, driven):
-            np.testing.assert_allclose(found[name][:, 0], wanted[name], rtol=1e-12)
+            np.testing.assert_allclose(found[name][:, 0], expected[name], rtol=1e-12)
 
 
 def worm(law, load, friction, *, drives="screw", ratio="1/30", frame="ground", **values):
@@ -285,9 +285,9 @@ def test_a_wheel_drives_its_worm():
 @pytest.mark.slow
 def test_a_wheel_locks_on_a_worm_whose_friction_exceeds_its_lead():
     mechanism = worm("2*t", "-0.5", friction_of_worm(0.12), drives="wheel")
-    with pytest.raises(jn.errors.SolveError, match=r"friction locks at t = 0 s") as told:
+    with pytest.raises(jn.errors.SolveError, match=r"friction locks at t = 0 s") as caught:
         _ = jn.solve(mechanism, [0.0, 0.7], order=1).outputs["torque"]
-    assert "mesh.friction" in str(told.value)
+    assert "mesh.friction" in str(caught.value)
 
 
 @pytest.mark.slow
@@ -395,6 +395,6 @@ def test_a_gear_has_friction_of_gears_and_a_pin_that_of_pins():
 def test_the_efficiency_of_a_worm_in_many_digits():
     with mp.workdps(30):
         rise, angle = mp.atan(mpf("0.1")), mp.atan(mpf("0.07") / mp.cos(mpf("0.35")))
-        wanted = mp.tan(rise) / mp.tan(rise + angle), mp.tan(rise - angle) / mp.tan(rise)
+        expected = mp.tan(rise) / mp.tan(rise + angle), mp.tan(rise - angle) / mp.tan(rise)
     found = friction_of_worm(0.07, pressure_angle=0.35).efficiencies
-    np.testing.assert_allclose(np.array(found, float), np.array(wanted, float), rtol=1e-13)
+    np.testing.assert_allclose(np.array(found, float), np.array(expected, float), rtol=1e-13)

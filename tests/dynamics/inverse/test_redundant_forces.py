@@ -43,8 +43,8 @@ def test_what_two_hinges_share_has_no_unique_reaction():
     for force, torque in zip(*[iter(of_both(motion))] * 2, strict=True):
         assert np.isnan(force).all()
         np.testing.assert_array_equal(np.isnan(torque), [[True, True, False]] * 2)
-    told = jn.joint_reaction(motion, "upper").force.attrs["comment"]
-    assert told.startswith("not unique, as constraints are redundant: joint upper repeats 5 equations of lower")
+    comment = jn.joint_reaction(motion, "upper").force.attrs["comment"]
+    assert comment.startswith("not unique, as constraints are redundant: joint upper repeats 5 equations of lower")
     torque = jn.driver_force(motion, "turn")
     assert "comment" not in torque.attrs
     inertia = 0.3 + MASS * 0.25
@@ -75,8 +75,8 @@ def test_elastic_hinges_share_the_weight_by_their_stiffness(share):
     chosen = dict(zip(("lower", "upper"), stiffness, strict=True))
     motion = jn.solve(door(law="0*t", redundant_reactions=chosen), TIMES, order=2)
     found = np.concatenate([x[0] for x in of_both(motion)])[ACROSS]
-    wanted = shared(np.concatenate([[x["force"]] * 3 + [x["torque"]] * 2 for x in stiffness]))
-    np.testing.assert_allclose(found, wanted, atol=1e-10 * MASS * GRAVITY)
+    expected = shared(np.concatenate([[x["force"]] * 3 + [x["torque"]] * 2 for x in stiffness]))
+    np.testing.assert_allclose(found, expected, atol=1e-10 * MASS * GRAVITY)
     assert found[7] == pytest.approx(share * MASS * GRAVITY)  # springs side by side
     asked = jn.joint_reaction(jn.solve(door(law="0*t"), TIMES, order=2), "upper", redundant=chosen)
     np.testing.assert_array_equal(asked.force.values[0, 0], found[5:8])
@@ -89,7 +89,7 @@ def test_stiffnesses_that_decide_nothing_are_refused():
 
 
 @pytest.mark.parametrize(
-    "wanted, message",
+    "choice, message",
     [
         ("all", "redundant_reactions: must be one of unique, least_norm, or stiffnesses"),
         ({}, "must name a joint"),
@@ -98,9 +98,9 @@ def test_stiffnesses_that_decide_nothing_are_refused():
         ({"lower": {"bend": 1.0}}, "must be the stiffness of the joint"),
     ],
 )
-def test_bad_choices_are_refused(wanted, message):
+def test_bad_choices_are_refused(choice, message):
     with pytest.raises(jn.errors.MechanismError, match=message):
-        door(redundant_reactions=wanted)
+        door(redundant_reactions=choice)
 
 
 @pytest.mark.slow

@@ -109,8 +109,8 @@ def test_the_highest_of_many_peaks_is_found_where_another_has_the_highest_sample
 
 def test_units_and_words_tell_turning_from_sliding():
     found = check_limits(slide_and_pin(), JointTrajectory({"slide": "sin(t)", "pin": "t"}, start=0.0, stop=1.0))
-    told = [(row.joint, row.quantity, row.unit) for row in found.rows]
-    assert told[:6] == [
+    listed = [(row.joint, row.quantity, row.unit) for row in found.rows]
+    assert listed[:6] == [
         ("slide", "position", "m"),
         ("slide", "velocity", "m/s"),
         ("slide", "acceleration", "m/s^2"),
@@ -118,7 +118,7 @@ def test_units_and_words_tell_turning_from_sliding():
         ("slide", "force", "N"),
         ("slide", "force rate", "N/s"),
     ]
-    assert [unit for joint, _, unit in told if joint == "pin"] == [
+    assert [unit for joint, _, unit in listed if joint == "pin"] == [
         "rad",
         "rad/s",
         "rad/s^2",
@@ -128,7 +128,7 @@ def test_units_and_words_tell_turning_from_sliding():
     ]
 
 
-def test_a_quantity_without_limit_is_told_by_its_largest_magnitude():
+def test_a_quantity_without_limit_is_reported_by_its_largest_magnitude():
     found = check_limits(pendulum(), JointTrajectory({"pin": "1 - t"}, start=0.0, stop=3.0))
     assert (found.kept, found.worst, found.limited) == (True, None, ())
     row = rows_of(found)["pin", "position"]
@@ -246,9 +246,9 @@ def test_long_trajectories_and_own_instants():
     report = check_limits(pendulum(velocity=2.0), trajectory)
     assert len(report.times) > BLOCK
     np.testing.assert_allclose(report.values[:, 1, 0], np.cos(report.times), atol=1e-14)
-    alone = check_limits(pendulum(velocity=2.0), trajectory, times=[1.0])
-    assert alone.worst.time == 1.0
-    assert alone.worst.value == pytest.approx(np.cos(1.0), rel=1e-14)
+    single = check_limits(pendulum(velocity=2.0), trajectory, times=[1.0])
+    assert single.worst.time == 1.0
+    assert single.worst.value == pytest.approx(np.cos(1.0), rel=1e-14)
 
 
 def test_samples_that_support_the_jerk_raise_no_warning():

@@ -127,10 +127,10 @@ def test_a_trajectory_that_starts_in_motion_is_repaired_only_if_it_is_handed_ove
     assert jn.retime(robot, motion("1.9*t"), repair=True, hand_over=True).report.kept
 
 
-def test_doubts_about_degrees_are_told_once():
+def test_doubts_about_degrees_are_reported_once():
     swing = jn.JointTrajectory.from_samples(
         np.linspace(0, 1, 50), 45 * np.sin(3 * np.linspace(0, 1, 50))[:, None], ["a"]
     )
-    with pytest.warns(jn.errors.UnitWarning) as told:
+    with pytest.warns(jn.errors.UnitWarning) as caught:
         check_motion(arm(), swing, jn.planning.MotionLimits(jounce={"a": 1e9}))
-    assert len(told) == 1
+    assert len(caught) == 1

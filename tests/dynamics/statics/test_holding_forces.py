@@ -356,23 +356,23 @@ def test_friction_of_two_directions_that_a_motion_joins():
 @pytest.mark.slow
 def test_what_has_no_range_is_refused_by_name():
     parts = {"space": "planar", "gravity": [0, -10], "parameters": {"mu": 0.3}, "bodies": sled().bodies}
-    alone = jn.Mechanism(**parts, joints=sled().joints)
+    single = jn.Mechanism(**parts, joints=sled().joints)
     with pytest.raises(jn.errors.MechanismError, match="holding forces are those of drivers, and there are none"):
-        jn.dynamics.holding_forces(jn.simulate(alone, [0.0, 0.1]))
+        jn.dynamics.holding_forces(jn.simulate(single, [0.0, 0.1]))
     parts["bodies"] = {**parts["bodies"], "other": jn.Body([5, 0], mass=1.0)}
-    swing = {**alone.joints, "pin": jn.planar.Revolute(("ground", "other"), [5, 0], [0.5, 0])}
+    swing = {**single.joints, "pin": jn.planar.Revolute(("ground", "other"), [5, 0], [0.5, 0])}
     loose = jn.Mechanism(**parts, joints=swing, drivers=sled().drivers)
     with pytest.raises(jn.errors.UnsupportedError, match=r"joints\.guide\.friction: .* drivers do not hold all"):
         jn.dynamics.holding_forces(jn.simulate(loose, [0.0, 0.1]))
-    twice = {**alone.joints, "again": jn.planar.Parallel1(("ground", "sled"), [1, 0], [np.cos(0.4), -np.sin(0.4)])}
+    twice = {**single.joints, "again": jn.planar.Parallel1(("ground", "sled"), [1, 0], [np.cos(0.4), -np.sin(0.4)])}
     held_twice = jn.Mechanism(**{**parts, "bodies": sled().bodies}, joints=twice, drivers=sled().drivers)
     with pytest.raises(jn.errors.UnsupportedError, match="friction follows reactions, and redundant constraints"):
         jn.dynamics.holding_forces(jn.solve(held_twice, [0.0], order=0))
 
 
 def test_a_mechanism_without_friction_has_one_force():
-    alone = dataclasses.replace(sled().joints["guide"], friction=None)
-    found = held(jn.Mechanism(**{**vars_of(sled()), "joints": {"guide": alone}}), "push")
+    single = dataclasses.replace(sled().joints["guide"], friction=None)
+    found = held(jn.Mechanism(**{**vars_of(sled()), "joints": {"guide": single}}), "push")
     np.testing.assert_allclose(found, 20 * np.sin(0.4) * np.ones(3), rtol=1e-12)
 
 

@@ -97,7 +97,7 @@ def test_free_chain_keeps_its_rigid_motion_at_zero_with_and_without_damping():
 
 
 @pytest.mark.slow
-def test_overdamped_and_toppling_motions_are_told():
+def test_overdamped_and_toppling_motions_are_reported():
     slow = jn.linearize(chain([2.0], [3.0], [50.0]))
     roots = np.roots([2.0, 50.0, 3.0])
     assert np.allclose(np.sort(slow.modes.eigenvalues.real), np.sort(roots), rtol=1e-12)

@@ -107,7 +107,7 @@ def test_results_are_not_taken_for_each_other(program):
     np.testing.assert_allclose(total, sums, rtol=1e-9)
 
 
-def test_programs_are_told_apart_by_arrays_that_their_code_does_not_read():
+def test_programs_are_distinguished_by_arrays_that_their_code_does_not_read():
     """Such as the forces of a mechanism in programs of its positions, in one order or another."""
 
     def function(shared, lanes):

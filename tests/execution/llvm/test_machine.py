@@ -38,9 +38,9 @@ def test_haste_changes_no_digit(monkeypatch):
 
 
 def test_what_is_called_once_is_compiled_without_optimizing():
-    (binary, found), (usual, wanted) = run(brief=True), run()
+    (binary, found), (usual, expected) = run(brief=True), run()
     assert binary != usual
-    np.testing.assert_allclose(found, wanted, rtol=1e-14)
+    np.testing.assert_allclose(found, expected, rtol=1e-14)
 
 
 @pytest.mark.parametrize("trouble", ["no process", "it fails", "an application"])

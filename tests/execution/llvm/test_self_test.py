@@ -44,10 +44,10 @@ def killed(words, **_):
 @pytest.mark.parametrize("run, reason", [(failed, "the numbers are others"), (killed, "status -11")])
 def test_where_it_fails_one_warning_says_why(monkeypatch, run, reason):
     monkeypatch.setattr(self_test.subprocess, "run", run)
-    with pytest.warns(UserWarning, match=reason) as told:
+    with pytest.warns(UserWarning, match=reason) as caught:
         assert not self_test.is_usable()
     assert not self_test.is_usable()
-    assert len(told) == 1
+    assert len(caught) == 1
 
 
 def test_an_application_is_not_started_again(monkeypatch):

@@ -155,7 +155,7 @@ def test_without_a_home_that_can_be_written_nothing_is_kept_without_a_word(undec
         assert store.current_store() is None
 
 
-def test_a_folder_that_was_chosen_and_cannot_be_used_is_told_once(undecided, monkeypatch, tmp_path):
+def test_a_folder_that_was_chosen_and_cannot_be_used_is_reported_once(undecided, monkeypatch, tmp_path):
     tmp_path.chmod(0o777)
     monkeypatch.setenv("JOUNCE_CACHE_DIR", str(tmp_path))
     with pytest.warns(jn.errors.ProgramFolderWarning, match="may be written by others"):
@@ -165,7 +165,7 @@ def test_a_folder_that_was_chosen_and_cannot_be_used_is_told_once(undecided, mon
         jn.keep_programs(tmp_path)
 
 
-def test_a_folder_that_may_not_be_written_is_told(undecided, monkeypatch, tmp_path):
+def test_a_folder_that_may_not_be_written_is_reported(undecided, monkeypatch, tmp_path):
     monkeypatch.setattr(os, "access", lambda *_: False)
     with pytest.raises(jn.errors.OutputError, match="may not be written"):
         jn.keep_programs(tmp_path)

@@ -53,10 +53,10 @@ def test_a_program_for_parallel_joints_gives_the_same_motion(name, monkeypatch):
     assert exact(tree) is not None
     found = motion()
     monkeypatch.setattr(ExactNumbers, "of_parallel", classmethod(lambda *_: None))
-    wanted = motion()
-    assert np.array_equal(found.status, wanted.status)
-    assert len(found.steps.start) == len(wanted.steps.start)
-    np.testing.assert_allclose(found.q, wanted.q, rtol=1e-10, atol=1e-12)
+    expected = motion()
+    assert np.array_equal(found.status, expected.status)
+    assert len(found.steps.start) == len(expected.steps.start)
+    np.testing.assert_allclose(found.q, expected.q, rtol=1e-10, atol=1e-12)
 
 
 @pytest.mark.parametrize(
@@ -92,6 +92,6 @@ def test_pendulums_with_other_zeros_swing_as_one_equation_says(center):
     def slope(_, state):
         return state[1], -9.81 * length * np.cos(state[0] + start) / (0.1 + length**2)
 
-    wanted = solve_ivp(slope, (0.0, 1.0), [0.3, 0.5], method="DOP853", rtol=1e-13, atol=1e-14).y[:, -1]
+    expected = solve_ivp(slope, (0.0, 1.0), [0.3, 0.5], method="DOP853", rtol=1e-13, atol=1e-14).y[:, -1]
     found = jn.simulate(tree, [0.0, 1.0], 1, state=[[0.3], [0.5]]).q[-1, :, 0]
-    np.testing.assert_allclose(found, wanted, rtol=0, atol=1e-11)
+    np.testing.assert_allclose(found, expected, rtol=0, atol=1e-11)

@@ -56,7 +56,7 @@ def test_kinks_are_found_to_rounding_and_none_is_left_out():
 
 
 @pytest.mark.slow
-def test_what_jumps_is_told_from_what_bends_and_from_what_is_smooth():
+def test_what_jumps_is_distinguished_from_what_bends_and_from_what_is_smooth():
     def orders(**values):
         run = jn.simulate(sled(**values), [0.0, 0.45], 1)
         return [found.order for found in breaks(run.dense_output, run.model.length)]

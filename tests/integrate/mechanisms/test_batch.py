@@ -62,9 +62,9 @@ def test_every_run_is_what_it_is_alone():
     assert batch.outputs["angle"].shape == (6, 3, 4)
     for run in (0, 2, 3, 4, 5):
         assert (batch.status[run] == jn.Status.OK).all()
-        alone = jn.simulate(pendulum(**{name: float(v[run]) for name, v in values.items()}), TIME, order=3)
-        assert alone.steps == batch.steps[run]
-        for name, expected in alone.outputs.items():
+        single = jn.simulate(pendulum(**{name: float(v[run]) for name, v in values.items()}), TIME, order=3)
+        assert single.steps == batch.steps[run]
+        for name, expected in single.outputs.items():
             scale = np.abs(expected).max(axis=0)
             # the runs meet the same numbers in another order; a double pendulum multiplies what rounding differs by
             assert np.all(np.abs(batch.outputs[name][run] - expected) <= 1e-10 * scale)

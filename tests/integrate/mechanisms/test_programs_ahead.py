@@ -25,12 +25,12 @@ def made(monkeypatch):
     monkeypatch.delenv("JOUNCE_NATIVE", raising=False)
     found, make = [], Translated._made
 
-    def told(self, *given, **named):
+    def recorded(self, *given, **named):
         if self.function.__name__ in ("march", "expanded"):
             found.append(self.function.__name__)
         return make(self, *given, **named)
 
-    monkeypatch.setattr(Translated, "_made", told)
+    monkeypatch.setattr(Translated, "_made", recorded)
     return found
 
 
@@ -69,7 +69,7 @@ def test_those_with_redundant_rows_begin_with_the_start(made, monkeypatch):
     assert sorted(made) == ["expanded", "march"]
 
 
-def test_a_start_that_is_refused_is_told_whatever_is_made_beside(made, monkeypatch):
+def test_a_start_that_is_refused_is_reported_whatever_is_made_beside(made, monkeypatch):
     monkeypatch.setenv("JOUNCE_THREADS", "2")
     pendulum = simple_pendulum(0.3, 1.0)
     other = jn.drivers.CoordinateDriver(("ground", "bob"), "angle", "angle + 1")

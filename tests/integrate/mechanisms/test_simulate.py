@@ -29,13 +29,13 @@ def pendulum_derivatives(angle, rate, w=GRAVITY):
 def test_a_short_run_calls_few_programs(monkeypatch):
     called, call = [], Compiled.__call__
 
-    def told(self, *arguments, **keywords):
+    def recorded(self, *arguments, **keywords):
         called.append(self.__name__)
         return call(self, *arguments, **keywords)
 
     pendulum = simple_pendulum(0.3, 0.0)
     jn.simulate(pendulum, [0.0, 1e-3], tolerance=1e-10)  # `expanded` is traced here, with `output_series` in it
-    monkeypatch.setattr(Compiled, "__call__", told)
+    monkeypatch.setattr(Compiled, "__call__", recorded)
     jn.simulate(pendulum, [0.0, 1e-3], tolerance=1e-10)
     start = ["_moved", "_with_row_rates", "_judged"]
     instants = [] if uses_machine_code() else ["_block"]
@@ -91,8 +91,8 @@ def test_the_reaction_of_the_pivot_in_closed_form(swing):
     angle, rate = swing.outputs["angle"][:, 0], swing.outputs["angle"][:, 1]
     force = swing.evaluate(jn.outputs.JointForceOutput("pivot", "bob")).values[:, 0]
     along = -(rate**2) + GRAVITY * np.sin(angle)  # N, on 1 kg at 1 m: toward the pivot less weight
-    wanted = along[:, None] * np.stack([np.cos(angle), np.sin(angle)], axis=1)
-    assert np.allclose(force, wanted, rtol=0, atol=1e-12)
+    expected = along[:, None] * np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    assert np.allclose(force, expected, rtol=0, atol=1e-12)
 
 
 def test_power_balances(swing):
@@ -118,10 +118,10 @@ def test_progress_ends_with_all_instants():
 
 
 def test_one_instant_and_a_longest_step():
-    alone = jn.simulate(simple_pendulum(0.3, 1.0), [5.0])
-    assert alone.outputs["angle"].shape == (1, 5)
+    single = jn.simulate(simple_pendulum(0.3, 1.0), [5.0])
+    assert single.outputs["angle"].shape == (1, 5)
     # the law of the initial condition holds at the start: 0.3 + 1.0 * 5
-    assert np.allclose(alone.outputs["angle"], pendulum_derivatives(np.array([5.3]), np.array([1.0])), rtol=1e-13)
+    assert np.allclose(single.outputs["angle"], pendulum_derivatives(np.array([5.3]), np.array([1.0])), rtol=1e-13)
     fine = jn.simulate(simple_pendulum(0.3, 1.0), GRID, longest_step=0.05)
     assert fine.steps == 40
 

@@ -38,8 +38,8 @@ def height(value=0.0, **keywords):
 def test_values_are_crossed_when_the_closed_form_says():
     found = happened(height(1.0), height(1.0, direction=1), height(1.0, direction=-1), height(2.0))
     roots = (5 + np.array([-1, 1]) * np.sqrt(5)) / 10
-    for times, wanted in zip(found, (roots, roots[:1], roots[1:], []), strict=True):
-        assert times == pytest.approx(list(wanted), abs=1e-14)
+    for times, expected in zip(found, (roots, roots[:1], roots[1:], []), strict=True):
+        assert times == pytest.approx(list(expected), abs=1e-14)
 
 
 @pytest.mark.slow
@@ -145,7 +145,7 @@ def chebyshev(*roots, lead=1.0):
 
 
 @pytest.mark.parametrize(
-    "roots, wanted",
+    "roots, expected",
     [
         ((0.3,), [(0.3, 1)]),
         ((0.2, 0.7), [(0.2, -1), (0.7, 1)]),
@@ -158,11 +158,11 @@ def chebyshev(*roots, lead=1.0):
         ((0.5 + 1e-3j, 0.5 - 1e-3j), []),
     ],
 )
-def test_crossings_of_polynomials_with_known_roots(roots, wanted):
+def test_crossings_of_polynomials_with_known_roots(roots, expected):
     found = crossings(chebyshev(*roots).real)
-    assert [sense for _, sense in found] == [sense for _, sense in wanted]
+    assert [sense for _, sense in found] == [sense for _, sense in expected]
     places = [place for place, _ in found]
-    assert places == pytest.approx([place for place, _ in wanted], abs=1e-4 if len(roots) == 3 else 1e-9)
+    assert places == pytest.approx([place for place, _ in expected], abs=1e-4 if len(roots) == 3 else 1e-9)
 
 
 def test_the_beginning_of_a_run_is_no_crossing():

@@ -80,7 +80,7 @@ def test_a_pulse_in_place_gives_its_work(place):
 
 
 @pytest.mark.slow
-def test_steps_over_a_jump_and_a_kink_cost_no_digits_and_are_told():
+def test_steps_over_a_jump_and_a_kink_cost_no_digits_and_are_reported():
     jump = jn.simulate(sled(J=2.0, edge=0.0), [0.0, 3.0], 1)  # falls to 0 at 1 s, turns at -1 m at 2 s
     np.testing.assert_allclose(jump.outputs["x"][-1, :, 0], [0.0, 2.0], atol=1e-9)
     ((when, name),) = jump.kinks
@@ -137,8 +137,8 @@ def test_implicit_formulas_see_pulses_too():
 def test_every_run_of_a_batch_sees_its_own_pulse():
     t0, w = np.array([0.05, 0.137, 0.2137, 0.35]), np.array([1e-4, 1e-3, 1e-2, 1e-3])
     batch = jn.simulate_batch(sled(A=STRENGTH), {"t0": t0, "w": w}, [0.0, 0.4], 1)
-    wanted = [gained(0.4, *pair) for pair in zip(t0, w, strict=True)]
-    assert (abs(batch.outputs["x"][:, -1, 1, 0] - wanted) < PRECISION / w).all()
+    expected = [gained(0.4, *pair) for pair in zip(t0, w, strict=True)]
+    assert (abs(batch.outputs["x"][:, -1, 1, 0] - expected) < PRECISION / w).all()
 
 
 @pytest.mark.slow
@@ -157,8 +157,8 @@ def test_a_pulse_of_a_driver():
     )
     for t0, w in ((0.05, 1e-3), (0.2, 1e-4), (0.3137, 1e-3), (0.3, 1e-2)):
         motion = jn.simulate(mechanism.with_parameters(t0=t0, w=w), [0.0, 0.4], 1)
-        wanted = -4 * 0.3 * w * math.sqrt(math.pi) * math.exp(-2 * (0.4 - t0) + w**2)
-        assert motion.outputs["x"][-1, 1, 0] == pytest.approx(wanted, rel=1e-7)
+        expected = -4 * 0.3 * w * math.sqrt(math.pi) * math.exp(-2 * (0.4 - t0) + w**2)
+        assert motion.outputs["x"][-1, 1, 0] == pytest.approx(expected, rel=1e-7)
         assert motion.drift.max() < 1e-13
     # where the law jumps, the run ends
     torn = jn.simulate(mechanism.with_parameters(rise=0.0, leap=0.1, when=0.3), [0.0, 0.2, 0.4], 1, strict=False)

@@ -92,8 +92,8 @@ def test_steps_of_given_length_are_cut_only_where_the_iteration_does_not_converg
     assert tried == 8
     _, tried = marched(swinging, jn.Obreshkov(4, step=4.0), 4.0, LENIENT)
     assert tried > 4
-    wanted = dynamics.rolling_motion([1.0], 1)[0]
-    assert np.allclose(ends(current)[[0, 3], 0], wanted, atol=2e-3)
+    expected = dynamics.rolling_motion([1.0], 1)[0]
+    assert np.allclose(ends(current)[[0, 3], 0], expected, atol=2e-3)
 
 
 @pytest.mark.slow
@@ -101,8 +101,8 @@ def test_steps_by_the_error_reach_what_is_asked():
     time, kinds = dynamics.dynamic_reference("double_pendulum")
     motion = jn.simulate(dynamics.double_pendulum(), [0.0, float(time[0])], 2, method=jn.Obreshkov(4), tolerance=1e-11)
     for name in "ab":
-        found, wanted = motion.outputs[name][1], kinds["angles"][name][0, :3]
-        assert np.allclose(found[1:], wanted[1:], rtol=0, atol=1e-7)
+        found, expected = motion.outputs[name][1], kinds["angles"][name][0, :3]
+        assert np.allclose(found[1:], expected[1:], rtol=0, atol=1e-7)
     assert np.max(np.abs(motion.drift)) < 1e-13
 
 

@@ -252,7 +252,7 @@ for put in (lambda: write(data, "motion.nc"), lambda: write(data, "motion.csv"),
 
 
 @pytest.mark.slow
-def test_a_disk_that_is_full_is_told_in_one_line():
+def test_a_disk_that_is_full_is_reported_in_one_line():
     environment = {**os.environ, "PYTHONPATH": str(ROOT / "src"), "MPLBACKEND": "Agg"}
     before = names()
     done = subprocess.run([sys.executable, "-c", FULL], capture_output=True, text=True, env=environment, timeout=120)

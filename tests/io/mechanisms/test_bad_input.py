@@ -126,16 +126,16 @@ def test_the_early_look_passes_what_is_right_and_that_alone(tmp_path, file):
         check_keys(path)
 
 
-def test_a_misspelling_is_told_without_jax(tmp_path):
+def test_a_misspelling_is_reported_without_jax(tmp_path):
     path = tmp_path / "typo.yaml"
     path.write_text(PLANAR.replace("angle: 30", "angel: 30"))
     command = [sys.executable, "-X", "importtime", "-m", "jounce", "inspect", path]
-    told = subprocess.run(command, capture_output=True, text=True, check=False)
-    imported = [line.rpartition("|")[2].strip() for line in told.stderr.splitlines() if line.startswith("import time:")]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    imported = [line.rpartition("|")[2].strip() for line in done.stderr.splitlines() if line.startswith("import time:")]
     assert "ruamel.yaml" in imported
     assert not {"jax", "numpy", "pydantic"} & set(imported)
-    assert "line 6, bodies.crank.angel: unknown key 'angel'; did you mean 'angle'?" in told.stderr
-    assert told.returncode == 2
+    assert "line 6, bodies.crank.angel: unknown key 'angel'; did you mean 'angle'?" in done.stderr
+    assert done.returncode == 2
 
 
 def test_a_misspelled_key_is_named_rather_than_the_key_that_misses(tmp_path):
@@ -149,7 +149,7 @@ def test_a_misspelled_key_is_named_rather_than_the_key_that_misses(tmp_path):
     "spaces, words",
     [(3, "further than the entries beside it (3 spaces, not 2)"), (1, "less than those before it (1 space, not 2)")],
 )
-def test_a_line_that_is_indented_otherwise_is_told_with_its_column(tmp_path, spaces, words):
+def test_a_line_that_is_indented_otherwise_is_reported_with_its_column(tmp_path, spaces, words):
     path = tmp_path / "indent.yaml"
     path.write_text(f"space: planar\nbodies:\n  a: {{position: [0, 0]}}\n{' ' * spaces}b: {{position: [1, 0]}}\n")
     with pytest.raises(MechanismFileError, match="indented") as error:
@@ -157,7 +157,7 @@ def test_a_line_that_is_indented_otherwise_is_told_with_its_column(tmp_path, spa
     assert f"line 4: the YAML cannot be read: the line is indented {words}" in str(error.value)
 
 
-def test_a_colon_without_a_space_is_told(tmp_path):
+def test_a_colon_without_a_space_is_reported(tmp_path):
     path = tmp_path / "glued.yaml"
     path.write_text("space: planar\nbodies: {a: {}}\njoints:\n  A: {type:revolute, bodies: [ground, a]}\n")
     with pytest.raises(MechanismFileError, match=r"line 4, .* a colon must be followed by a space: write type: r"):

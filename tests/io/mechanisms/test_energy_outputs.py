@@ -87,9 +87,9 @@ def test_units_and_names_of_peaks(motion):
     assert motion.dataset["E2"].attrs["units"] == "J/s^4"
     assert jn.energy.kinetic_energy(motion).total.attrs["units"] == "J"
     assert jn.energy.acceleration_energy(motion, order=1).total.attrs["units"] == "J/s^2"
-    told = {(p.output, p.derivative): p.unit for p in peaks(motion)}
-    assert told["T", "energy"] == "J"
-    assert told["E1", "first rate"] == "J/s^3"
+    units = {(p.output, p.derivative): p.unit for p in peaks(motion)}
+    assert units["T", "energy"] == "J"
+    assert units["E1", "first rate"] == "J/s^3"
 
 
 @pytest.mark.slow
@@ -105,9 +105,9 @@ def test_files_written_and_read(path, motion, tmp_path):
 
 
 def test_inspection_tells_of_what_they_are(path, run):
-    status, told, _ = run("inspect", path, "--json")
+    status, printed, _ = run("inspect", path, "--json")
     assert status == 0
-    found = {row["name"]: (row["quantity"], row["unit"], row["of"]) for row in json.loads(told)["outputs"]}
+    found = {row["name"]: (row["quantity"], row["unit"], row["of"]) for row in json.loads(printed)["outputs"]}
     assert found["T"] == ("kinetic_energy", "J", ["mechanism"])
     assert found["E2"] == ("acceleration_energy", "J/s^4", ["cart"])
 

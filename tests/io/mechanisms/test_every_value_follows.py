@@ -195,13 +195,13 @@ def test_every_value_follows_its_parameters(tmp_path, space, part):
         after = before + 2 if slot[-1] in ("count", "stop") else 1.0625 * before
         first = jn.load(written(tmp_path, space, part, slot, before))
         changed = first.with_parameters(p=after)
-        told = override(first, [f"p={after!r}"])
+        overridden = override(first, [f"p={after!r}"])
         fresh = jn.load(written(tmp_path, space, part, slot, after))
         flat = any(slot[-len(end) :] == end for end in FLAT) and "density" not in at(part, slot[:3])
         bears = space == "spatial" or not flat
         assert np.array_equal(numbers(first), numbers(fresh)) != bears, slot
         np.testing.assert_array_equal(numbers(changed), numbers(fresh), err_msg=str(slot))
-        np.testing.assert_array_equal(numbers(told), numbers(fresh), err_msg=str(slot))
+        np.testing.assert_array_equal(numbers(overridden), numbers(fresh), err_msg=str(slot))
 
 
 def test_the_walk_meets_every_key_of_the_schema():
@@ -273,8 +273,8 @@ def test_a_top_starts_from_the_orientation_that_its_parameter_gives(tmp_path):
     path.write_text(TOP)
     top = jn.load(path)
     tilts = np.radians([10.0, 80.0, 45.0])
-    alone = [jn.simulate(top.with_parameters(tilt=tilt), order=2).outputs["tip"] for tilt in tilts]
-    for tilt, tip in zip(tilts, alone, strict=True):
+    single = [jn.simulate(top.with_parameters(tilt=tilt), order=2).outputs["tip"] for tilt in tilts]
+    for tilt, tip in zip(tilts, single, strict=True):
         np.testing.assert_allclose(tip[0, 0], [0, -np.sin(tilt), np.cos(tilt)], atol=1e-15)
         torque = 9.81 * 0.3 * np.sin(tilt)  # about x, through the point that is held
         np.testing.assert_allclose(
@@ -282,7 +282,7 @@ def test_a_top_starts_from_the_orientation_that_its_parameter_gives(tmp_path):
         )
     batch = jn.simulate_batch(top, {"tilt": tilts}, order=2)
     assert (batch.status == 0).all()
-    np.testing.assert_allclose(batch.outputs["tip"], alone, rtol=1e-11, atol=1e-11)
+    np.testing.assert_allclose(batch.outputs["tip"], single, rtol=1e-11, atol=1e-11)
 
 
 def test_orientations_in_python_have_the_forms_of_files(tmp_path):

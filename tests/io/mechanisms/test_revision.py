@@ -34,8 +34,8 @@ def test_all_else_of_a_file_stays_as_it_is(tmp_path):
     changed = jn.load(FOUR_BAR).with_parameters(BC=0.1375, tau=3.0)
     path = tmp_path / "better.yaml"
     write_revised(changed, ["BC", "tau"], FOUR_BAR, path)
-    wanted = FOUR_BAR.read_text().replace("BC: 14.23 cm", "BC: 13.75 cm").replace("tau: 2 s", "tau: 3 s")
-    assert path.read_text() == wanted
+    expected = FOUR_BAR.read_text().replace("BC: 14.23 cm", "BC: 13.75 cm").replace("tau: 2 s", "tau: 3 s")
+    assert path.read_text() == expected
     assert jn.load(path) == changed
 
 

@@ -89,8 +89,8 @@ def test_samples_may_be_those_of_a_cam(tmp_path):
     mechanism = loaded(tmp_path, FILE[:start] + law + FILE[stop:])
     found = values(mechanism.drivers["cam"].motion, mechanism.parameter_values, [2.3])
     turn = 2 * np.pi
-    wanted = [0.01 * (1 - np.cos(turn * 2.3)), 0.01 * turn * np.sin(turn * 2.3)]
-    np.testing.assert_allclose(found[:2, 0], wanted, rtol=1e-5)
+    expected = [0.01 * (1 - np.cos(turn * 2.3)), 0.01 * turn * np.sin(turn * 2.3)]
+    np.testing.assert_allclose(found[:2, 0], expected, rtol=1e-5)
 
 
 @pytest.mark.parametrize(

@@ -79,7 +79,7 @@ def test_defaults_are_for_the_kind_that_their_units_say(read):
         ("joints: {pin: {stiffness: .inf}}", ("finite",)),
     ],
 )
-def test_mistakes_are_told_with_place_and_advice(read, text, words):
+def test_mistakes_are_reported_with_place_and_advice(read, text, words):
     with pytest.raises(jn.errors.RobotError) as raised:
         read(text)
     message = str(raised.value)

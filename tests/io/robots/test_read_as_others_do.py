@@ -38,7 +38,7 @@ TOLD = {
 
 
 @pytest.mark.parametrize("case", TOLD)
-def test_what_others_let_pass_is_read_and_told(tmp_path, case):
+def test_what_others_let_pass_is_read_and_reported(tmp_path, case):
     text, says = TOLD[case]
     with pytest.warns(jn.errors.RobotWarning) as caught:
         robot = read(tmp_path, text)
@@ -159,7 +159,7 @@ def test_a_closure_that_has_the_name_of_a_joint_gets_another(tmp_path):
         ("revolute", ENDS + "<axis><xyz expressed_in='a'>1 0 0</xyz></axis>"),
     ],
 )
-def test_other_joints_that_gazebo_adds_are_told(tmp_path, kind, inside):
+def test_other_joints_that_gazebo_adds_are_reported(tmp_path, kind, inside):
     with pytest.warns(jn.errors.RobotWarning, match="links and joints that <gazebo> adds: tip"):
         assert not read(tmp_path, five_bar(GAZEBO_LOOP.format(kind, inside, ""))).closures
 

@@ -102,7 +102,7 @@ def test_order_and_names_of_joints(tmp_path):
         ({"path": "none/x.csv"}, "folder"),
     ],
 )
-def test_what_does_not_fit_is_told(tmp_path, settings, words):
+def test_what_does_not_fit_is_reported(tmp_path, settings, words):
     settings = {"format": "ur", "path": "x.csv", **settings}
     path = tmp_path / settings.pop("path")
     with pytest.raises(jn.errors.JounceError, match=words):
@@ -139,7 +139,7 @@ POINT = "- positions: [1.0]\n  time_from_start: {sec: 0, nanosec: 0}\n"
         ("joint_names: [a]\npoints:\n- velocities: [0.0]\n- velocities: [0.0]\n", "positions are missing"),
     ],
 )
-def test_faults_of_messages_are_told_with_their_line(tmp_path, text, words):
+def test_faults_of_messages_are_reported_with_their_line(tmp_path, text, words):
     path = tmp_path / "message.yaml"
     path.write_text(text)
     with pytest.raises(jn.errors.TrajectoryError, match=words) as caught:
@@ -157,7 +157,7 @@ def test_times_of_points_may_be_numbers_of_seconds_and_a_list_may_hold_one_messa
     np.testing.assert_allclose(np.ravel(values), [1.0, 1.5, 2.0, 2.5], rtol=1e-14)
 
 
-def test_faults_of_tables_are_told(tmp_path):
+def test_faults_of_tables_are_reported(tmp_path):
     path = tmp_path / "table.csv"
     path.write_text("timestamp,target_q_0,target_qd_0\n0,1,0\n0,2,0\n")
     with pytest.raises(jn.errors.TrajectoryError, match="line 3, time: must come after"):

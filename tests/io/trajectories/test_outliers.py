@@ -47,7 +47,7 @@ def test_outliers_in_a_row_are_found_where_they_are(count):
 
 
 @pytest.mark.parametrize("count", [2, 3])
-def test_a_group_is_told_by_lines_and_column(tmp_path, count):
+def test_a_group_is_reported_by_lines_and_column(tmp_path, count):
     times = np.linspace(0, 1, 51)
     rates = 2 * np.cos(2 * times)
     rates[20 : 20 + count] += 3.0

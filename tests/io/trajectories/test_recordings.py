@@ -101,7 +101,7 @@ def test_series_at_stamps_of_their_own(tmp_path):
     check(trajectory)
 
 
-def test_rows_out_of_order_and_repeated_ones_are_told(tmp_path):
+def test_rows_out_of_order_and_repeated_ones_are_reported(tmp_path):
     order = [*range(20), 21, 20, *range(22, 40), 39, *range(40, 51)]
     path = table(tmp_path, "time,shoulder,elbow", [TIMES[order], *Q[:, order]])
     with pytest.warns(

@@ -131,13 +131,13 @@ def test_a_disc_above_its_line_turns_backwards_as_it_rolls_along(line, on):
 
 
 @pytest.mark.parametrize("line, on", [(2.0, 0.1), (-1.0, -0.1)])
-def test_a_disc_on_the_other_side_of_its_line_is_told(line, on):
+def test_a_disc_on_the_other_side_of_its_line_is_reported(line, on):
     with pytest.warns(AssemblyWarning, match=r"joints\.roll: the center of the disc .* reverse the vector"):
         jn.solve(disc(line, on=on), [0.0, 1.0], order=1)
 
 
 @pytest.mark.slow
-def test_a_pinion_on_the_other_side_of_its_rack_in_space_is_told():
+def test_a_pinion_on_the_other_side_of_its_rack_in_space_is_reported():
     def pinion(side):
         return jn.Mechanism(
             space="spatial",

@@ -140,7 +140,7 @@ def test_a_kinematotropic_linkage_has_branches_of_one_and_of_two_degrees_of_free
 
 
 @pytest.mark.slow
-def test_a_cusp_is_told():
+def test_a_cusp_is_reported():
     found = jn.mobility(cusp_mechanism())
     assert (found.kind, found.count, found.instantaneous, found.finite) == ("cusp", 1, 2, 1)
     (branch,) = found.branches

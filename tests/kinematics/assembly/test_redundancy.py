@@ -100,11 +100,11 @@ def test_random_bennett_linkages_from_bad_guesses_in_any_unit():
 def test_what_is_nearly_a_bennett_linkage_is_refused_and_what_is_one_to_rounding_is_not(size):
     with pytest.raises(
         jn.errors.AssemblyError, match=r"over-constrained at t = .* joints.R3, joints.R1 and others stay open"
-    ) as told:
+    ) as caught:
         jn.solve(overconstrained.bennett(off=1e-3, size=size).mechanism, TIMES)
     joints = "joints.R3, joints.R1, joints.R4, joints.R2 stay open, by .* mm and .* deg"
-    wanted = rf"{joints}.*; 3 equations more than coordinates .* contradict each other by that much"
-    assert re.search(wanted, told.value.details)
+    expected = rf"{joints}.*; 3 equations more than coordinates .* contradict each other by that much"
+    assert re.search(expected, caught.value.details)
     moves_as_told(overconstrained.bennett(off=1e-12, size=size), order=6, tolerance=1e-10)
 
 
@@ -140,7 +140,7 @@ def test_drivers_that_agree_are_solved_and_others_refused():
 
 
 @pytest.mark.slow
-def test_drivers_that_part_later_are_told_where_they_do():
+def test_drivers_that_part_later_are_reported_where_they_do():
     late = "t + 1e-3*(t - 1)**5*(0.5 + 0.5*tanh(1e6*(t - 1)))"
     motion = jn.solve(turned("t", late), np.linspace(0, 2, 9), strict=False)
     assert motion.status.tolist() == [0] * 5 + [Status.INCONSISTENT] + [Status.NOT_REACHED] * 3
@@ -181,8 +181,8 @@ def test_a_dead_point_is_no_redundancy():
     }
     law = jn.drivers.RotationDriver(("ground", "rocker"), Z, f"{angle!r} - t")
     dead = dataclasses.replace(linkage, bodies=bodies, drivers={"turn": law})
-    told = "18 of them independent; joint D repeats 3 equations of A, B, C, .* a singular position"
-    with pytest.raises(jn.errors.MobilityError, match=told):
+    message = "18 of them independent; joint D repeats 3 equations of A, B, C, .* a singular position"
+    with pytest.raises(jn.errors.MobilityError, match=message):
         jn.solve(dead, [0.0], order=1)
 
 
@@ -192,8 +192,8 @@ def test_who_repeats_whom_follows_from_the_combinations_that_vanish():
     combinations = np.zeros((7, 3))
     combinations[[0, 3], 0] = combinations[[2, 4], 1] = combinations[[5, 6], 2] = np.sqrt(0.5) * np.array([1, -1])
     turn = np.linalg.qr(np.random.default_rng(0).normal(size=(3, 3)))[0]
-    told = [str(x) for x in repetitions(rows, combinations @ turn)]
-    assert told == ["joint c repeats 2 equations of a", "driver y repeats 1 equation of x"]
+    phrases = [str(x) for x in repetitions(rows, combinations @ turn)]
+    assert phrases == ["joint c repeats 2 equations of a", "driver y repeats 1 equation of x"]
 
 
 @pytest.mark.slow

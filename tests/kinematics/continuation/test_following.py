@@ -84,7 +84,7 @@ PARALLELOGRAM = four_bar("0.5", "0.5", "t", AB=0.1, CD=0.1, AD=0.2, BC=0.2)
 
 
 @pytest.mark.parametrize("order, tolerance", [(0, [1e-14]), (4, [1e-14, 1e-13, 1e-11, 1e-9, 1e-7])])
-def test_change_point_is_passed_at_any_instant_and_told(order, tolerance):
+def test_change_point_is_passed_at_any_instant_and_reported(order, tolerance):
     time = np.sort(np.r_[np.linspace(0.5, 6, 23), np.pi, np.pi + np.array([-1e-2, -1e-5, 1e-9, 1e-3])])
     motion = jn.solve(PARALLELOGRAM, time, order=order)
     np.testing.assert_allclose(motion.change_points, [np.pi], atol=1e-12)
@@ -219,6 +219,6 @@ def test_a_motion_that_begins_at_rest_and_comes_back_is_not_stepped_over(law):
 
 
 @pytest.mark.slow
-def test_designs_that_lock_between_two_instants_at_rest_are_told():
+def test_designs_that_lock_between_two_instants_at_rest_are_reported():
     designs = jn.solve_batch(excursion(EXCURSIONS[0]), {"AB": [0.04, 0.12]}, order=1)
     assert designs["status"].values.tolist() == [[Status.OK] * 2, [Status.OK, Status.SINGULAR]]

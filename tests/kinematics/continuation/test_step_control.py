@@ -73,5 +73,5 @@ def test_a_design_among_many_is_decided_as_alone(status):
     outcome = np.full(count, int(status))
     many = decided(control, outcome, there)
     for k in range(count):
-        alone = decided(*jax.tree.map(lambda x, k=k: x[k : k + 1], (control, outcome, there)))
-        jax.tree.map(lambda x, y, k=k: np.testing.assert_array_equal(x[k : k + 1], y), many, alone)
+        single = decided(*jax.tree.map(lambda x, k=k: x[k : k + 1], (control, outcome, there)))
+        jax.tree.map(lambda x, y, k=k: np.testing.assert_array_equal(x[k : k + 1], y), many, single)

@@ -98,20 +98,20 @@ def test_whole_power_of_time_given_by_a_parameter_at_zero():
 def test_uneven_grid_gives_what_each_instant_gives_alone():
     time = np.array([0.0, 1e-9, 1e-4, 0.3, 0.31, 1.7])
     together = jn.solve(four_bar(), time, order=2).outputs["psi"]
-    alone = [jn.solve(four_bar(), [0.0, t], order=2).outputs["psi"][-1] for t in time[1:]]
-    np.testing.assert_allclose(together[1:], alone, rtol=1e-13)
+    single = [jn.solve(four_bar(), [0.0, t], order=2).outputs["psi"][-1] for t in time[1:]]
+    np.testing.assert_allclose(together[1:], single, rtol=1e-13)
 
 
-def test_long_grid_is_the_short_one_and_progress_is_told():
-    told = []
+def test_long_grid_is_the_short_one_and_progress_is_reported():
+    reports = []
     short = jn.solve(four_bar(), np.linspace(0, 2, 31))
-    long = jn.solve(four_bar(), np.linspace(0, 2, 3001), progress=lambda done, total: told.append((done, total)))
+    long = jn.solve(four_bar(), np.linspace(0, 2, 3001), progress=lambda done, total: reports.append((done, total)))
     for k in range(5):
         expected = short.outputs["psi"][:, k]
         np.testing.assert_allclose(long.outputs["psi"][::100, k], expected, rtol=0, atol=1e-14 * np.abs(expected).max())
-    done = [d for d, _ in told]
+    done = [d for d, _ in reports]
     assert done == sorted(done)
-    assert told[-1] == (3001, 3001)
+    assert reports[-1] == (3001, 3001)
 
 
 def compilations():

@@ -36,10 +36,10 @@ CASES = {
 @pytest.mark.parametrize("name", CASES)
 @pytest.mark.parametrize("transformed", [jax.grad, jax.jit, lambda f: lambda x: jax.vmap(f)(np.array([x]))])
 def test_traced_values_are_refused_by_name(name, transformed):
-    with pytest.raises(jn.errors.UnsupportedError) as told:
+    with pytest.raises(jn.errors.UnsupportedError) as caught:
         transformed(CASES[name])(0.14)
-    assert told.value.name == name
-    assert "jax.grad" in str(told.value)
+    assert caught.value.name == name
+    assert "jax.grad" in str(caught.value)
 
 
 @pytest.mark.slow

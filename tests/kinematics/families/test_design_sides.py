@@ -28,9 +28,9 @@ def test_breaks_are_looked_for_as_often_as_they_differ(monkeypatch, name, expect
     monkeypatch.setattr(design_sides, "breaks_of_laws", lambda *x, **how: looked.append(1) or breaks_of_laws(*x, **how))
     values = np.array([0.3, 0.4, 0.6])
     breaks, sides = design_sides.sides_of_designs(CRANK, {name: values}, 0.0, 1.0, 2)
-    wanted = np.repeat(values if expected else [0.25] * 3, 2).reshape(3, 2)
-    assert breaks == pytest.approx(wanted, abs=1e-9)
-    assert sides == pytest.approx(wanted + np.array([-2e-11, 2e-11]), abs=1e-11)
+    exact = np.repeat(values if expected else [0.25] * 3, 2).reshape(3, 2)
+    assert breaks == pytest.approx(exact, abs=1e-9)
+    assert sides == pytest.approx(exact + np.array([-2e-11, 2e-11]), abs=1e-11)
     assert len(looked) == (3 if expected else 1)
 
 

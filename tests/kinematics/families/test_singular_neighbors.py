@@ -22,8 +22,8 @@ def passed():
 @pytest.mark.parametrize("gap", [5e-4, 1e-5])
 def test_an_instant_next_to_a_change_point_is_refused_as_alone(passed, side, gap):
     time = np.linspace(0.0, passed - gap, 5) if side == "end" else np.linspace(passed + gap, passed + 0.4, 5)
-    alone = jn.solve(CHANGING, time, order=2, strict=False)
+    single = jn.solve(CHANGING, time, order=2, strict=False)
     family = jn.solve_batch(CHANGING, BESIDE, time, order=2)
-    assert alone.status[-1 if side == "end" else 0] == Status.SINGULAR
+    assert single.status[-1 if side == "end" else 0] == Status.SINGULAR
     for status in family["status"].values:
-        np.testing.assert_array_equal(status, alone.status)
+        np.testing.assert_array_equal(status, single.status)

@@ -16,13 +16,13 @@ def check(mechanism, parameters, family, time, order, error=1e-12):
     """Compare a family with its designs one by one: every output, derivative and status."""
     for k in range(family.sizes["design"]):
         values = {name: float(given[k]) for name, given in parameters.items()}
-        alone = jn.solve(mechanism.with_parameters(**values), time, order=order, strict=False)
-        np.testing.assert_array_equal(family["status"].values[k], alone.status)
-        for name, wanted in alone.outputs.items():
-            found = family[name].values[k].reshape(wanted.shape)
-            others = tuple(k for k in range(wanted.ndim) if k != 1)
-            size = np.nan_to_num(np.abs(wanted)).max(axis=others, keepdims=True)  # of each derivative
-            np.testing.assert_allclose(found / (size + 1e-300), wanted / (size + 1e-300), atol=error, rtol=0)
+        single = jn.solve(mechanism.with_parameters(**values), time, order=order, strict=False)
+        np.testing.assert_array_equal(family["status"].values[k], single.status)
+        for name, expected in single.outputs.items():
+            found = family[name].values[k].reshape(expected.shape)
+            others = tuple(k for k in range(expected.ndim) if k != 1)
+            size = np.nan_to_num(np.abs(expected)).max(axis=others, keepdims=True)  # of each derivative
+            np.testing.assert_allclose(found / (size + 1e-300), expected / (size + 1e-300), atol=error, rtol=0)
 
 
 @pytest.mark.slow
@@ -65,7 +65,7 @@ def test_one_that_locks_or_cannot_be_assembled_stops_no_other():
 
 
 @pytest.mark.slow
-def test_bad_designs_are_told():
+def test_bad_designs_are_reported():
     with pytest.raises(jn.errors.MechanismError, match=r"greater than zero.*design 1: BC = -0\.14"):
         jn.solve_batch(FOUR_BAR, {"BC": [0.14, -0.14]}, TIME, order=2)
     with pytest.raises(jn.errors.MechanismError, match="one for each design"):

@@ -101,9 +101,9 @@ def test_xla_has_the_same_outcome(monkeypatch, name, native):
     monkeypatch.setenv("JOUNCE_NATIVE", native)
     found = jn.solve(mechanism, time, order=2, strict=False)
     np.testing.assert_array_equal(found.status[::100] == Status.OK, expected.status == Status.OK)
-    for output, wanted in expected.outputs.items():
-        peak = np.nanmax(np.abs(wanted), axis=0) + 1e-300
-        np.testing.assert_allclose(found.outputs[output][::100] / peak, wanted / peak, rtol=0, atol=1e-9)
+    for output, exact in expected.outputs.items():
+        peak = np.nanmax(np.abs(exact), axis=0) + 1e-300
+        np.testing.assert_allclose(found.outputs[output][::100] / peak, exact / peak, rtol=0, atol=1e-9)
 
 
 @needs_machine_code
@@ -118,31 +118,31 @@ def test_instants_that_start_from_failures_are_solved_again(monkeypatch):
         if room.time[0] == 0.0:
             room.status[64], room.state[0]["angle"][..., 64] = Status.NOT_CONVERGED, np.nan
 
-    def told(self, *given):
+    def spoiled(self, *given):
         again.append(in_blocks(self, *given))
         return again[-1]
 
     monkeypatch.setattr(solve_buffers.SolveBuffer, "solve", spoiling)
-    monkeypatch.setattr(grid.GridSolver, "_in_blocks", told)
+    monkeypatch.setattr(grid.GridSolver, "_in_blocks", spoiled)
     assert_same(jn.solve(four_bar(), time, threads=1), expected)
     np.testing.assert_array_equal(np.flatnonzero(again[0]), np.arange(64, 96))
 
 
 @needs_machine_code
 def test_progress_never_goes_back_and_ends_with_all():
-    told = []
+    reports = []
     motion = jn.solve(
-        FAILING["a dead point"], np.linspace(0, 2, 5000), strict=False, progress=lambda *x: told.append(x)
+        FAILING["a dead point"], np.linspace(0, 2, 5000), strict=False, progress=lambda *x: reports.append(x)
     )
     assert (motion.status != Status.OK).any()
-    assert told == sorted(told)
-    assert told[-1] == (5000, 5000)
+    assert reports == sorted(reports)
+    assert reports[-1] == (5000, 5000)
 
 
 @needs_machine_code
 @pytest.mark.parametrize("keep", [True, False])
 @pytest.mark.parametrize("name", ["nothing", *FAILING])
-def test_stretches_solved_at_once_are_those_solved_one_after_another(monkeypatch, name, keep):
+def test_chunks_solved_at_once_are_those_solved_one_after_another(monkeypatch, name, keep):
     mechanism, time, solved = FAILING.get(name, four_bar()), np.linspace(0, 2, 5000), []
     monkeypatch.setattr(grid_storage, "CHUNK", 1100)
     with monkeypatch.context() as patch:
@@ -151,7 +151,7 @@ def test_stretches_solved_at_once_are_those_solved_one_after_another(monkeypatch
     at_once = grid_storage._solved_at_once
     monkeypatch.setattr(grid_storage, "_solved_at_once", lambda *given: solved.append(at_once(*given)) or solved[-1])
     assert_same(jn.solve(mechanism, time, order=3, keep=keep, strict=False, threads=2), expected)
-    firsts = range(0, 4400, 1100)  # the last stretch is a short grid
+    firsts = range(0, 4400, 1100)  # the last chunk is a short grid
     fine = {first for first in firsts if np.all(expected.status[first : first + 1100] == Status.OK)}
     assert solved[0] < fine if name == "change points" else solved[0] == fine
 
@@ -159,9 +159,9 @@ def test_stretches_solved_at_once_are_those_solved_one_after_another(monkeypatch
 @needs_machine_code
 @pytest.mark.parametrize("keep", [True, False])
 @pytest.mark.parametrize("always", [True, False])
-def test_a_stretch_in_which_some_instant_fails_is_solved_again(monkeypatch, always, keep):
-    """Of what failed nothing is kept, of the stretches beside it everything, and progress does not go back."""
-    time, told, spoiled = np.linspace(0, 2, 4400), [], []
+def test_a_chunk_in_which_some_instant_fails_is_solved_again(monkeypatch, always, keep):
+    """Of what failed nothing is kept, of the chunks beside it everything, and progress does not go back."""
+    time, reports, spoiled = np.linspace(0, 2, 4400), [], []
     monkeypatch.setattr(grid_storage, "CHUNK", 1100)
     expected = jn.solve(four_bar(), time, keep=keep)
     solve = solve_buffers.SolveBuffer.solve
@@ -174,8 +174,8 @@ def test_a_stretch_in_which_some_instant_fails_is_solved_again(monkeypatch, alwa
             spoiled.append(True)
 
     monkeypatch.setattr(solve_buffers.SolveBuffer, "solve", spoiling)
-    found = jn.solve(four_bar(), time, threads=1, keep=keep, progress=lambda *x: told.append(x))
+    found = jn.solve(four_bar(), time, threads=1, keep=keep, progress=lambda *x: reports.append(x))
     assert len(spoiled) == 1 + always
     assert_same(found, expected)
-    assert told == sorted(told)
-    assert told[-1] == (4400, 4400)
+    assert reports == sorted(reports)
+    assert reports[-1] == (4400, 4400)

@@ -1,4 +1,4 @@
-"""Long grids, solved stretch by stretch: the same motion, and what was not kept is there when it is asked for."""
+"""Long grids, solved chunk by chunk: the same motion, and what was not kept is there when it is asked for."""
 
 import numpy as np
 import pytest
@@ -14,14 +14,14 @@ TIME = np.linspace(0, 2, 2501)
 
 
 @pytest.fixture
-def short_stretches(monkeypatch):
+def short_chunks(monkeypatch):
     monkeypatch.setattr("jounce.kinematics.position_analysis.grid_storage.CHUNK", 1100)
 
 
 @pytest.mark.slow
-def test_stretches_make_one_motion(short_stretches):
-    told = []
-    motion = jn.solve(four_bar(), TIME, progress=lambda done, total: told.append((done, total)))
+def test_chunks_make_one_motion(short_chunks):
+    reports = []
+    motion = jn.solve(four_bar(), TIME, progress=lambda done, total: reports.append((done, total)))
     angle, length = motion.outputs["psi"], 0.1423
     crank = np.pi / 6 + np.pi / 3 * np.sin(np.pi * TIME)
     gap = 0.04 * np.exp(1j * crank) - 0.1321 - 0.2031 * np.exp(1j * angle[:, 0])
@@ -30,13 +30,13 @@ def test_stretches_make_one_motion(short_stretches):
     np.testing.assert_allclose(
         angle[::50] / np.abs(expected).max(axis=0), expected / np.abs(expected).max(axis=0), atol=1e-13
     )
-    assert [done for done, _ in told] == sorted(done for done, _ in told)
-    assert told[-1] == (2501, 2501)
+    assert [done for done, _ in reports] == sorted(done for done, _ in reports)
+    assert reports[-1] == (2501, 2501)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("keep", [None, True, False])
-def test_points_are_there_whether_bodies_were_kept_or_not(short_stretches, keep):
+def test_points_are_there_whether_bodies_were_kept_or_not(short_chunks, keep):
     motion = jn.solve(four_bar(), TIME, order=2, keep=keep)
     assert callable(motion._bodies) == (keep is not True)
     tip = motion.point("rocker", [0.2031, 0])
@@ -53,11 +53,11 @@ def test_a_short_grid_need_not_keep_bodies_either():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("stretch", [500, 1100])
-def test_an_end_is_explained_once(monkeypatch, stretch):
+@pytest.mark.parametrize("chunk", [500, 1100])
+def test_an_end_is_explained_once(monkeypatch, chunk):
     mechanism = slider_crank("3.8 - 2*t")  # beyond its range from t = 0.9 on
     whole = jn.solve(mechanism, TIME, order=0, strict=False)
-    monkeypatch.setattr("jounce.kinematics.position_analysis.grid_storage.CHUNK", stretch)
+    monkeypatch.setattr("jounce.kinematics.position_analysis.grid_storage.CHUNK", chunk)
     motion = jn.solve(mechanism, TIME, order=0, strict=False)
     np.testing.assert_array_equal(motion.status, whole.status)
     assert motion.faults == whole.faults

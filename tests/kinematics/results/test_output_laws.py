@@ -46,8 +46,8 @@ def test_the_driver_follows_with_all_derivatives(motion):
     scale = np.abs(exact).max(axis=0)
     for found in (motion.outputs["theta"], motion.driver("theta").values, motion.outputs["crank_angle"]):
         assert np.abs((found - exact) / scale).max() < 1e-13
-    wanted = [[0.015 * 3**k * math.cos(3 * t + k * math.pi / 2) for k in range(1, ORDER + 1)] for t in GRID]
-    np.testing.assert_allclose(motion.outputs["stroke"][:, 1:, 0], wanted, atol=1e-12)
+    expected = [[0.015 * 3**k * math.cos(3 * t + k * math.pi / 2) for k in range(1, ORDER + 1)] for t in GRID]
+    np.testing.assert_allclose(motion.outputs["stroke"][:, 1:, 0], expected, atol=1e-12)
 
 
 @pytest.mark.slow
@@ -115,8 +115,8 @@ def test_families_are_designs_solved_alone(forces):
     family = jn.solve_batch(mechanism, {"r": lengths}, GRID[:4], order=3)
     assert (family["status"].values != 0).tolist() == [[False] * 4, [False] * 4, [True] * 4]
     for k in range(2):
-        alone = jn.solve(mechanism.with_parameters(r=lengths[k]), GRID[:4], order=3).outputs
-        for name, values in alone.items():
+        single = jn.solve(mechanism.with_parameters(r=lengths[k]), GRID[:4], order=3).outputs
+        for name, values in single.items():
             np.testing.assert_allclose(family[name].values[k], values, rtol=1e-11, atol=1e-12 * np.abs(values).max())
 
 

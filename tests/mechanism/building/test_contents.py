@@ -72,14 +72,14 @@ def test_equal_values_make_equal_contents_and_one_model():
     assert build(mechanism(parameters={"AB": 0.04, "BC": 0.15})) is not kept
 
 
-def test_a_nested_list_is_told_from_its_entries():
+def test_a_nested_list_is_distinguished_from_its_entries():
     """Where lists begin and end belongs to the contents."""
     inner = np.zeros(1)
     nested = [[[1.0, inner], [3.0]], [[1.0], [inner, 3.0]], [1.0, inner, [3.0]], [[1.0, inner, 3.0]], [1.0, inner, 3.0]]
     assert len({contents_of(mechanism(), x) for x in nested}) == len(nested)
 
 
-def test_arrays_of_the_same_bytes_are_told_apart():
+def test_arrays_of_the_same_bytes_are_distinguished():
     """The shape and the type of an array belong to the contents."""
     arrays = [np.zeros((2, 3)), np.zeros((3, 2)), np.zeros(6), np.zeros(6, int)]
     assert len({contents_of(mechanism(), x) for x in arrays}) == len(arrays)

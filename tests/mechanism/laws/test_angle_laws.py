@@ -31,8 +31,8 @@ def looked_at(mechanism, times=T):
     check_laws(mechanism, times, 4, forces=False)
 
 
-def told(call):
-    """Return the doubts about units that a call tells, with the file that they are told of."""
+def unit_warnings(call):
+    """Return the warnings of units by a call that name this file."""
     with warnings.catch_warnings(record=True) as found:
         warnings.simplefilter("always")
         call()
@@ -57,25 +57,25 @@ SWING = "drivers.motor.motion: goes from -30 to 90 rad, 19 turns: degrees? A num
          "goes on over 360 rad of its leader, 57 turns: degrees?"),
     ],
 )  # fmt: skip
-def test_a_law_in_degrees_is_told_once(motion, words):
+def test_a_law_in_degrees_is_reported_once(motion, words):
     mechanism = rod(motion)
-    (found,) = told(lambda: looked_at(mechanism))
+    (found,) = unit_warnings(lambda: looked_at(mechanism))
     assert words in found
     other = dataclasses.replace(mechanism, outputs={"tip": jn.outputs.PointOutput("rod", [1.0, 0.0])})
-    assert not told(lambda: (looked_at(mechanism), looked_at(other, 2 * T)))
+    assert not unit_warnings(lambda: (looked_at(mechanism), looked_at(other, 2 * T)))
 
 
 def test_solutions_and_simulations_tell_it():
     mechanism = rod("size*sin(pi*t)", parameters={"size": 1.0})
-    assert not told(lambda: jn.solve(mechanism, T, order=0))
-    (found,) = told(lambda: jn.solve(mechanism.with_parameters(size=60.0), T, order=0))
+    assert not unit_warnings(lambda: jn.solve(mechanism, T, order=0))
+    (found,) = unit_warnings(lambda: jn.solve(mechanism.with_parameters(size=60.0), T, order=0))
     assert "goes from -60 to 60 rad" in found
 
     def run():
         with pytest.raises(jn.errors.MechanismError, match="mass"):
             jn.simulate(rod("60*sin(pi*t)", joints={}, bodies={"rod": jn.Body([0, 0])}), T)
 
-    assert len(told(run)) == 1
+    assert len(unit_warnings(run)) == 1
 
 
 @pytest.mark.parametrize(
@@ -91,15 +91,15 @@ def test_a_length_is_no_angle():
     looked_at(rod("t", joints=joints, drivers={"motor": sliding}))  # warnings are errors here
 
 
-def test_what_a_file_told_is_not_told_again(tmp_path):
+def test_what_a_file_reported_is_not_reported_again(tmp_path):
     path = tmp_path / "four_bar.yaml"
     text = Path("examples/four_bar.yaml").read_text()
     path.write_text(text.replace("motion: 30*deg + 60*deg*sin", "motion: 1 + 60*sin"))
     with pytest.warns(jn.errors.UnitWarning, match="four_bar.yaml, line"):
         mechanism = jn.load(path)
-    assert not told(lambda: looked_at(mechanism))
+    assert not unit_warnings(lambda: looked_at(mechanism))
     path.write_text(text.replace("motion: 30*deg + 60*deg*sin(2*pi*t/tau)", "motion: {samples: law.csv}"))
     rows = "".join(f"{t},{30 * np.sin(np.pi * t)}\n" for t in np.linspace(0, 2, 101))
     (tmp_path / "law.csv").write_text(f"time [s],angle [rad]\n{rows}")
     meant = jn.load(path)  # in rad, as the file says
-    assert not told(lambda: looked_at(dataclasses.replace(meant, title="other")))
+    assert not unit_warnings(lambda: looked_at(dataclasses.replace(meant, title="other")))

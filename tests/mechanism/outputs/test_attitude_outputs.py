@@ -59,8 +59,8 @@ def test_relative_attitudes_are_those_of_the_frames():
     angles = jn.outputs.RelativeEulerAnglesOutput(pair, "xzy").evaluate(one, two)
     again = jn.rigid.rotation_matrix("xzy", angles)
     np.testing.assert_allclose(coefficients(again)[..., 0, :], expected, rtol=0, atol=1e-12)
-    alone = coefficients(jn.outputs.RotationMatrixOutput("b").evaluate(two))[:, :, 0]
-    np.testing.assert_allclose(alone.reshape(B.shape), B, rtol=0, atol=1e-15)
+    single = coefficients(jn.outputs.RotationMatrixOutput("b").evaluate(two))[:, :, 0]
+    np.testing.assert_allclose(single.reshape(B.shape), B, rtol=0, atol=1e-15)
 
 
 LAWS = {"alpha": "0.3 + 7*t", "beta": "b0 + b1*t + b2*sin(2*t)", "gamma": "0.5 + c1*t + c2*t**2"}
@@ -220,7 +220,7 @@ def test_simulated_angles_are_continuous_over_turns():
 
 
 @pytest.mark.slow  # to compile
-def test_simulated_angles_without_a_value_are_told():
+def test_simulated_angles_without_a_value_are_reported():
     """A rotor that turns about z only has no angles of the sequence ZXZ; of a batch the other numbers stay."""
     outputs = {"turn": jn.outputs.EulerAnglesOutput("rotor", "ZXZ"), "p": jn.outputs.EulerParametersOutput("rotor")}
     mechanism = jn.Mechanism(

@@ -133,11 +133,11 @@ def test_where_both_lines_of_a_roll_center_are_one_only_that_of_a_symmetric_axle
     for output, known, tolerance in ((one, np.ones(7, bool), 1e-12), (two, np.abs(time) > 0.1, 1e-2)):
         made = jn.Mechanism(space="spatial", bodies=bodies, joints=joints, drivers=drivers, outputs={"R": output})
         motion = jn.solve(made, time, order=ORDER, strict=False)
-        found, told = motion.outputs["R"], motion.status == Status.OK
-        assert told[known].all()
-        assert told[3] == known[3]
-        close(found[told][..., 2], np.array(expected)[told], tolerance)  # 1e-2 is what quotients are given to
-        np.testing.assert_array_less(np.abs(found[told][..., :2]), tolerance)
+        found, solved = motion.outputs["R"], motion.status == Status.OK
+        assert solved[known].all()
+        assert solved[3] == known[3]
+        close(found[solved][..., 2], np.array(expected)[solved], tolerance)  # 1e-2 is what quotients are given to
+        np.testing.assert_array_less(np.abs(found[solved][..., :2]), tolerance)
 
 
 def _center(its, t):
@@ -221,19 +221,19 @@ def ratio(t, order, times=1):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("order", [1, 4, 6])
-def test_nothing_false_is_told_near_where_the_reference_stands_still(order):
+def test_nothing_false_is_reported_near_where_the_reference_stands_still(order):
     """What is given as solved is right, however near; what rounding decides is not given."""
     off = np.array([0.0, 1e-16, 2e-16, 1e-14, 1e-12, 1e-9, 1e-7, 1e-6, 1e-5, 1e-4, 3e-4, 1e-3, 3e-3, 1e-2])
     time = np.unique(np.concatenate([[0.4], 0.5 - off, 0.5 + off]))
     motion = jn.solve(four_bar(ratio=jn.outputs.DerivativeOutput("psi", "theta")), time, order=order, strict=False)
     natural = np.abs([float(x) for x in ratio(0.4, order)]) + 1.0
-    told = motion.status == 0
-    for k in np.flatnonzero(told):
+    solved = motion.status == 0
+    for k in np.flatnonzero(solved):
         wrong = np.abs(motion.outputs["ratio"][k] - [float(x) for x in ratio(time[k], order)])
         assert (wrong < 0.1 * natural).all(), (time[k], wrong)
-    assert set(motion.status[~told]) == {int(Status.UNDEFINED)}
-    assert not told[np.abs(time - 0.5) < 1e-15].any()
-    assert told[np.abs(time - 0.5) >= (9e-3 if order > 4 else 9e-4)].all()
+    assert set(motion.status[~solved]) == {int(Status.UNDEFINED)}
+    assert not solved[np.abs(time - 0.5) < 1e-15].any()
+    assert solved[np.abs(time - 0.5) >= (9e-3 if order > 4 else 9e-4)].all()
 
 
 def crossing(**given):
@@ -284,7 +284,7 @@ def test_projected_angles_count_turns_and_do_not_depend_on_frames():
 
 
 @pytest.mark.slow
-def test_a_force_has_derivatives_by_an_angle_and_what_has_none_is_told():
+def test_a_force_has_derivatives_by_an_angle_and_what_has_none_is_reported():
     weight = jn.Mechanism(
         space="planar",
         gravity=[0, -9.81],
@@ -326,7 +326,7 @@ def test_a_force_has_derivatives_by_an_angle_and_what_has_none_is_told():
         (jn.outputs.DerivativeOutput("psi", "C_z"), "C_z"),
     ],
 )
-def test_bad_derivatives_are_told(given, words):
+def test_bad_derivatives_are_reported(given, words):
     with pytest.raises(jn.errors.MechanismError, match=words) as caught:
         four_bar(self=given)
     assert caught.value.name.startswith("outputs.self.")

@@ -34,7 +34,7 @@ def test_inertia_and_time_constant_are_those_at_the_joint():
         ({"lead": -0.1}, "lead"),
     ],
 )
-def test_wrong_values_are_told_by_their_names(values, field):
+def test_wrong_values_are_reported_by_their_names(values, field):
     with pytest.raises(jn.errors.RobotError) as raised:
         jn.planning.Drive(**values)
     assert raised.value.name == field

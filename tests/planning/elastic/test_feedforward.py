@@ -162,7 +162,7 @@ def test_springs_obey_their_law_on_robots_of_chance(seed):
     )
 
 
-def test_limits_are_told_with_joint_and_instant():
+def test_limits_are_reported_with_joint_and_instant():
     """tau = 3.2 cos t about a vertical axis, K = 100, so that the deflection is largest at the start and at pi."""
     rod = jn.Inertia(1.0, tensor=[0.16, 0.16, 0.32])
     robot = jn.Robot("fan", [jn.Link("base"), jn.Link("rod", rod)], [jn.Joint("pin", "base", "rod")])

@@ -86,6 +86,6 @@ def test_a_motion_there_and_back_takes_as_long_as_its_closed_form_says():
     assert found.derivatives(np.linspace(0.0, found.stop, 20001), 0)[:, 0, 0].max() == pytest.approx(0.5, abs=1e-8)
 
 
-def test_what_does_not_move_is_told():
+def test_what_does_not_move_is_reported():
     with pytest.raises(TrajectoryError, match="does not move"):
         path_of(jn.JointTrajectory({"j": 1.0}, 0.0, 1.0))

@@ -63,7 +63,7 @@ def test_a_repaired_trajectory_carries_too():
     np.testing.assert_allclose(found.derivatives([found.loads[0].start], 0), given.derivatives([0.2], 0))
 
 
-def test_places_that_are_not_on_the_path_are_told():
+def test_places_that_are_not_on_the_path_are_reported():
     path, robot = {"slide": [0.0, 1.0, 3.0]}, cart(effort=30.0)
     for place, words in (
         ({"start": 4, "by": "waypoint"}, "waypoints go from 1 to 3"),

@@ -152,7 +152,7 @@ def test_rates_at_the_ends_are_kept():
     assert duration * (1 - 1e-9) < found.stop < duration * 1.003
 
 
-def test_a_duration_is_kept_and_one_that_is_too_short_is_told_with_the_least():
+def test_a_duration_is_kept_and_one_that_is_too_short_is_reported_with_the_least():
     robot = cart(velocity=SPEED, acceleration=ACCELERATION)
     slow = jn.retime(robot, LINE, duration=4.0)
     assert slow.stop == pytest.approx(4.0, rel=1e-12)
@@ -301,7 +301,7 @@ def test_a_result_is_a_trajectory_like_others():
         ([[0.0], [9.0]], "leaves the range"),
     ],
 )
-def test_bad_paths_are_told(path, message):
+def test_bad_paths_are_reported(path, message):
     with pytest.raises(JounceError, match=message):
         jn.retime(cart(velocity=SPEED, acceleration=ACCELERATION, lower=-3.0, upper=3.0), path)
 
@@ -314,12 +314,12 @@ def test_a_jump_of_curvature_is_refused_only_where_rates_are_limited():
         jn.retime(cart(velocity=SPEED, acceleration=ACCELERATION, jerk=JERK), bent)
 
 
-def test_a_static_torque_above_its_limit_is_told_with_its_place():
+def test_a_static_torque_above_its_limit_is_reported_with_its_place():
     with pytest.raises(TrajectoryError, match=r"pin: .*s = 0\.\d+ \(q = .*4\.9\d* N m.* 4 N m"):
         jn.retime(pendulum(effort=4.0, velocity=1.0), {"pin": "1.2*(1 - 2*s)"})
 
 
-def test_limits_that_allow_anything_or_nothing_are_told():
+def test_limits_that_allow_anything_or_nothing_are_reported():
     with pytest.raises(TrajectoryError, match="nothing with a limit moves"):
         jn.retime(cart(), LINE)
     with pytest.raises(SolveError, match="rates at the ends"):

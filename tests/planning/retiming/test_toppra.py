@@ -111,6 +111,6 @@ def test_torque(toppra):
         ({"deviation": 0.1, "degree": 3}, "degree"),
     ],
 )
-def test_bad_parameters_are_told(given, message):
+def test_bad_parameters_are_reported(given, message):
     with pytest.raises(TrajectoryError, match=message):
         jn.retime(arm(velocity=1.0), waypoints(0)[1], **given)

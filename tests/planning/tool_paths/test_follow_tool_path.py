@@ -102,14 +102,14 @@ def test_forward_after_inverse_of_a_wrist_arm_in_any_frames_along_laws_and_sampl
     assert np.allclose(motion.q[0, 0], q, rtol=0, atol=1e-9)
     found = jn.forward_kinematics(arm, motion.q, "hand", place)
     time = jn.Jet.variable(motion.time, 4)
-    wanted = path.position(motion.time, 4)
+    expected = path.position(motion.time, 4)
     scale = np.maximum.accumulate(np.abs(motion.q).max(axis=(0, 2)))
-    assert (np.abs(found.position - wanted).max(axis=(0, 2)) <= 1e-13 * scale).all()
+    assert (np.abs(found.position - expected).max(axis=(0, 2)) <= 1e-13 * scale).all()
     law = jn.JointTrajectory(dict(zip("abc", turns, strict=True)), 0.0, 2.0)
     attitude = jn.rigid.rotation_matrix(axes, law(time)).derivatives()  # (derivative, 3, 3, time)
     assert (np.abs(np.moveaxis(attitude, -1, 0) - found.rotation).max(axis=(0, 2, 3)) <= 1e-13 * scale).all()
     # and through samples of the same path
-    places, turned = wanted[:, 0], Rotation.from_matrix(np.moveaxis(attitude[0], -1, 0))
+    places, turned = expected[:, 0], Rotation.from_matrix(np.moveaxis(attitude[0], -1, 0))
     path = jn.planning.ToolPath.through(motion.time, places, turned, degree=7)
     motion = jn.planning.follow_tool_path(arm, "hand", path, motion.time, **{**settings, "order": 3})
     there = jn.forward_kinematics(arm, motion.q, "hand", place)
@@ -197,7 +197,7 @@ def test_singular_position_ends_the_path_and_names_the_joints():
 
 
 @pytest.mark.slow
-def test_limits_jumps_and_starts_are_told():
+def test_limits_jumps_and_starts_are_reported():
     arm = planar_chain([0.7, 0.6], lower=-1.0, upper=1.8)
     settings = {"point": [0.6, 0, 0], "start": [-0.8, 1.6], "order": 1}
     path = jn.planning.ToolPath(CIRCLE, start=0.0, stop=4.0)
@@ -248,7 +248,7 @@ def test_panda_with_a_posture():
         (lambda: jn.planning.ToolPath.through([0, 1], [[0, 0, 0]] * 2), "at least"),
     ],
 )
-def test_bad_paths_are_told(make, words):
+def test_bad_paths_are_reported(make, words):
     with pytest.raises(jn.errors.JounceError, match=words):
         make()
 
@@ -265,7 +265,7 @@ def test_bad_paths_are_told(make, words):
         ({"order": -1}, "whole number"),
     ],
 )
-def test_bad_settings_are_told(settings, words):
+def test_bad_settings_are_reported(settings, words):
     path = jn.planning.ToolPath(["0.8 + 0.1*t", 0.1, 0.0], start=0.0, stop=1.0)
     with pytest.raises(jn.errors.JounceError, match=words):
         jn.planning.follow_tool_path(planar_chain([0.7, 0.6]), "link_1", path, point=[0.6, 0, 0], **settings)

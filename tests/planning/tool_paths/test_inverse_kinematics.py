@@ -115,11 +115,11 @@ def test_direction_leaves_the_turn_about_it_free():
     link = robot.moving_links[-1]
     q = np.random.default_rng(5).uniform(-1, 1, (20, len(robot.joint_names)))
     there = jn.forward_kinematics(robot, q[:, None], link)
-    wanted = np.asarray(there.rotation)[:, 0] @ axis
-    found = jn.inverse_kinematics(robot, link, there.position[:, 0], direction=3 * wanted, axis=axis, limits=False)
+    direction = np.asarray(there.rotation)[:, 0] @ axis
+    found = jn.inverse_kinematics(robot, link, there.position[:, 0], direction=3 * direction, axis=axis, limits=False)
     assert (found.status == Status.OK).all()
     again = jn.forward_kinematics(robot, found.q[:, None], link)
-    assert np.allclose(np.asarray(again.rotation)[:, 0] @ axis, wanted, rtol=0, atol=1e-8)
+    assert np.allclose(np.asarray(again.rotation)[:, 0] @ axis, direction, rtol=0, atol=1e-8)
     assert np.allclose(again.position, there.position, rtol=0, atol=1e-8)
 
 
@@ -143,7 +143,7 @@ def test_direction_leaves_the_turn_about_it_free():
         ({"position": [0, 0, 0], "link": "base"}, "no joint moves it"),
     ],
 )
-def test_bad_input_is_told(settings, words):
+def test_bad_input_is_reported(settings, words):
     link = settings.pop("link", "link_1")
     with pytest.raises(jn.errors.JounceError, match=words):
         jn.inverse_kinematics(planar_chain([0.7, 0.5]), link, **settings)

@@ -40,17 +40,17 @@ def along(*laws, order=4):
 def test_a_corner_is_kept_and_its_velocities_jump(laws, kink):
     _, path, laws = along(*laws)
     times = np.union1d(np.linspace(0.0, 2.0, 4001), kink + np.array([-1e-5, -1e-7, 1e-7, 1e-5]))
-    wanted = path.position(times, 1)
+    expected = path.position(times, 1)
     smooth = (np.abs(times - kink) > 1e-8) & (times < 2.0)  # at its end a law that is held has the derivatives of rest
     found = laws.derivatives(times, 1)
-    np.testing.assert_allclose(found[:, 0], wanted[:, 0], rtol=0, atol=2e-9)
-    np.testing.assert_allclose(found[smooth, 1], wanted[smooth, 1], rtol=0, atol=1e-6)
+    np.testing.assert_allclose(found[:, 0], expected[:, 0], rtol=0, atol=2e-9)
+    np.testing.assert_allclose(found[smooth, 1], expected[smooth, 1], rtol=0, atol=1e-6)
     law = laws.laws["x"]
     assert isinstance(law, jn.laws.HermiteMotion)
     instants, jumps = law.jumps(1)
     broken = jumps[1] != 0
     assert instants[broken] == pytest.approx([kink], abs=1e-9)
-    after, before = wanted[times > kink + 1e-8][0, 1, 0], wanted[times < kink - 1e-8][-1, 1, 0]
+    after, before = expected[times > kink + 1e-8][0, 1, 0], expected[times < kink - 1e-8][-1, 1, 0]
     assert jumps[1][broken] == pytest.approx([after - before], abs=1e-6)
 
 
@@ -63,7 +63,7 @@ def test_a_spike_between_instants_is_followed(order):
 
 
 @pytest.mark.slow
-def test_a_spike_too_narrow_to_be_followed_is_told_with_its_instant():
+def test_a_spike_too_narrow_to_be_followed_is_reported_with_its_instant():
     with pytest.raises(TrajectoryError, match=r"too narrow to be followed, at t = 0\.9871"):
         along("0.5*t + 0.3*exp(-((t - 0.9871)/0.0000005)**2)", "t", 0.0)
 

@@ -54,7 +54,7 @@ def test_a_panel_for_each_quantity_with_the_shares_of_each_joint(report):
         np.testing.assert_array_equal(line.get_ydata(), report.shares[:, 0, joint])
 
 
-def test_the_worst_instant_is_marked_and_told(report):
+def test_the_worst_instant_is_marked_and_reported(report):
     velocity = drawn(draw_limits(report))[2]
     (mark,) = (line for line in velocity.get_lines() if line.get_marker() == "o")
     assert (mark.get_xdata()[0], mark.get_ydata()[0]) == (0.0, pytest.approx(2.0))
@@ -108,7 +108,7 @@ def test_long_trajectories_are_thinned():
     assert (line.get_xdata()[0], line.get_xdata()[-1]) == (0.0, 1.0)
 
 
-def test_nothing_to_draw_is_told():
+def test_nothing_to_draw_is_reported():
     report = check_limits(crane(jn.Limits(), jn.Limits()), MOTION)
     with pytest.raises(jn.errors.RobotError, match="there are no limits to draw"):
         draw_limits(report)

@@ -9,10 +9,10 @@ from jounce.reporting.text.law_facts import jump_facts, law_facts, law_words
 
 
 @pytest.mark.parametrize("power", [0.5, 2.5])
-def test_derivatives_that_are_infinite_or_none_are_told(power):
-    told = jn.laws.continuity(jn.laws.PiecewiseMotion(["0", f"(t-1)**{power}"], until=[1.0]), 0.0, 2.0, order=1)
-    law = {"of": "ram", "unit": "m", "continuous_to": told.smoothness, "remark": ""}
-    (words,) = law_words([{**law, "derivatives": jump_facts(told)}])
+def test_derivatives_that_are_infinite_or_none_are_reported(power):
+    result = jn.laws.continuity(jn.laws.PiecewiseMotion(["0", f"(t-1)**{power}"], until=[1.0]), 0.0, 2.0, order=1)
+    law = {"of": "ram", "unit": "m", "continuous_to": result.smoothness, "remark": ""}
+    (words,) = law_words([{**law, "derivatives": jump_facts(result)}])
     assert words.startswith("law of ram: continuous to position; ")
     assert all(word in words for word in ("velocity", "no finite value", "1 s"))
 
@@ -51,15 +51,15 @@ def cam(folder, last=70, speed="20*pi"):
     return jn.load(path)
 
 
-@pytest.mark.parametrize("last, told", [(50, "repeats every 340 deg of shaft"), (70, ""), (430, ""), (60, "350 deg")])
-def test_a_cam_that_does_not_close_over_a_turn_is_told(tmp_path, last, told):
+@pytest.mark.parametrize("last, part", [(50, "repeats every 340 deg of shaft"), (70, ""), (430, ""), (60, "350 deg")])
+def test_a_cam_that_does_not_close_over_a_turn_is_reported(tmp_path, last, part):
     facts = {x["driver"]: x["remark"] for x in law_facts(cam(tmp_path, last), 0.0, 0.2)}
     assert facts["shaft"] == ""
-    assert (told in facts["cam"]) if told else facts["cam"] == ""
+    assert (part in facts["cam"]) if part else facts["cam"] == ""
 
 
 @pytest.mark.slow
-def test_a_contact_force_that_changes_its_sign_is_told_as_lift_off(tmp_path):
+def test_a_contact_force_that_changes_its_sign_is_reported_as_lift_off(tmp_path):
     fast = jn.solve(cam(tmp_path, speed="200*pi/3"), [k / 2000 for k in range(60)], order=2)
     (remark,) = motion_facts(fast)["remarks"]
     assert remark.startswith("contact: changes its sign before t = ")

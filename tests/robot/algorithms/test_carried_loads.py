@@ -33,7 +33,7 @@ def test_torques_follow_what_is_carried():
     np.testing.assert_allclose(found, moment(times, carried), rtol=1e-12)
 
 
-def test_both_sides_of_a_change_are_compared_with_limits_and_the_step_is_told():
+def test_both_sides_of_a_change_are_compared_with_limits_and_the_step_is_reported():
     trajectory, load = jn.JointTrajectory({"pin": "t**3/3"}, 0.0, 2.0), CarriedLoad("rod", TIP, 0.8, 1.2)
     whole = jn.check_limits(pendulum(effort=50.0, effort_rate=100.0), trajectory, loads=[load], hand_over=True)
     torque, rate = (next(row for row in whole.rows if row.quantity == word) for word in ("torque", "torque rate"))
@@ -48,7 +48,7 @@ def test_both_sides_of_a_change_are_compared_with_limits_and_the_step_is_told():
     assert down.steps["pin"] == pytest.approx(moment(1.2, 0.0)[0] - moment(1.2, 1.0)[0], rel=1e-12)
 
 
-def test_what_cannot_be_is_told():
+def test_what_cannot_be_is_reported():
     trajectory = jn.JointTrajectory({"pin": "t**3/3"}, 0.0, 2.0)
     for loads, words in (
         ([CarriedLoad("rod", TIP, 0.5, 3.0)], "outside of the motion"),

@@ -63,8 +63,8 @@ def bias_rate(model, data, q, v, a, _):
 def single(model, data, q, v, *_):
     """Return the sum of what each velocity alone needs."""
     gravity = np.array(pinocchio.computeGeneralizedGravity(model, data, q))
-    alone = [pinocchio.nonLinearEffects(model, data, q, row) - gravity for row in np.diag(v)]
-    return np.sum(alone, axis=0)
+    one_by_one = [pinocchio.nonLinearEffects(model, data, q, row) - gravity for row in np.diag(v)]
+    return np.sum(one_by_one, axis=0)
 
 
 SLOW = "floating_solo12"
@@ -116,12 +116,13 @@ def test_parts_with_rates_of_joints_that_follow():
     whole = jn.bias_forces(robot, q, rates=True, drives=False)
     assert whole.shape == (1, 2, len(robot.joint_names))
     assert difference(sum(parts), whole) <= BOUND
-    alone = np.zeros_like(q)
-    alone[:, 0], alone[:, 1:, 0] = q[:, 0], q[:, 1:, 0]  # one coordinate only: no products of two
+    one_by_one = np.zeros_like(q)
+    one_by_one[:, 0], one_by_one[:, 1:, 0] = q[:, 0], q[:, 1:, 0]  # one coordinate only: no products of two
     weightless = robot.with_gravity([0, 0, 0])
     assert (
         difference(
-            jn.bias_forces(weightless, alone, drives=False), jn.bias_forces(weightless, alone, parts="centrifugal")
+            jn.bias_forces(weightless, one_by_one, drives=False),
+            jn.bias_forces(weightless, one_by_one, parts="centrifugal"),
         )
         <= BOUND
     )

@@ -192,7 +192,7 @@ def test_gradients_of_accelerations_and_their_rates():
     assert abs(slope - np.subtract(*ends) / (2 * step)) <= 1e-7 * max(1.0, abs(slope))
 
 
-def test_bad_input_is_told():
+def test_bad_input_is_reported():
     robot = random_robot(2, 3)
     state = np.zeros((2, 3))
     with pytest.raises(jn.errors.RobotError, match=r"tau: must have the shape \(order \+ 1, 3\), as"):
@@ -233,7 +233,7 @@ def test_a_lone_body_that_is_fixed_has_no_motion():
     assert jn.forward_dynamics(post, np.zeros((3, 2, 0)), np.zeros((3, 2, 0))).shape == (3, 4, 0)
 
 
-def test_free_base_without_inertia_is_told():
+def test_free_base_without_inertia_is_reported():
     ball = jn.Inertia(1.0, center_of_mass=[0.1, 0, 0], tensor=[0.1, 0.1, 0.1])
     robot = jn.Robot("ball", [jn.Link("base"), jn.Link("ball", ball)], [jn.Joint("pin", "base", "ball")])
     base = jn.robot.BaseMotion([0, 0, 0], [1, 0, 0, 0], np.zeros((1, 6)))

@@ -321,7 +321,7 @@ def test_frames_of_reactions_are_checked():
     assert str(caught.value) == "frame: unknown frame, got 'world'; valid: base, link"
 
 
-def test_calls_as_in_pinocchio_are_told_how_they_are_made_here():
+def test_calls_as_in_pinocchio_are_answered_by_how_they_are_made_here():
     robot = jn.load_robot("examples/robots/ur5.urdf")
     q = np.zeros(6)
     for call, words in (

@@ -150,13 +150,13 @@ def test_a_point_that_no_joint_moves_is_singular():
 
 def test_damping_holds_back_what_is_lost_and_nothing_else():
     direction, across = np.array([np.cos(0.3), np.sin(0.3)]), np.array([-np.sin(0.3), np.cos(0.3)])
-    wanted = np.zeros((1, 3))
-    wanted[0, :2] = 2 * direction + 5 * across
-    found = jn.robot.joint_motion(ARM, STRETCHED, wanted, *TIP, task="position", damping=0.05)
+    requested = np.zeros((1, 3))
+    requested[0, :2] = 2 * direction + 5 * across
+    found = jn.robot.joint_motion(ARM, STRETCHED, requested, *TIP, task="position", damping=0.05)
     np.testing.assert_allclose(found.residual[0, :2], 2 * direction, rtol=0, atol=1e-14)
     np.testing.assert_allclose(found.q[1], [2.0, 1.0], rtol=0, atol=1e-12)  # least norm of 2 q1 + q2 = 5
-    bent = jn.robot.joint_motion(ARM, [0.3, 1.0], wanted, *TIP, task="position", damping=0.05)
-    exact = jn.robot.joint_motion(ARM, [0.3, 1.0], wanted, *TIP, task="position")
+    bent = jn.robot.joint_motion(ARM, [0.3, 1.0], requested, *TIP, task="position", damping=0.05)
+    exact = jn.robot.joint_motion(ARM, [0.3, 1.0], requested, *TIP, task="position")
     assert np.array_equal(bent.q, exact.q)  # far from singular the damping has faded out
 
 
@@ -175,16 +175,16 @@ def test_damping_fades_in_by_the_textbook():
 
 
 def test_nan_stays_in_its_sample():
-    wanted = np.ones((2, 2, 3))
-    wanted[1] = np.nan
-    found = jn.robot.joint_motion(ARM, [[0.3, 1.0]] * 2, wanted, *TIP, task="position")
+    requested = np.ones((2, 2, 3))
+    requested[1] = np.nan
+    found = jn.robot.joint_motion(ARM, [[0.3, 1.0]] * 2, requested, *TIP, task="position")
     assert np.isfinite(found.q[0]).all()
     assert np.isnan(found.q[1, 1:]).all()
 
 
 def test_arrays_of_jax_of_single_precision():
-    wanted = jnp.ones((2, 3), jnp.float32)
-    found = jn.robot.joint_motion(ARM, jnp.asarray([0.5, 1.0], jnp.float32), wanted, *TIP, task="position")
+    requested = jnp.ones((2, 3), jnp.float32)
+    found = jn.robot.joint_motion(ARM, jnp.asarray([0.5, 1.0], jnp.float32), requested, *TIP, task="position")
     assert found.q.dtype == np.float64
 
 

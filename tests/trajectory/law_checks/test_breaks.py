@@ -39,7 +39,7 @@ def test_breaks_are_found(law, expected):
     assert may_break(law) or not expected
 
 
-def test_those_of_several_laws_are_told_once():
+def test_those_of_several_laws_are_reported_once():
     laws = [expression("abs(t - 0.5)"), jn.laws.PiecewiseMotion(["t", "0.5"], until=[0.5])]
     assert law_breaks(laws, 0.0, 1.0, 4).tolist() == pytest.approx([0.5], abs=1e-11)
 

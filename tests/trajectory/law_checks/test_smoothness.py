@@ -23,10 +23,10 @@ def test_segments_jump_as_their_formulas_say(profile):
     )
     found = jn.laws.continuity(law, 0.0, 4.0)
     assert found.smoothness == order - 1
-    told = found.derivatives[order]
-    assert told.count == 2
-    assert abs(told.size) == pytest.approx(3 * size / 2**order)
-    assert told.instant == 0.5
+    jumps = found.derivatives[order]
+    assert jumps.count == 2
+    assert abs(jumps.size) == pytest.approx(3 * size / 2**order)
+    assert jumps.instant == 0.5
     assert all(x.count == 0 for x in found.derivatives[:order])
 
 
@@ -34,10 +34,10 @@ def test_profiles_jump_as_their_formulas_say():
     for rest in (1, 2, 3):  # the derivative above the rest is (2 r + 1)! / r! of the way, at both ends
         law = jn.laws.RestToRestMotion(1.0, 3.0, duration=0.5, start_time=0.25, rest=rest)
         found = jn.laws.continuity(law, 0.0, 1.0)
-        told = found.derivatives[rest + 1]
+        jumps = found.derivatives[rest + 1]
         size = 2.0 * math.factorial(2 * rest + 1) / math.factorial(rest) / 0.5 ** (rest + 1)
-        assert (found.smoothness, told.count, found.unknown) == (rest, 2, "")
-        assert (told.size, told.instant) == (pytest.approx(size), 0.25)
+        assert (found.smoothness, jumps.count, found.unknown) == (rest, 2, "")
+        assert (jumps.size, jumps.instant) == (pytest.approx(size), 0.25)
         assert jn.laws.continuity(law, 0.3, 0.7).smoothness is None
     cycloid = jn.laws.continuity(jn.laws.CycloidalMotion(0.0, -1.0, duration=2.0), -1.0, 3.0)
     assert (cycloid.smoothness, cycloid.derivatives[3].size) == (2, pytest.approx(-(math.pi**2) / 2))
@@ -50,11 +50,11 @@ def test_what_follows_jumps_where_its_leader_passes_the_knots():
     law = jn.laws.FollowingMotion(lift, "2*pi*t + 0.1*sin(2*pi*t)")
     found = jn.laws.continuity(law, -0.2, 1.2)
     assert found.smoothness == 1
-    told = found.derivatives[2]
+    jumps = found.derivatives[2]
     speed = 2 * math.pi * 1.1  # at 0 s and at 1 s
-    assert told.count == 2
-    assert abs(told.size) == pytest.approx(0.01 * speed**2)
-    assert told.instant == pytest.approx(0.0, abs=1e-12)
+    assert jumps.count == 2
+    assert abs(jumps.size) == pytest.approx(0.01 * speed**2)
+    assert jumps.instant == pytest.approx(0.0, abs=1e-12)
     assert found.derivatives[3].count == 0  # the leader has no acceleration there
     repeated = jn.laws.SegmentedMotion(
         [jn.laws.Segment("cycloidal", math.pi, to=1.0), jn.laws.Segment("cycloidal", math.pi, to=0.0)], beyond="repeat"
@@ -84,9 +84,9 @@ def test_a_leader_that_has_no_value_beyond_its_ends_passes_nothing_there(leader)
 
 def test_pieces_splines_and_expressions():
     pieces = jn.laws.PiecewiseMotion(["t**3", "3*t - 2"], until=[1.0])
-    told = jn.laws.continuity(pieces, 0.0, 2.0)
-    assert told.smoothness == 1
-    assert told.derivatives[2].size == -6.0
+    result = jn.laws.continuity(pieces, 0.0, 2.0)
+    assert result.smoothness == 1
+    assert result.derivatives[2].size == -6.0
     assert jn.laws.continuity(pieces, 0.0, 0.5).smoothness is None  # nothing happens there
     t = np.linspace(0.0, 1.0, 21)
     spline = jn.laws.continuity(jn.laws.SplineMotion(t, np.sin(7 * t), degree=5), 0.0, 1.0)
@@ -105,22 +105,22 @@ def test_pieces_splines_and_expressions():
 @pytest.mark.parametrize("law", ["0.01*(1 - cos(t))", "0.2*sin(3*t) - 0.1*sin(t)**2"])
 def test_rounding_is_no_jump_where_a_smooth_law_begins_again(law):
     """sin(2 pi) is 2e-16 and not zero: a derivative that vanishes where laws meet is rounding of any size."""
-    told = jn.laws.continuity(jn.laws.ExpressionMotion(law), 0.0, 2 * math.pi, order=6, periodic=True)
-    assert told.smoothness is None
+    result = jn.laws.continuity(jn.laws.ExpressionMotion(law), 0.0, 2 * math.pi, order=6, periodic=True)
+    assert result.smoothness is None
 
 
 def test_rounding_is_no_jump_between_pieces():
     law = jn.laws.PiecewiseMotion(["sin(pi*t)", "pi*(1 - t)", "-pi + sin(t - 2)**3"], until=[1.0, 2.0])
-    told = jn.laws.continuity(law, 0.0, 3.0)
-    assert [x.count for x in told.derivatives] == [0, 1, 0, 2, 0]
-    assert told.derivatives[1].size == pytest.approx(math.pi)
-    assert told.derivatives[3].size == pytest.approx(-(math.pi**3))
+    result = jn.laws.continuity(law, 0.0, 3.0)
+    assert [x.count for x in result.derivatives] == [0, 1, 0, 2, 0]
+    assert result.derivatives[1].size == pytest.approx(math.pi)
+    assert result.derivatives[3].size == pytest.approx(-(math.pi**3))
     share = "(t/0.7)"
     rise = f"10*{share}**3 - 15*{share}**4 + 6*{share}**5"
     for after in ("1", jn.laws.SplineMotion(np.linspace(0.7, 0.9, 11), np.ones(11))):  # these say nothing after 0.9 s
-        told = jn.laws.continuity(jn.laws.PiecewiseMotion([rise, after], until=[0.7]), 0.0, 0.9)
-        assert told.smoothness == 2
-        assert told.derivatives[3].size == pytest.approx(-60 / 0.7**3)
+        result = jn.laws.continuity(jn.laws.PiecewiseMotion([rise, after], until=[0.7]), 0.0, 0.9)
+        assert result.smoothness == 2
+        assert result.derivatives[3].size == pytest.approx(-60 / 0.7**3)
 
 
 @pytest.mark.parametrize("levels", [1, 3, 5, 9])

@@ -67,7 +67,7 @@ def test_values_by_numpy_are_those_of_the_law(law):
 
 
 @pytest.mark.parametrize(
-    "law, told",
+    "law, expected",
     [
         ("8*sin(3.1*t)", "goes from -8 to 8 rad, 2.5 turns: degrees?"),
         ("3 + 9*sin(4*t)", "goes from -6 to 12 rad, 2.9 turns: degrees?"),
@@ -80,8 +80,8 @@ def test_values_by_numpy_are_those_of_the_law(law):
         ("2.5*pi*sin(3*t)", ""),
     ],
 )
-def test_swings_to_whole_and_half_degrees_of_more_than_a_turn_are_told(law, told):
-    assert degrees_meant(values_of(jn.laws.ExpressionMotion(law), 0.0, 2.0)) == told
+def test_swings_to_whole_and_half_degrees_of_more_than_a_turn_are_reported(law, expected):
+    assert degrees_meant(values_of(jn.laws.ExpressionMotion(law), 0.0, 2.0)) == expected
 
 
 @pytest.mark.parametrize("law", ["log(t - 1)", "1.7e308*t", "1e300 + t", "1/(t - 1)"])
@@ -108,7 +108,7 @@ IN_DEGREES = {
 
 @pytest.mark.parametrize("robot", [FREE, LIMITED], ids=["free", "limited"])
 @pytest.mark.parametrize("given", IN_DEGREES)
-def test_a_trajectory_in_degrees_is_told(robot, given):
+def test_a_trajectory_in_degrees_is_reported(robot, given):
     with pytest.warns(jn.errors.UnitWarning, match=r"pin goes from .* to 90 rad, .* turns: degrees\?"):
         jn.dynamics.trajectory_torques(robot, IN_DEGREES[given])
 
@@ -128,7 +128,7 @@ def test_a_trajectory_in_rad_is_not_doubted(robot, law):
     assert jn.dynamics.trajectory_torques(robot, jn.JointTrajectory({"pin": law, "slide": "50*sin(t)"}, 0.0, 2.0))
 
 
-def test_waypoints_in_degrees_are_told():
+def test_waypoints_in_degrees_are_reported():
     with pytest.warns(jn.errors.UnitWarning, match="pin goes from 0 to 91.87 rad"), pytest.raises(jn.JounceError):
         jn.retime(LIMITED, [[0.0, 0.0], [90.0, 0.1], [45.0, 0.0]])
 
@@ -144,8 +144,8 @@ def _panda(folder, header, factor):
 def test_commands_tell_degrees_on_standard_error_and_in_json(tmp_path, capsys, command):
     path = _panda(tmp_path, "time,panda_joint1,panda_joint4", 1.0)
     shown = main([command, "examples/robots/panda.urdf", str(path), "--json"])
-    told = [json.loads(line)["warning"] for line in capsys.readouterr().err.splitlines()]
-    words = [line["message"] for line in told if line["kind"] == "UnitWarning"]
+    record = [json.loads(line)["warning"] for line in capsys.readouterr().err.splitlines()]
+    words = [line["message"] for line in record if line["kind"] == "UnitWarning"]
     assert len(words) == 1
     assert "panda_joint1 goes from -0.2721 to 70 rad, 11 turns: degrees? (and 1 joint like it)" in words[0]
     assert shown == (0 if command == "torques" else 1)
@@ -158,7 +158,7 @@ def test_commands_say_nothing_of_a_trajectory_with_units_or_in_rad(tmp_path, cap
     assert "degrees?" not in capsys.readouterr().err
 
 
-def test_a_mechanism_in_degrees_runs_with_status_0_and_is_told_in_json(tmp_path, capsys):
+def test_a_mechanism_in_degrees_runs_with_status_0_and_is_reported_in_json(tmp_path, capsys):
     path = tmp_path / "four_bar.yaml"
     shutil.copy("examples/four_bar.yaml", path)
     path.write_text(path.read_text().replace("motion: 30*deg", "motion: 30 + 0*deg").replace("60*deg*sin", "60*sin"))

@@ -115,8 +115,8 @@ def test_slopes_by_the_start_and_the_values_there():
 @pytest.mark.slow
 def test_knots_are_those_of_the_derivative_one_order_higher():
     ramp = jn.laws.SegmentedMotion([jn.laws.Segment("constant_velocity", 1.0, to=2.0)])
-    told = jn.laws.continuity(jn.laws.IntegratedMotion(ramp), -0.5, 1.5)
-    assert [(x.order, x.count, abs(x.size)) for x in told.derivatives if x.count] == [(2, 2, 2.0)]
+    result = jn.laws.continuity(jn.laws.IntegratedMotion(ramp), -0.5, 1.5)
+    assert [(x.order, x.count, abs(x.size)) for x in result.derivatives if x.count] == [(2, 2, 2.0)]
 
 
 def test_what_cannot_be_is_refused():

@@ -66,13 +66,13 @@ def test_advance_adds_what_a_repetition_gains():
     ], atol=1e-12)  # fmt: skip
 
 
-def test_both_limits_at_a_knot_are_told_also_those_between_repetitions():
+def test_both_limits_at_a_knot_are_reported_also_those_between_repetitions():
     law = jn.laws.PiecewiseMotion(["t**2", "2*t - 1"], until=[1.0, 2.0], beyond="advance")
     instants, jumps = law.jumps(2)
     np.testing.assert_allclose(instants, [0.0, 1.0])
     np.testing.assert_allclose(jumps, [[0, 0], [-2, 0], [2, -2]])  # at 2 s speed falls from 2 to 0
-    told = jn.laws.continuity(law, 0.5, 8.5)
-    assert [(x.order, x.count) for x in told.derivatives if x.count] == [(1, 4), (2, 8)]
+    result = jn.laws.continuity(law, 0.5, 8.5)
+    assert [(x.order, x.count) for x in result.derivatives if x.count] == [(1, 4), (2, 8)]
     held = jn.laws.PiecewiseMotion(["t"], until=[2.0], start=1.0, beyond="hold").jumps(1)
     np.testing.assert_allclose(held[0], [1.0, 2.0])
     np.testing.assert_allclose(held[1], [[0, 0], [1, -1]])

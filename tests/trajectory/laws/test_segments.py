@@ -40,8 +40,8 @@ def test_laws_known_already_are_the_same():
     law, instants = SegmentedMotion(segments, initial=0.5, start=1.0), np.linspace(0.5, 5.0, 91)
     first = derivatives(jn.laws.CycloidalMotion(0.5, 3.5, 2.0, 1.0), instants)
     second = derivatives(jn.laws.RestToRestMotion(3.5, -1.0, 1.5, 3.0, rest=3), instants)
-    wanted = np.where(instants < 3.0, first, second)
-    np.testing.assert_allclose(derivatives(law, instants), wanted, rtol=0, atol=1e-12 * np.abs(wanted).max())
+    expected = np.where(instants < 3.0, first, second)
+    np.testing.assert_allclose(derivatives(law, instants), expected, rtol=0, atol=1e-12 * np.abs(expected).max())
 
 
 CAM = [

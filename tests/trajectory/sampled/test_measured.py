@@ -174,7 +174,7 @@ def test_bad_trajectory_files(tmp_path, text, words):
     assert all(word in str(raised.value) for word in words), str(raised.value)
 
 
-def test_noisy_accelerations_are_told():
+def test_noisy_accelerations_are_reported():
     noisy = polynomial(T, 2) + np.random.default_rng(1).normal(scale=5.0, size=len(T))
     trajectory = jn.JointTrajectory({"a": jn.laws.MeasuredMotion(T, noisy)}, T[0], T[-1])
     with pytest.warns(jn.errors.SampleWarning, match="'a'"):

@@ -24,7 +24,7 @@ def test_the_newest_of_many_requests_wins():
     assert session.error is None
 
 
-def test_a_failure_is_told_and_keeps_the_last_motion():
+def test_a_failure_is_reported_and_keeps_the_last_motion():
     subject, errors = Slow(), []
     session = Session(subject, 1, on_failure=errors.append)
     first = session.recording

@@ -61,7 +61,7 @@ SLOW = [pytest.param(file, marks=pytest.mark.slow) for file in ("rsur", "scotch_
 def test_every_body_of_an_example_can_be_seen(file):
     mechanism = jn.load(f"examples/{file}.yaml")
     appearance = mechanism_appearance(jn.solve(mechanism, np.array([0.0, 0.01]), order=0))
-    rods = {body for stretch in appearance.connectors for body in stretch.bodies}
+    rods = {body for connector in appearance.connectors for body in connector.bodies}
     for body in mechanism.bodies:
         assert appearance.meshes[body] or body in rods
         assert all(np.isfinite(each.mesh.vertices).all() and len(each.mesh.faces) for each in appearance.meshes[body])

@@ -209,7 +209,7 @@ def test_a_force_that_is_not_finite_is_named_with_its_time():
 
 
 @pytest.mark.slow
-def test_forces_at_a_change_point_are_not_told():
+def test_forces_at_a_change_point_are_not_reported():
     """A parallelogram in circular translation: its weight on the crank in closed form, but where it is stretched out.
 
     There the Jacobian is singular, and what rounding makes of the torque looks like any other number.
@@ -232,8 +232,8 @@ def test_forces_at_a_change_point_are_not_told():
     np.testing.assert_allclose(motion.change_points, [1.0], rtol=0, atol=1e-9)
     torque = jn.driver_force(motion, "turn").values
     expected = 9.81 * (0.1 + 0.1 + 0.4) * np.cos(0.5 + (np.pi - 0.5) * motion.time)
-    told = [0, 1, 2, 4, 5]
-    np.testing.assert_allclose(torque[told, 0], expected[told], rtol=0, atol=1e-9)
+    finite = [0, 1, 2, 4, 5]
+    np.testing.assert_allclose(torque[finite, 0], expected[finite], rtol=0, atol=1e-9)
     assert np.isnan(torque[3]).all()
     assert np.isnan(jn.joint_reaction(motion, "B").force.values[3]).all()
     equations = jn.constraint_equations(motion).isel(time=3)

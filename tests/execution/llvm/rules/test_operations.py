@@ -135,10 +135,10 @@ def test_select_by_truth_values():
     def run(shared, which, a, b):
         one = {"shared": jnp.where(shared > 0.0, a[0], a[1]), "lane": jnp.where(which, a[0], a[1])}
         scalar = {"scalar": lax.select_n(shared[0] > 0.0, a[0], a[1]), "of whole": jnp.where(which, b[0], b[1])}
-        alone = {"of one": lax.select_n(which, jnp.array([np.nan]), shared), "both": jnp.where(which, a[0], a[0])}
+        single = {"of one": lax.select_n(which, jnp.array([np.nan]), shared), "both": jnp.where(which, a[0], a[0])}
         zeros = {"zeros": jnp.where(which, jnp.array([0.0]), jnp.array([-0.0]))}
         only = {"one case": lax.select_n(which, a[0, 0])}
-        return one | scalar | alone | zeros | only
+        return one | scalar | single | zeros | only
 
     assert_agree(run, TRUTH, a, b, shared=(np.array([1.0]),))
 

@@ -42,9 +42,9 @@ def test_results_are_right_to_the_last_digit(name, width):
 
 def test_results_depend_on_no_other_lane():
     angles = ordinary(low=-9.0, high=9.0)
-    alone = compiled(both, [angles])([], [angles])
+    single = compiled(both, [angles])([], [angles])
     angles[3::4] = np.resize([np.pi, np.nan, 1e20, np.inf], len(angles[3::4]))
-    for mine, theirs in zip(compiled(both, [angles])([], [angles]), alone, strict=True):
+    for mine, theirs in zip(compiled(both, [angles])([], [angles]), single, strict=True):
         kept = np.arange(COUNT) % 4 != 3
         np.testing.assert_array_equal(mine[kept], theirs[kept])
 

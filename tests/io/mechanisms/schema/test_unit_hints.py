@@ -91,7 +91,7 @@ PROFILE = "{{profile: [{{profile: cycloidal, duration: 1, to: {}}}]}}"
         ("{profile: [{profile: trapezoidal, duration: 1, to: 120}]}", "goes from 0 to 120 rad"),
     ],
 )
-def test_laws_that_take_degrees_over_the_run_are_told(tmp_path, motion, words):
+def test_laws_that_take_degrees_over_the_run_are_reported(tmp_path, motion, words):
     rows = "".join(f"{k / 100},{30 + 60 * math.sin(math.pi * k / 100)}\n" for k in range(201))
     (tmp_path / "swing.csv").write_text(f"time,angle\n{rows}")
     with pytest.warns(jn.errors.UnitWarning, match=words):
@@ -158,7 +158,7 @@ def bare(folder, **changes):
         ({"motion": "30*deg", "crank": ", mass: 30, inertia: 0.02"}, "an inertia of 0.02 kg m.2: millimeters"),
     ],
 )
-def test_a_file_in_bare_millimeters_is_told(tmp_path, changes, words):
+def test_a_file_in_bare_millimeters_is_reported(tmp_path, changes, words):
     with pytest.warns(jn.errors.UnitWarning, match=words):
         bare(tmp_path, **changes)
 
@@ -187,7 +187,7 @@ def test_lengths_that_may_be_metres_are_not_doubted(tmp_path, changes):
         ("swing=45", r"--set: now the law of drivers.theta goes from -44.5 to 45.5 rad, 14 turns: degrees\?"),
     ],
 )
-def test_a_value_set_without_its_unit_is_told(tmp_path, given, words):
+def test_a_value_set_without_its_unit_is_reported(tmp_path, given, words):
     (tmp_path / "set.yaml").write_text(
         FOUR_BAR.format(**PLAIN | {"motion": "0.5 + (amplitude + swing)*sin(pi*t)", "AB": "4 cm"}).replace(
             "AD: 13.21 cm", "AD: 13.21 cm, amplitude: 0 deg, swing: 0.4"
@@ -216,7 +216,7 @@ def test_values_that_are_set_as_they_are_meant_are_not_doubted():
         ("joints", "angle", "piecewise", r"piecewise\[1\]\.until: 360 rad is 57 turns: 360 deg\?"),
     ],
 )
-def test_a_cam_law_over_degrees_without_a_unit_is_told(tmp_path, section, coordinate, law, words):
+def test_a_cam_law_over_degrees_without_a_unit_is_reported(tmp_path, section, coordinate, law, words):
     follower = CAM_FOLLOWER.format(coordinate=coordinate, law=CAM_LAWS[law])
     path = tmp_path / "cam.yaml"
     path.write_text(CAM.replace(f"{section}:\n", f"{section}:\n{follower}"))

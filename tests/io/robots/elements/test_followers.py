@@ -105,7 +105,7 @@ def test_ranges_that_leave_room_count(write, case):
 
 
 @pytest.mark.parametrize("case", FAULTS)
-def test_ranges_that_leave_no_room_are_told_of_and_do_not_count(write, case):
+def test_ranges_that_leave_no_room_are_reported_and_do_not_count(write, case):
     leader, followers, expected, bad = FAULTS[case]
     path = write(leader, followers)
     with pytest.warns(
@@ -151,10 +151,10 @@ def test_ranges_are_compared_in_proportion_to_the_joints(monkeypatch, against):
             for k in range(count)
         ]
         turned = jn.Joint("turned", "b", "t", limits=jn.Limits(lower=-1.0, upper=-0.2), mimic=jn.robot.Mimic("lead"))
-        alone = [jn.Joint(f"a{k}", "b", f"c{k}") for k in range(count)]
+        single = [jn.Joint(f"a{k}", "b", f"c{k}") for k in range(count)]
         lead = jn.Joint("lead", "b", "l", limits=jn.Limits(lower=-1.0, upper=1.0))
         seen.clear()
-        faults, every = Faults("robot.urdf"), [lead, *rest, *alone, *([turned] if against else [])]
+        faults, every = Faults("robot.urdf"), [lead, *rest, *single, *([turned] if against else [])]
         followers.with_room(every, faults, lambda error: RobotFileError(error.message))
         left_out.append(len(faults.unread.get(followers.NO_ROOM, ())))
         assert len(seen) <= 12 * count  # each with itself, with the tightest, and all together

@@ -95,7 +95,7 @@ def test_a_free_body_with_damping_and_armature(tmp_path):
     np.testing.assert_allclose(jn.inverse_dynamics(robot, q)[0], expected, rtol=0, atol=1e-12 * np.abs(expected).max())
 
 
-def test_what_of_a_tendon_is_not_linear_is_told(tmp_path):
+def test_what_of_a_tendon_is_not_linear_is_reported(tmp_path):
     path = tmp_path / "robot.xml"
     path.write_text(ARM.replace('springlength="0.2"', 'springlength="0.1 0.3"'))
     with pytest.warns(jn.errors.RobotWarning, match=r"of tendons: line \(line 9\)"):

@@ -102,7 +102,7 @@ def forces(model):
 
 
 @pytest.mark.parametrize("case", CASES)
-def test_it_is_told_of_where_mujoco_computes_other_forces(tmp_path, case):
+def test_it_is_reported_where_mujoco_computes_other_forces(tmp_path, case):
     """Without a warning the torques are those of MuJoCo; with one they are not."""
     *parts, says = CASES[case]
     path = written(tmp_path, *parts)
@@ -164,10 +164,10 @@ def test_one_warning_names_the_first_six_of_each_kind_and_the_faults(tmp_path):
 
 @pytest.mark.parametrize("name", ["five_bar", "human_arm", "planar_arm"])
 def test_of_the_examples_nothing_is_left_out(name):
-    with warnings.catch_warnings(record=True) as told:
+    with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         found = load_robot(FILES / f"{name}.xml")
-    assert told == []
+    assert caught == []
     assert load_robot(FILES / f"{name}.xml", strict=True).joint_names == found.joint_names != ()
 
 

@@ -105,7 +105,7 @@ def test_a_merged_model_keeps_its_names(tmp_path):
     )
 
 
-def test_what_is_included_and_not_there_is_told(tmp_path):
+def test_what_is_included_and_not_there_is_reported(tmp_path):
     with pytest.warns(
         jn.errors.RobotWarning, match=r"models that the world includes and that are not there: model://sun"
     ):

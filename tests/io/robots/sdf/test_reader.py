@@ -52,8 +52,8 @@ def same(robot, expected, gravity, seed=1):
     states_here[:, by_name] = states
     same_gravity = jn.Robot("e", list(expected.links.values()), list(expected.joints.values()), gravity, strict=False)
     torque = jn.robot.inverse_dynamics(robot, states_here)[:, by_name]
-    wanted = jn.robot.inverse_dynamics(same_gravity, states)
-    np.testing.assert_allclose(torque, wanted, rtol=0, atol=1e-11 * np.abs(wanted).max())
+    exact = jn.robot.inverse_dynamics(same_gravity, states)
+    np.testing.assert_allclose(torque, exact, rtol=0, atol=1e-11 * np.abs(exact).max())
     for name in expected.joint_names:
         assert robot.joints[name].damping == expected.joints[name].damping
         assert robot.joints[name].friction == expected.joints[name].friction
@@ -133,7 +133,7 @@ def test_links_that_feel_no_gravity(tmp_path, felt):
     assert torque_at_rest(robot) == pytest.approx(-2 * 0.5 * 9.81 if felt else 0.0, rel=1e-14)
 
 
-def test_a_static_model_is_fixed_to_the_world_and_that_its_joints_move_is_told(tmp_path):
+def test_a_static_model_is_fixed_to_the_world_and_that_its_joints_move_is_reported(tmp_path):
     text = model("<static>true</static>", link("a", "1 0 0 0 0 0"), link("b"), joint("j", "a", "b"))
     with pytest.warns(RobotWarning, match=r"<static>, which holds all joints .* where they are: m \(line 1\)"):
         robot = read(tmp_path, text)
@@ -183,7 +183,7 @@ def looped(first, second, inside):
 
 
 @pytest.mark.parametrize("case", LEFT_OUT)
-def test_what_bears_on_motions_and_is_left_out_is_told_of(tmp_path, case):
+def test_what_bears_on_motions_and_is_left_out_is_reported(tmp_path, case):
     *parts, warns, refuses = LEFT_OUT[case]
     text = looped(*parts)
     with pytest.warns(RobotWarning, match=warns) as caught:
@@ -328,7 +328,7 @@ def coupler_angle():
     return np.arctan2(tip[1], tip[0])
 
 
-def test_a_link_without_inertia_weighs_a_kilogram_and_is_told_of(tmp_path):
+def test_a_link_without_inertia_weighs_a_kilogram_and_is_reported(tmp_path):
     text = model(link("a"), link("bare", body=""), joint("j", "a", "bare"))
     with pytest.warns(RobotWarning, match=r"1 kg.*bare \(line 1\)"):
         robot = read(tmp_path, text)
@@ -337,7 +337,7 @@ def test_a_link_without_inertia_weighs_a_kilogram_and_is_told_of(tmp_path):
         read(tmp_path, text, strict=True)
 
 
-def test_what_an_inertia_does_not_give_is_one_and_is_told_of(tmp_path):
+def test_what_an_inertia_does_not_give_is_one_and_is_reported(tmp_path):
     body = "<inertial><mass>2</mass><inertia><ixx>0.5</ixx><iyy>0.5</iyy></inertia></inertial>"
     with pytest.warns(RobotWarning, match=r"lack their mass or moments .*: bare \(line 1\)"):
         robot = read(tmp_path, model(link("a"), link("bare", body=body), joint("j", "a", "bare")))
@@ -463,7 +463,7 @@ UNKNOWN = {
 
 
 @pytest.mark.parametrize("case", UNKNOWN)
-def test_unknown_elements_are_left_out_and_told(tmp_path, case):
+def test_unknown_elements_are_left_out_and_reported(tmp_path, case):
     text, says = UNKNOWN[case]
     with pytest.warns(RobotWarning, match=f"elements that their formats do not have: {says}"):
         read(tmp_path, text)

@@ -57,7 +57,7 @@ def test_rotors_are_armature_at_the_joint(tmp_path):
         ),
     ],
 )
-def test_what_is_not_read_is_told_of(tmp_path, settings, says):
+def test_what_is_not_read_is_reported(tmp_path, settings, says):
     with pytest.warns(jn.errors.RobotWarning, match=says) as caught:
         read(tmp_path, **settings)
     assert len(caught) == 1

@@ -8,8 +8,8 @@ from jounce.errors import RobotFileError, RobotWarning
 from tests.io.robots.sdf.test_reader import SOME, joint, link, model, read
 
 
-def told(tmp_path, text, says):
-    """Return the robot, of which something is told; strict makes that an error."""
+def read_with_warning(tmp_path, text, says):
+    """Return the robot, read with a warning, which is an error if it is read strictly."""
     with pytest.warns(RobotWarning, match=says):
         robot = read(tmp_path, text)
     with pytest.raises(RobotFileError):
@@ -19,7 +19,7 @@ def told(tmp_path, text, says):
 
 def test_links_that_nothing_joins_are_free(tmp_path):
     parts = [link("a"), link("b", "1 2 3 0 0 1"), link("c", "1 2 4 0 0 1"), joint("j", "b", "c")]
-    robot = told(tmp_path, model(*parts), "are joined to the base by nothing.*: b")
+    robot = read_with_warning(tmp_path, model(*parts), "are joined to the base by nothing.*: b")
     assert robot.joint_names[:3] == ("b_x", "b_y", "b_z")
     assert len(robot.joint_names) == 7
     np.testing.assert_allclose(jn.forward_kinematics(robot, np.zeros((1, 7)), "c").position[0], [1, 2, 4], atol=1e-15)
@@ -66,7 +66,7 @@ def test_names_of_models_stand_for_their_frames(tmp_path):
 
 def test_old_files_name_links_and_joints_alike(tmp_path):
     parts = [link("a"), link("b"), joint("b", "a", "b")]
-    robot = told(tmp_path, model(*parts, version="1.6"), "have the name of a link.*: b")
+    robot = read_with_warning(tmp_path, model(*parts, version="1.6"), "have the name of a link.*: b")
     assert robot.joint_names == ("b_joint",)
     with pytest.raises(RobotFileError, match="this name is given twice"):
         read(tmp_path, model(*parts, version="1.7"))
@@ -74,13 +74,13 @@ def test_old_files_name_links_and_joints_alike(tmp_path):
 
 def test_of_two_elements_the_first_counts(tmp_path):
     twice = SOME.replace("</mass>", "</mass>\n<mass>7</mass>")
-    robot = told(tmp_path, model(link("a", body=twice)), r"given twice.*: links\.a\.inertial \(line 2\)")
+    robot = read_with_warning(tmp_path, model(link("a", body=twice)), r"given twice.*: links\.a\.inertial \(line 2\)")
     assert robot.links["a"].inertia.mass == 2.0
 
 
 def test_the_mass_of_a_fluid_is_left_out(tmp_path):
     moved = SOME.replace("<mass>", "<fluid_added_mass><xx>1</xx></fluid_added_mass><mass>")
-    robot = told(tmp_path, model(link("a", body=moved)), "the mass of the fluid that links move.*: a")
+    robot = read_with_warning(tmp_path, model(link("a", body=moved)), "the mass of the fluid that links move.*: a")
     assert robot.links["a"].inertia.mass == 2.0
 
 

@@ -91,7 +91,7 @@ def test_two_halves_are_the_whole(tmp_path):
 @pytest.mark.parametrize(
     "inside, says", [("", "without a density"), ("<density>5</density><pose>1 0 0 0 0 0</pose>", "poses or moments")]
 )
-def test_what_sdf_takes_or_leaves_is_told(tmp_path, inside, says):
+def test_what_sdf_takes_or_leaves_is_reported(tmp_path, inside, says):
     with pytest.warns(RobotWarning, match=rf"{says}.*: a \(line 2\)"):
         inertia = only_inertia(tmp_path, inside, collision(BOX), strict=False)
     assert inertia.mass == pytest.approx(0.006 * (5 if inside else 1000))

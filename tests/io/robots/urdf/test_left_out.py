@@ -61,7 +61,7 @@ def write(tmp_path, more="", version="", kind="revolute", dynamics="", turn=""):
     return path
 
 
-def told(path, says):
+def read_with_warning(path, says):
     """Check that one warning says something, that it is an error if the file is read strictly, and return the robot."""
     with pytest.warns(jn.errors.RobotWarning, match=says) as caught:
         robot = load_robot(path)
@@ -73,13 +73,13 @@ def told(path, says):
 
 
 @pytest.mark.parametrize("case", CASES)
-def test_what_bears_on_motions_is_told_of_once_and_nothing_else_is(tmp_path, case):
+def test_what_bears_on_motions_is_reported_once_and_nothing_else_is(tmp_path, case):
     more, says = CASES[case]
     path = write(tmp_path, more)
     if says is None:
         load_robot(path, strict=True)
     else:
-        told(path, says)
+        read_with_warning(path, says)
 
 
 @pytest.mark.parametrize(
@@ -91,7 +91,7 @@ def test_what_bears_on_motions_is_told_of_once_and_nothing_else_is(tmp_path, cas
     ],
 )
 def test_attributes_of_dynamics_of_other_simulators(tmp_path, dynamics, says):
-    told(write(tmp_path, dynamics=f"<dynamics {dynamics}/>"), says)
+    read_with_warning(write(tmp_path, dynamics=f"<dynamics {dynamics}/>"), says)
     load_robot(write(tmp_path, dynamics='<dynamics damping="1" D="1" K="7000" mu_coulomb="0"/>'), strict=True)
 
 
@@ -128,7 +128,7 @@ def test_rotors_that_cannot_be_are_refused(tmp_path, joint, parts, name):
 
 def test_a_rotor_of_a_joint_of_several_coordinates(tmp_path):
     rotor = ROTOR.format('<joint name="j"/>', '<drake:rotor_inertia value="1"/>')
-    told(write(tmp_path, rotor, kind="planar"), r"armature of planar, floating and spherical joints: j")
+    read_with_warning(write(tmp_path, rotor, kind="planar"), r"armature of planar, floating and spherical joints: j")
 
 
 def pinocchio_torque(path):
@@ -141,7 +141,11 @@ def test_quaternions_count_from_version_1_1_on_as_in_the_reference_parser(tmp_pa
     version = f' version="{version}"' if version else ""
     path = write(tmp_path, version=version, turn=f'quat_xyzw="{" ".join(map(str, TURN))}"')
     old = "1.1" not in version and "1.2" not in version
-    robot = told(path, r"quat_xyzw, which the version .*: l \(line 2\), j \(line 5\)") if old else load_robot(path)
+    robot = (
+        read_with_warning(path, r"quat_xyzw, which the version .*: l \(line 2\), j \(line 5\)")
+        if old
+        else load_robot(path)
+    )
     found = float(jn.inverse_dynamics(robot, [[0.2], [0.0], [0.0]])[0, 0])
     assert found == pytest.approx(pinocchio_torque(path), rel=1e-13)
 

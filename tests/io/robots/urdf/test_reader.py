@@ -223,7 +223,7 @@ def test_a_planar_joint_of_any_axis_slides_across_it(tmp_path):
 
 @pytest.mark.parametrize("kind", ["planar", "floating"])
 @pytest.mark.parametrize("key", ["damping", "friction"])
-def test_damping_and_friction_of_joints_of_several_coordinates_are_told_of(tmp_path, kind, key):
+def test_damping_and_friction_of_joints_of_several_coordinates_are_reported(tmp_path, kind, key):
     zero = small(tmp_path, f'type="{kind}"><dynamics damping="0" friction="0"/>')
     load_robot(zero, strict=True)
     path = small(tmp_path, f'type="{kind}"><dynamics {key}="0.5"/>')
@@ -405,7 +405,7 @@ def test_no_floating_base_where_a_link_is_named_world_already(tmp_path):
 
 
 @pytest.mark.parametrize(
-    "limit, expected, told",
+    "limit, expected, message",
     [
         ('lower="-1" upper="1" effort="9" velocity="inf"', (-1.0, 1.0, None), None),
         ('lower="-1" upper="1" effort="9" velocity="-1"', (-1.0, 1.0, None), "below zero, .* read as none: j"),
@@ -414,14 +414,14 @@ def test_no_floating_base_where_a_link_is_named_world_already(tmp_path):
         ('upper="0.3" effort="9" velocity="2"', (0.0, 0.3, 2.0), None),
     ],
 )
-def test_limits_that_say_little_are_read(tmp_path, limit, expected, told):
+def test_limits_that_say_little_are_read(tmp_path, limit, expected, message):
     moving = f'type="revolute"><limit {limit}/>'
-    with pytest.warns(jn.errors.RobotWarning, match=told) if told else contextlib.nullcontext():
+    with pytest.warns(jn.errors.RobotWarning, match=message) if message else contextlib.nullcontext():
         limits = load_robot(small(tmp_path, moving)).joints["j"].limits
     assert (limits.lower, limits.upper, limits.velocity) == expected
 
 
-def test_a_range_with_both_ends_the_wrong_way_round_is_none_and_told(tmp_path):
+def test_a_range_with_both_ends_the_wrong_way_round_is_none_and_reported(tmp_path):
     path = small(tmp_path, 'type="revolute"><limit lower="0.3" upper="0" effort="9" velocity="2"/>')
     with pytest.raises(jn.errors.RobotFileError, match="lower limit must not exceed"):
         load_robot(path, strict=True)
