@@ -1,6 +1,6 @@
 """Which of the collected tests run: dear examples of docstrings are slow tests, of which a run may take a share.
 
-The slow tests take half an hour, nine tenths of it in JAX and XLA, which compile each mechanism anew. A check before
+The slow tests take hours, nine tenths of them in JAX and XLA, which compile each mechanism anew. A check before
 each submission has not that long: it runs the share of the day, and the tests of what changed as far as another share
 goes. Whoever changes what slow tests cover runs all.
 """

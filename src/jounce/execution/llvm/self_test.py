@@ -43,7 +43,7 @@ def passes() -> bool:
             return True
     message = (
         f"machine code was not tried on {sys.platform}, and a small program does not run here as it does in XLA "
-        f"({reason}); XLA computes instead, with the same results in two to six times the time; JOUNCE_NATIVE=0 in "
+        f"({reason}); XLA computes instead, with the same results in two to fifty times the time; JOUNCE_NATIVE=0 in "
         "the environment selects it without this message"
     )
     warnings.warn(message, MachineCodeWarning, stacklevel=2)
