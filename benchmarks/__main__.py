@@ -40,7 +40,7 @@ def main() -> int:
     added_to: Path | None = options.out if options.only else None
     try:
         there = {row["benchmark"] for row in records.read(added_to)} if added_to else set()
-    except records.TableError as error:  # told before hours of measuring
+    except records.TableError as error:  # reported before hours of measuring
         parser.error(str(error))
     rows, failed = [], []
     for name in names:

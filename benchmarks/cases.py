@@ -9,7 +9,7 @@ ROOT = Path(__file__).parents[1]
 EXAMPLES = ROOT / "examples"
 
 
-class Told(NamedTuple):
+class Reported(NamedTuple):
     """A measurement taken elsewhere, as in another process: seconds or bytes, and what came out."""
 
     value: float
@@ -17,7 +17,7 @@ class Told(NamedTuple):
 
 
 class CannotRunError(Exception):
-    """Raised by a contestant that this machine has something missing for; the message is told in the table."""
+    """Raised by a contestant that this machine has something missing for; the message is in the table."""
 
 
 @dataclass(frozen=True)
@@ -33,7 +33,7 @@ class Contestant:
     error : callable, optional
         Returns the error of what that function returned, against the reference of the case.
     needs : str, optional
-        Package without which it is left out, and told so.
+        Package without which it is left out, with a message.
     extra : str
         The extra of the library that brings this package.
     count : int, optional

@@ -11,7 +11,7 @@ import tempfile
 from collections.abc import Callable
 from typing import Any
 
-from benchmarks.cases import ROOT, CannotRunError, Case, Cases, Contestant, Told
+from benchmarks.cases import ROOT, CannotRunError, Case, Cases, Contestant, Reported
 
 CALLS = {
     "four-bar, 201 instants": "jn.solve(jn.load('examples/four_bar.yaml'), np.linspace(0, 2, 201))",
@@ -48,9 +48,9 @@ def parts_of(call: str, folder: str) -> tuple[float, float]:
 def emptied(call: str, part: int) -> Callable[[], Any]:
     """Return what measures a part with an empty folder."""
 
-    def run() -> Told:
+    def run() -> Reported:
         with tempfile.TemporaryDirectory() as folder:
-            return Told(parts_of(call, folder)[part])
+            return Reported(parts_of(call, folder)[part])
 
     return run
 
@@ -59,7 +59,7 @@ def filled(call: str) -> Callable[[], Any]:
     """Return what measures the first call with the folder that such a process left before."""
     folder = tempfile.TemporaryDirectory()
     parts_of(call, folder.name)
-    return lambda: Told(parts_of(call, folder.name)[1])
+    return lambda: Reported(parts_of(call, folder.name)[1])
 
 
 def cases(quick: bool) -> Cases:

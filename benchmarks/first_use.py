@@ -6,7 +6,7 @@ import tempfile
 from collections.abc import Callable
 from typing import Any
 
-from benchmarks.cases import ROOT, Case, Cases, Contestant, Told
+from benchmarks.cases import ROOT, Case, Cases, Contestant, Reported
 from benchmarks.processes import command
 
 FILES = {
@@ -19,9 +19,9 @@ AIM = 2.5  # s, of the second time
 def emptied(words: list[str]) -> Callable[[], Any]:
     """Return what runs a command with an empty folder."""
 
-    def run() -> Told:
+    def run() -> Reported:
         with tempfile.TemporaryDirectory() as folder:
-            return Told(command(words, {"JOUNCE_CACHE_DIR": folder}).wall)
+            return Reported(command(words, {"JOUNCE_CACHE_DIR": folder}).wall)
 
     return run
 
@@ -30,7 +30,7 @@ def filled(words: list[str]) -> Callable[[], Any]:
     """Return what runs a command with the folder that it left before."""
     folder = tempfile.TemporaryDirectory()
     command(words, {"JOUNCE_CACHE_DIR": folder.name})
-    return lambda: Told(command(words, {"JOUNCE_CACHE_DIR": folder.name}).wall)
+    return lambda: Reported(command(words, {"JOUNCE_CACHE_DIR": folder.name}).wall)
 
 
 def cases(quick: bool) -> Cases:

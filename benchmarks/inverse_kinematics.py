@@ -70,11 +70,11 @@ def cases(quick: bool) -> Cases:
         ["0.45 + 0.1*cos(2*t)", "0.1 + 0.1*sin(2*t)", 0.3], ("ZYX", ["0.3*sin(t)", 2.9, 0.2]), start=0.0, stop=6.0
     )
     time = np.linspace(0.0, 6.0, samples)
-    wanted = path.position(time, 4)
+    requested = path.position(time, 4)
 
     def off(found: Any) -> float:
         there = jn.forward_kinematics(robot, found.q, LINK).position
-        return float((np.abs(there - wanted).max(axis=(0, 2)) / np.abs(wanted).max(axis=(0, 2))).max())
+        return float((np.abs(there - requested).max(axis=(0, 2)) / np.abs(requested).max(axis=(0, 2))).max())
 
     along = Contestant("jounce", ready(lambda: jn.planning.follow_tool_path(robot, LINK, path, time, order=4)), off)
     name = f"a path of the UR5 followed, with four derivatives at {samples:,} instants"

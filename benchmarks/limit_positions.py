@@ -69,9 +69,9 @@ def assemblies(count: int, seed: int) -> int:
         right = len(crank) == len(angles) and away.min(axis=0).max() < 1e-8 and away.min(axis=1).max() < 1e-8
         numbers[len(angles)] += 1
         wrong += not right
-    told = ", ".join(f"{number} with {k}" for k, number in sorted(numbers.items()))
+    some = ", ".join(f"{number} with {k}" for k, number in sorted(numbers.items()))
     print(
-        f"{STEPHENSON}: {count} linkages ({told} assemblies), {wrong} wrong, {1e3 * spent / max(1, count):.0f} ms each"
+        f"{STEPHENSON}: {count} linkages ({some} assemblies), {wrong} wrong, {1e3 * spent / max(1, count):.0f} ms each"
     )
     return wrong
 

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 import jounce as jn
-from benchmarks.cases import EXAMPLES, Case, Cases, Contestant, Told, ready
+from benchmarks.cases import EXAMPLES, Case, Cases, Contestant, Reported, ready
 from benchmarks.processes import command
 
 FILE = EXAMPLES / "four_bar.yaml"
@@ -16,7 +16,7 @@ FILE = EXAMPLES / "four_bar.yaml"
 def peak(instants: int) -> Callable[[], Any]:
     """Return what gives the peak of a process that solves the four-bar over so many instants."""
     script = f"import numpy, jounce; jounce.solve(jounce.load({str(FILE)!r}), numpy.linspace(0, 2, {instants}))"
-    return lambda: Told(command([sys.executable, "-c", script]).memory)
+    return lambda: Reported(command([sys.executable, "-c", script]).memory)
 
 
 def cases(quick: bool) -> Cases:
@@ -29,9 +29,10 @@ def cases(quick: bool) -> Cases:
         f"four-bar to jounce, {instants:,} instants",
         [
             Contestant(
-                f"jounce, peak above that for {few:,}", ready(lambda: Told(peak(instants)().value - libraries.value))
+                f"jounce, peak above that for {few:,}",
+                ready(lambda: Reported(peak(instants)().value - libraries.value)),
             ),
-            Contestant("its outputs", ready(lambda: Told(size)), aim=2.0),
+            Contestant("its outputs", ready(lambda: Reported(size)), aim=2.0),
             Contestant(f"libraries and {few:,} instants", ready(lambda: libraries)),
         ],
         clock="memory",

@@ -10,7 +10,7 @@ from multiprocessing import get_context
 from multiprocessing.connection import Connection
 from typing import Any, NamedTuple
 
-from benchmarks.cases import ROOT, CannotRunError, Told
+from benchmarks.cases import ROOT, CannotRunError, Reported
 
 SECONDS_TO_ANSWER = 900.0
 
@@ -36,17 +36,19 @@ def command(words: Sequence[str], environment: Mapping[str, str] | None = None) 
         words, cwd=ROOT, env=os.environ | (environment or {}), stdout=subprocess.DEVNULL, stderr=subprocess.PIPE
     )
     with child.stderr as stream:
-        told = stream.read().decode(errors="replace").strip()
+        message = stream.read().decode(errors="replace").strip()
     _, status, used = os.wait4(child.pid, 0)
     child.returncode = os.waitstatus_to_exitcode(status)
     if child.returncode:
-        raise CannotRunError(f"`{' '.join(words[1:4])}` ended with {child.returncode}: {told.rpartition(chr(10))[2]}")
+        raise CannotRunError(
+            f"`{' '.join(words[1:4])}` ended with {child.returncode}: {message.rpartition(chr(10))[2]}"
+        )
     wall = time.perf_counter() - start
     return Usage(used.ru_utime + used.ru_stime, wall, used.ru_maxrss * (1 if sys.platform == "darwin" else 1024))
 
 
 class Worker:
-    """A process of its own that does one computation whenever it is told to, and says how long that took.
+    """A process of its own that does one computation whenever it is message to, and says how long that took.
 
     Parameters
     ----------
@@ -69,7 +71,7 @@ class Worker:
         other.close()
         self.connection = own
 
-    def run(self) -> Told:
+    def run(self) -> Reported:
         """Compute once."""
         self.connection.send("run")
         if not self.connection.poll(SECONDS_TO_ANSWER):
@@ -96,8 +98,8 @@ def _serve(connection: Connection, task: str, arguments: Any, environment: dict[
         while connection.recv() == "run":
             start = time.perf_counter()
             outcome = run()
-            connection.send(Told(time.perf_counter() - start, outcome))
+            connection.send(Reported(time.perf_counter() - start, outcome))
     except EOFError:
         return
-    except Exception as failure:  # noqa: BLE001 - told to the process that asked
+    except Exception as failure:  # noqa: BLE001 - message to the process that asked
         connection.send(f"{type(failure).__name__}: {failure}")

@@ -79,7 +79,7 @@ def cases(quick: bool) -> Cases:
 
 
 def panda() -> tuple[jn.Robot, dict[str, jn.Limits], list[str]]:
-    """Return the arm, its limits, and its joints without those of the fingers; warnings are not told from here on."""
+    """Return the arm, its limits, and its joints without those of the fingers; warnings are not shown from here on."""
     logging.disable(logging.WARNING)
     warnings.simplefilter("ignore")
     robot = jn.load_robot(EXAMPLES / "robots" / "panda.urdf")
@@ -287,12 +287,12 @@ def straight_lines(robot, limits, names, rng) -> None:
         found = jn.retime(robot, ends, bare, names=names)
         spent.append(time.process_time() - begin)
         way = np.abs(ends[1] - ends[0])
-        asked, moved = InputParameter(1), Trajectory(1)
-        asked.current_position, asked.target_position = [0.0], [1.0]
+        request, moved = InputParameter(1), Trajectory(1)
+        request.current_position, request.target_position = [0.0], [1.0]
         for field in ("velocity", "acceleration", "jerk"):
             bounds = np.array([getattr(bare[name], field) for name in names])
-            setattr(asked, f"max_{field}", [float(np.min(bounds / way))])
-        Ruckig(1).calculate(asked, moved)
+            setattr(request, f"max_{field}", [float(np.min(bounds / way))])
+        Ruckig(1).calculate(request, moved)
         excess.append(found.stop / moved.duration - 1)
     print(f"straight lines with velocity, acceleration and a fiftieth of the jerk, {LINES} lines")
     print(f"  duration beside Ruckig: median {np.median(excess):+.3%}, {min(excess):+.3%} to {max(excess):+.3%}")

@@ -4,13 +4,13 @@ import sys
 from collections.abc import Callable
 from typing import Any
 
-from benchmarks.cases import Case, Cases, Contestant, Told, ready
+from benchmarks.cases import Case, Cases, Contestant, Reported, ready
 from benchmarks.processes import command
 
 
 def fresh(*words: str) -> Callable[[], Callable[[], Any]]:
     """Return what runs Python with these words in a new process."""
-    return ready(lambda: Told(command([sys.executable, *words]).processor))
+    return ready(lambda: Reported(command([sys.executable, *words]).processor))
 
 
 def cases(quick: bool) -> Cases:
@@ -28,9 +28,9 @@ def cases(quick: bool) -> Cases:
     )
     imported = fresh("-c", "import jax, jax.numpy")()
 
-    def beyond() -> Told:
+    def beyond() -> Reported:
         whole = fresh("-c", "import jounce; jounce.Jet; jounce.load")()
-        return Told(whole().value - imported().value)
+        return Reported(whole().value - imported().value)
 
     yield Case(
         "first names after `import jounce`, `Jet` and `load`, beyond JAX",

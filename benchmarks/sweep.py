@@ -12,7 +12,7 @@ import numpy as np
 import xarray
 
 import jounce as jn
-from benchmarks.cases import EXAMPLES, CannotRunError, Case, Cases, Contestant, Told, ready
+from benchmarks.cases import EXAMPLES, CannotRunError, Case, Cases, Contestant, Reported, ready
 from benchmarks.processes import command
 
 FILE = EXAMPLES / "four_bar.yaml"
@@ -33,16 +33,16 @@ def words(designs: int, workers: int | None, out: Path) -> list[str]:
     return [sys.executable, "-c", SCRIPT.format(**settings, designs=designs, workers=workers)]
 
 
-def processor(few: int, many: int, workers: int) -> Callable[[], Told]:
+def processor(few: int, many: int, workers: int) -> Callable[[], Reported]:
     """Return what gives the processor time of the designs beyond the first few: starting and compiling are left out."""
 
-    def measure() -> Told:
+    def measure() -> Reported:
         with tempfile.TemporaryDirectory() as folder:
             taken = [
                 command(words(designs, workers, Path(folder, f"{designs}.zarr")), {"JOUNCE_THREADS": "1"}).processor
                 for designs in (few, many)
             ]
-            return Told(taken[1] - taken[0], error(Path(folder, f"{many}.zarr")))
+            return Reported(taken[1] - taken[0], error(Path(folder, f"{many}.zarr")))
 
     return measure
 
@@ -59,24 +59,24 @@ def error(folder: Path) -> float:
     return float(max(errors))
 
 
-def whole(designs: int) -> Callable[[], Told]:
+def whole(designs: int) -> Callable[[], Reported]:
     """Return what gives the wall time of a sweep on all cores, starting and compiling counted."""
 
-    def measure() -> Told:
+    def measure() -> Reported:
         with tempfile.TemporaryDirectory() as folder:
             begun = time.perf_counter()
             command(words(designs, None, Path(folder, "sweep.zarr")))
-            return Told(time.perf_counter() - begun, error(Path(folder, "sweep.zarr")))
+            return Reported(time.perf_counter() - begun, error(Path(folder, "sweep.zarr")))
 
     return measure
 
 
-def memory(designs: int) -> Callable[[], Told]:
+def memory(designs: int) -> Callable[[], Reported]:
     """Return what gives the memory of all processes of a sweep together at the peak, what they share counted once."""
 
-    def measure() -> Told:
+    def measure() -> Reported:
         if not Path("/proc/self/smaps_rollup").exists():
-            raise CannotRunError("memory that processes share is told by Linux only")
+            raise CannotRunError("only Linux says how much memory processes share")
         peak, ended = [0], threading.Event()
 
         def look() -> None:
@@ -91,7 +91,7 @@ def memory(designs: int) -> Callable[[], Told]:
             finally:
                 ended.set()
                 watch.join()
-        return Told(peak[0])
+        return Reported(peak[0])
 
     return measure
 
@@ -124,14 +124,14 @@ def cases(quick: bool) -> Cases:
     """Yield what Dask adds, the whole time, and the memory."""
     few, many, all_of_them = (512, 1024, 1024) if quick else (4096, 20_480, 100_000)
 
-    def told(found: Any) -> float:
+    def unchanged(found: Any) -> float:
         return found
 
     yield Case(
         f"four-bars x {INSTANTS} instants to jounce, designs beyond the first {few:,}",
         [
-            Contestant("two worker processes by Dask", ready(processor(few, many, 2)), told),
-            Contestant("the same work in one process", ready(processor(few, many, 0)), told, aim=1.15),
+            Contestant("two worker processes by Dask", ready(processor(few, many, 2)), unchanged),
+            Contestant("the same work in one process", ready(processor(few, many, 0)), unchanged, aim=1.15),
         ],
         count=many - few,
         unit="design",
@@ -140,7 +140,7 @@ def cases(quick: bool) -> Cases:
     )
     yield Case(
         f"{all_of_them:,} four-bars x {INSTANTS} instants to jounce, on all cores, start counted",
-        [Contestant("jounce", ready(whole(all_of_them)), told)],
+        [Contestant("jounce", ready(whole(all_of_them)), unchanged)],
         clock="wall time",
         rounds=0,
         reference="three designs solved alone, relative, of the peaks",

@@ -56,11 +56,11 @@ def as_markdown(rows: Rows, about: Mapping[str, str]) -> str:
 
 
 def _markdown(rows: Rows, about: Mapping[str, str]) -> Iterator[str]:
-    yield f"Written by `python -m benchmarks`. Unless a section says otherwise, {_told(about)}."
+    yield f"Written by `python -m benchmarks`. Unless a section says otherwise, {_in_words(about)}."
     for name, group in groupby(rows, key=lambda row: row["benchmark"]):
         own = list(group)
         days = " and ".join(sorted({row["day"] for row in own}))
-        measured = "; ".join(filter(None, (f"measured on {days}", _told(own[0].get("circumstances", {})))))
+        measured = "; ".join(filter(None, (f"measured on {days}", _in_words(own[0].get("circumstances", {})))))
         yield f"\n### {BENCHMARKS[name].about}\n"
         yield f"`python -m benchmarks --only {name}`, {own[0]['clock']}, {measured}.\n"
         yield "| " + " | ".join(HEADINGS) + " |"
@@ -70,7 +70,7 @@ def _markdown(rows: Rows, about: Mapping[str, str]) -> Iterator[str]:
         yield from (f"\nErrors are against {reference}." for reference in references)
 
 
-def _told(about: Mapping[str, str]) -> str:
+def _in_words(about: Mapping[str, str]) -> str:
     return "; ".join(f"{key}: {value}" for key, value in about.items())
 
 

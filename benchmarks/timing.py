@@ -8,7 +8,7 @@ from importlib.metadata import PackageNotFoundError, version
 from importlib.util import find_spec
 from typing import Any
 
-from benchmarks.cases import CannotRunError, Case, Contestant, Told
+from benchmarks.cases import CannotRunError, Case, Contestant, Reported
 
 SECONDS_A_CASE, SECONDS_QUICK = 60.0, 4.0  # after which no further round is begun
 FEWEST_ROUNDS = 3
@@ -80,7 +80,7 @@ def _timed(run: Callable[[], Any], clock: Callable[[], float]) -> tuple[float, A
     start = clock()
     outcome = run()
     taken = clock() - start
-    return (outcome.value, outcome.outcome) if isinstance(outcome, Told) else (taken, outcome)
+    return (outcome.value, outcome.outcome) if isinstance(outcome, Reported) else (taken, outcome)
 
 
 def _rounds(most: int, quick: bool) -> Iterator[int]:

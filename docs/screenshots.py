@@ -74,10 +74,10 @@ PICTURES = {
 
 
 def main():
-    wanted = sys.argv[1:] or list(PICTURES)
+    requested = sys.argv[1:] or list(PICTURES)
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path="/usr/bin/chromium", args=FLAGS)
-        for name in wanted:
+        for name in requested:
             files, act = PICTURES[name]
             with view(*files, open_page=False, playing=False) as shown:
                 page = browser.new_page(viewport=SIZE, device_scale_factor=2)

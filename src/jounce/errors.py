@@ -327,7 +327,7 @@ class TrajectoryError(JounceError):
 
 
 class SingularityError(JounceError):
-    """An orientation or a configuration is singular: what was asked for does not exist or is not unique there."""
+    """An orientation or a configuration is singular: what was requested does not exist or is not unique there."""
 
 
 class _BoundedWarning(UserWarning):
@@ -353,7 +353,7 @@ class RobotWarning(_BoundedWarning):
 
 
 class SampleWarning(_BoundedWarning):
-    """Samples do not determine the derivatives asked for to a useful accuracy."""
+    """Samples do not determine the requested derivatives to a useful accuracy."""
 
 
 class RecordingWarning(_BoundedWarning):

@@ -13,7 +13,7 @@ import pytest
 
 import benchmarks
 from benchmarks import figures, records, tables
-from benchmarks.cases import CannotRunError, Case, Contestant, Told, ready
+from benchmarks.cases import CannotRunError, Case, Contestant, Reported, ready
 from benchmarks.timing import measured, spread
 
 ROOT = Path(__file__).parents[2]
@@ -22,7 +22,7 @@ ROOT = Path(__file__).parents[2]
 def costing(name, *seconds, **more):
     """A contestant that tells what it takes, round after round, the run before the first round included."""
     durations = iter(seconds)
-    return Contestant(name, ready(lambda: Told(next(durations), seconds[0])), **more)
+    return Contestant(name, ready(lambda: Reported(next(durations), seconds[0])), **more)
 
 
 def rows(*contestants, **more):

@@ -35,7 +35,7 @@ def in_plain_operations(program: Any) -> Any:
 
 
 def trace_settings() -> tuple[Any, ...]:
-    """Return how JAX is set up in this thread, as `jax.jit` tells its own programs apart."""
+    """Return how JAX is set up in this thread, as `jax.jit` distinguishes its own programs."""
     return config.trace_context()
 
 

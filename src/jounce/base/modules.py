@@ -144,7 +144,7 @@ class Module(metaclass=_ModuleType):
     object is made, converters run, and then `__check_init__` of its class and of each of its bases.
     """
 
-    if TYPE_CHECKING:  # classes of joints, laws and outputs are told apart by facts, too
+    if TYPE_CHECKING:  # classes of joints, laws and outputs are distinguished by facts, too
 
         def __getattr__(self, name: str) -> Any: ...
 

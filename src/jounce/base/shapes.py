@@ -6,7 +6,7 @@ then `derivative`, then `joint`, `row`, `column` or a component. An axis `order`
 
 Public functions write `Array` for `Float`, and name the unions that they take by `TypeAliasType`: in a signature that
 ``help`` shows such an alias is its name. The checks see what it stands for. Within `dict[...]` and `tuple[...]`, which
-beartype tells apart by their text, only one shape of `Array` may be written: write `Float` there.
+beartype distinguishes by their text, only one shape of `Array` may be written: write `Float` there.
 """
 
 import datetime

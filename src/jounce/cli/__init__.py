@@ -145,7 +145,7 @@ def _settings() -> AbstractContextManager[Any]:
 
 
 def _end_at_once(status: int) -> None:
-    """End the process without waiting for programs that threads still compile, which nobody wants any more."""
+    """End the process without waiting for programs that threads still compile, which are not needed any more."""
     if "jounce.execution.background" not in sys.modules:
         return
     from jounce.execution.background import is_compiling

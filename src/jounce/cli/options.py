@@ -256,7 +256,7 @@ class Heading:
         Raises
         ------
         JounceError
-            Both are asked for.
+            Both are requested.
         """
         if self.header_units and self.plain_header:
             raise JounceError("cannot be given together with --header-units", name="--plain-header")

@@ -77,7 +77,7 @@ class OnLlvm:
             are its own, and those that all have the same, of one instant. They are read as they are in each round.
         results : pytree
             Arrays that the results are written to, those of the first part among them unless all sources are beyond the
-            instants or in the round before; None for what nobody wants.
+            instants or in the round before; None for what is not needed.
         sources : array of int, shape (time,)
             Index of the source of each instant; below zero if it is its lane of the round before.
         links : sequence of int

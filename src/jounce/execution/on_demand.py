@@ -1,4 +1,4 @@
-"""Arrays by name, each computed when it is first asked for."""
+"""Arrays by name, each computed when it is first requested."""
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import Any
@@ -9,7 +9,7 @@ from jounce.settings import under_own_settings
 
 
 class OnDemand(Mapping[str, Any]):
-    """A mapping whose values are computed when they are first asked for, and kept. To JAX it is a tree of them all.
+    """A mapping whose values are computed when they are first requested, and kept. To JAX it is a tree of them all.
 
     Parameters
     ----------

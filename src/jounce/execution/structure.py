@@ -29,7 +29,7 @@ from jounce.execution.llvm import machine
 
 PACKAGE = Path(__file__).parents[1]
 LIBRARIES = ("jax", "jaxlib", "numpy")  # whose releases decide what is traced and compiled
-OPTIONS = ("jax_disable_most_optimizations",)  # of JAX, beside those by which it tells its own programs apart
+OPTIONS = ("jax_disable_most_optimizations",)  # of JAX, beside those by which it distinguishes its own programs
 MARGIN = 2.0  # s, between the clock of files and that of processes
 CONTAINERS = (tuple, list, dict, type(None))
 

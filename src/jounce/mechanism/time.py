@@ -48,7 +48,7 @@ TimeLike = TypeAliasType("TimeLike", ArrayLike | TimeGrid)
 
 @dataclasses.dataclass(frozen=True)
 class SpacedInstants:
-    """The instants of an evenly spaced grid, computed where they are asked for, s.
+    """The instants of an evenly spaced grid, computed where they are requested, s.
 
     Parameters
     ----------

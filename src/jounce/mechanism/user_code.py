@@ -95,7 +95,7 @@ def holds_users_code(elements: Iterable[Any]) -> bool:
 
 
 def users_code(groups: Sequence[Any]) -> tuple[Any, ...] | None:
-    """Return what tells the code of users in the elements of groups from others; None where JAX traces its numbers."""
+    """Return what distinguishes the code of users in the elements of groups; None where JAX traces its numbers."""
     read = ReadMotion, ReadLaw
     parts_found: list[Any] = []
     for group in groups:

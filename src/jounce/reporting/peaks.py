@@ -381,7 +381,7 @@ def _keep_best(
     around: Float[np.ndarray, "..."],
     own: Float[np.ndarray, "..."],
 ) -> None:
-    """Take over what is larger than what was found before, by more than rounding: instants asked for are round."""
+    """Take over what is larger than what was found before, by more than rounding: requested instants are round."""
     flat = own.reshape(-1, own.shape[-1])
     every = np.arange(own.shape[-1])
     top = np.argmax(flat, axis=0)

@@ -102,7 +102,7 @@ def retiming_result(
     files: tuple[Path, Path | None],
     written: tuple[Path | None, Path | None],
 ) -> dict[str, Any]:
-    """Return what `jounce retime` tells."""
+    """Return the results of `jounce retime`."""
     facts = limits_result(retimed.report, files[0], files[1] or files[0], written[0])
     del facts["held"], facts["broken"], facts["between"]
     return {

@@ -44,7 +44,7 @@ def smoothing_words(motion: SmoothedTrajectory) -> str:
 def smoothing_result(
     motion: SmoothedTrajectory, files: tuple[Path, Path], rows: int, written: tuple[Path | None, Path | None]
 ) -> dict[str, Any]:
-    """Return what `jounce smooth` tells."""
+    """Return the results of `jounce smooth`."""
     return {
         "file": files[0],
         "trajectory": files[1],
@@ -66,6 +66,6 @@ def smoothing_result(
     }
 
 
-def _dwells(spans: tuple[tuple[float, float], ...]) -> str:
-    shown = [f"{first:.4g} to {last:.4g}" for first, last in spans[:SHOWN]]
-    return ", ".join([*shown, f"and {len(spans) - SHOWN} more"] if len(spans) > SHOWN else shown)
+def _dwells(intervals: tuple[tuple[float, float], ...]) -> str:
+    shown = [f"{first:.4g} to {last:.4g}" for first, last in intervals[:SHOWN]]
+    return ", ".join([*shown, f"and {len(intervals) - SHOWN} more"] if len(intervals) > SHOWN else shown)

@@ -1,4 +1,4 @@
-"""Digests of models and files: what tells one sweep from another."""
+"""Digests of models and files: what distinguishes one sweep from another."""
 
 import dataclasses
 import enum

@@ -19,7 +19,7 @@ from jounce.execution.device import on_processor
 from jounce.sweeps.fingerprints import fingerprint
 
 FORMAT = 3  # of 1, digests did not cover the sweep and the place of a chunk; of 2, coordinates were compressed
-LARGEST_CHUNK = 2**20  # that may be asked for
+LARGEST_CHUNK = 2**20  # that may be requested
 COMPARED = ("vary", "options", "versions", "arithmetic")  # groups of a manifest, value by value
 LIBRARIES = ("jax", "jaxlib", "numpy")  # other versions may give other last bits
 MOST_SHOWN = 200  # characters of a value of a manifest

@@ -41,7 +41,7 @@ from jounce.trajectory.law_checks.breaks import both_sides, law_breaks
 from jounce.units.values import parse_value
 
 Designs = Mapping[str, Float[np.ndarray, " design"]]
-MORE_INSTANTS = 4  # times those asked for, at most, at which designs are simulated side by side
+MORE_INSTANTS = 4  # times the requested ones, at most, at which designs are simulated side by side
 
 
 @dataclasses.dataclass(frozen=True)

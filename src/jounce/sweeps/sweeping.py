@@ -105,7 +105,7 @@ def sweep(
         Opened, not read: for each output NAME the arrays NAME_peak, NAME_peak_time, NAME_rms, NAME_min and NAME_max of
         the dimensions design and derivative, SI; failed_instants and first_status of every design, see `Status`: one
         that was not solved at all instants has no statistics. With histories NAME (design, time, derivative) and
-        status (design, time) as well. The attribute ``checksum`` tells sweeps apart.
+        status (design, time) as well. The attribute ``checksum`` identifies the sweep.
 
     Raises
     ------

@@ -18,7 +18,7 @@ def check_within(first: float, last: float, start: float, stop: float, of: str) 
     Parameters
     ----------
     first, last : float
-        What is asked for, s.
+        Requested instants, s.
     start, stop : float
         The ends of the law.
     of : str

@@ -231,7 +231,7 @@ def _write_result(
     write: Callable[[], None] = lambda: None,
     held: list[dict[str, Any]] | None = None,
 ) -> int:
-    """Print what there is to tell of a motion, write it, and return the exit status."""
+    """Print the results for a motion, write it, and return the exit status."""
     from jounce.reporting.facts.motion_facts import motion_facts
     from jounce.reporting.json.results import motion_result
     from jounce.reporting.peaks import peaks, shown_peaks

@@ -85,7 +85,7 @@ class ExtremeFriction:
         Parameters
         ----------
         along : array of shape (directions, instants)
-            What friction of one in each direction adds to what is asked for.
+            What friction of one in each direction adds to what is requested.
 
         Returns
         -------

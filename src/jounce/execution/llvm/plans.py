@@ -155,7 +155,7 @@ def _written(
 
 
 def _key(equation: Any, given: Sequence[Any], alike: Mapping[Any, Any], sparse: bool) -> Any:
-    """Return what tells an operation from others, None where that is not known."""
+    """Return what distinguishes an operation from others, None where that is not known."""
 
     def number(x: Any) -> Any:
         return (str(x.aval), np.asarray(x.val).tobytes()) if isinstance(x, Literal) else alike.get(x, x)

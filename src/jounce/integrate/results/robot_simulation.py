@@ -39,7 +39,7 @@ CLOSE = 1e-5  # of the longest step: steps that come so near to a jump are of th
 
 
 class RobotSimulation(Tabulated):
-    """The motion of a robot under forces of its joints, at the instants asked for and at any other.
+    """The motion of a robot under forces of its joints, at the requested instants and at any other.
 
     At each instant the derivatives of every order follow from the equations of motion, not from the steps. `status`
     says of each instant whether it was reached; values are NaN where it was not.
@@ -61,7 +61,7 @@ class RobotSimulation(Tabulated):
     faults : dict of int to str
         What failed at an instant.
     events : list of list of float
-        For each event asked for, the times at which it happened, s.
+        For each requested event, the times at which it happened, s.
     steps : RobotSteps
         As polynomials.
     backend : str

@@ -49,7 +49,7 @@ APPROACH = 4  # steps to such a place, each much shorter than the one before
 
 
 class Simulation(Motion):
-    """The motion of a mechanism under its forces, at the instants asked for and at any other.
+    """The motion of a mechanism under its forces, at the requested instants and at any other.
 
     All that `Motion` offers is there: outputs, points and angles with their derivatives, forces of joints. At each
     instant the derivatives of every order follow from the equations of motion, not from the steps.
@@ -63,7 +63,7 @@ class Simulation(Motion):
     mobility : str
         Degrees of freedom and the bodies that have them.
     events : list of list of float
-        For each event asked for, the times at which it happened, s.
+        For each requested event, the times at which it happened, s.
     kinks : list of tuple of float and str
         When a force or a motion law had a jump or a kink, s, and which.
     dense : DenseOutput

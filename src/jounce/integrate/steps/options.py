@@ -1,4 +1,4 @@
-"""Options of simulations: what is valid, and the instants that are asked for."""
+"""Options of simulations: what is valid, and the instants that are requested."""
 
 from collections.abc import Callable, Mapping
 from typing import Any, TypedDict

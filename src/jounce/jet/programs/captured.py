@@ -138,7 +138,7 @@ def read_off(function: Callable[..., Any], *examples: Any) -> ReadOff:
 
 
 def value_key(closed: ClosedJaxpr) -> tuple[str, tuple[Same, ...]]:
-    """Return what tells a program, and the numbers in it, from others."""
+    """Return what identifies a program and the numbers in it."""
     description = _Description(values=True)
     description.of(closed)
     return description.digest(), tuple(map(Same, description.nameless))
@@ -155,7 +155,7 @@ def known_as(digest: str) -> AbstractContextManager[None]:
 
 
 def parameters_of(equation: JaxprEqn) -> tuple[list[str], list[Any]]:
-    """Return what tells an operation from others of its name, and what of it has no description."""
+    """Return what distinguishes an operation from others of its name, and what of it has no description."""
     description = _Description()
     return description.parameters(equation), description.nameless
 
@@ -304,7 +304,7 @@ class _Description(Pass):
         return names
 
     def parameters(self, equation: JaxprEqn) -> list[str]:
-        """Return what tells an operation from others of its name."""
+        """Return what distinguishes an operation from others of its name."""
         trusted = all(map(_is_of_libraries, _inner(equation))) and equation.primitive.name.startswith("custom_")
         given = sorted((key, value) for key, value in equation.params.items() if key != "name")
         description = [f"{key}={self._parameter(key, value, trusted)}" for key, value in given]
@@ -353,5 +353,5 @@ class _Description(Pass):
 
 
 def array_digest(array: np.ndarray) -> str:
-    """Return what tells an array from others: not rounded, and zero from minus zero."""
+    """Return what distinguishes an array from others: not rounded, and zero from minus zero."""
     return f"{array.shape} {array.dtype} {hashlib.sha256(array.tobytes()).hexdigest()}"

@@ -78,7 +78,7 @@ class Recursion(ProgramReader):
     Attributes
     ----------
     form : tuple
-        What tells the program from others: the operations that were read, the shapes of what is multiplied, and for
+        What identifies the program: the operations that were read, the shapes of what is multiplied, and for
         each product the places of its two factors among those.
     outputs
         Coefficients of order zero of the results, in the pytree that the function returns.
@@ -260,7 +260,7 @@ class Recursion(ProgramReader):
         return jnp.zeros_like(fixed) if jnp.issubdtype(jnp.result_type(fixed), jnp.floating) else fixed
 
     def _key(self, equation: JaxprEqn, operands: list[Any]) -> Any:
-        """Return what tells an operation from others; None where that is not known."""
+        """Return what distinguishes an operation from others; None where that is not known."""
         names = [x if isinstance(x, int) else x.key() for x in operands]
         if equation.primitive.name in ("mul", "add", "add_any"):
             names.sort(key=str)
@@ -408,7 +408,7 @@ class _Constant(NamedTuple):
     array: Any
 
     def key(self) -> Any:
-        """Return what tells it from others: small numbers of a program by value, results by identity."""
+        """Return what distinguishes it from others: small numbers of a program by value, results by identity."""
         if isinstance(self.array, bool | int | float | np.generic):
             return str(jnp.result_type(self.array)), np.asarray(self.array).tobytes()
         return "array", id(self.array)

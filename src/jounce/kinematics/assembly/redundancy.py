@@ -24,7 +24,7 @@ OPEN = 1e-7  # part of a row in combinations that vanish: what is less is none
 KINDS = {"joints": "joint", "drivers": "driver", "initial": "initial condition"}
 CURVE_ORDER = 4  # to which curves are looked for that lead away from a singular position
 CLOSED = 1e-9  # rad or sizes of the mechanism, by which joints may be open at a position in general
-ROUNDING = 1e-14  # of residuals, whose rows have one size: what is less does not tell two positions from each other
+ROUNDING = 1e-14  # of residuals, whose rows have one size: what is less does not distinguish two positions
 STEP = 1e-3  # rad or sizes of the mechanism, over which the change of the Jacobian is measured
 
 
@@ -125,7 +125,7 @@ def redundancy(model: Model, coordinates: Coordinates, jacobian: HostJacobian, d
 
 
 def _next_to_singular(coordinates: Coordinates, jacobian: HostJacobian, displace: Displace) -> HostJacobian:
-    """Return the Jacobian with those singular values zero that are so at a position that rounding does not tell apart.
+    """Return the Jacobian with those singular values zero that are so at a position that rounding does not distinguish.
 
     Along the velocity v of a small singular value s, the residual by the combination u of rows that belongs to it grows
     as ``s x + c x^2 / 2``, where c is the change of the Jacobian in that direction, seen by u. At ``x = -s / c`` the

@@ -96,8 +96,8 @@ class Solver:
         known : tuple
             What predictions need of the instants of the sources, see `needed`.
         state : tuple
-            Where jets of coordinates, by name, and of outputs, and the sign of all instants go; None for what nobody
-            wants.
+            Where jets of coordinates, by name, and of outputs, and the sign of all instants go; None for what is not
+            needed.
         step, instant : array of shape (time,)
             Time from the source, and the time arrived at, s.
         status : array of int, shape (time,)

@@ -31,7 +31,7 @@ from jounce.mechanism.carriages import check_without_ends
 
 BATCH = 256  # starts side by side
 OFTEN = 3  # times that each assembly is to be found before it is believed that none is left
-MOST_ROUNDS = 8  # times as many starts as asked for, if some were found less often
+MOST_ROUNDS = 8  # times as many starts as requested, if some were found less often
 CLOSED = 1e-9  # of the residual of a start that led to an assembly
 SAME, SAME_IF_SINGULAR = 1e-6, 1e-3  # rad or sizes of the mechanism
 NEARLY_SINGULAR = 1e-5  # smallest singular value of the Jacobian
@@ -51,7 +51,7 @@ class Assembly:
         With this configuration as its starting guess.
     circuit : int or None
         Which of the circuits it is on, from 1: two assemblies on one circuit can move into each other without being
-        taken apart. None where circuits were not asked for.
+        taken apart. None where circuits were not requested.
     branch : int or None
         Which of the branches of the circuit, from 1: two on one branch can be driven into each other.
     hits : int
@@ -146,7 +146,7 @@ def assemblies(
 ) -> Assemblies:
     """Return all assemblies of a driven mechanism at one instant that many random starts lead to.
 
-    Starts are random poses of all bodies; as many as asked for are made, and more, up to eight times as many, while
+    Starts are random poses of all bodies; as many as requested are made, and more, up to eight times as many, while
     some assembly was found less than three times. The circuits through those found are then traced, which finds what
     else lies on them.
 

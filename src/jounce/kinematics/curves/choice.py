@@ -12,7 +12,7 @@ from jounce.mechanism import Mechanism, build
 from jounce.mechanism.mechanism import NEAREST, SIDES
 from jounce.rigid.planar import PlanarPose
 
-DIFFERENT = 1e-6  # sizes of the mechanism, by which a wish must tell assemblies apart
+DIFFERENT = 1e-6  # sizes of the mechanism, by which a wish must distinguish assemblies
 
 
 def chosen(mechanism: Mechanism, instant: float) -> Mechanism:
@@ -21,7 +21,7 @@ def chosen(mechanism: Mechanism, instant: float) -> Mechanism:
     Raises
     ------
     AssemblyError
-        If there is no assembly of the number, or a wish does not tell assemblies apart.
+        If there is no assembly of the number, or a wish does not distinguish assemblies.
     """
     wish = mechanism.assembly
     if wish is None:

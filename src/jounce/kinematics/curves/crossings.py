@@ -43,7 +43,7 @@ class ChangePoint:
     dimension : int
         How many independent directions the first order allows.
     decided : bool
-        Whether the second order tells all branches apart; where it does not, there may be others, or fewer.
+        Whether the second order distinguishes all branches; where it does not, there may be others, or fewer.
     """
 
     center: CurvePoint
@@ -149,7 +149,7 @@ def _located(tracker: PathTracker, short: CurvePoint, step: float) -> CurvePoint
 def _tangents(
     tracker: PathTracker, point: CurvePoint, null: Float[np.ndarray, "unknown k"], own: Float[np.ndarray, " unknown"]
 ) -> tuple[Float[np.ndarray, "branch unknown"], bool]:
-    """Return the directions of all branches that the second order allows, and whether it tells them apart."""
+    """Return the directions of all branches that the second order allows, and whether it distinguishes them."""
     rows = tracker.left_null_space(point.jacobian, NEARLY_SINGULAR)
     # how combinations of rows that vanish see directions of the first order
     forms = polarized(lambda along: rows.T @ tracker.second_order(point, null @ along.T), null.shape[1])

@@ -67,7 +67,7 @@ def track_both_directions(tracker: PathTracker, start: CurvePoint, length: float
 
 
 def track(tracker: PathTracker, start: CurvePoint, length: float) -> Path:
-    """Follow a curve from a point, until it closes, ends, or is as long as asked for."""
+    """Follow a curve from a point, until it closes, ends, or is as long as requested."""
     path, point = Path([start]), start
     while point.arc_length - start.arc_length < length:
         ahead = tracker.singularity_distance(point)

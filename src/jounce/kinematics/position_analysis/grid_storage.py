@@ -66,7 +66,7 @@ def solve_grid(
         That solve batches.
     keep : bool, optional
         Whether the jets of all bodies are kept; where they fit into one chunk, unless given. They are computed again
-        when they are asked for.
+        when they are requested.
     """
     keeps_series = len(time) <= CHUNK if keep is None else keep
     status, faults = np.empty(len(time), int), {}

@@ -101,7 +101,7 @@ def holding_idle(solver: Callable[[], Callable[..., Any]]) -> Callable[[Callable
             rest: Any = {name: value for name, value in keywords.items() if name != "mechanism"}
             solve_held: Any = function
             result: Any = solve_held(mechanism, *arguments[1:], **rest)
-            if isinstance(result, Motion):  # what is asked for later must not depend on them either
+            if isinstance(result, Motion):  # what is requested later must not depend on them either
                 vars(result).update(mechanism=given["mechanism"], check_idle=check)
             return cast("R", result)
 

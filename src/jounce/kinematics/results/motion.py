@@ -237,7 +237,7 @@ class Motion(Tabulated):
     def outputs(self) -> Mapping[str, Any]:
         """Outputs by name: arrays of shape (time, order + 1) or (time, order + 1, component), SI.
 
-        The nine components of a rotation matrix stand row by row. An output is computed when it is first asked for.
+        The nine components of a rotation matrix stand row by row. An output is computed when it is first requested.
         """
         # not kept, as it refers to the motion: its arrays are to go with the last reference, not with the next search
         outputs = OnDemand(self.mechanism.outputs, self._outputs_with, self._known_outputs)

@@ -297,7 +297,7 @@ def _builder(mechanism: Mechanism, made_of: Callable[[Mechanism], Mechanism]) ->
 
 
 def _users_code(mechanism: Mechanism) -> tuple[Any, ...] | None:
-    """Return what tells code of users in a mechanism from others; None where it holds what JAX traces."""
+    """Return what distinguishes code of users in a mechanism from others; None where it holds what JAX traces."""
     if not holds_users_code(element for part in mechanism.elements.values() for element in part.values()):
         return ()
     return users_code([group for groups, _ in grouped_elements(mechanism, initial=True) for group in groups])

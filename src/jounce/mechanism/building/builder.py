@@ -236,7 +236,7 @@ def model_of(
 def grouped_elements(mechanism: Mechanism, *, initial: bool = False) -> tuple[Grouped, Grouped, Grouped]:
     """Return the groups of joints and drivers, of forces and of outputs; values may be traced by JAX.
 
-    Initial conditions are among the drivers, where they are asked for.
+    Initial conditions are among the drivers, where they are requested.
     """
 
     def grouped(*kinds: str) -> Grouped:

@@ -77,7 +77,7 @@ def concrete_or(
 
 
 def check_holonomic(mechanism: Any, what: str, instead: str = "simulate the motion") -> None:
-    """Raise UnsupportedError, by name, for a joint that holds velocities where positions are asked for."""
+    """Raise UnsupportedError, by name, for a joint that holds velocities where positions are requested."""
     for name, joint in mechanism.joints.items():
         if getattr(joint, "nonholonomic", False):
             message = (

@@ -98,10 +98,10 @@ def warn_of_degrees(mechanism: Mechanism, first: float, last: float) -> None:
     UnitWarning
         With the name of the driver, what its law is over the run, and the unit that may be meant.
     """
-    spans = mechanism.checked_intervals
-    if (first, last) in spans:
+    intervals = mechanism.checked_intervals
+    if (first, last) in intervals:
         return
-    spans.add((first, last))
+    intervals.add((first, last))
     for angle_law in laws_of_angles(mechanism):
         if _settled.get(id(angle_law.driver)) is angle_law.driver or names_angle(angle_law):
             continue

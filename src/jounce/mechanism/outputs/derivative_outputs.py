@@ -176,7 +176,7 @@ def _series(motion: Any, operand: Operand) -> Jet:
 def bound(outputs: Mapping[str, AbstractQuantity], mechanism: Any) -> Mapping[str, AbstractQuantity]:
     """Return outputs of a mechanism, derivatives among them with the outputs that they name.
 
-    Those that name none that is left keep what they have: some of the outputs of a mechanism may be asked for alone.
+    Those that name none that is left keep what they have: some of the outputs of a mechanism may be requested alone.
 
     Raises
     ------

@@ -24,7 +24,7 @@ from jounce.errors import JounceError, MechanismError
 from jounce.mechanism.mechanism import GROUND, Mechanism
 from jounce.mechanism.resolve import along_instances, resolve
 from jounce.mechanism.system import POSITION_COMPONENTS, Group, group_elements, holding
-from jounce.mechanism.transmissions.held_places import (
+from jounce.mechanism.transmissions.joined_points import (
     BodyVector,
     Joined,
     as_array,

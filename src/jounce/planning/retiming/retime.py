@@ -120,7 +120,7 @@ def retime(
         What links carry on parts of the path, as from the second waypoint to the fourth: limits of torques and of their
         rates hold on both sides of each change. The motion stops there, unless the load is said to be ``moving``; a
         repaired trajectory stops only where it did. Torques step as the load changes, so that their rate is infinite
-        then: the report tells by how much they step, and how fast the load moves.
+        then: the report states by how much they step, and how fast the load moves.
 
     Returns
     -------

@@ -179,10 +179,10 @@ def smoothed_samples(
         own = (curve.knots[:-1] >= times[dwell.first]) & (curve.knots[:-1] < times[dwell.last])
         powers[0, own], powers[1:, own] = dwell.position, 0.0
     law = SmoothPieces(curve.knots[:-1], powers, float(curve.knots[-1]))
-    spans = tuple((float(times[d.first]), float(times[d.last])) for d in still)
+    intervals = tuple((float(times[d.first]), float(times[d.last])) for d in still)
     rates = [estimate.cutoff / (2 * np.pi) for estimate in estimates]
     noise = max(sigma, float(np.median([estimate.noise for estimate in estimates])))
-    return law, SmoothedJoint(noise, curve.away, spans, (min(rates), max(rates)))
+    return law, SmoothedJoint(noise, curve.away, intervals, (min(rates), max(rates)))
 
 
 def _dwells_and_estimates(

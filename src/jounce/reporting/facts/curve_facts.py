@@ -149,7 +149,7 @@ def curve_tables(facts: Facts) -> list[Table]:
             )
             points.append([*location, "this curve" if k == 0 else str(k), _direction_words(direction)])
         if not point["decided"]:
-            points.append([""] * 3 + ["?", "there may be others: the second order does not tell them apart"])
+            points.append([""] * 3 + ["?", "there may be others: the second order does not distinguish them"])
     value = facts["driver"] or ""
     tables = [
         table("Limit positions", ("arc length", value, "kind"), limits, (0, 1)),

@@ -100,7 +100,7 @@ def _largest(values: np.ndarray, errors: LinkErrors) -> str:
 def feedforward_result(
     motion: Feedforward, file: Path, trajectory: Path | None, errors: LinkErrors | None, written: Path | None
 ) -> dict[str, Any]:
-    """Return what `jounce feedforward` tells, as plain data in SI units."""
+    """Return the results of `jounce feedforward`, as plain data in SI units."""
     names = {"worst": "value", "at": "time"}
     keys = ("joint", "quantity", "unit", "worst", "limit", "ratio", "at", "broken")
     report = motion.report

@@ -87,7 +87,7 @@ def complaint(kind: str, problem: object) -> str:
 def motion_result(
     motion: Motion | ChunkedMotion, file: Path, written: Path | None, refine: bool = True
 ) -> dict[str, Any]:
-    """Return what `jounce run` and `jounce simulate` tell of a motion."""
+    """Return the results of `jounce run` and `jounce simulate` for a motion."""
     peak_records = [peak_facts(peak) for peak in peaks(motion, refine=refine)]
     return {"file": file, **motion_facts(motion), "peaks": peak_records, "written": written}
 
@@ -102,7 +102,7 @@ def peak_facts(peak: Peak) -> dict[str, Any]:
 def limits_result(
     report: LimitReport, robot: Path, trajectory: Path, written: Path | None, motion: JointTrajectory | None = None
 ) -> dict[str, Any]:
-    """Return what `jounce check` tells of a trajectory and the limits of a robot."""
+    """Return the results of `jounce check` for a trajectory and the limits of a robot."""
     names = {"worst": "value", "at": "time"}
     keys = ("joint", "quantity", "unit", "worst", "limit", "ratio", "at", "broken")
     return {
@@ -126,7 +126,7 @@ def limits_result(
 def robot_motion_result(
     motion: RobotSimulation, peaks_found: Iterable[Peak], file: Path, written: Path | None
 ) -> dict[str, Any]:
-    """Return what `jounce simulate` tells of a robot file."""
+    """Return the results of `jounce simulate` for a robot file."""
     energy = [float(x) if math.isfinite(x) else None for x in motion.energy[[0, -1]]]
     peak_records = [peak_facts(peak) for peak in peaks_found]
     return {
@@ -151,7 +151,7 @@ def torques_result(
     files: tuple[Path, Path],
     written: Path | None,
 ) -> dict[str, Any]:
-    """Return what `jounce torques` tells of a robot on a trajectory."""
+    """Return the results of `jounce torques` for a robot on a trajectory."""
     (robot, trajectory), times = files, dataset["time"].values
     peak_records = [peak_facts(peak) for peak in peaks_found]
     return {

@@ -154,23 +154,23 @@ class LoadedRobot:
     def __init__(self, robot: Robot, loads: Sequence[CarriedLoad], start: float, stop: float):
         self.loads, near, moved = tuple(loads), SAME * (stop - start), f"the motion runs from {start:g} to {stop:g}"
         self.near = near
-        spans = []
+        intervals = []
         for load in self.loads:
             first, last = (start if load.start is None else load.start), (stop if load.stop is None else load.stop)
             if first < start - near or last > stop + near or last - first <= near:
                 what = "is taken up or set down outside of the motion" if last > first else "is not carried at all"
                 raise TrajectoryError(f"{what}: {moved}", name=f"loads.{load.link}", value=[first, last])
-            spans.append((first, last))
-        edges = np.unique(np.array(spans).reshape(-1))
+            intervals.append((first, last))
+        edges = np.unique(np.array(intervals).reshape(-1))
         edges = edges[(edges > start + near) & (edges < stop - near)]
         self.changes: Float[np.ndarray, " change"] = edges[np.diff(edges, prepend=-np.inf) > near]
         self.robots = tuple(
-            self._carrying(robot, spans, (a + b) / 2)
+            self._carrying(robot, intervals, (a + b) / 2)
             for a, b in itertools.pairwise([start, *self.changes.tolist(), stop])
         )
 
-    def _carrying(self, robot: Robot, spans: list[tuple[float, float]], at: float) -> Robot:
-        for load, (first, last) in zip(self.loads, spans, strict=True):
+    def _carrying(self, robot: Robot, intervals: list[tuple[float, float]], at: float) -> Robot:
+        for load, (first, last) in zip(self.loads, intervals, strict=True):
             if first < at < last:
                 robot = robot.with_payload(load.link, load.inertia)
             else:

@@ -37,7 +37,7 @@ class JointMotion:
     singular_values : array of shape (..., k)
         Of the Jacobian of the task, the largest first.
     singular : array of bool, shape (...)
-        Whether the configuration is singular: the motion is damped there, or NaN where no damping was asked for.
+        Whether the configuration is singular: the motion is damped there, or NaN without damping.
     residual : array of shape (..., order, task)
         What the motion lacks of the one prescribed: zero to rounding, unless damped or where joints are too few.
     """

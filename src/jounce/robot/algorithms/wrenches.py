@@ -29,7 +29,7 @@ class Wrench:
         Name of the link that it acts on.
     force, torque : array_like or callable, default zero
         N and N m. Shape (3,): constant. Shape (..., order - 1, 3): values and derivatives in time for each sample, as
-        many as torques are asked for. A callable maps the time, a scalar in s, to three components, by JAX functions.
+        many torques as are requested. A callable maps the time, a scalar in s, to three components, by JAX functions.
     point : array_like of shape (3,), default zero
         Where the force acts, in the frame of the link, m.
     frame : {"base", "link"}, default "base"

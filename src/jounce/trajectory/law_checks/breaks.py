@@ -18,7 +18,7 @@ from jounce.trajectory.motion import AbstractMotion, ExpressionMotion, SplineMot
 BENDING = frozenset({"abs", "sign", "sqrt", "asin", "acos", "atan2"})  # functions that may have kinks or jumps
 LOOKS = 2001  # at a law that may bend anywhere
 SIDE_OFFSET = 2e-11  # of a span of time: how far beside a break its sides are; kinks are found to half of that
-MOST = 1000  # breaks of the derivative above those asked for; of more, as of a spline through samples, none is used
+MOST = 1000  # breaks of the derivative above the requested ones; of more, as of a spline through samples, none is used
 
 Times = Float[np.ndarray, " time"]
 Breaks = Float[np.ndarray, " break"]

@@ -117,7 +117,7 @@ class IntegratedMotion(MadeOfOthers):
         return IntegratedMotion(law, self.derivative, numbers[:-1], numbers[-1])
 
     def check_instants(self, first: float, last: float) -> None:
-        """Raise MechanismError if the derivative says nothing of instants between the start and those asked for."""
+        """Raise MechanismError if the derivative says nothing of instants between the start and the requested ones."""
         if self.is_open:
             return
         start = float(self.start)

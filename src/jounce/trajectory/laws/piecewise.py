@@ -133,7 +133,7 @@ class PiecewiseMotion(MadeOfOthers):
                 part.check_instants(max(first, begin), min(last, end))
 
     def _borders(self) -> tuple[tuple[Any, ...], tuple[Any, ...]]:
-        """Return where each law begins and ends; the first and the last go on as far as they are asked for."""
+        """Return where each law begins and ends; the first and the last go on as far as they are requested."""
         inner = self.until[: len(self.parts) - 1]
         return (-np.inf, *inner), (*inner, np.inf)
 

@@ -44,7 +44,7 @@ class Session:
     """The motion that is shown, solved again when parameters change.
 
     One thread solves. A request that arrives while it works waits; one that arrives after it takes its place, so that
-    the newest values win and no time is spent on values that nobody wants any more. What fails leaves the last motion
+    the newest values win and no time is spent on values that are out of date. What fails leaves the last motion
     as it was.
 
     Parameters

@@ -89,7 +89,7 @@ class _File:
         """Return the lines of comment before a function."""
         text = f"{function.text}: out[{']['.join(x.upper() for x in function.axes)}], the last index running fastest."
         if function.by_order:
-            text += f" orders: how many of them are wanted, at most {len(function.results)}."
+            text += f" orders: how many of them are requested, at most {len(function.results)}."
         lines = ["/*", *_comment(text)]
         for x in function.arguments:
             rows = f", {_rows(x)} of them" if x.by_order else ""

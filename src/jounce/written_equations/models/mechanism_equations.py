@@ -90,13 +90,13 @@ def rows_of(mechanism: Mechanism, model: Model, joint: str | None) -> tuple[str,
 def _constraints(mechanism: Mechanism, model: Model, inputs: Inputs, own: tuple[str, ...]) -> list[Function]:
     """Return residual, Jacobian and right sides."""
     rows = equation_labels(mechanism, model)["row"].tolist()
-    order_of_rows, spans = row_order(mechanism, model).tolist(), group_rows(model)
+    order_of_rows, rows_of_groups = row_order(mechanism, model).tolist(), group_rows(model)
     chosen = [order_of_rows[rows.index(row)] for row in own]
     numbers: dict[int, tuple[Any, Any, Any]] = {}
-    for group, span in zip(model.system.groups, spans, strict=True):
-        if any(row in range(span.start, span.stop) for row in chosen):
-            residual, jacobian, sides = _read(of_one_group(model, group, span), model, inputs, span)
-            for k, row in enumerate(range(span.start, span.stop)):
+    for group, part in zip(model.system.groups, rows_of_groups, strict=True):
+        if any(row in range(part.start, part.stop) for row in chosen):
+            residual, jacobian, sides = _read(of_one_group(model, group, part), model, inputs, part)
+            for k, row in enumerate(range(part.start, part.stop)):
                 numbers[row] = residual[k], jacobian[k], sides[:, k]
     residual, jacobian, sides = (np.array([numbers[row][k] for row in chosen], np.int64) for k in range(3))
     place, moving = (inputs.t, inputs.q), inputs.velocities(0)

@@ -81,7 +81,7 @@ class Reaction:
     force : xarray.DataArray
         N, N/s, ...; dimensions time, derivative, component.
     torque : xarray.DataArray
-        N m, N m/s, ..., about the point asked for; without components in the plane.
+        N m, N m/s, ..., about the requested point; without components in the plane.
     """
 
     force: "xarray.DataArray"

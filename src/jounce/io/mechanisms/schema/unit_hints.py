@@ -261,9 +261,9 @@ def _angles_of_leaders(data: dict[str, Any], mechanism: Mechanism) -> Iterator[t
             entries = [
                 (key, k, entry) for key in ("profile", "piecewise") for k, entry in enumerate(law.get(key) or ())
             ]
-            spans = [((section, name, "motion", key, k, span), entry[span]) for key, k, entry in entries
-                     for span in ("duration", "until") if isinstance(entry.get(span), int | float)]  # fmt: skip
-            yield from sorted(spans, key=lambda span: -span[1])[:1]
+            lengths = [((section, name, "motion", key, k, field), entry[field]) for key, k, entry in entries
+                       for field in ("duration", "until") if isinstance(entry.get(field), int | float)]  # fmt: skip
+            yield from sorted(lengths, key=lambda length: -length[1])[:1]
 
 
 def _lengths(data: dict[str, Any], mechanism: Mechanism) -> Iterator[tuple[Location, float, bool]]:
