@@ -370,6 +370,23 @@ def test_a_rope_within_its_bounds_is_taken():
         jn.solve(crank(0.8, ((1, 0), (0.3, 0)), ("ground", "rod"), rod=rod), [0.0], 1)
 
 
+class OwnPin(jn.joints.AbstractConstraint, space="planar"):
+    point_i: jn.joints.Vector
+    point_j: jn.joints.Vector
+
+    point_distance = "zero"
+
+    def residual(self, body_i, body_j, time):
+        del time
+        return body_j.point(self.point_j) - body_i.point(self.point_i)
+
+
+def test_bounds_follow_from_what_a_joint_of_the_user_states():
+    long = crank(1.55, ((1, 0), (0.3, 0)), ("ground", "rod"), B=OwnPin(("crank", "rod"), [0.2, 0], ZERO))
+    with pytest.raises(jn.errors.MechanismError, match=r"1.5 m at most"):
+        jn.solve(long, [0.0], 1)
+
+
 @pytest.mark.parametrize("bodies", [("a", "a"), ("a",)])
 def test_a_rope_joins_bodies(bodies):
     with pytest.raises(jn.errors.MechanismError, match="joins two or more bodies, but all its points are on one"):

@@ -80,6 +80,15 @@ class Beside(planar.Revolute):
         return body_j.point(self.point_j) - body_i.point(self.point_i) - body_i.direction(jnp.array([0.1, 0.0]))
 
 
+class Slack(planar.DoubleRevolute):
+    point_distance = "length"
+
+    def residual(self, body_i, body_j, time):
+        del time
+        d = body_j.point(self.point_j) - body_i.point(self.point_i)
+        return d.dot(d) - 4.0 * self.length**2
+
+
 class Turned(planar.DoubleRevolute):
     dimensions = {"length": "angle"}
 
@@ -107,6 +116,7 @@ class Constant(jn.joints.AbstractConstraint, space="planar"):
         (Across, "facts", r"held_parallel \('vector_i', 'vector_j'\): .* at an angle of 90 deg"),
         (Doubled, "facts", "squared_distance 'length': the residual is not the square"),
         (Beside, "facts", "pair revolute: it does not hold"),
+        (Slack, "facts", "point_distance 'length': where the joint holds, its points are .* m apart"),
         (Turned, "facts", "dimensions: a joint that holds does not where all lengths are those in another unit"),
         (Changing, "copies", "a joint from copy.copy is not equal to the original"),
     ],

@@ -107,6 +107,9 @@ class AbstractConstraint(Module):
         Class variable: pairs of fields of one body, of which the first must not be parallel to the second.
     squared_distance : str
         Class variable: the field, a value or a law, whose square the residual subtracts from that of a distance.
+    point_distance : str
+        Class variable: how far apart the joint holds ``point_i`` and ``point_j``: ``zero``, or the field of their
+        distance. Of a `pair` it is known.
     rolls_along : tuple of str
         Class variable, of a disc that rolls on the first body: fields of the direction of its line, and in space of the
         axis of the disc, whose center ``point_j`` lies by ``radius`` on the right of the line through ``point_i``.
@@ -136,16 +139,15 @@ class AbstractConstraint(Module):
     periodic: ClassVar[bool] = False  # whether its residual forgets whole turns, which the law must not skip then
     nonholonomic: ClassVar[bool] = False  # whether rows of it hold velocities, which no positions fulfill
     parts: ClassVar[Mapping[str, Mapping[str, str]]] = MappingProxyType({})  # keys of files within a key, with fields
-    law_apart: ClassVar[bool] = False  # of the class that defines `residual`: a function of bodies less one of the law
-    has_friction_radius: ClassVar[bool] = (
-        False  # whether its surfaces turn on one another, so that friction has a radius
-    )
+    separable: ClassVar[bool] = False  # of the class that defines `residual`: a function of bodies less one of the law
+    has_friction_radius: ClassVar[bool] = False  # whether its surfaces turn on one another
     dimensions: ClassVar[Mapping[str, str]] = USUAL_DIMENSIONS
     signs: ClassVar[Mapping[str, str]] = USUAL_SIGNS
     choices: ClassVar[Mapping[str, tuple[str, ...]]] = MappingProxyType({})
     held_parallel: ClassVar[tuple[tuple[str, str], ...]] = ()
     never_parallel: ClassVar[tuple[tuple[str, str], ...]] = ()
     squared_distance: ClassVar[str] = ""
+    point_distance: ClassVar[str] = ""
     rolls_along: ClassVar[tuple[str, ...]] = ()
     symbol: ClassVar[str] = ""
     pair: ClassVar[str] = ""

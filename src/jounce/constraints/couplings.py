@@ -32,6 +32,7 @@ class ConstantVelocity(AbstractConstraint, type="constant_velocity", space="spat
     offset: Scalar = None  # rad, by which shaft j is turned about its axis
 
     dimensions = {"offset": "angle"}
+    point_distance = "zero"
     symbol = "spherical"
 
     def residual(self, body_i: SpatialPose, body_j: SpatialPose, time: Jet) -> Jet:

@@ -27,7 +27,7 @@ class CoordinateDriver(AbstractConstraint, type="coordinate", space="planar", ro
     ratio: Scalar = None
     offset: Scalar = 0.0  # rad or m
 
-    law_apart = True
+    separable = True
     dimensions = {"motion": "of coordinate", "ratio": "per angle", "offset": "of coordinate"}
     choices = {"coordinate": COORDINATES}
     symbol = "coordinate"
@@ -48,7 +48,7 @@ class SlideDriver(AbstractConstraint, type="slide", space="planar", role="driver
     vector_i: Vector  # direction of travel
     motion: MotionLaw  # m
 
-    law_apart = True
+    separable = True
     dimensions = {"motion": "length"}
     symbol = "slide"
 
@@ -66,7 +66,7 @@ class DistanceDriver(AbstractConstraint, type="distance", space="planar", role="
     point_j: Vector
     motion: MotionLaw  # m
 
-    law_apart = True
+    separable = True
     dimensions = {"motion": "length"}
     squared_distance = "motion"
     symbol = "distance"
@@ -107,7 +107,7 @@ class RotationDriver(AbstractConstraint, type="rotation", space="spatial", role=
     datum: Datum | None = field(default=None, init=False)  # found when the mechanism is assembled
 
     periodic = True
-    law_apart = True
+    separable = True
     dimensions = {"motion": "angle"}
     never_parallel = (("vector_i", "axis_i"),)
     symbol = "rotation"

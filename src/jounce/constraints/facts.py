@@ -97,6 +97,7 @@ PAIRS = {
     "prismatic": ("point_i", "point_j", "vector_i"),
 }
 """Pairs by which planar linkages are recognized, and the fields that a joint has as one of them."""
+_DISTANCES = {"revolute": "zero", "rod": "length"}  # of the points of such pairs
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -118,6 +119,8 @@ class Facts:
         Pairs of fields: the first must not be parallel to the second, on the same body.
     squared_distance : str
         Field of the distance, a value or a law, where the residual is the square of a distance less the square of it.
+    point_distance : str
+        How far apart the joint holds ``point_i`` and ``point_j``: ``zero``, or the field of their distance; else empty.
     rolls_along : tuple of str
         Of a disc that rolls on the first body: fields of the direction of its line, and in space of the axis of the
         disc. Its center ``point_j`` lies by ``radius`` on the right of the line through ``point_i``.
@@ -133,6 +136,7 @@ class Facts:
     held_parallel: tuple[tuple[str, str], ...]
     never_parallel: tuple[tuple[str, str], ...]
     squared_distance: str
+    point_distance: str
     rolls_along: tuple[str, ...]
     symbol: str
     pair: str
@@ -165,6 +169,7 @@ def facts_of(kind: type[Any]) -> Facts:
         if field.name in NAMES:
             message = f"no field of {kind.__qualname__} may have this name, by which a class states a fact; rename it"
             raise MechanismError(message, name="field", value=field.name)
+    pair = _of_residual(kind, "pair")
     facts = Facts(
         dimensions={name: _of_field(kind, "dimensions", name, "any") for name in fields},
         signs={name: _of_field(kind, "signs", name, "any") for name in fields},
@@ -172,9 +177,10 @@ def facts_of(kind: type[Any]) -> Facts:
         held_parallel=tuple(map(tuple, getattr(kind, "held_parallel", ()))),
         never_parallel=tuple(map(tuple, getattr(kind, "never_parallel", ()))),
         squared_distance=_of_residual(kind, "squared_distance"),
+        point_distance=_of_residual(kind, "point_distance") or _DISTANCES.get(pair, ""),
         rolls_along=tuple(getattr(kind, "rolls_along", ())),
         symbol=getattr(kind, "symbol", ""),
-        pair=_of_residual(kind, "pair"),
+        pair=pair,
     )
     _check(kind, facts, fields)
     return facts
@@ -219,6 +225,9 @@ def _check(kind: type[Any], facts: Facts, fields: tuple[str, ...]) -> None:
         (fact, name) for fact in ("held_parallel", "never_parallel") for both in getattr(facts, fact) for name in both
     ]
     named += [("squared_distance", facts.squared_distance)] if facts.squared_distance else []
+    if facts.point_distance:
+        named += [("point_distance", name) for name in ("point_i", "point_j")]
+        must_be("point_distance", facts.point_distance, ("zero", *fields), "field")
     if facts.rolls_along:
         named += [("rolls_along", name) for name in (*facts.rolls_along, "point_i", "point_j", "radius")]
     for fact, name in named:

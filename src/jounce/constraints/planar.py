@@ -154,6 +154,7 @@ class Fixed(AbstractConstraint, type="fixed", space="planar"):
     offset: Scalar = None  # rad, the angle of body j less that of body i
 
     dimensions = {"offset": "angle"}
+    point_distance = "zero"
 
     def residual(self, body_i: PlanarPose, body_j: PlanarPose, time: Jet) -> Jet:
         d = body_j.point(self.point_j) - body_i.point(self.point_i)

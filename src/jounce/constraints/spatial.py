@@ -38,6 +38,7 @@ class Spherical(AbstractConstraint, type="spherical", space="spatial"):
     friction: Nested = None
 
     has_friction_radius = True
+    point_distance = "zero"
     symbol = "spherical"
 
     def __check_init__(self):
@@ -59,6 +60,7 @@ class DoubleSpherical(AbstractConstraint, type="double_spherical", space="spatia
     length: Scalar  # m
 
     squared_distance = "length"
+    point_distance = "length"
     symbol = "rod"
 
     def residual(self, body_i: SpatialPose, body_j: SpatialPose, time: Jet) -> Jet:
@@ -100,6 +102,7 @@ class Universal(AbstractConstraint, type="universal", space="spatial"):
     vector_i: Vector  # the arm of the cross held by each body
     vector_j: Vector
 
+    point_distance = "zero"
     symbol = "universal"
 
     def residual(self, body_i: SpatialPose, body_j: SpatialPose, time: Jet) -> Jet:
@@ -119,6 +122,7 @@ class Revolute(AbstractConstraint, type="revolute", space="spatial"):
     has_friction_radius = True
 
     held_parallel = (("axis_i", "axis_j"),)
+    point_distance = "zero"
     symbol = "revolute"
 
     def __check_init__(self):
@@ -222,6 +226,7 @@ class Fixed(AbstractConstraint, type="fixed", space="spatial"):
     normal_j: Vector
 
     held_parallel = (("axis_i", "axis_j"), ("normal_i", "normal_j"))
+    point_distance = "zero"
     never_parallel = (("normal_i", "axis_i"), ("normal_j", "axis_j"))
 
     def residual(self, body_i: SpatialPose, body_j: SpatialPose, time: Jet) -> Jet:

@@ -167,7 +167,7 @@ def law_left_out(group: Group, *, only_if_evaluated: bool = False) -> Group:
     """
     element = users_class(type(group.element))
     kind = next(kind for kind in element.__mro__ if "residual" in vars(kind))
-    is_separable = vars(kind).get("law_apart", False)
+    is_separable = vars(kind).get("separable", False)
     if is_separable and only_if_evaluated:  # `evaluate` may have been changed by a class that keeps the residual
         is_separable = getattr(kind, "evaluate", None) is getattr(element, "evaluate", object)
     return holding(group, "motion", LeftOut()) if is_separable else group

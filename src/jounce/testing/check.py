@@ -92,7 +92,7 @@ def check_joint(
     - ``expressions``: values may be expressions of parameters;
     - ``one program``: other values need no further compilation;
     - ``rank``: where the joint holds, it has as many independent equations as it has rows;
-    - ``facts``: `held_parallel`, `squared_distance`, `pair` and `dimensions`, as the class states them, are true;
+    - ``facts``: `held_parallel`, `squared_distance`, `point_distance`, `pair` and `dimensions`, as stated, are true;
     - ``equilibrium``: its reactions have no resultant, and their power is that of its multipliers on its residual;
     - ``copies``: copies and pickles are equal, with the same hash;
     - ``files``: it is the same after it was written to a file and read;

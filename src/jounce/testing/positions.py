@@ -51,6 +51,8 @@ def facts(subject: Subject) -> None:
     positions = _positions(subject, group)
     for motion, _ in positions:
         _held_parallel(group, motion)
+        if stated.point_distance:
+            _point_distance(group, motion, stated.point_distance)
         if stated.pair:
             _is_pair(subject, element, motion)
         _dimensions(subject, element, motion)
@@ -117,6 +119,19 @@ def _held_parallel(group: Group, motion: Motion) -> None:
         if abs(abs(first @ second) / size - 1.0) > 1e-12:
             angle = np.degrees(np.arccos(np.clip(first @ second / size, -1, 1)))
             raise Broken(f"held_parallel {names}: where the joint holds, they are at an angle of {angle:.3g} deg")
+
+
+def _point_distance(group: Group, motion: Motion, stated: str) -> None:
+    """Check how far apart the points of a joint that holds are."""
+    pose = pose_of(motion)
+    first, second = (
+        np.array(pose.take(bodies).point(getattr(group.element, name)).coefficients[0])[:, 0, 0]
+        for name, bodies in zip(("point_i", "point_j"), group.bodies[:2], strict=True)
+    )
+    distance = float(np.linalg.norm(second - first))
+    expected = 0.0 if stated == "zero" else float(np.squeeze(getattr(group.element, stated)))
+    if abs(distance - abs(expected)) > 1e-10 * max(1.0, abs(expected)):
+        raise Broken(f"point_distance {stated!r}: where the joint holds, its points are {distance:.6g} m apart")
 
 
 def _is_pair(subject: Subject, element: Any, motion: Motion) -> None:

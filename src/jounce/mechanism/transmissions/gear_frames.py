@@ -19,6 +19,7 @@ from jounce.base.modules import with_fields
 from jounce.constraints import planar, spatial
 from jounce.constraints.angles import Datum, coaxial
 from jounce.constraints.cams import Cam, turns_in_space
+from jounce.constraints.facts import facts_of, value_fields
 from jounce.constraints.ropes import Rope, distinct, shares_points
 from jounce.errors import JounceError, MechanismError
 from jounce.mechanism.mechanism import GROUND, Mechanism
@@ -253,7 +254,7 @@ def _on_frames(group: Group, gears: Sequence[spatial.Gear], mechanism: Mechanism
 def _check_points_on_axes(gears: Mapping[str, spatial.Gear], mechanism: Mechanism) -> None:
     """Raise MechanismError where a point on the axis of a gear is on that of no hinge of its body."""
     parameters = mechanism.parameter_values
-    hinges = [x for x in mechanism.joints.values() if isinstance(x, spatial.Revolute | spatial.Cylindrical)]
+    hinges = [joint for joint in mechanism.joints.values() if _is_hinge(type(joint))]
     for name, gear in gears.items():
         if gear.point_m is None:
             continue
@@ -281,6 +282,12 @@ def _check_points_on_axes(gears: Mapping[str, spatial.Gear], mechanism: Mechanis
                     f"this point of '{body}' is {min(away):.6g} m from the axis of its hinge: give one that is on it"
                 )
                 raise MechanismError(message, name=f"{name}.points", value=point.tolist())
+
+
+def _is_hinge(kind: type[Any]) -> bool:
+    """Tell whether bodies turn about an axis through points of both."""
+    fields = {"point_i", "point_j", "axis_i", "axis_j"}
+    return facts_of(kind).symbol in ("revolute", "cylindrical") and fields <= value_fields(kind).keys()
 
 
 def _check_racks(racks: Mapping[str, spatial.Rolling], mechanism: Mechanism) -> None:

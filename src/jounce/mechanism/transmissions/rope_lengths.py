@@ -14,20 +14,11 @@ import numpy as np
 from jax.core import Tracer
 from jaxtyping import Float
 
-from jounce.constraints import planar, spatial
 from jounce.constraints.facts import facts_of
 from jounce.constraints.ropes import Rope
 from jounce.errors import MechanismError
 
 ROUNDING = 1e-9  # of lengths, as written numbers are rounded
-COINCIDENT = (
-    planar.Fixed,
-    spatial.Spherical,
-    spatial.Universal,
-    spatial.Revolute,
-    spatial.Fixed,
-    spatial.ConstantVelocity,
-)
 Bounds = Float[np.ndarray, "point point"]
 
 
@@ -122,9 +113,6 @@ def _check(group: Any, instance: int, name: str, points: _Points) -> None:
 
 
 def _fixed_distance(joint: Any) -> Any:
-    """Return how far joints hold their two points apart: zero for pins; None where they do not."""
-    kind = type(joint)
-    pair = facts_of(kind).pair
-    if pair == "rod" or kind.residual is spatial.DoubleSpherical.residual:
-        return joint.length
-    return 0.0 if pair == "revolute" or any(kind.residual is held.residual for held in COINCIDENT) else None
+    """Return how far apart joints hold their two points: zero for pins; None where they do not."""
+    stated = facts_of(type(joint)).point_distance
+    return 0.0 if stated == "zero" else getattr(joint, stated) if stated else None
