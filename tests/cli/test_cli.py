@@ -403,7 +403,7 @@ def test_a_cache_that_cannot_be_made_does_no_harm(tmp_path):
     done = process("run", "none.yaml", cwd=tmp_path, JOUNCE_CACHE_DIR=str(folder))
     assert done.returncode == 2
     warning, error = done.stderr.splitlines()
-    assert warning == f"compiled programs are not kept: {folder}: cannot be used: Not a directory"
+    assert warning == f"compiled programs are not stored: {folder}: cannot be used: Not a directory"
     assert error == "error: none.yaml: file not found"
 
 

@@ -66,7 +66,7 @@ def test_a_folder_that_others_may_write_is_not_used_and_said_once(tmp_path, mode
     assert process.returncode == 0
     assert "psi" in out
     assert len(err.splitlines()) == 1
-    assert "compiled programs are not kept" in err
+    assert "compiled programs are not stored" in err
     assert "may be written by others" in err
     assert list(folder.iterdir()) == []
 

@@ -67,6 +67,19 @@ def test_facts_of_a_residual_go_with_it():
     assert facts_of(Pin).pair == "revolute"
     assert facts_of(OffsetPin).pair == ""
     assert facts_of(spatial.DoubleSpherical).squared_distance == "length"
+    assert (facts_of(Pin).point_distance, facts_of(OffsetPin).point_distance) == ("zero", "")
+    assert facts_of(planar.DoubleRevolute).point_distance == "length"
+
+
+def test_space_and_role_hold_without_a_type():
+    class Winch(jn.joints.AbstractConstraint, space="planar", role="driver"):
+        def residual(self, body_i, body_j, time): ...
+
+    assert (Rail.space, Rail.role, Winch.role) == ("planar", "", "driver")
+    with pytest.raises(jn.errors.MechanismError, match="is planar, in a spatial mechanism"):
+        jn.Mechanism(
+            space="spatial", bodies={"a": jn.Body([0, 0, 0])}, joints={}, drivers={"w": Winch(("ground", "a"))}
+        )
 
 
 def test_fields_of_usual_names_have_usual_facts():
@@ -105,6 +118,12 @@ def own(name, **stated):
             "signs.size: the class Own: no sign has .*did you mean 'positive'",
         ),
         ({"signs": "positive"}, "signs: the class Own must state this by field"),
+        (
+            {"dimensions": {"sise": "length"}},
+            "dimensions: the class Own: no field has this name, .*did you mean 'size'",
+        ),
+        ({"held_parallel": ("point_i", "point_i")}, "held_parallel: the class Own must state pairs of fields"),
+        ({"point_distance": "zero"}, "point_distance: the class Own: no field has this name, got 'point_j'"),
         ({"dimensions": {"size": "lenght"}}, "dimensions.size: .*did you mean 'length'"),
         ({"held_parallel": (("axis_i", "axis_j"),)}, "held_parallel: the class Own: no field has this name"),
         ({"squared_distance": "length"}, "squared_distance: the class Own: no field"),

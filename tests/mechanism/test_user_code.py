@@ -91,6 +91,32 @@ def test_a_residual_that_is_no_jet_is_named():
         jn.solve(held(Listed(("ground", "a"))), TIME)
 
 
+class Numeric(jn.joints.AbstractConstraint, space="planar"):
+    """A function of NumPy, which takes no jets."""
+
+    def residual(self, body_i, body_j, time):
+        del body_i, time
+        return np.sqrt(body_j.angle)
+
+
+class Deciding(jn.joints.AbstractConstraint, space="planar"):
+    """A residual that decides by the position of its bodies."""
+
+    def residual(self, body_i, body_j, time):
+        del body_i, time
+        return body_j.angle if body_j.angle.coefficients[0] > 0 else body_j.position[0]
+
+
+@pytest.mark.parametrize("kind", [Numeric, Deciding])
+def test_a_residual_that_cannot_be_evaluated_on_jets_is_named(kind):
+    words = (
+        rf"joints\.shelf: the residual of {kind.__name__} cannot be evaluated \(.*operators and functions of jounce.jet"
+    )
+    with pytest.raises(jn.errors.MechanismError, match=words) as caught:
+        jn.solve(held(kind(("ground", "a"))), TIME)
+    assert caught.value.__cause__ is not None
+
+
 @pytest.mark.parametrize("kind", [Steady, Twice])
 def test_a_force_that_is_no_jet_of_the_shape_of_its_displacement_is_named(kind):
     mechanism = held(Shelf(("ground", "a"), 0.5), push=kind(("ground", "a"), 3.0, "b"))

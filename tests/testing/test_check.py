@@ -117,13 +117,29 @@ class Constant(jn.joints.AbstractConstraint, space="planar"):
         (Doubled, "facts", "squared_distance 'length': the residual is not the square"),
         (Beside, "facts", "pair revolute: it does not hold"),
         (Slack, "facts", "point_distance 'length': where the joint holds, its points are .* m apart"),
-        (Turned, "facts", "dimensions: a joint that holds does not where all lengths are those in another unit"),
+        (Turned, "facts", "dimensions: a joint that holds no longer does where all lengths are multiplied by 3"),
         (Changing, "copies", "a joint from copy.copy is not equal to the original"),
     ],
 )
 def test_a_contract_that_is_broken_is_named(kind, contract, words):
     with pytest.raises(ContractError, match=f"{kind.__qualname__}: {contract}: .*{words}"):
         check_joint(kind, space="planar", contracts=[contract], order=2)
+
+
+class Empty(jn.joints.AbstractConstraint, space="planar"):
+    """A class without a residual."""
+
+
+class Spaceless(jn.joints.AbstractConstraint):
+    def residual(self, body_i, body_j, time): ...
+
+
+@pytest.mark.parametrize(
+    "kind, words", [(Empty, "kind: defines no method residual"), (Spaceless, "space: the class says")]
+)
+def test_a_class_that_is_not_complete_is_refused(kind, words):
+    with pytest.raises(jn.errors.MechanismError, match=words):
+        check_joint(kind)
 
 
 class Fork(jn.joints.AbstractConstraint, space="planar"):

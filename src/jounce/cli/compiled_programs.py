@@ -65,7 +65,7 @@ def use_compilation_cache(*, quiet: bool = False) -> None:
         folder = PrivateFolder(directory)
     except OutputError as error:
         if not quiet:
-            sys.stderr.write(f"compiled programs are not kept: {error}\n")
+            sys.stderr.write(f"compiled programs are not stored: {error}\n")
         return
     except (RuntimeError, ValueError):  # there is no home, or a name that no file can have
         return

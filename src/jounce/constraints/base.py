@@ -155,9 +155,15 @@ class AbstractConstraint(Module):
     def __init_subclass__(cls, type: str = "", space: str = "", role: str = "joint", **keywords: Any):  # noqa: A002
         super().__init_subclass__(**keywords)
         keep_words_static(cls)
+        check_choice("role", role, ("joint", "driver"), MechanismError)
         if type:
-            check_choice("role", role, ("joint", "driver"), MechanismError)
             register(cls, type, space, role)
+            return
+        if space:
+            check_choice("space", space, SPACES, MechanismError)
+            cls.space = space
+        if role == "driver":
+            cls.role = role
 
     def __check_init__(self):
         check_bodies(self, self.body_counts or (self.body_count,))

@@ -174,8 +174,8 @@ def facts_of(kind: type[Any]) -> Facts:
         dimensions={name: _of_field(kind, "dimensions", name, "any") for name in fields},
         signs={name: _of_field(kind, "signs", name, "any") for name in fields},
         choices={name: choices for name in fields if (choices := _of_field(kind, "choices", name, ()))},
-        held_parallel=tuple(map(tuple, getattr(kind, "held_parallel", ()))),
-        never_parallel=tuple(map(tuple, getattr(kind, "never_parallel", ()))),
+        held_parallel=_pairs(kind, "held_parallel"),
+        never_parallel=_pairs(kind, "never_parallel"),
         squared_distance=_of_residual(kind, "squared_distance"),
         point_distance=_of_residual(kind, "point_distance") or _DISTANCES.get(pair, ""),
         rolls_along=tuple(getattr(kind, "rolls_along", ())),
@@ -199,6 +199,16 @@ def _of_field(kind: type[Any], fact: str, field: str, otherwise: Any) -> Any:
     return otherwise
 
 
+def _pairs(kind: type[Any], fact: str) -> tuple[tuple[str, str], ...]:
+    """Return the pairs of fields that a class states."""
+    pairs = getattr(kind, fact, ())
+    for both in pairs:
+        if isinstance(both, str) or len(both) != 2:
+            message = f"the class {kind.__qualname__} must state pairs of fields, such as (('axis_i', 'axis_j'),)"
+            raise MechanismError(message, name=fact, value=pairs)
+    return tuple((first, second) for first, second in pairs)
+
+
 def _of_residual(kind: type[Any], fact: str) -> str:
     """Return what is stated by the class that a user's residual is of, or by one derived from it; else it is empty."""
     for base in kind.__mro__:
@@ -210,28 +220,23 @@ def _of_residual(kind: type[Any], fact: str) -> str:
 
 
 def _check(kind: type[Any], facts: Facts, fields: tuple[str, ...]) -> None:
+    """Raise MechanismError if a class states what cannot be."""
+
     def must_be(fact: str, word: str, known: Any, noun: str) -> None:
         if word not in known:
             message = f"the class {kind.__qualname__}: {no_such(noun, word, list(known))}"
             raise MechanismError(message, name=fact, value=word)
 
-    for name in _stated_fields(kind, ("signs", "choices")):
-        must_be("signs", name, {*fields, *map(stem_of, fields)}, "field")
+    for fact, name in _named_fields(facts):
+        must_be(fact, name, fields, "field")
+    for fact, name in _stated_fields(kind):
+        must_be(fact, name, {*fields, *map(stem_of, fields)}, "field")
     dimensions = (*KINDS, *BY_COORDINATE, "direction")
     for field in fields:
         must_be(f"dimensions.{field}", facts.dimensions[field], dimensions, "dimension")
         must_be(f"signs.{field}", facts.signs[field], SIGNS, "sign")
-    named = [
-        (fact, name) for fact in ("held_parallel", "never_parallel") for both in getattr(facts, fact) for name in both
-    ]
-    named += [("squared_distance", facts.squared_distance)] if facts.squared_distance else []
-    if facts.point_distance:
-        named += [("point_distance", name) for name in ("point_i", "point_j")]
+    if facts.point_distance and not facts.pair:
         must_be("point_distance", facts.point_distance, ("zero", *fields), "field")
-    if facts.rolls_along:
-        named += [("rolls_along", name) for name in (*facts.rolls_along, "point_i", "point_j", "radius")]
-    for fact, name in named:
-        must_be(fact, name, fields, "field")
     if facts.pair:
         must_be("pair", facts.pair, PAIRS, "pair")
         for name in PAIRS[facts.pair]:
@@ -242,13 +247,28 @@ def _check(kind: type[Any], facts: Facts, fields: tuple[str, ...]) -> None:
             must_be(f"symbol {facts.symbol}", name, fields, "field")
 
 
-def _stated_fields(kind: type[Any], facts: tuple[str, ...]) -> Iterator[str]:
-    """Give the names of the fields of which a class or one of its bases states facts, the usual ones left out."""
+def _named_fields(facts: Facts) -> Iterator[tuple[str, str]]:
+    """Give the names of fields in facts of a class, after those of the facts."""
+    for fact in ("held_parallel", "never_parallel"):
+        yield from ((fact, name) for both in getattr(facts, fact) for name in both)
+    if facts.squared_distance:
+        yield "squared_distance", facts.squared_distance
+    if facts.point_distance and not facts.pair:
+        yield from (("point_distance", name) for name in ("point_i", "point_j"))
+    if facts.rolls_along:
+        yield from (("rolls_along", name) for name in (*facts.rolls_along, "point_i", "point_j", "radius"))
+
+
+def _stated_fields(kind: type[Any]) -> Iterator[tuple[str, str]]:
+    """Give the names of fields of which a class or one of its bases states facts, after those of the facts.
+
+    The usual names are left out.
+    """
     for base in kind.__mro__:
-        for fact in facts:
+        for fact in ("dimensions", "signs", "choices"):
             stated = vars(base).get(fact, {})
-            if stated is not USUAL_SIGNS:
-                yield from stated
+            if stated is not USUAL_SIGNS and stated is not USUAL_DIMENSIONS:
+                yield from ((fact, name) for name in stated)
 
 
 def symbols(kind: type[Any]) -> tuple[str, ...]:

@@ -270,7 +270,7 @@ class Surface(AbstractConstraint, type="surface", space="spatial"):
     start_v: Scalar = None
 
     hidden = ("u", "v")
-    dimensions = {"surface": "length", "start": "any"}
+    dimensions = {"surface": "length"}
     symbol = "surface"
 
     def residual(self, body_i: SpatialPose, body_j: SpatialPose, carriage: SpatialPose, time: Jet) -> Jet:

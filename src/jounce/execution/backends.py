@@ -1,14 +1,13 @@
 """Which arithmetic computes: machine code made by LLVM, or XLA, which takes its place where there is none."""
 
 import os
-import warnings
 from collections.abc import Iterable
 from typing import Any
 
 import jax
 import numpy as np
 
-from jounce.errors import MachineCodeWarning
+from jounce.errors import MachineCodeWarning, warn_caller
 from jounce.execution.background import is_ahead
 from jounce.execution.device import device_name, on_processor
 from jounce.execution.llvm import self_test
@@ -64,4 +63,4 @@ def tell_missing(what: str) -> None:
         f"there is no machine code for {what}: XLA computes what needs it, with the same results in two to fifty times "
         "the time; another form of the operation, or a lower order of a long program, may have machine code"
     )
-    warnings.warn(message, MachineCodeWarning, stacklevel=2)
+    warn_caller(MachineCodeWarning(message))

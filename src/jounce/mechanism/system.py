@@ -190,7 +190,7 @@ def group_elements(
             check_no_own_code(element)
             readings = readings_of(element, values, components) if type(element) in written else {}
         except JounceError as error:
-            raise error.located(name=name) from None
+            raise error.located(name=name) from error.__cause__
         if readings:
             values[READINGS] = readings
         members_by_key.setdefault(group_key(element, values), []).append((name, element, values))

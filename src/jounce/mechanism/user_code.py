@@ -20,7 +20,7 @@ from jax.core import Tracer
 from jounce.base.modules import changes_parts, field, is_ours, unchecked, with_fields
 from jounce.constraints import AbstractConstraint
 from jounce.constraints.base import field_kinds, value_fields
-from jounce.errors import MechanismError, UnsupportedError
+from jounce.errors import JounceError, MechanismError, UnsupportedError
 from jounce.forces import AbstractForce
 from jounce.forces.laws import AbstractLaw, ReadLaw, is_users_law
 from jounce.jet import Jet
@@ -243,8 +243,17 @@ class _Reader:
 
         try:
             shape = jax.eval_shape(residual)
-        except Exception:  # noqa: BLE001 - its use raises the error again
-            return
+        except JounceError:
+            raise
+        except Exception as failure:
+            if not self.settled:
+                return  # a field that is found later may be missing
+            message = (
+                f"the residual of {self.kind.__qualname__} cannot be evaluated ({type(failure).__name__}: "
+                f"{str(failure).strip().partition(chr(10))[0]}): it must consist of operators and functions of "
+                "jounce.jet on points, directions and angles of its bodies, without decisions by their values"
+            )
+            raise MechanismError(message) from failure
         if not isinstance(shape, Jet):
             message = (
                 f"the residual of {self.kind.__qualname__} must return a jet, computed from those of its bodies; "

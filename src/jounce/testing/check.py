@@ -1,6 +1,7 @@
 """The check of a class of joints or drivers against the contracts of the library."""
 
 import dataclasses
+import inspect
 from collections.abc import Callable, Mapping, Sequence
 from types import MappingProxyType
 from typing import Any
@@ -146,8 +147,13 @@ def check_joint(
     """
     if not (isinstance(kind, type) and issubclass(kind, AbstractConstraint)):
         raise MechanismError("must be a class derived from jn.joints.AbstractConstraint", name="kind", value=kind)
-    space = kind.space or space
-    check_choice("space", space, SPACES, MechanismError)
+    if inspect.isabstract(kind):
+        raise MechanismError("defines no method residual(self, body_i, body_j, time)", name="kind", value=kind)
+    if not (kind.space or space):
+        message = "the class says neither planar nor spatial: state space= here, or as an argument of the class"
+        raise MechanismError(message, name="space", value=kind)
+    space = space or kind.space
+    check_choice("space", space, (kind.space,) if kind.space else SPACES, MechanismError)
     whole_number("order", order, 1, error=MechanismError)
     chosen = tuple(CONTRACTS) if contracts is None else tuple(contracts)
     for name in chosen:

@@ -51,7 +51,7 @@ def facts(subject: Subject) -> None:
     positions = _positions(subject, group)
     for motion, _ in positions:
         _held_parallel(group, motion)
-        if stated.point_distance:
+        if stated.point_distance and not stated.pair:
             _point_distance(group, motion, stated.point_distance)
         if stated.pair:
             _is_pair(subject, element, motion)
@@ -82,7 +82,10 @@ def _positions(subject: Subject, group: Group) -> list[tuple[Motion, np.ndarray]
         if position is not None:
             positions.append(position)
     if not positions:
-        raise Broken(f"from {STARTS} random positions of its bodies none was found in which the joint holds")
+        raise Broken(
+            f"from {STARTS} random positions of its bodies none was found in which the joint holds; give `values` of "
+            "its fields with which it can, or see whether its residual has a zero"
+        )
     return positions
 
 
@@ -118,7 +121,10 @@ def _held_parallel(group: Group, motion: Motion) -> None:
         size = np.linalg.norm(first) * np.linalg.norm(second)
         if abs(abs(first @ second) / size - 1.0) > 1e-12:
             angle = np.degrees(np.arccos(np.clip(first @ second / size, -1, 1)))
-            raise Broken(f"held_parallel {names}: where the joint holds, they are at an angle of {angle:.3g} deg")
+            raise Broken(
+                f"held_parallel {names}: where the joint holds, they are at an angle of {angle:.3g} deg; leave the "
+                "pair out, or have the residual hold it"
+            )
 
 
 def _point_distance(group: Group, motion: Motion, stated: str) -> None:
@@ -185,5 +191,8 @@ def _dimensions(subject: Subject, element: Any, motion: Motion) -> None:
     if period := subject.period_of(group_of([element], subject.space)):
         period = FACTOR * period if isinstance(subject.period, str) else period
         gap[-1] -= period * np.round(gap[-1] / period)
-    words = "dimensions: a joint that holds does not where all lengths are those in another unit"
+    words = (
+        f"dimensions: a joint that holds no longer does where all lengths are multiplied by {FACTOR:g}; one of its "
+        "fields has another dimension than the class states"
+    )
     subject.same(gap, 0 * gap, 1e-10, words)

@@ -105,10 +105,16 @@ def derivatives(subject: Subject) -> None:
         if all(size[-NODES // 4 :].max() <= 1e-13 * max(size.max(), subject.scale) for size in sizes):
             break
     else:
-        raise Broken("the residual is not smooth along a random motion: no polynomial follows it")
+        raise Broken(
+            "the residual is not smooth along a random motion, as with abs, floor or a step: no polynomial follows "
+            "it; write it without them, or give `values` with which it is smooth"
+        )
     for k in range(1, 5):
         exact = [fit.deriv(k)(0.0) / np.prod(range(1, k + 1)) for fit in fits]
-        words = f"derivative {k} along a motion is not that of the residual as a function of time"
+        words = (
+            f"derivative {k} along a motion is not that of the residual as a function of time; compute it from the "
+            "jets of bodies and time alone"
+        )
         subject.same(jets[k].reshape(-1), exact, 1e-8 * 10**k, words)
 
 
@@ -143,7 +149,10 @@ def frames(subject: Subject) -> None:
         for name, series in moved.items():
             series[..., -1, :] = motion[name][..., -1, :]
     here, there = residual(group, motion), residual(group, moved)
-    words = "the residual changes where all bodies are moved together; is it between places in the global frame?"
+    words = (
+        "the residual changes where all bodies are moved together; take components along directions of a body, not of "
+        "the global frame, or state relative=False where that is meant"
+    )
     if period := subject.period_of(group):
         subject.same(here[1:], there[1:], 1e-11, words)
         turns = (here[0] - there[0]) / period
@@ -216,7 +225,10 @@ def one_program(subject: Subject) -> None:
     elements = [subject.samples.element(random) for _ in range(2)]
     first, second = (run(group_of([element], subject.space), pose, time_jet(1)) for element in elements)
     if len(calls) > 1:
-        raise Broken("the residual is compiled anew for other values; does it look at them in Python?")
+        raise Broken(
+            "the residual is compiled anew for other values: it turns them into numbers of Python, or decides by them; "
+            "use operators and functions of jounce.jet instead"
+        )
     numbers = [kind in ("scalar", "vector", "points") for kind in field_kinds(subject.samples.kind).values()]
     if any(numbers) and not subject.samples.given and np.array_equal(first[0], second[0]):
         raise Broken("the residual does not depend on the values of its fields")

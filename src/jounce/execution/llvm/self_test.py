@@ -5,12 +5,11 @@ Code may ask there for functions that LLVM does not find, and then it ends the p
 
 import subprocess
 import sys
-import warnings
 from functools import lru_cache
 from importlib.util import find_spec
 from pathlib import Path
 
-from jounce.errors import MachineCodeWarning
+from jounce.errors import MachineCodeWarning, warn_caller
 
 TRIED = ("linux",)
 HOME = Path(__file__).parents[3]  # the folder that this package is imported from
@@ -46,7 +45,7 @@ def passes() -> bool:
         f"({reason}); XLA computes instead, with the same results in two to fifty times the time; JOUNCE_NATIVE=0 in "
         "the environment selects it without this message"
     )
-    warnings.warn(message, MachineCodeWarning, stacklevel=2)
+    warn_caller(MachineCodeWarning(message))
     return False
 
 

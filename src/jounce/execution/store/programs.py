@@ -8,7 +8,6 @@ import os
 import pickle
 import sys
 import threading
-import warnings
 import zlib
 from collections.abc import Callable
 from contextlib import suppress
@@ -16,7 +15,7 @@ from pathlib import Path
 from typing import Any, Protocol, runtime_checkable
 
 from jounce.base.private_folder import PrivateFolder
-from jounce.errors import OutputError, ProgramFolderWarning
+from jounce.errors import OutputError, ProgramFolderWarning, warn_caller
 from jounce.execution.store.folder import VARIABLE, ProgramFolder, chosen_folder
 
 OURS = ("jounce",)
@@ -101,7 +100,7 @@ def _usual_store() -> Store | None:
         return None if folder is None else ProgramFolder(PrivateFolder(folder))
     except OutputError as error:
         if VARIABLE in os.environ:
-            warnings.warn(f"compiled programs are not kept: {error}", ProgramFolderWarning, stacklevel=2)
+            warn_caller(ProgramFolderWarning(f"compiled programs are not stored: {error}"))
     except (RuntimeError, ValueError):  # there is no home, or a name that no file can have
         pass
     return None
