@@ -14,7 +14,7 @@ from jounce.execution.threads import in_callers_context
 from jounce.integrate.results.robot_sensitivities import of_traced_robots
 from jounce.integrate.results.robot_simulation import RobotSimulation
 from jounce.integrate.simulate_robot import simulate_robot
-from jounce.kinematics.families.solve_batch import checked_values
+from jounce.kinematics.families.parameter_values import checked_values
 from jounce.robot.model.arguments import checked_state
 from jounce.robot.robot import Robot
 

@@ -126,7 +126,9 @@ def test_either_back_end_solves_designs_as_alone(monkeypatch, native):
     named = dataclasses.replace(FOUR_BAR, parameters={**FOUR_BAR.parameters, "unused": 1.0})
     time = np.linspace(0.0, 2.0, 41)
     for parameters in ({"AB": np.linspace(0.03, 0.05, 11)}, {"unused": np.array([1.0, 2.0])}):
-        check(named, parameters, jn.solve_batch(named, parameters, time, order=3), time, 3)
+        family = jn.solve_batch(named, parameters, time, order=3)
+        assert family.attrs["backend"] == ("xla" if native == "0" else "llvm")
+        check(named, parameters, family, time, 3)
 
 
 @pytest.mark.slow

@@ -15,6 +15,7 @@ from jounce.base.shapes import ArrayLike, is_traced
 from jounce.dynamics.forward.accelerations import Equations, State
 from jounce.dynamics.forward.initial_state import consistent_start, initial_as_drivers
 from jounce.errors import MechanismError
+from jounce.execution.backends import backend_of, joined
 from jounce.execution.threads import in_callers_context
 from jounce.integrate.marching.marching import MOVING, DenseOutput, IntegratorState, Outcome, march, unexpanded
 from jounce.integrate.marching.user_methods import integrator
@@ -32,7 +33,7 @@ from jounce.integrate.steps.revolution_counts import POINTS_IN_STEP, attitudes_a
 from jounce.jet.derivatives import plain_derivatives
 from jounce.jet.turns import brought_near, whole_periods
 from jounce.kinematics import Status
-from jounce.kinematics.families.solve_batch import check_parameter, checked_values
+from jounce.kinematics.families.parameter_values import check_parameter, checked_values
 from jounce.kinematics.results.pose_outputs import output_series
 from jounce.mechanism import Mechanism, TimeGrid, build, check_mechanism
 from jounce.mechanism.building.builder import with_reference
@@ -184,7 +185,7 @@ def simulate_batch(
     status = runs.status
     for run, reason in starts.failed.items():
         status[run, 0] = int(reason)
-    return Batch(instants, values, runs.outputs, status, runs.steps, mechanism, order)
+    return Batch(instants, values, runs.outputs, status, runs.steps, mechanism, order, joined(runs.backends))
 
 
 def _of_robot(robot: Robot, values: dict[str, np.ndarray], runs: list[RobotSimulation]) -> Batch:
@@ -193,7 +194,8 @@ def _of_robot(robot: Robot, values: dict[str, np.ndarray], runs: list[RobotSimul
     outputs = {name: q[..., k] for k, name in enumerate(runs[0].robot.joint_names)}
     steps = np.array([len(run.steps.start) for run in runs])
     status, order = np.stack([run.status for run in runs]), runs[0].order
-    return Batch(runs[0].time, values, outputs, status, steps, robot, order)
+    backend = joined(name for run in runs for name in run.backend.split(", "))
+    return Batch(runs[0].time, values, outputs, status, steps, robot, order, backend)
 
 
 class _Runs:
@@ -213,7 +215,7 @@ class _Runs:
     ):
         self.parametric, self.instants, self.order, self.settings = parametric, instants, order, settings
         self.width = min(LANES, 1 << (len(rows) - 1).bit_length())
-        self.steps = np.zeros(len(rows), int)
+        self.steps, self.backends = np.zeros(len(rows), int), set[str]()
         self._made = parametric.of(rows)
         self._reached = np.zeros((len(rows), len(instants)), bool)
         self._direction = 1.0 if instants[-1] >= instants[0] else -1.0
@@ -282,6 +284,7 @@ class _Runs:
         current = jax.tree.map(lambda x: x[..., runs], self._current)
         method = integrator(method, equations, current)
         marched = march(equations, current, self.instants[-1], tolerance, longest, method=method, count=STEPS)
+        self.backends.add(backend_of(marched[0]))
         current, (steps, taken), tried = jax.tree.map(np.asarray, marched)
         self._put(runs, current)
         self.steps[runs] += taken.sum(axis=0)

@@ -43,6 +43,8 @@ class Batch(Displayed):
         As it was given.
     order : int
         Highest derivative of the outputs.
+    backend : str
+        Which arithmetic gave the numbers: "llvm", machine code, or "xla", with the device unless that is the processor.
     """
 
     time: Float[np.ndarray, " time"]
@@ -52,6 +54,7 @@ class Batch(Displayed):
     steps: Int[np.ndarray, " run"]
     mechanism: Mechanism | Robot
     order: int
+    backend: str = ""
 
     @property
     def dataset(self) -> Any:
@@ -66,9 +69,10 @@ class Batch(Displayed):
             described = {name: JointCoordinate("rad" if joints[name].turning else "m") for name in self.outputs}
         else:
             title, described = self.mechanism.title, self.mechanism.outputs
-        return labeled_family(
-            "run", title, described, self.time, self.order, self.parameters, self.outputs, self.status
-        ).assign(steps=("run", self.steps, {"long_name": "steps taken"}))
+        family = labeled_family(
+            "run", title, described, self.time, self.order, self.parameters, self.outputs, self.status, self.backend
+        )
+        return family.assign(steps=("run", self.steps, {"long_name": "steps taken"}))
 
     def __repr__(self) -> str:
         complete = int((self.status == Status.OK).all(axis=1).sum())

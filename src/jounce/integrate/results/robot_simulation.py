@@ -241,7 +241,8 @@ class RobotSimulation(Tabulated):
             unit = "rad" if self.robot.joints[name].turning else "m"
             attributes = {"units": unit, "long_name": derivatives_of(name)}
             variables[name] = (tuple(axes), self.q[:, :, k], attributes)
-        return xarray.Dataset(variables, axes, attrs={"title": self.robot.name, "source": "jounce"})
+        about = {"title": self.robot.name, "source": "jounce", "backend": self.backend}
+        return xarray.Dataset(variables, axes, attrs=about)
 
 
 def _derivatives(coefficients: np.ndarray) -> np.ndarray:

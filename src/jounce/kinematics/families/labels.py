@@ -23,6 +23,7 @@ def labeled_family(
     values: Mapping[str, np.ndarray],
     outputs: Mapping[str, np.ndarray],
     status: Int[np.ndarray, "lane time"],
+    backend: str,
 ) -> Any:
     """Return the results of designs or runs as an `xarray.Dataset`, with their parameters as coordinates.
 
@@ -44,6 +45,8 @@ def labeled_family(
         Those that were computed.
     status : numpy.ndarray of shape (lane, time)
         See `Status`.
+    backend : str
+        Which arithmetic gave the numbers.
     """
     import xarray
 
@@ -66,5 +69,5 @@ def labeled_family(
     taken = {*variables, *coordinates}
     named = {name: name if name not in taken else f"parameter_{name}" for name in values}
     coordinates |= {named[name]: (lane, value, {"long_name": name}) for name, value in values.items()}
-    attributes = {"title": title or f"{lane}s of a mechanism", "source": "jounce"}
+    attributes = {"title": title or f"{lane}s of a mechanism", "source": "jounce", "backend": backend}
     return xarray.Dataset(variables, coordinates, attributes)

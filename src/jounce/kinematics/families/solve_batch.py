@@ -6,14 +6,14 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import jax
-import jax.numpy as jnp
 import numpy as np
 from jax.core import Tracer
 from jaxtyping import Float, Int
 
 from jounce.base.activity import Count
-from jounce.base.shapes import ArrayLike, is_traced, real_numbers
-from jounce.errors import AssemblyError, JounceError, MechanismError, MobilityError, SolveError, check_name
+from jounce.base.shapes import ArrayLike
+from jounce.errors import AssemblyError, JounceError, MechanismError, MobilityError, SolveError
+from jounce.execution.backends import joined
 from jounce.execution.threads import thread_count
 from jounce.kinematics.assembly.assemble import assemble
 from jounce.kinematics.continuation.solver import Solver
@@ -22,6 +22,7 @@ from jounce.kinematics.families.design_sides import Sides, sides_of_designs
 from jounce.kinematics.families.design_values import Designs
 from jounce.kinematics.families.known_outputs import with_outputs
 from jounce.kinematics.families.labels import labeled_family
+from jounce.kinematics.families.parameter_values import check_parameter, checked_values
 from jounce.kinematics.position_analysis.idle_holding import with_idle_held_in_family
 from jounce.kinematics.position_analysis.solve import LOWEST_ORDER, checked_settings, lost_orders, solve
 from jounce.kinematics.results.motion import Motion
@@ -48,46 +49,6 @@ if TYPE_CHECKING:
     import xarray
 
 SPOILED = (AssemblyError, MobilityError, SolveError)  # a design, not the family
-
-
-def checked_values(
-    parameters: Mapping[str, Any],
-    each: str,
-    check: Callable[[str], None],
-    error: type[JounceError] = MechanismError,
-) -> dict[str, Any]:
-    """Return values of parameters that many designs, or runs, have, one for each: arrays of JAX where it traces them.
-
-    Parameters
-    ----------
-    parameters : mapping
-        By name.
-    each : str
-        What they differ in: designs or runs.
-    check : callable
-        Raises for a name that is none of a parameter.
-    error : type
-        To raise if values are not finite or of unequal number.
-    """
-    if not parameters:
-        raise error("a batch differs in at least one parameter", name="parameters", value=dict(parameters))
-    values, count = {}, None
-    for name, given in parameters.items():
-        check(name)
-        expected, traced = f"a list of finite numbers, one for each {each}", is_traced(given)
-        array = jnp.asarray(given, float) if traced else real_numbers(f"parameters.{name}", given, error, expected)
-        if array.ndim != 1 or not array.size or not (traced or np.isfinite(array).all()):
-            raise error(f"must be {expected}", name=f"parameters.{name}", value=given)
-        if count is not None and len(array) != count:
-            message = f"must have one value for each {each}, {count} as those before"
-            raise error(message, name=f"parameters.{name}", value=len(array))
-        values[name], count = array, len(array)
-    return values
-
-
-def check_parameter(mechanism: Mechanism, name: str) -> None:
-    """Raise MechanismError if a mechanism has no such parameter."""
-    check_name("parameter", name, mechanism.parameters, MechanismError, name="parameters")
 
 
 @concrete
@@ -133,7 +94,7 @@ def solve_batch(
         Outputs with the dimensions design, time, derivative, and component where there are some, SI; the values of the
         parameters are coordinates of the designs, ``parameter_NAME`` where something else has the NAME. ``status``
         (design, time) is the outcome, see `Status`: where it is not 0, outputs are NaN. An output that no design has is
-        left out.
+        left out. The attribute ``backend`` says which arithmetic gave the numbers, as that of `Motion`.
 
     Raises
     ------
@@ -224,6 +185,7 @@ class _Family:
         self.held = with_output_drivers(mechanism)  # solved side by side
         self.order, self.tolerance, self.progress = order, tolerance, progress
         self.outputs: dict[str, np.ndarray] = {}
+        self.backends: set[str] = set()
         self._set_instants(np.zeros((len(rows), 0)), np.zeros((len(rows), 0)))
 
     def _set_instants(
@@ -277,8 +239,9 @@ class _Family:
         outputs = {name: series[:, :count] for name, series in self.outputs.items()}
         title, definitions = self.mechanism.title, self.mechanism.outputs
         return labeled_family(
-            "design", title, definitions, self.instants, self.order, values, outputs, self.status[:, :count]
-        )
+            "design", title, definitions, self.instants, self.order, values, outputs, self.status[:, :count],
+            joined(self.backends),
+        )  # fmt: skip
 
     def _of_whole_motions(self) -> bool:
         """Return whether an output follows from the whole motion, not from one instant."""
@@ -365,6 +328,7 @@ class _Family:
         paths = DesignPaths(solver, designs, self.all_instants[chosen], float(self.instants[-1]))
         paths.follow(coordinates, plain, threads)
         outputs, status = paths.solved(threads)
+        self.backends.add(solver.backend)
         whole = ~paths.individual
         self.status[chosen[whole]] = status[whole]
         names = itertools.chain(*solver.model.outputs)
@@ -387,6 +351,7 @@ class _Family:
             return
         except JounceError as error:
             raise self._located(error, k) from None
+        self.backends.update(motion.backend.split(", "))
         self.status[k] = motion.status[indices]
         for name, values in outputs.items():
             values = values[indices]

@@ -270,7 +270,8 @@ class Motion(Tabulated):
         variables = {
             name: self._labeled(name, values, self.mechanism.outputs[name]) for name, values in self.outputs.items()
         }
-        attributes: dict[str, Any] = {"title": self.mechanism.title or "motion of a mechanism", "source": "jounce"}
+        title = self.mechanism.title or "motion of a mechanism"
+        attributes: dict[str, Any] = {"title": title, "source": "jounce", "backend": self.backend}
         if self.change_points.size:
             attributes["change_points"] = self.change_points
         return xarray.Dataset(variables, coords=time_axes(self.time, self.order + 1), attrs=attributes)

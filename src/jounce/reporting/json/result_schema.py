@@ -52,6 +52,7 @@ class SimulateRobotResult(Result):
     followed_to: float
     energy_at_start: float | None
     energy_at_stop: float | None
+    backend: str
     peaks: list[TorquePeak]
     ok: bool
     written: str | None

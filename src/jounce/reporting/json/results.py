@@ -137,6 +137,7 @@ def robot_motion_result(
         "followed_to": motion.ended_at,
         "energy_at_start": energy[0],
         "energy_at_stop": energy[1],
+        "backend": motion.backend,
         "peaks": [{"joint": peak.pop("output"), **peak} for peak in peak_records],
         "ok": not motion.status.any(),
         "written": written,

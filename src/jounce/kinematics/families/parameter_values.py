@@ -1,0 +1,51 @@
+"""Values of parameters in which designs, or runs of a simulation, differ."""
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import jax.numpy as jnp
+import numpy as np
+
+from jounce.base.shapes import is_traced, real_numbers
+from jounce.errors import JounceError, MechanismError, check_name
+from jounce.mechanism import Mechanism
+
+
+def checked_values(
+    parameters: Mapping[str, Any],
+    each: str,
+    check: Callable[[str], None],
+    error: type[JounceError] = MechanismError,
+) -> dict[str, Any]:
+    """Return values of parameters that many designs, or runs, have, one for each: arrays of JAX where it traces them.
+
+    Parameters
+    ----------
+    parameters : mapping
+        By name.
+    each : str
+        What they differ in: designs or runs.
+    check : callable
+        Raises for a name that is none of a parameter.
+    error : type
+        To raise if values are not finite or of unequal number.
+    """
+    if not parameters:
+        raise error("a batch differs in at least one parameter", name="parameters", value=dict(parameters))
+    values, count = {}, None
+    for name, given in parameters.items():
+        check(name)
+        expected, traced = f"a list of finite numbers, one for each {each}", is_traced(given)
+        array = jnp.asarray(given, float) if traced else real_numbers(f"parameters.{name}", given, error, expected)
+        if array.ndim != 1 or not array.size or not (traced or np.isfinite(array).all()):
+            raise error(f"must be {expected}", name=f"parameters.{name}", value=given)
+        if count is not None and len(array) != count:
+            message = f"must have one value for each {each}, {count} as those before"
+            raise error(message, name=f"parameters.{name}", value=len(array))
+        values[name], count = array, len(array)
+    return values
+
+
+def check_parameter(mechanism: Mechanism, name: str) -> None:
+    """Raise MechanismError if a mechanism has no such parameter."""
+    check_name("parameter", name, mechanism.parameters, MechanismError, name="parameters")
