@@ -192,10 +192,9 @@ def _of_robot(robot: Robot, values: dict[str, np.ndarray], runs: list[RobotSimul
     """Return the runs of a robot, its joints as outputs."""
     q = np.stack([run.q for run in runs])
     outputs = {name: q[..., k] for k, name in enumerate(runs[0].robot.joint_names)}
-    steps = np.array([len(run.steps.start) for run in runs])
-    status, order = np.stack([run.status for run in runs]), runs[0].order
+    steps, status = np.array([len(run.steps.start) for run in runs]), np.stack([run.status for run in runs])
     backend = joined(name for run in runs for name in run.backend.split(", "))
-    return Batch(runs[0].time, values, outputs, status, steps, robot, order, backend)
+    return Batch(runs[0].time, values, outputs, status, steps, robot, runs[0].order, backend)
 
 
 class _Runs:

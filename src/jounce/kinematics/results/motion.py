@@ -102,8 +102,7 @@ class Motion(Tabulated):
     derived : dict
         Values computed from the motion that may be needed again, by name: the forces, for one.
     backend : str
-        Which arithmetic gave the numbers: "llvm", machine code, or "xla", with the device unless that is the processor;
-        both where each computed a part.
+        What computed the numbers: "llvm", machine code, "xla", with the device unless it is the processor, or both.
 
     It is assembled from the Taylor coefficients of the coordinates of all bodies, or what computes them, and the
     derivatives of the outputs, (order + 1, components, instances, time) for each group.
