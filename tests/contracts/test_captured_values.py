@@ -722,6 +722,7 @@ def test_events_of_joints():
         assert crossed == pytest.approx(controller.stiffness, abs=1e-11)
 
 
+@pytest.mark.slow
 def test_feedback_of_motors():
     drives = {"pin": jn.planning.Drive(stiffness=1000.0, rotor_inertia=0.01, gear_ratio=10)}
     controller, found = Controller(), []

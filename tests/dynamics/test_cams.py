@@ -281,6 +281,7 @@ def test_a_flat_face_has_no_path_and_is_named(tmp_path):
         load(tmp_path, text=ROLLER.replace("CAM", "indexing_rocker.yaml"))
 
 
+@pytest.mark.slow
 def test_a_driver_is_reported_what_follows_it_as_a_signal(tmp_path):
     (follows,) = (line for line in FILE.splitlines() if line.startswith("  cam:"))
     text = FILE.replace(f"{follows}\n", "").replace("drivers:", f"drivers:\n{follows}")
@@ -289,6 +290,7 @@ def test_a_driver_is_reported_what_follows_it_as_a_signal(tmp_path):
     assert "cam follows it without loading it" in found["torque"].attrs["comment"]
 
 
+@pytest.mark.slow
 def test_the_exercise_of_the_forum(tmp_path):
     """Spring of 15 N/mm compressed by 2.5 mm, 1.8 kg, 1000 rpm, rise of 10 mm: 61.69 N and 0.1473 N m at 100 deg."""
     text = FILE.replace("5 kN/m", "15 N/mm").replace("1.3 kg", "1.8 kg").replace("15 mm", "10 mm")
@@ -312,6 +314,7 @@ def test_the_reactions_of_a_cam_balance_on_shaft_follower_and_ground(tmp_path):
     np.testing.assert_allclose(found, -torque, rtol=0, atol=1e-12 * np.abs(torque).max())
 
 
+@pytest.mark.slow
 def test_what_is_written_reads_the_same(tmp_path):
     leader = "theta"
     mechanism = load(tmp_path, RISES, leader)
@@ -371,6 +374,7 @@ def test_what_is_no_cam_is_refused():
     assert (renamed.follower.bodies, renamed.leader.bodies) == (("ground", "c"), ("ground", "d"))
 
 
+@pytest.mark.slow
 def test_the_least_preload_that_keeps_contact_at_a_dwell(tmp_path):
     """At 200 rpm the least force is that at rest, below: the spring and the weight of 1 kg balance at 46 mm."""
     found = jn.dynamics.contact_spring(jn.load("examples/camshaft.yaml"), "cam", "spring", np.linspace(0, 0.3, 31))

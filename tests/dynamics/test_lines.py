@@ -229,6 +229,7 @@ def tension(t, length=4.0):
     return 5 * (G + lifted) * part / (2 * -height(t, length))
 
 
+@pytest.mark.slow
 def test_a_load_in_the_bight_of_a_rope_is_lifted_and_its_tension_has_its_rates():
     time = [0.1, 0.8]
     motion = jn.solve(tackle(), time, 4)

@@ -45,14 +45,15 @@ def both_ways(mechanism, times, monkeypatch, **given):
 
 
 @pytest.mark.parametrize("count", [1, 40, 1500])
-@pytest.mark.parametrize("mechanism", [four_bar, slider_crank])
+@pytest.mark.parametrize("mechanism", [four_bar, pytest.param(slider_crank, marks=pytest.mark.slow)])
 def test_motions_are_those_of_xla(mechanism, count, monkeypatch):
     found, expected = both_ways(mechanism(), np.linspace(0, 2, count), monkeypatch)
     agree(found, expected)
     assert (found.backend, expected.backend) == ("llvm", "xla")
 
 
-@pytest.mark.parametrize("samples", [25, pytest.param(301, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("samples", [25, 301])
 def test_motions_by_laws_through_samples_are_those_of_xla(samples, monkeypatch):
     """Of many samples, too: their table stays in memory, where single values would be too much code."""
     made, program = [], Mapped.program

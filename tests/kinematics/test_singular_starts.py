@@ -84,6 +84,7 @@ def test_next_to_a_change_point_the_motion_is_what_the_closed_form_gives():
     assert (motion.status == Status.OK).all()
 
 
+@pytest.mark.slow
 def test_a_small_lever_is_no_singular_position():
     lever = 2e-7  # of a mechanism of one metre: the smallest singular value is as small as next to a change point
     mechanism = jn.Mechanism(
@@ -115,6 +116,7 @@ def test_free_motions_do_not_start_there():
     assert caught.value.status == Status.SINGULAR
 
 
+@pytest.mark.slow
 def test_curves_do_not_start_there():
     with pytest.raises(jn.errors.SingularityError, match="change point"):
         jn.trace(four_bar(FLAT, guess=(0.8, 1.7)))

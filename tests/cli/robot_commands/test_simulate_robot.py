@@ -40,6 +40,7 @@ def test_a_pendulum_swings_with_its_energy(run, tmp_path):
     np.testing.assert_allclose(INERTIA * rate**2 / 2 + weight * np.cos(angle), record["energy_at_start"], rtol=1e-9)
 
 
+@pytest.mark.slow
 def test_torques_by_name(run):
     status, printed, _ = run("--until", "0.1", "--torque", "pin=-9.81*sin(-pin) + 2", "--order", 2, "--json")
     (peak,) = [x for x in json.loads(printed)["peaks"] if x["unit"] == "rad/s^2"]

@@ -77,6 +77,7 @@ def test_how_far_splines_are_from_straight_lines_is_reported(run, files, tmp_pat
     assert f"at most {record['deviation']:.2g} rad or m from straight lines, pin" in out
 
 
+@pytest.mark.slow
 def test_a_path_of_samples_keeps_its_deviation_and_what_is_reported_as_kept_is_kept(run, files, tmp_path):
     limits, given, out = tmp_path / "limits.yaml", tmp_path / "dwells.csv", tmp_path / "fast.csv"
     limits.write_text("joints: {pin: {velocity: 2, acceleration: 10, jerk: 500}}")

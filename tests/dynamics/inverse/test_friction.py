@@ -131,6 +131,7 @@ def vars_of(mechanism):
     return {name: getattr(mechanism, name) for name in ("space", "bodies", "drivers", "outputs", "gravity")}
 
 
+@pytest.mark.slow
 def test_rates_are_open_where_what_presses_passes_zero():
     free = wedge(0.3)
     driver = jn.drivers.CoordinateDriver(("ground", "wedge"), "x", motion="-0.3*t - (t - 1)**3")
@@ -240,6 +241,7 @@ def ladder(law="0.3 + 0.4*t", start=0.3):
     )
 
 
+@pytest.mark.slow
 def test_designs_and_instants_whose_friction_locks_fail_alone_with_their_status():
     made = ladder()
     mu, time = np.array([0.1, 1.0, 0.2]), np.array([0.0, 0.6, 1.5])

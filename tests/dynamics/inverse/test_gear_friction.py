@@ -40,7 +40,13 @@ def pair(law="3*t", load="-10", friction=None, *, ring=False, ratio=False, **val
 
 
 @pytest.mark.parametrize(
-    "kind", [{}, pytest.param({"ring": True}, marks=pytest.mark.slow), {"ratio": True}, {"pressure_angle": 0.35}]
+    "kind",
+    [
+        {},
+        pytest.param({"ring": True}, marks=pytest.mark.slow),
+        pytest.param({"ratio": True}, marks=pytest.mark.slow),
+        {"pressure_angle": 0.35},
+    ],
 )
 def test_power_that_leaves_is_power_that_enters_times_the_efficiency(kind):
     """Both directions of turning and of power; the loads of weights vary, those of inertia are none at one speed."""
@@ -116,6 +122,7 @@ def test_a_belt_passes_on_its_share(crossed):
         np.testing.assert_allclose(found[:, 0], -load * ratio * share, rtol=1e-12)
 
 
+@pytest.mark.slow
 def test_a_pinion_drives_its_rack_and_is_driven_by_it_with_their_efficiencies():
     friction = jn.joints.GearFriction(speed=1e-3, efficiency=0.95, backward=0.85)
     o, x = [0.0, 0.0], [1.0, 0.0]
@@ -322,6 +329,7 @@ def test_what_gears_on_a_moving_frame_lose_is_the_balance_of_power():
     assert (balance["friction"].sel(derivative=0) < 0).all()
 
 
+@pytest.mark.slow
 def test_rates_are_open_where_the_torque_passes_zero():
     motion = jn.solve(pair("3*t", "t - 1", ratio=True), [0.5, 1.0, 1.5], order=2)
     still = pair("3*t", "t - 1", ratio=True)

@@ -86,6 +86,7 @@ def test_only_limits_there_are_can_be_broken():
     assert (broken(slowing, "start"), broken(slowing, "stop")) == (set(), {("a", "acceleration")})
 
 
+@pytest.mark.slow
 def test_limits_of_other_kinds_are_broken_too():
     limits = jn.planning.MotionLimits(
         points=(
@@ -107,6 +108,7 @@ def test_limits_of_other_kinds_are_broken_too():
         assert check_motion(arm(), motion(law), limits, hand_over=True).kept
 
 
+@pytest.mark.slow
 def test_what_is_retimed_rests_unless_rates_are_given():
     robot = arm(velocity=2.0, acceleration=5.0, jerk=50.0)
     path = {"a": "s", "b": "0.3*sin(s)"}

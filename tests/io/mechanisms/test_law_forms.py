@@ -46,6 +46,7 @@ def wheel(mechanism, instants, order=2):
     return jn.solve(mechanism, instants, order=order).outputs["wheel"]
 
 
+@pytest.mark.slow
 def test_a_geneva_of_its_crank_over_many_turns(tmp_path):
     instants = np.array([-7.0, 0.3, math.pi / 2 + 0.1, 17.3])
     found = wheel(load(tmp_path, GENEVA), instants)
@@ -147,8 +148,12 @@ def test_a_law_that_does_not_go_as_far_as_its_leader_is_named_before_any_computi
 @pytest.mark.parametrize(
     "law",
     [
-        "{profile: [{profile: cycloidal, duration: 90 deg, to: 45 deg}], beyond: hold}",
-        "{piecewise: [{until: 90 deg, expression: t/2 - sin(4*t)/8}, {expression: 45 deg}]}",
+        pytest.param(
+            "{profile: [{profile: cycloidal, duration: 90 deg, to: 45 deg}], beyond: hold}", marks=pytest.mark.slow
+        ),
+        pytest.param(
+            "{piecewise: [{until: 90 deg, expression: t/2 - sin(4*t)/8}, {expression: 45 deg}]}", marks=pytest.mark.slow
+        ),
         "{samples: table.csv, degree: 1, beyond: hold}",
     ],
 )

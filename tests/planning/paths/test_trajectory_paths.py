@@ -45,7 +45,7 @@ def test_joints_that_turn_together_stay_on_their_line():
     assert path.deviation < 1e-9
 
 
-@pytest.mark.parametrize("order", [1, 2, 3])
+@pytest.mark.parametrize("order", [1, pytest.param(2, marks=pytest.mark.slow), 3])
 def test_a_corner_at_which_a_trajectory_stands_still_is_kept(order):
     first = jn.laws.SegmentedMotion([THERE, jn.laws.Segment("dwell", 1.3)])
     second = jn.laws.SegmentedMotion([jn.laws.Segment("dwell", 1.0), jn.laws.Segment("cycloidal", 1.3, to=0.4)])

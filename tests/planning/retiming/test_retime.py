@@ -183,6 +183,7 @@ def test_a_duration_holds_also_with_speeds_at_the_ends_and_with_damping():
     assert np.all(v <= 0.5 * (1 + 1e-6))
 
 
+@pytest.mark.slow
 def test_limits_that_differ_by_direction():
     limits = {"slide": jn.Limits(velocity=2.0, acceleration=8.0)}
     directed = jn.planning.MotionLimits(limits, backward={"slide": jn.Limits(velocity=0.5, acceleration=2.0)})
@@ -205,6 +206,7 @@ def test_limits_that_differ_by_direction():
     assert broken.ratio == pytest.approx(2 / 1.9, rel=2e-3)
 
 
+@pytest.mark.slow
 def test_a_pull_that_is_weaker_than_the_push():
     limits = jn.planning.MotionLimits(
         {"slide": jn.Limits(velocity=9.0, effort=4.0, effort_rate=80.0)},

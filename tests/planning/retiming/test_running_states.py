@@ -26,6 +26,7 @@ def kept(found):
     return all(most(found, k) <= bound * (1 + 1e-6) for k, bound in ((1, 2.0), (2, 8.0), (3, 100.0)))
 
 
+@pytest.mark.slow
 def test_a_state_on_the_path_is_gone_on_with():
     path = [[0.0, 0.0], [1.0, 0.4], [2.0, 0.0]]
     first = jn.retime(table(), path, LIMITS)

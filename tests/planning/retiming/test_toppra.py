@@ -75,7 +75,9 @@ def kinematic(toppra):
     return [kind(bound) for kind, bound in zip(kinds, bounds, strict=True)]
 
 
-@pytest.mark.parametrize("rates", [(0.0, 0.0), (0.1, 0.05)], ids=["rest", "sd_start, sd_end"])
+@pytest.mark.parametrize(
+    "rates", [pytest.param((0.0, 0.0), marks=pytest.mark.slow), (0.1, 0.05)], ids=["rest", "sd_start, sd_end"]
+)
 def test_velocity_acceleration_and_rates_at_the_ends(toppra, rates):
     s, points = waypoints(1)
     ours, theirs = durations(
@@ -87,6 +89,7 @@ def test_velocity_acceleration_and_rates_at_the_ends(toppra, rates):
     assert ours.report.kept
 
 
+@pytest.mark.slow
 def test_torque(toppra):
     s, points = waypoints(2)
     robot = arm(velocity=SPEED, effort=TORQUE)

@@ -155,6 +155,7 @@ def test_drives_add_armature_damping_and_friction(torque):
     near(found[:, 0], tree.armature * Q[:, 2])  # no friction at rest
 
 
+@pytest.mark.slow
 def test_a_floating_base_at_rest_is_a_fixed_one(torque):
     floating = ROBOT.with_floating_base()
     q = np.concatenate([np.zeros((3, ORDER + 1, 6)), Q], axis=-1)

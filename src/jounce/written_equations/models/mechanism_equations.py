@@ -19,7 +19,7 @@ from jounce.mechanism.system import Group, System
 from jounce.mechanism.time import time_grid
 from jounce.mechanism.transmissions.axis_angles import measures_angle
 from jounce.written_equations.models.inputs import Inputs
-from jounce.written_equations.models.mechanism_forces import force_functions, output_function
+from jounce.written_equations.models.mechanism_forces import check_forces, force_functions, output_function
 from jounce.written_equations.operations.functions import Code, Function
 from jounce.written_equations.operations.graph import Graph
 from jounce.written_equations.operations.reading import GraphReader, NotWrittenError
@@ -58,12 +58,16 @@ def mechanism_code(given: Mechanism | Motion, joint: str | None, order: int, qua
     Raises
     ------
     MechanismError
-        If there is no such joint, or it has an operation that cannot be written out; or if there is nothing that has
-        mass or a force.
+        If there is no such joint, or it has an operation that cannot be written out; or, of forces, if there is
+        nothing that has mass or a force, or the order is below 2.
+    UnsupportedError
+        Of forces, if a joint has friction.
     """
     mechanism = given.mechanism if isinstance(given, Motion) else given
     if joint is not None:
         check_name("joint or driver", joint, (*mechanism.joints, *mechanism.drivers), MechanismError, name="joint")
+    if FORCES in quantities:
+        check_forces(mechanism, order)
     model = given.model if isinstance(given, Motion) else put_together(mechanism)
     graph = Graph()
     inputs = Inputs(graph, mechanism, model, order)

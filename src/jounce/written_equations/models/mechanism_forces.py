@@ -22,20 +22,30 @@ from jounce.written_equations.operations.functions import Argument, Function
 from jounce.written_equations.operations.reading import Entries, GraphReader, NotWrittenError
 
 
+def check_forces(mechanism: Mechanism, order: int) -> None:
+    """Refuse forces as code where there are none, or where friction makes them depend on the unknowns.
+
+    Raises
+    ------
+    MechanismError
+        If nothing has a mass or a force, or if the order is below 2.
+    UnsupportedError
+        If a joint has friction, which follows from the multipliers of the same instant.
+    """
+    check_loads(mechanism)
+    check_no_friction(mechanism, "forces as code")
+    if order < 2:
+        raise MechanismError("must be 2 or more: forces give accelerations", name="order", value=order)
+
+
 def force_functions(mechanism: Mechanism, model: Model, inputs: Inputs) -> list[Function]:
     """Return the mass matrix, and the forces and their rates, as far as they do not depend on the unknowns.
 
     Raises
     ------
     MechanismError
-        If nothing has a mass or a force; if a force cannot be written out; or if the order is below 2.
-    UnsupportedError
-        If a joint has friction, which follows from the multipliers of the same instant.
+        If a force cannot be written out.
     """
-    check_loads(mechanism)
-    check_no_friction(mechanism, "forces as code")
-    if inputs.order < 2:
-        raise MechanismError("must be 2 or more: forces give accelerations", name="order", value=inputs.order)
     masses, gravity, pose_type = masses_of(mechanism), gravity_of(mechanism), model.pose_type
     system, levels = in_si_units(model), inputs.order - 1
     loaded = dataclasses.replace(system, forces=model.system.forces)

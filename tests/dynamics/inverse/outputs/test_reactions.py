@@ -103,6 +103,7 @@ def position(motion, body, point):
     return np.zeros((len(TIME), motion.order + 1, len(point)))
 
 
+@pytest.mark.slow
 def test_frames_and_points_of_a_reaction_agree():
     motion = jn.solve(massed_example("slider_crank"), TIME, order=4)
     angle = motion.angle("rod").values[:, 0]
@@ -244,6 +245,7 @@ def test_forces_at_a_change_point_are_not_reported():
     assert np.isnan(inertia[3])
 
 
+@pytest.mark.slow
 def test_gradient_of_what_a_bearing_does_to_the_ground():
     """A bar of mass m turns at w about its end: what it does to the ground is -m (a - g), a = -w^2 L/2 along it."""
     bar = jn.Body([0, 0], 0.3, mass=2.0, inertia=0.1, center_of_mass=["L/2", 0])
