@@ -15,36 +15,6 @@ import warnings
 from collections.abc import Collection, Hashable, Iterable
 from typing import Any
 
-__all__ = [
-    "AssemblyError",
-    "AssemblyWarning",
-    "DesignError",
-    "ExpressionError",
-    "JounceError",
-    "MechanismError",
-    "MechanismFileError",
-    "MobilityError",
-    "OutputError",
-    "RecordingWarning",
-    "RobotError",
-    "RobotFileError",
-    "RobotWarning",
-    "SampleWarning",
-    "SingularityError",
-    "SolveError",
-    "TrajectoryError",
-    "UnitError",
-    "UnitWarning",
-    "UnsupportedError",
-    "check_choice",
-    "check_name",
-    "did_you_mean",
-    "no_such",
-    "show_value",
-    "unknown",
-    "whole_number",
-]
-
 
 class _Unset:
     """Marks a value that was not given, so that ``None`` can be reported as a value."""

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import wraps
-from typing import Any, overload
+from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -140,13 +140,7 @@ class Jet:
         return Jet(self.coefficients[: order + 1])
 
     def differentiate(self) -> "Jet":
-        """Return the jet of the time derivative, one order shorter.
-
-        Raises
-        ------
-        ValueError
-            If the jet has order 0 and carries no derivative.
-        """
+        """Return the jet of the time derivative, one order shorter; a ValueError for order 0."""
         if self.order == 0:
             raise ValueError("a jet of order 0 carries no derivative")
         first, *rest = (None if c is None else multiplied(c, k) for k, c in enumerate(self.coefficients) if k)
@@ -154,9 +148,8 @@ class Jet:
 
     def integrate(self, initial: Real) -> "Jet":
         """Return the jet of the time integral that has the value `initial`, one order longer."""
-        return Jet(
-            (initial, *[None if c is None else multiplied(c, 1 / (k + 1)) for k, c in enumerate(self.coefficients)])
-        )
+        rest = [None if c is None else multiplied(c, 1 / (k + 1)) for k, c in enumerate(self.coefficients)]
+        return Jet((initial, *rest))
 
     def evaluate(self, step: Real) -> Any:
         """Return the Taylor prediction a time `step` (in seconds) away."""
@@ -204,9 +197,7 @@ class Jet:
         return self.map(lambda c: jnp.broadcast_to(ranked(c, len(shape)), shape))
 
     def __mul__(self, other: "Quantity") -> "Jet":
-        if other is self:
-            return self.square()
-        return bilinear(multiplied, self, other)
+        return self.square() if other is self else bilinear(multiplied, self, other)
 
     __rmul__ = __mul__
 
@@ -278,13 +269,7 @@ def components(vector: Jet | Numbers) -> list[Any]:
     return [vector[i : i + 1] for i in range(vector.shape[0])]
 
 
-@overload
-def dot(a: Jet, b: Jet | Numbers) -> Jet: ...
-@overload
-def dot(a: Numbers, b: Jet) -> Jet: ...
-@overload
-def dot(a: Numbers, b: Numbers) -> jax.Array: ...
-def dot(a: Jet | Numbers, b: Jet | Numbers) -> Jet | jax.Array:
+def dot(a: Jet | Numbers, b: Jet | Numbers) -> Any:
     """Return the scalar product of two vectors, of shape (components, ...), as shape (...)."""
     if isinstance(a, Jet) and a is b:
         return total(symmetric(multiplied, x) for x in components(a))[0]
@@ -336,11 +321,7 @@ def of_quantities(on_arrays: Callable[[Any], Any]) -> Callable[[Callable[[Jet], 
     """Let a function of jets take arrays and numbers too, for which JAX has a function."""
 
     def decorate(on_jets: Callable[[Jet], Jet]) -> Callable[[Quantity], Any]:
-        @wraps(on_jets)
-        def either(x: Quantity) -> Any:
-            return on_jets(x) if isinstance(x, Jet) else on_arrays(x)
-
-        return either
+        return wraps(on_jets)(lambda x: on_jets(x) if isinstance(x, Jet) else on_arrays(x))
 
     return decorate
 
@@ -376,10 +357,8 @@ def power(x: Quantity, exponent: Quantity) -> Any:
         return exp(exponent * log(x))
     if not isinstance(x, Jet):
         return jnp.power(x, exponent)
-    if isinstance(exponent, float) and exponent.is_integer():
-        exponent = int(exponent)
-    if isinstance(exponent, int):
-        return whole_power(x, exponent)
+    if isinstance(exponent, int) or (isinstance(exponent, float) and exponent.is_integer()):
+        return whole_power(x, int(exponent))
     if isinstance(exponent, float) and exponent == 0.5:
         return sqrt(x)
     return real_power(x, jnp.asarray(exponent, float))

@@ -391,11 +391,7 @@ def _keep_best(
     sizes[better] = flat[top, every][better]
 
 
-def _vertex(
-    low: Peaks,
-    high: Peaks,
-    *near: Peaks,
-) -> Peaks:
+def _vertex(low: Peaks, high: Peaks, *near: Peaks) -> Peaks:
     """Return where the parabola through three evenly spaced values is largest, between the outer two."""
     left, middle, right = near
     with np.errstate(invalid="ignore", divide="ignore"):

@@ -23,7 +23,7 @@ from jounce.kinematics.families.design_sides import Sides, sides_of_designs
 from jounce.kinematics.families.known_outputs import with_outputs
 from jounce.kinematics.families.solve_batch import solve_with_sides
 from jounce.kinematics.position_analysis.solve import checked_settings
-from jounce.kinematics.results.motion import output_group
+from jounce.kinematics.results.pose_outputs import output_group
 from jounce.mechanism import (
     AbstractMotionOutput,
     AbstractOutput,

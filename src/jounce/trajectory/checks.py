@@ -1,6 +1,6 @@
 """Checks of the numbers that motion laws are made of; each raises an error that names the number at fault."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from functools import partial
 from typing import Any
 
@@ -66,3 +66,14 @@ def check_samples(
         message = f"times of samples must increase; this one {what}"
         raise error(message, name=f"times[{first + 1}]", value=float(times[first + 1]))
     return times, values
+
+
+def names_of_joints(names: Iterable[str]) -> tuple[str, ...]:
+    """Return names of joints, at least one and each once."""
+    result = (names,) if isinstance(names, str) else tuple(names)
+    if not result or not all(isinstance(name, str) for name in result):
+        raise TrajectoryError("names of joints are needed, as a list of text", name="names", value=list(result))
+    if len(set(result)) < len(result):
+        twice = next(name for k, name in enumerate(result) if name in result[:k])
+        raise TrajectoryError("a joint is named twice", name="names", value=twice)
+    return result

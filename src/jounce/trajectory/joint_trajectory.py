@@ -14,14 +14,22 @@ from jounce.base.shapes import Array, ArrayLike, seconds
 from jounce.errors import JounceError, MechanismError, SampleWarning, TrajectoryError, check_name
 from jounce.jet import Jet
 from jounce.trajectory.beyond import check_within
-from jounce.trajectory.checks import check_samples, finite, finite_numbers, finite_row, positive, whole_number
+from jounce.trajectory.checks import (
+    check_samples,
+    finite,
+    finite_numbers,
+    finite_row,
+    names_of_joints,
+    positive,
+    whole_number,
+)
 from jounce.trajectory.laws.profiles import motion_profile
 from jounce.trajectory.laws.stacking import evaluate_laws, law_derivatives
 from jounce.trajectory.laws.trapezoid import LIMITS
 from jounce.trajectory.motion import AbstractMotion, ExpressionMotion, SplineMotion
 from jounce.trajectory.sample_errors import TOLERANCE, unsupported_derivative, unsupported_words
 from jounce.trajectory.sampled.deferred import Laws, SampledLaw, law_through
-from jounce.trajectory.splines import HIGHEST_DEGREE
+from jounce.trajectory.splines import check_odd
 from jounce.units.expression import Expression
 
 MAX_ORDER = 30
@@ -69,7 +77,9 @@ class JointTrajectory(Displayed):
             raise TrajectoryError("a trajectory needs a law for at least one joint", name="laws", value=laws)
         given = laws.given() if isinstance(laws, Laws) else laws
         self.laws = Laws({name: _law(name, x) for name, x in given.items()})
-        self.start, self.stop = _bounds(start, stop)
+        self.start, self.stop = finite_numbers("start and stop", (start, stop), (2,), read=seconds).tolist()
+        if self.stop <= self.start:
+            raise TrajectoryError(f"must come after the start, {self.start:g} s", name="stop", value=self.stop)
         for name, law in self.laws.given().items():
             try:
                 if isinstance(law, SampledLaw):
@@ -78,11 +88,9 @@ class JointTrajectory(Displayed):
                     law.check_instants(self.start, self.stop)
             except JounceError as error:
                 raise TrajectoryError(error.message, name=f"laws.{name}", value=error.value) from None
-        instants = (
-            np.linspace(self.start, self.stop, 201)
-            if times is None
-            else check_samples(times, seconds("times", times, TrajectoryError))[0]
-        )
+        instants = np.linspace(self.start, self.stop, 201)
+        if times is not None:
+            instants = check_samples(times, seconds("times", times, TrajectoryError))[0]
         self.times = self._inside(instants)
         self.measures = MappingProxyType(dict(measures or {}))
 
@@ -141,7 +149,7 @@ class JointTrajectory(Displayed):
         >>> trajectory.derivatives([1.0], order=3)[0, :, 1].round(6).tolist()
         [1.0, 3.0, 6.0, 6.0]
         """
-        names = _names(names)
+        names = names_of_joints(names)
         check_odd(degree)
         times, positions = check_samples(times, positions)
         if positions.ndim != 2 or positions.shape[1] != len(names):
@@ -198,7 +206,7 @@ class JointTrajectory(Displayed):
         >>> trajectory.derivatives([1.0], order=1)[0].tolist()
         [[0.5, 0.75], [0.9375, -0.46875]]
         """
-        names = _names(names)
+        names = names_of_joints(names)
         begins, ends = (finite_numbers(key, x, (len(names),)) for key, x in (("start", start), ("end", end)))
         bounds = [None] * len(names) if limits is None else _limits(limits, len(names))
         start_time = finite("start_time", start_time, seconds)
@@ -282,13 +290,10 @@ class JointTrajectory(Displayed):
         self._warn(order, chosen)
         derivatives = law_derivatives([self.laws[name] for name in chosen], jnp.asarray(instants), order)
         result = np.ascontiguousarray(np.moveaxis(np.asarray(derivatives), -1, 0))
-        bad = np.argwhere(~np.isfinite(result))
-        if len(bad):
+        if len(bad := np.argwhere(~np.isfinite(result))):
             at, derivative, joint = bad[0]
-            message = (
-                f"the law is not defined or not smooth at {instants[at]:.9g} s: derivative {derivative} is no number"
-            )
-            raise TrajectoryError(message, name=f"laws.{chosen[joint]}")
+            where = f"at {instants[at]:.9g} s: derivative {derivative} is no number"
+            raise TrajectoryError(f"the law is not defined or not smooth {where}", name=f"laws.{chosen[joint]}")
         return result
 
     def estimate_error(self, order: int, names: Iterable[str] | None = None) -> Array[np.ndarray, "derivative joint"]:
@@ -359,7 +364,7 @@ class JointTrajectory(Displayed):
             warnings.warn(SampleWarning(unsupported_words(name, worst, -error, degree)), stacklevel=3)
 
     def _chosen(self, names: Iterable[str] | None) -> tuple[str, ...]:
-        chosen = self.names if names is None else _names(names)
+        chosen = self.names if names is None else names_of_joints(names)
         for name in chosen:
             check_name("joint of the trajectory", name, self.laws, TrajectoryError, name="names")
         return chosen
@@ -375,13 +380,6 @@ class JointTrajectory(Displayed):
         return np.clip(times, self.start, self.stop)
 
 
-def check_odd(degree: object) -> None:
-    """Raise TrajectoryError unless a degree of splines is odd, from 3 to 11."""
-    if isinstance(degree, bool) or degree not in range(3, HIGHEST_DEGREE + 1, 2):
-        message = f"the degree of the splines is odd, from 3 to {HIGHEST_DEGREE}"
-        raise TrajectoryError(f"{message}; even ones carry errors along undamped", name="degree", value=degree)
-
-
 def _law(name: Any, law: Any) -> AbstractMotion | SampledLaw:
     if not isinstance(name, str) or not name:
         raise TrajectoryError("the name of a joint must be text", name="laws", value=name)
@@ -393,23 +391,6 @@ def _law(name: Any, law: Any) -> AbstractMotion | SampledLaw:
         return ExpressionMotion(law if isinstance(law, str | Expression) else repr(finite(f"laws.{name}", law)))
     except JounceError as error:
         raise TrajectoryError(error.message, name=f"laws.{name}", value=error.value) from None
-
-
-def _bounds(start: float, stop: float) -> tuple[float, float]:
-    first, last = finite_numbers("start and stop", (start, stop), (2,), read=seconds).tolist()
-    if last <= first:
-        raise TrajectoryError(f"must come after the start, {first:g} s", name="stop", value=last)
-    return first, last
-
-
-def _names(names: Iterable[str]) -> tuple[str, ...]:
-    result = (names,) if isinstance(names, str) else tuple(names)
-    if not result or not all(isinstance(name, str) for name in result):
-        raise TrajectoryError("names of joints are needed, as a list of text", name="names", value=list(result))
-    if len(set(result)) < len(result):
-        twice = next(name for k, name in enumerate(result) if name in result[:k])
-        raise TrajectoryError("a joint is named twice", name="names", value=twice)
-    return result
 
 
 def _limits(limits: ArrayLike, count: int) -> list[Any]:

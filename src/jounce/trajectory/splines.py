@@ -7,7 +7,7 @@ import numpy as np
 from jaxtyping import Float
 
 from jounce.base.shapes import ArrayLike
-from jounce.errors import MechanismError
+from jounce.errors import MechanismError, TrajectoryError
 from jounce.jet.turns import whole_periods
 from jounce.trajectory.beyond import CLOSED
 from jounce.trajectory.checks import check_samples, whole_number
@@ -137,3 +137,10 @@ def _periodic(times: _Samples, values: _Samples, degree: int, beyond: str) -> tu
     coefficients[0] += slope * (breakpoints[:-1] - times[0])
     coefficients[1] += slope
     return breakpoints, coefficients, advance
+
+
+def check_odd(degree: object) -> None:
+    """Raise TrajectoryError unless a degree of splines through samples is odd, from 3 to 11."""
+    if isinstance(degree, bool) or degree not in range(3, HIGHEST_DEGREE + 1, 2):
+        message = f"the degree of the splines is odd, from 3 to {HIGHEST_DEGREE}"
+        raise TrajectoryError(f"{message}; even ones carry errors along undamped", name="degree", value=degree)

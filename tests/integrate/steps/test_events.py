@@ -8,7 +8,7 @@ from jounce import drivers, jet, spatial
 from jounce.dynamics.forward.accelerations import State
 from jounce.integrate.marching.marching import DenseOutput
 from jounce.integrate.steps.events import EventDetector, crossings
-from jounce.kinematics.results.motion import output_group
+from jounce.kinematics.results.pose_outputs import output_group
 from jounce.rigid.planar import PlanarPose
 
 

@@ -176,9 +176,8 @@ class Equations(Module):
             Of the shape of the attitude.
         """
         shifts = self.pose_type.shifts
-        at_rest = self.pose_at_rest(
-            state.position, state.attitude
-        )  # made once: what repeats is summed once, if it is the same
+        # made once: what repeats is summed once, if it is the same
+        at_rest = self.pose_at_rest(state.position, state.attitude)
         moving = self.extended(at_rest, state.velocity, state.spin)
         pose = self.extended(moving, acceleration[:shifts] / 2.0, acceleration[shifts:] / 2.0)
         clock = Jet.variable(time, 2)
@@ -186,7 +185,6 @@ class Equations(Module):
         force, moment = inertia_forces(pose, self.masses, self.gravity)
         inertia = jnp.concatenate([force.coefficients[0], moment.coefficients[0]])[:, 1:]
         now = clock.truncate(0)
-
         friction = FreeFriction(self.system, moving, now)
 
         def loosened(change: Any) -> Any:
@@ -225,10 +223,8 @@ class Equations(Module):
         """Return a placeholder for the factors of a batch, to start a loop with."""
         if self.system.rank is not None:
             return ReducedFactor.blank(self.system.shape, self.system.rank, lanes)
-        if self.saddle is None:
-            size = sum(self.system.shape)
-            return DenseFactor.blank((size, size), lanes)
-        return self.saddle.blank(lanes)
+        size = sum(self.system.shape)
+        return DenseFactor.blank((size, size), lanes) if self.saddle is None else self.saddle.blank(lanes)
 
     def jacobian(self, state: State, time: Instants) -> Jacobian:
         """Return the scaled Jacobian of the constraints, shape (rows, columns, batch)."""
@@ -252,8 +248,7 @@ class Equations(Module):
         forces, second : array
             As `balance` returns them.
         """
-        scale = self.system.column_scale
-        columns = self.system.shape[1]
+        scale, columns = self.system.column_scale, self.system.shape[1]
         solution = -solve(jnp.concatenate([as_column(forces, scale), second]))
         return by_body(solution[:columns], scale), solution[columns:]
 
@@ -369,14 +364,11 @@ def expand(
     """
     count, bodies, lanes = equations.coordinates, *state.position.shape[1:]
     known = inverted(equations.factored(state, time)) if inverse is None else inverse
-    rows = equations.system.row_scale.shape[0]
 
     def program(*leaves: Any) -> Any:
-        position, attitude, velocity, spin, acceleration, multipliers, clock = leaves
-        state = State(position, attitude, velocity, spin)
-        return _balance(equations, state, acceleration, multipliers, clock)
+        return _balance(equations, State(*leaves[:4]), *leaves[4:])
 
-    trial = jnp.zeros((count, bodies, lanes)), jnp.zeros((rows, lanes))
+    trial = jnp.zeros((count, bodies, lanes)), jnp.zeros((len(equations.system.row_scale), lanes))
     forces, second, _ = program(*state, *trial, time)
     acceleration, multipliers, solved = equations.begun(known.solve, state, time, forces, second)
     recursion = Recursion(program, (*state, acceleration, multipliers, time), order - 1, reversible=reversible)

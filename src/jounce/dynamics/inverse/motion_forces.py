@@ -52,13 +52,7 @@ class MotionForces:
     """
 
     def __init__(
-        self,
-        motion: Motion,
-        *,
-        gravity: bool = True,
-        applied: bool = True,
-        flanks: bool = True,
-        friction: bool = True,
+        self, motion: Motion, *, gravity: bool = True, applied: bool = True, flanks: bool = True, friction: bool = True
     ):
         check_loads(motion.mechanism)
         self.motion, self.model = motion, motion.model
@@ -218,8 +212,7 @@ class MotionForces:
     def open(self) -> OpenMultipliers:
         """Forces that redundant constraints do not determine, at the first solved instant."""
         model = self.model
-        lanes = np.flatnonzero(self.motion.status == Status.OK)[:1]
-        lanes = lanes if len(lanes) else np.zeros(1, int)
+        lanes = np.array([np.argmax(self.motion.status == Status.OK)])  # 0 where none is
         scaled = programs.scaled_jacobian(dataclasses.replace(model.system, outputs=(), forces=()), self._blocks(lanes))
         mechanism = self.motion.mechanism
         selection = resolved_reactions(mechanism.redundant_reactions, mechanism.parameter_values)
@@ -278,8 +271,9 @@ class MotionForces:
         tuple of two arrays of shape (levels, components, time)
             Taylor coefficients.
         """
-        whole = self._bodies_of(name)  # the carriage of a joint, which has a hidden coordinate, is no body
-        element = self._member(name)[0].element
+        group, instance = self._member(name)
+        element, whole = group.element, [slot[instance] for slot in group.bodies]  # 0 is the ground
+        # the carriage of a joint, which has a hidden coordinate, is no body
         joined = enumerate(whole[: len(whole) - bool(getattr(element, "hidden", ()))])
         if body:
             work = total(self._wrench(name, slot) for slot, its in joined if its == body)
@@ -301,11 +295,6 @@ class MotionForces:
         given = [value for key in names if (value := getattr(group.element, key, None)) is not None]
         given += [group.element.first_on(slot) for slot in slots[:1] if hasattr(group.element, "first_on")]
         return given[0].reshape(self.pose_type.shifts, -1)[:, instance] if given else np.zeros(self.pose_type.shifts)
-
-    def _bodies_of(self, name: str) -> tuple[int, ...]:
-        """Return the indices of the bodies of a joint, driver or force in their order; 0 is the ground."""
-        group, instance = self._member(name)
-        return tuple(slot[instance] for slot in group.bodies)
 
     def _member(self, name: str) -> tuple[Group, int]:
         """Return the group of a joint, driver or force, and its index in the group."""
@@ -377,17 +366,7 @@ class MotionForces:
         return self._numbers[key]
 
     def _expressed(self, work: Numbers, body: int, frame: int | None, point: Numbers) -> tuple[Any, Any]:
-        """Return a wrench on a body as force and moment about a point of it, (levels, components, time).
-
-        Parameters
-        ----------
-        work : array of shape (levels, coordinates, time)
-            Force along the global axes, and moment about the origin of the body along its own axes.
-        body, frame : int
-            Indices of the body, and of the body along whose axes the wrench is expressed: 0 is the ground, None global.
-        point : array of shape (c,)
-            In the frame of the body, m.
-        """
+        """Return force and moment about a point of a body, as `reaction` does, from a wrench as `_wrench` has it."""
 
         def chunk(lanes: np.ndarray) -> Any:
             bodies = (body,) if frame is None else (body, frame)

@@ -1,17 +1,15 @@
 """Many simulations of one mechanism side by side: initial conditions, masses, forces and lengths by parameters."""
 
 import functools
-import inspect
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
-from typing import Any, ParamSpec, TypeVar, Unpack
+from typing import Any, Unpack
 
 import jax
-import jax.numpy as jnp
 import numpy as np
 
-from jounce.base.shapes import ArrayLike, is_traced
+from jounce.base.shapes import ArrayLike
 from jounce.dynamics.forward.accelerations import Equations, State
 from jounce.dynamics.forward.initial_state import consistent_start, initial_as_drivers
 from jounce.errors import MechanismError
@@ -21,10 +19,8 @@ from jounce.integrate.marching.marching import MOVING, DenseOutput, IntegratorSt
 from jounce.integrate.marching.user_methods import integrator
 from jounce.integrate.mechanisms.batch_equations import BatchStart, ParametricMechanism, Turns
 from jounce.integrate.results.batch import Batch
-from jounce.integrate.results.robot_sensitivities import TracedRobotBatch
-from jounce.integrate.results.robot_simulation import RobotSimulation
 from jounce.integrate.results.simulation import expanded
-from jounce.integrate.robot_batch import simulate_robots
+from jounce.integrate.robot_batch import batch_of_robot, of_traced_robot_batches, simulate_robots
 from jounce.integrate.simulate_robot import RobotOptions
 from jounce.integrate.steps.events import pose_coordinates
 from jounce.integrate.steps.methods import AbstractMethod
@@ -44,52 +40,11 @@ from jounce.mechanism.transmissions.axis_angles import measures_angle, raw_angle
 from jounce.mechanism.transmissions.turn_counting import counted_along
 from jounce.robot.robot import Robot
 
-P = ParamSpec("P")
-R = TypeVar("R")
-
 LANES = 64  # runs marched together: more fall out of the cache
 STEPS = 16  # tried before runs that have ended make room for others
 
 
-def _of_traced_robots(guarded: Callable[P, R]) -> Callable[P, R]:
-    """Return what simulates batches, also of robots of which JAX traces something; their joints are outputs."""
-    signature = inspect.signature(guarded)
-
-    @functools.wraps(guarded)
-    def door(*arguments: P.args, **keywords: P.kwargs) -> R:
-        robot: Any = arguments[0] if arguments else keywords.get("mechanism")
-        if not isinstance(robot, Robot) or robot.closures or not is_traced((robot.tree, arguments[1:], keywords)):
-            return guarded(*arguments, **keywords)
-        bound = signature.bind(*arguments, **keywords)
-        bound.apply_defaults()
-        given = dict(bound.arguments)
-        options = given.pop("robot")
-        values, motions = _robot_runs(*given.values(), **options)
-        q = jnp.stack([motion.q for motion in motions])
-        outputs = {name: q[..., k] for k, name in enumerate(robot.joint_names)}
-        batch: Any = TracedRobotBatch(robot, motions[0].time, motions[0].order, values, outputs)
-        return batch
-
-    return door
-
-
-def _robot_runs(
-    robot: Robot,
-    parameters: Mapping[str, Any],
-    time: ArrayLike | TimeGrid | None,
-    order: int,
-    method: AbstractMethod | None,
-    tolerance: float,
-    longest_step: float,
-    **options: Any,
-) -> tuple[dict[str, Any], list[Any]]:
-    """Return in what the runs of a robot differ, and each of them."""
-    order, method = checked_options(order, method, tolerance, longest_step)
-    limits = {"method": method, "tolerance": float(tolerance), "longest_step": float(longest_step)}
-    return simulate_robots(robot, parameters, instants_of(time, {}), order, **limits, **options)
-
-
-@_of_traced_robots
+@of_traced_robot_batches
 @concrete
 def simulate_batch(
     mechanism: Mechanism | Robot,
@@ -147,8 +102,8 @@ def simulate_batch(
     (3, 2, 5)
     """
     if isinstance(mechanism, Robot):
-        limits = (method, tolerance, longest_step)
-        return _of_robot(mechanism, *_robot_runs(mechanism, parameters, time, order, *limits, **robot))
+        options: Any = {"method": method, "tolerance": tolerance, "longest_step": longest_step, **robot}
+        return batch_of_robot(mechanism, *simulate_robots(mechanism, parameters, time, order, **options))
     for name in robot:
         message = "belongs to simulations of robots in joint coordinates; a mechanism has forces and `initial`"
         raise MechanismError(message, name=name)
@@ -186,15 +141,6 @@ def simulate_batch(
     for run, reason in starts.failed.items():
         status[run, 0] = int(reason)
     return Batch(instants, values, runs.outputs, status, runs.steps, mechanism, order, joined(runs.backends))
-
-
-def _of_robot(robot: Robot, values: dict[str, np.ndarray], runs: list[RobotSimulation]) -> Batch:
-    """Return the runs of a robot, its joints as outputs."""
-    q = np.stack([run.q for run in runs])
-    outputs = {name: q[..., k] for k, name in enumerate(runs[0].robot.joint_names)}
-    steps, status = np.array([len(run.steps.start) for run in runs]), np.stack([run.status for run in runs])
-    backend = joined(name for run in runs for name in run.backend.split(", "))
-    return Batch(runs[0].time, values, outputs, status, steps, robot, runs[0].order, backend)
 
 
 class _Runs:

@@ -34,7 +34,7 @@ from jounce.integrate.steps.options import checked_options, instants_of
 from jounce.jet import Jet
 from jounce.kinematics import Status, raise_for_status
 from jounce.kinematics.position_analysis.curve_ends import beyond_end, ends_of
-from jounce.kinematics.results.motion import check_output, output_group
+from jounce.kinematics.results.pose_outputs import check_output, output_group
 from jounce.mechanism import Mechanism, Model, ParameterOutput, ParametersOutput, check_mechanism
 from jounce.mechanism.building.belts import check_room
 from jounce.mechanism.building.element_indices import force_names
@@ -290,18 +290,8 @@ def _finite_forces(equations: Equations, state: State, time: Instants) -> Bool[N
     return equations.system.finite_forces(equations.pose(state), Jet.variable(time, 1))
 
 
-def unfit_rates(start: ConsistentStart, coordinates: Coordinates, instant: float) -> str:
-    """Name the applied forces of which a low derivative is not finite at an instant, where their values may be.
-
-    Parameters
-    ----------
-    start : ConsistentStart
-        The mechanism.
-    coordinates : dict of str to array
-        Taylor coefficients at the instant, (order + 1, ..., 1); the higher ones need not be finite.
-    instant : float
-        s.
-    """
+def _unfit_rates(start: ConsistentStart, coordinates: Coordinates, instant: float) -> str:
+    """Name the applied forces of which a low derivative is not finite at an instant, where their values may be."""
     known = np.isfinite(coordinates["position"]).reshape(len(coordinates["position"]), -1).all(axis=1)
     order = min(int(np.argmin(np.append(known, False))) - 1, FEW)
     if order < 1:
@@ -343,16 +333,14 @@ class _Run:
 
     def go(self, instants: np.ndarray, progress: Callable[[int, int], None] | None) -> None:
         """March from the first to the last instant."""
-        equations, stop = self.start.equations, instants[-1]
+        equations, watched = self.start.equations, self.watched
         self.direction = direction = np.sign(instants[-1] - instants[0])
         order = self.method.expansion_order(self.limits[0])
         current = unexpanded(equations, self.start.state, instants[:1], order=order)
-        (_, _, *how), options = march_arguments(
-            equations, current, stop, self.limits, self.method, watched=self.watched
-        )
+        given = equations, current, instants[-1], self.limits, self.method
+        (_, _, *how), options = march_arguments(*given, watched=watched)
         while current.outcome.item() in GOING and self.events.stopped_at is None:
-            current, steps, attempts = march(equations, current, *how, **options)
-            output, taken = steps
+            current, (output, taken), attempts = march(equations, current, *how, **options)
             self.backends.add(backend_of(output))
             taken = np.asarray(taken)[: int(attempts), 0]
             if taken.any():
@@ -391,7 +379,7 @@ class _Run:
             finite = all(np.isfinite(part).all() for part in state)
             if finite and (names := _unfit(here, state, instant)):
                 return Status.INADMISSIBLE, f"{names} at t = {instant:g} s"
-        if names := unfit_rates(here, pose_coordinates(series), time):
+        if names := _unfit_rates(here, pose_coordinates(series), time):
             return Status.INADMISSIBLE, f"a derivative of {names} at t = {time:g} s"
         if current.outcome.item() == Outcome.UNBALANCED:
             names = hiding_names(self.start.model, here.equations, series.map(lambda x: x[0]), np.array([[time]]))

@@ -180,9 +180,8 @@ def in_pieces(
     size, before, whole = None, np.full(count, np.inf), []
     for split in range(SPLITS + 1):
         share = begin[:, None] + (end - begin)[:, None] * np.concatenate([NODES, ENDS])
-        series = _at(
-            group, polynomial.map(lambda part, of=step: part[of]), length[step][:, None] * share, order, pose_type
-        )
+        own = polynomial.map(lambda part, of=step: part[of])
+        series = _at(group, own, length[step][:, None] * share, order, pose_type)
         size, left = _unresolved(judged(series).reshape(-1, *share.shape), step, size)
         wide = (left > RESOLVED) & ~((left < BLURRED) & (left > 0.25 * before))
         if split == SPLITS or len(step) + np.count_nonzero(wide) > MOST_PIECES * count:
@@ -233,13 +232,7 @@ def _at(
 
 
 class AbstractDetector(abc.ABC):
-    """The crossings of one event along a run, of which the steps come piece by piece.
-
-    Parameters
-    ----------
-    event : Event or JointEvent
-        What is looked for.
-    """
+    """The crossings of one event, an Event or JointEvent, along a run, of which the steps come piece by piece."""
 
     def __init__(self, event: Any):
         self.event = event
@@ -248,13 +241,7 @@ class AbstractDetector(abc.ABC):
 
     @abc.abstractmethod
     def detect(self, part: Any) -> list[tuple[int, float]]:
-        """Return the crossings in the next steps, each as the number of the step and the time from its beginning.
-
-        Parameters
-        ----------
-        part : DenseOutput or RobotSteps
-            Steps; their start, length and polynomial count.
-        """
+        """Return the crossings in the next steps, each as the number of the step and the time from its beginning."""
 
     def _crossings(
         self, values: Float[np.ndarray, "piece node"], pieces: Iterable[tuple[int, float, float]], part: Any
@@ -350,10 +337,8 @@ def crossings(coefficients: Float[np.ndarray, " order"], *, first: bool = False)
     crossings_found = []
     for cluster, before, after in zip(clusters, edges, edges[1:], strict=False):
         root = cluster[len(cluster) // 2]
-        low, high = (
-            polynomial(max(before, cluster[0] - NEIGHBORHOOD)),
-            polynomial(min(after, cluster[-1] + NEIGHBORHOOD)),
-        )
+        low = polynomial(max(before, cluster[0] - NEIGHBORHOOD))
+        high = polynomial(min(after, cluster[-1] + NEIGHBORHOOD))
         if low * high < 0 and -EDGE <= root <= 1 + EDGE and not (first and 0.0 in cluster):
             crossings_found.append((min(max(root, 0.0), 1.0), float(np.sign(high))))
     return crossings_found

@@ -18,8 +18,8 @@ from jounce.trajectory import (
     JointTrajectory,
 )  # fmt: skip
 from jounce.trajectory.checks import check_samples
-from jounce.trajectory.joint_trajectory import check_odd
 from jounce.trajectory.sampled.deferred import SampledLaw, law_through
+from jounce.trajectory.splines import check_odd
 
 
 def trajectory_of(

@@ -12,8 +12,8 @@ other products are of coefficients known before: one sum over the orders for all
 
 from collections.abc import Callable, Sequence
 from contextlib import nullcontext
-from functools import reduce
-from itertools import accumulate
+from functools import partial, reduce
+from itertools import accumulate, pairwise
 from typing import Any, NamedTuple
 
 import jax
@@ -167,15 +167,7 @@ class Recursion(ProgramReader):
         return self._collected([value_of(x) for x in self._outputs]), tuple(map(value_of, self._stored))
 
     def corrected(self, newest: Sequence[Any], changes: Sequence[Any]) -> tuple[Any, ...]:
-        """Return the newest coefficients of what is multiplied after a change of those of the arguments.
-
-        Parameters
-        ----------
-        newest
-            As `advanced` returned it.
-        changes : sequence of array or None
-            To add to the newest coefficients of the arguments; None where there is no change.
-        """
+        """Return the `newest` coefficients of what is multiplied after changes, or None, of those of the arguments."""
         change = self._swept(changes, None)
         return tuple(plus(c, change.get(x)) for x, c in zip(self._stored, newest, strict=True))
 
@@ -239,25 +231,27 @@ class Recursion(ProgramReader):
         scanned = equation.primitive.name == "scan" and not self.is_constant(equation, operands)
         if not scanned or not only_adds(equation.params["jaxpr"].jaxpr):
             return super().results(equation, operands)
-        values = equation.primitive.bind(*map(self.value, operands), **equation.params)
+        bind = partial(equation.primitive.bind, **equation.params)
 
         def of(which: int) -> Callable[..., Any]:
             def rule(parts: list[Any], _: Any) -> Any:
-                if all(part is None for part in parts):
-                    return None
-                whole = [self._next(x, part) for x, part in zip(operands, parts, strict=True)]
-                return equation.primitive.bind(*whole, **equation.params)[which]
+                results = self._passed(bind, operands, parts, additive=True)
+                return None if results is None else results[which]
 
             return rule
 
-        return [self._node(of(i), value, operands) for i, value in enumerate(values)]
+        return [self._node(of(i), value, operands) for i, value in enumerate(bind(*map(self.value, operands)))]
 
-    def _next(self, x: Any, part: Any) -> Any:
-        """Return the next coefficient of what is added, or a constant that says how."""
-        if part is not None:
-            return part
-        fixed = self.value(x)
-        return jnp.zeros_like(fixed) if jnp.issubdtype(jnp.result_type(fixed), jnp.floating) else fixed
+    def _passed(self, bind: Callable[..., Any], operands: list[Any], parts: list[Any], *, additive: bool) -> Any:
+        """Return what a linear operation makes of next coefficients; constants that are not added say how."""
+        if all(part is None for part in parts):
+            return None
+        whole = []
+        for x, part in zip(operands, parts, strict=True):
+            fixed = self.value(x)
+            adds = isinstance(x, int) or (additive and jnp.issubdtype(jnp.result_type(fixed), jnp.floating))
+            whole.append(part if part is not None else jnp.zeros_like(fixed) if adds else fixed)
+        return bind(*whole)
 
     def _key(self, equation: JaxprEqn, operands: list[Any]) -> Any:
         """Return what distinguishes an operation from others; None where that is not known."""
@@ -319,13 +313,12 @@ class Recursion(ProgramReader):
     def _separated(self, name: str, parameters: dict, operands: list[Any]) -> list[Any]:
         axis = parameters["axis"]
         sizes = parameters["sizes"] if name == "split" else [1] * jnp.shape(self.value(operands[0]))[axis]
-        ends = list(accumulate(map(int, sizes)))
+        bounds = pairwise(accumulate(map(int, sizes), initial=0))
 
         def part(x: Any, start: int, stop: int) -> Any:
             cut = jax.lax.slice_in_dim(x, start, stop, axis=axis)
             return cut if name == "split" else jnp.squeeze(cut, axis)
 
-        bounds = zip([0, *ends], ends, strict=False)
         return [self.composed(lambda x, a=start, b=stop: part(x, a, b), operands) for start, stop in bounds]
 
     # nodes
@@ -336,19 +329,12 @@ class Recursion(ProgramReader):
         return result
 
     def _linear(self, primitive: Any, parameters: dict, operands: list[Any]) -> int:
-        additive = primitive.name in ADDITIVE
+        bind = partial(primitive.bind, **parameters)
 
         def rule(parts: list[Any], _: Any) -> Any:
-            if all(part is None for part in parts):
-                return None
-            whole = []
-            for x, part in zip(operands, parts, strict=True):
-                fixed = self.value(x)
-                adds = isinstance(x, int) or (additive and jnp.issubdtype(jnp.result_type(fixed), jnp.floating))
-                whole.append(part if part is not None else jnp.zeros_like(fixed) if adds else fixed)
-            return primitive.bind(*whole, **parameters)
+            return self._passed(bind, operands, parts, additive=primitive.name in ADDITIVE)
 
-        return self._node(rule, primitive.bind(*map(self.value, operands), **parameters), operands)
+        return self._node(rule, bind(*map(self.value, operands)), operands)
 
     def _product(self, a: int, b: int) -> int:
         first, second = self.value(a), self.value(b)
@@ -393,11 +379,11 @@ class Recursion(ProgramReader):
             a, b = len(self._values), len(self._values) + 1
             values = PLAIN[first](self.value(x)), PLAIN[second](self.value(x))
 
-            def rule(parts: list[Any], sums: Any, slope: Any) -> Any:
-                return plus(sums, times(slope, parts[0]))
+            def rule(slope: Any) -> Callable[..., Any]:
+                return lambda parts, sums: plus(sums, times(slope, parts[0]))
 
-            self._node(lambda p, s: rule(p, s, values[1]), values[0], [x], [_Pair(x, b, True)])
-            self._node(lambda p, s: times(sign, rule(p, s, values[0])), values[1], [x], [_Pair(x, a, True)])
+            self._node(rule(values[1]), values[0], [x], [_Pair(x, b, True)])
+            self._node(lambda *given: times(sign, rule(values[0])(*given)), values[1], [x], [_Pair(x, a, True)])
             self._pairs[x, first], self._pairs[x, second] = a, b
         return self._pairs[x, name]
 

@@ -211,14 +211,10 @@ class _Family:
 
     def design(self, k: int) -> Mechanism:
         """Return one of the designs."""
-        return self.mechanism.with_parameters(**self._values(k))
+        return self._with_values(self.mechanism, k)
 
-    def held_design(self, k: int) -> Mechanism:
-        """Return one of the designs, its outputs held to their laws."""
-        return self.held.with_parameters(**self._values(k))
-
-    def _values(self, k: int) -> dict[str, float]:
-        return dict(zip(self.names, self.rows[k].tolist(), strict=True))
+    def _with_values(self, mechanism: Mechanism, k: int) -> Mechanism:
+        return mechanism.with_parameters(**dict(zip(self.names, self.rows[k].tolist(), strict=True)))
 
     def solve(self, threads: int, *, individually: bool = True) -> None:
         """Solve all designs: most side by side, the others one by one unless `individually` is false."""
@@ -255,7 +251,8 @@ class _Family:
         def pieces(values: Any) -> Any:
             design = self.held.with_parameters(**dict(zip(self.names, values, strict=True)))
             for law in laws_of(design):
-                tables.extend(x for x in jax.tree.leaves(law, is_leaf=_is_of_pieces) if _is_of_pieces(x))
+                parts = jax.tree.leaves(law, is_leaf=lambda x: isinstance(x, SplineMotion))
+                tables.extend(part for part in parts if isinstance(part, SplineMotion))
             return values
 
         if laws_may_break(self.mechanism):
@@ -266,7 +263,8 @@ class _Family:
         """Solve designs side by side; return those that are left to be solved individually."""
         count = len(self.rows)
         first, last = float(self.instants[0]), float(self.instants[-1])
-        model, known = self._first_assembled(first)
+        found = ((k, assembled) for k in range(count) if (assembled := self._assembled(k)) is not None)
+        known, (model, _) = next(found, (0, (None, None)))
         if model is None or model.system.rank is not None:
             return np.arange(count)
         lost = lost_orders(self.mechanism)
@@ -280,31 +278,20 @@ class _Family:
         plain = np.asarray(attempts.plain) & ~designs.unfit()
         return self._followed(levels, designs, attempts.coordinates, plain, np.arange(count), threads)
 
-    def _first_assembled(self, instant: float) -> tuple[Model | None, int]:
-        """Return the model of the first design that can be assembled, and which it is."""
-        for k in range(len(self.rows)):
-            try:
-                return assemble(build(self.held_design(k)), instant, self.tolerance)[0], k
-            except SPOILED:
-                continue
-            except JounceError as error:
-                raise self._located(error, k) from None
-        return None, 0
+    def _assembled(self, k: int) -> tuple[Model, dict[str, Any]] | None:
+        """Return the model of a design, its outputs held to their laws, and its start; None if it has no assembly."""
+        try:
+            return assemble(build(self._with_values(self.held, k)), float(self.instants[0]), self.tolerance)
+        except SPOILED:
+            return None
+        except JounceError as error:
+            raise self._located(error, k) from None
 
     def _individually_assembled(self, levels: int, threads: int) -> Int[np.ndarray, " design"]:
         """Assemble designs one by one, as angles about axes require, and follow them side by side."""
-        models, positions, assembled = [], [], []
-        for k in range(len(self.rows)):
-            try:
-                model, position = assemble(build(self.held_design(k)), float(self.instants[0]), self.tolerance)
-            except SPOILED:
-                continue
-            except JounceError as error:
-                raise self._located(error, k) from None
-            models.append(model)
-            positions.append(position)
-            assembled.append(k)
-        chosen = np.array(assembled)
+        assembled = {k: found for k in range(len(self.rows)) if (found := self._assembled(k)) is not None}
+        models, positions = zip(*assembled.values(), strict=True)
+        chosen = np.array(list(assembled))
         designs = Designs.of_models(self.held, models, self.names, self.rows[chosen])
         coordinates = {
             name: np.concatenate([np.asarray(position[name]) for position in positions], axis=-1)
@@ -372,7 +359,3 @@ class _Family:
         values = ", ".join(f"{name} = {value:g}" for name, value in zip(self.names, self.rows[k], strict=True))
         error.message = f"{error.message} (design {k}: {values})"
         return error
-
-
-def _is_of_pieces(part: Any) -> bool:
-    return isinstance(part, SplineMotion)

@@ -11,7 +11,6 @@ from jaxtyping import Float
 
 from jounce.base.modules import with_fields
 from jounce.base.shapes import ArrayLike, Numbers
-from jounce.constraints import AbstractConstraint
 from jounce.errors import MechanismError, check_name
 from jounce.execution.backends import xla_backend
 from jounce.execution.chunks import in_chunks
@@ -19,7 +18,7 @@ from jounce.execution.on_demand import OnDemand
 from jounce.jet.derivatives import plain_derivatives
 from jounce.jet.turns import brought_near
 from jounce.kinematics.continuation.path_following import ChangePoint
-from jounce.kinematics.results.pose_outputs import output_series
+from jounce.kinematics.results.pose_outputs import check_output, output_group, output_series
 from jounce.kinematics.results.tables import Tabulated
 from jounce.kinematics.status import Status
 from jounce.mechanism import (
@@ -34,12 +33,10 @@ from jounce.mechanism import (
     Model,
     PointOutput,
 )
-from jounce.mechanism.building.builder import counted_as_in
 from jounce.mechanism.laws.driver_outputs import is_turning
-from jounce.mechanism.mechanism import GROUND
 from jounce.mechanism.outputs.attitude_outputs import continued, euler_angles_of
 from jounce.mechanism.outputs.derivative_outputs import bound_alone
-from jounce.mechanism.system import POSITION_COMPONENTS, Group, group_elements
+from jounce.mechanism.system import Group
 from jounce.mechanism.transmissions.axis_angles import AttitudeHistory, at_lanes, attitudes_of, measures_angle
 from jounce.trajectory import HermiteMotion
 from jounce.units.shown_units import derivatives_of, time_axes
@@ -49,29 +46,6 @@ if TYPE_CHECKING:
 
 TOGETHER = 1024  # instants at which an output that was not solved for is evaluated: one program for few and for many
 _UNDEFINED = Status.UNDEFINED.advice.partition(": ")[2]
-
-
-def check_output(output: AbstractQuantity, mechanism: Mechanism, name: str = "output") -> None:
-    """Raise MechanismError unless an output names what the mechanism has, and exists in its space."""
-    mechanism.check_fit(output, name)
-    output.check(mechanism)
-
-
-def output_group(
-    output: AbstractOutput | AbstractConstraint,
-    mechanism: Mechanism,
-    model: Model | None = None,
-    name: str = "output",
-) -> Group:
-    """Return an output of poses, or a driver for its coordinate, as a group of one, on the pose of all bodies.
-
-    With a model, angles about axes are counted as those of the outputs that it was assembled with.
-    """
-    index = {body: k for k, body in enumerate((GROUND, *mechanism.bodies))}
-    components = POSITION_COMPONENTS[mechanism.space]
-    groups, _ = group_elements({name: output}, mechanism.parameter_values, index, components)
-    (group,) = groups if model is None else counted_as_in(groups, model)
-    return group
 
 
 class Motion(Tabulated):

@@ -6,11 +6,38 @@ import numpy as np
 from jaxtyping import Float
 
 from jounce.base.shapes import Numbers
+from jounce.constraints import AbstractConstraint
 from jounce.execution.compilation import compiled
 from jounce.jet import Jet
 from jounce.jet.algebra import stacked
 from jounce.jet.derivatives import plain_derivatives
-from jounce.mechanism.system import Group
+from jounce.mechanism import AbstractOutput, AbstractQuantity, Mechanism, Model
+from jounce.mechanism.building.builder import counted_as_in
+from jounce.mechanism.mechanism import GROUND
+from jounce.mechanism.system import POSITION_COMPONENTS, Group, group_elements
+
+
+def check_output(output: AbstractQuantity, mechanism: Mechanism, name: str = "output") -> None:
+    """Raise MechanismError unless an output names what the mechanism has, and exists in its space."""
+    mechanism.check_fit(output, name)
+    output.check(mechanism)
+
+
+def output_group(
+    output: AbstractOutput | AbstractConstraint,
+    mechanism: Mechanism,
+    model: Model | None = None,
+    name: str = "output",
+) -> Group:
+    """Return an output of poses, or a driver for its coordinate, as a group of one, on the pose of all bodies.
+
+    With a model, angles about axes are counted as those of the outputs that it was assembled with.
+    """
+    index = {body: k for k, body in enumerate((GROUND, *mechanism.bodies))}
+    components = POSITION_COMPONENTS[mechanism.space]
+    groups, _ = group_elements({name: output}, mechanism.parameter_values, index, components)
+    (group,) = groups if model is None else counted_as_in(groups, model)
+    return group
 
 
 @compiled("pose_type")

@@ -72,13 +72,8 @@ class Search:
         conditions: Conditions,
         level: int = 4,
     ):
-        self.source, self.labels, self.parameter, self.basis, self.conditions = (
-            source,
-            labels,
-            parameter,
-            basis,
-            conditions,
-        )
+        self.source, self.labels, self.parameter = source, labels, parameter
+        self.basis, self.conditions = basis, conditions
         self.limit_level, self.margin = level, 0.0
         self.duration: float | None = None  # prescribed duration of a law; None for the fastest
         self.points, self.enforced = np.zeros(0), np.zeros(0, bool)
@@ -161,10 +156,8 @@ class Search:
         """
         x, cost = start, self._cost(start) if settled else np.inf
         ratios = self.curves.ratios(self.at(x))
-        chosen = self.enforced[:, None] & (
-            ratios > (0 if len(self.nodes) == 2 * COARSE else SETTLED_NEAR if settled else NEAR)
-        )
-        chosen |= _peaks(ratios) & (ratios > 1)
+        near = 0 if len(self.nodes) == 2 * COARSE else SETTLED_NEAR if settled else NEAR
+        chosen = self.enforced[:, None] & (ratios > near) | _peaks(ratios) & (ratios > 1)
         if settled:
             chosen |= self.held & (ratios > HELD_NEAR)
         for self.rounds in range(1, rounds + 1):
@@ -353,18 +346,9 @@ class Search:
             for part, factor, matrix in zip(vectors, (0.5, 1.0), self.matrices[1::-1], strict=True)
         )
         equal, equal_right = self._end_equations(scale)
-        program = Program(
-            self.weights,
-            self.node_matrix,
-            rows,
-            right,
-            sparse.csr_matrix(cones),
-            np.full(len(size), 1 - self.margin),
-            equal,
-            equal_right,
-            None if self.duration is None else self.duration * np.sqrt(scale),
-        )
-        return program, curve[row], at
+        cone_bounds, duration = np.full(len(size), 1 - self.margin), self.duration and self.duration * np.sqrt(scale)
+        bounded = rows, right, sparse.csr_matrix(cones), cone_bounds, equal, equal_right
+        return Program(self.weights, self.node_matrix, *bounded, duration), curve[row], at
 
     def _margin_shares(self, at: np.ndarray, curve: np.ndarray) -> _Points:
         """Return which share of the margin rows keep: a state that is given may touch its limits."""

@@ -11,8 +11,8 @@ import numpy as np
 from jaxtyping import Float
 
 from jounce.mechanism.mechanism import GROUND
-from jounce.plot.drawings.frames import Frame, points_at, within
-from jounce.plot.drawings.geometry import Point, Skeleton, Symbol, frame_along
+from jounce.plot.drawings.frames import Frame, frame_along, points_at, within
+from jounce.plot.drawings.geometry import Point, Skeleton, Symbol
 from jounce.plot.style import BODY_COLORS
 
 __all__ = ["Drawing", "Flat", "Label", "Shape", "View", "screen_of", "tinted"]

@@ -25,7 +25,7 @@ from jounce.mechanism.mechanism import GROUND
 from jounce.mechanism.system import POSITION_COMPONENTS
 from jounce.rigid import PlanarPose, SpatialPose
 
-__all__ = ["Frame", "assembled", "frames", "guessed", "points_at", "within"]
+__all__ = ["Frame", "assembled", "frame_along", "frames", "guessed", "points_at", "within"]
 
 ASSEMBLY_TOLERANCE = 1e-10  # rad, or sizes of the mechanism
 
@@ -106,3 +106,17 @@ def points_at(
 def within(frame: Frame, points: Float[np.ndarray, "time components"]) -> Float[np.ndarray, "time components"]:
     """Return global points in the frame of a body."""
     return np.einsum("tkc,tk->tc", frame[:, :, 1:], points - frame[:, :, 0])
+
+
+def frame_along(axis: Float[np.ndarray, "3"]) -> Float[np.ndarray, "3 3"]:
+    """Return three unit vectors, in rows, of which the first is along an axis of any length.
+
+    Examples
+    --------
+    >>> frame_along(np.array([0.0, 0.0, 2.0])).tolist()
+    [[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]]
+    """
+    first = axis / np.linalg.norm(axis)
+    second = np.cross(first, np.eye(3)[np.argmin(np.abs(first))])
+    second /= np.linalg.norm(second)
+    return np.stack([first, second, np.cross(first, second)])

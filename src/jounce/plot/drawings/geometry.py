@@ -28,12 +28,12 @@ from jounce.plot.drawings.curve_lines import NONE, CurveLines, curve_lines
 from jounce.plot.drawings.frames import guessed, points_at
 from jounce.plot.drawings.gears import pitch_radii, shaft_wheels
 
-__all__ = ["DrawnLink", "Point", "Points", "Skeleton", "Symbol", "Wheel", "frame_along", "skeleton"]
+__all__ = ["DrawnLink", "Point", "Points", "Skeleton", "Symbol", "Wheel", "skeleton"]
 
 Point = Float[np.ndarray, " components"]
 Points = Float[np.ndarray, "points components"]
 Element = AbstractConstraint | AbstractForce
-Values = Mapping[str, Mapping[str, np.ndarray]]  # numbers and vectors by element and field
+Values = Mapping[str, np.ndarray]  # numbers and vectors of an element by field
 
 SLOTS = {"_i": 0, "_j": 1, "_m": 2}  # endings of fields, and the body that each is fixed to
 SAME = 1e-9  # points nearer than this, in sizes of the mechanism, are one
@@ -262,8 +262,7 @@ def skeleton(mechanism: Mechanism) -> Skeleton:
 
 def _values(element: Any, parameters: Mapping[str, Any], components: int, name: str) -> dict[str, np.ndarray]:
     """Return the numbers and vectors of an element by field; laws and words are left out."""
-    values = {}
-    signs = facts_of(type(element)).signs
+    values, signs = {}, facts_of(type(element)).signs
     for field_name, kind in field_kinds(type(element)).items():
         value = getattr(element, field_name)
         if kind in ("scalar", "vector") and value is not None:
@@ -282,7 +281,7 @@ def _slot(field_name: str) -> int:
     return SLOTS.get(field_name[-2:], 0)
 
 
-def _touched(elements: Mapping[str, Any], values: Values) -> Iterator[tuple[str, str, Point]]:
+def _touched(elements: Mapping[str, Any], values: Mapping[str, Values]) -> Iterator[tuple[str, str, Point]]:
     """Return the name of each element, the body and the place in its frame, for all points of elements."""
     for name, element in elements.items():
         for field_name, value in values[name].items():
@@ -302,7 +301,7 @@ def _complete(body: str, points: _Points, mechanism: Mechanism, components: int,
         points.add(np.zeros(components), "", near)
 
 
-def _largest(points: list[Point], mechanism: Mechanism, kinds: Mapping[str, Values]) -> float:
+def _largest(points: list[Point], mechanism: Mechanism, kinds: Mapping[str, Mapping[str, Values]]) -> float:
     """Return the largest length that is known where all points fall into one."""
     lengths = [float(np.linalg.norm(point)) for point in points]
     for kind, values in kinds.items():
@@ -346,12 +345,7 @@ def _bars(points: Points, near: float, is_held: list[bool]) -> tuple[tuple[int, 
 
 
 def _symbol(
-    mechanism: Mechanism,
-    name: str,
-    element: Element,
-    values: Mapping[str, np.ndarray],
-    components: int,
-    curve: CurveLines | None,
+    mechanism: Mechanism, name: str, element: Element, values: Values, components: int, curve: CurveLines | None
 ) -> Symbol:
     bodies, facts = element.bodies, facts_of(type(element))
     points: list[np.ndarray] = [np.zeros(components)] * len(bodies)
@@ -401,17 +395,3 @@ def _geared(mechanism: Mechanism, symbol: Symbol, coordinate: str, ratio: float)
         return symbol
     points, radii = (*centers, *symbol.points[2:]), (*radii, *symbol.radii[2:])
     return replace(symbol, kind="gear", points=points, radii=radii, internal=ratio > 0)
-
-
-def frame_along(axis: Float[np.ndarray, "3"]) -> Float[np.ndarray, "3 3"]:
-    """Return three unit vectors, in rows, of which the first is along an axis of any length.
-
-    Examples
-    --------
-    >>> frame_along(np.array([0.0, 0.0, 2.0])).tolist()
-    [[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]]
-    """
-    first = axis / np.linalg.norm(axis)
-    second = np.cross(first, np.eye(3)[np.argmin(np.abs(first))])
-    second /= np.linalg.norm(second)
-    return np.stack([first, second, np.cross(first, second)])

@@ -17,7 +17,8 @@ from jounce.plot.drawings.cams import pitch_curve
 from jounce.plot.drawings.curve_lines import shown
 from jounce.plot.drawings.drawing import BARS, GUIDES, INK, MARKS, SYMBOLS, WHEELS, Drawing, Flat, Label, tinted
 from jounce.plot.drawings.driver_symbols import DRIVERS_AND_FORCES
-from jounce.plot.drawings.geometry import Symbol, Wheel, frame_along
+from jounce.plot.drawings.frames import frame_along
+from jounce.plot.drawings.geometry import Symbol, Wheel
 from jounce.plot.style import GRAY
 
 __all__ = ["draw_symbols"]

@@ -5,6 +5,7 @@ this program order after order, and all that is not a sum along branches is done
 """
 
 import dataclasses
+from functools import partial
 from typing import Any, NamedTuple
 
 import jax
@@ -131,9 +132,8 @@ class TreeEquations(Module):
         def outward(state: Any, entry: Any) -> tuple[Any, Any]:
             slot, parent_slot, position, slides, turned, coordinate = entry
             parent = read_slot(tree, state, parent_slot)
-            axes = jnp.stack(
-                [total(parent[:, k] * turned.matrix[k, j][None] for k in range(3)) for j in range(3)], axis=1
-            )
+            columns = [total(parent[:, k] * turned.matrix[k, j][None] for k in range(3)) for j in range(3)]
+            axes = jnp.stack(columns, axis=1)
             arm = total(parent[:, k] * position[k] for k in range(3)) + axes[:, 2] * (slides * coordinate)[None]
             return write_slot(tree, state, slot, axes), (axes, arm)
 
@@ -163,11 +163,7 @@ class TreeEquations(Module):
         lanes, count = motion.axes.shape[-1], self.tree.shape.coordinates
         size = count + (6 if motion.base is not None else 0)
         zero = Unknowns(jnp.zeros((count, lanes)), None if motion.base is None else jnp.zeros((6, lanes)))
-
-        def forces(unknowns: Unknowns) -> Unknowns:
-            return self.needed(motion, unknowns)
-
-        _, slope = jax.linearize(forces, zero)
+        _, slope = jax.linearize(partial(self.needed, motion), zero)
         units = jnp.broadcast_to(jnp.eye(size)[..., None], (size, size, lanes))
         directions = Unknowns(units[:, :count], None if motion.base is None else units[:, count:])
         matrix = jnp.concatenate([x for x in jax.vmap(slope)(directions) if x is not None], axis=1)
@@ -184,13 +180,12 @@ class TreeEquations(Module):
         turning = jnp.asarray(tree.turning)[None, :, None]
         z, arm = motion.axes[:, 2], motion.arm
         rates, accelerations = self._at_joints(motion.rates)[None], self._at_joints(unknowns.joints)[None]
-        fall = jnp.broadcast_to(-jnp.asarray(tree.gravity)[:, None], (3, lanes))
-        nothing = jnp.zeros((3, lanes))
-        spin0, spin_rate0, shift0 = nothing, nothing, fall
+        shift0 = jnp.broadcast_to(-jnp.asarray(tree.gravity)[:, None], (3, lanes))
+        spin0 = spin_rate0 = jnp.zeros((3, lanes))
         if base is not None and unknowns.base is not None:
             v, w = base.twist[:3], base.twist[3:]
             spin0, spin_rate0 = _combined(base.axes, w), _combined(base.axes, unknowns.base[3:])
-            shift0 = fall + _combined(base.axes, unknowns.base[:3] + cross(w, v))
+            shift0 = shift0 + _combined(base.axes, unknowns.base[:3] + cross(w, v))
         turn = z * (turning * rates)
         before = sums_at_parents(tree, turn, spin0)
         arm_rate = cross(before, arm)
@@ -203,11 +198,9 @@ class TreeEquations(Module):
             shift = shift + cross(before, slide) + z * ((1 - turning) * accelerations)
         shift = shift + cross(before, arm_rate)
         acceleration = sums_at_parents(tree, shift, shift0) + shift
-        of_bodies = (tree.mass, tree.center, tree.inertia)
-        rate = spin_rate_before + spin_rate
+        of_bodies, rate = (tree.mass, tree.center, tree.inertia), spin_rate_before + spin_rate
         force, moment = _of_inertia(motion.axes, of_bodies, before + turn, rate, acceleration)
-        pushed = self._pushed(motion, wrenches)
-        if pushed is not None:
+        if (pushed := self._pushed(motion, wrenches)) is not None:
             force, moment = force - pushed[:3, :-1], moment - pushed[3:, :-1]
         force, base_force = totals(tree, force)
         moment, base_moment = totals(tree, moment, cross(arm, force))
@@ -237,8 +230,7 @@ class TreeEquations(Module):
         if base is not None and unknowns.base is not None:
             v, w = base.twist[:3], base.twist[3:]
             spin0 = _combined(base.axes, w)
-            spins = quaternion_spins(base.quaternion)
-            quaternion = 0.5 * total(spin * w[k : k + 1] for k, spin in enumerate(spins))
+            quaternion = 0.5 * total(spin * w[k : k + 1] for k, spin in enumerate(quaternion_spins(base.quaternion)))
             moved = FreeBase(_combined(base.axes, v), quaternion, cross(spin0[:, None], base.axes), unknowns.base)
         turn = z * (turning * rates)
         before = sums_at_parents(tree, turn, spin0)
@@ -252,8 +244,7 @@ class TreeEquations(Module):
         """Return kinetic energy, that of armatures included, and potential energy in gravity and springs, J."""
         tree, base = self.tree, motion.base
         turning = jnp.asarray(tree.turning)[None, :, None]
-        nothing = jnp.zeros((3, motion.axes.shape[-1]))
-        place0, spin0, velocity0 = nothing, nothing, nothing
+        place0 = spin0 = velocity0 = jnp.zeros((3, motion.axes.shape[-1]))
         if base is not None:
             place0, spin0 = base.position, _combined(base.axes, base.twist[3:])
             velocity0 = _combined(base.axes, base.twist[:3])
@@ -292,10 +283,7 @@ class TreeEquations(Module):
         return jnp.take(values, jnp.asarray(self.tree.coordinate), axis=0) * jnp.asarray(self.tree.multiplier)[:, None]
 
     def _pushed(self, motion: TreeState, wrenches: Wrenches) -> Any:
-        """Return forces and moments from outside about the origins of the bodies and, last, of the base.
-
-        What bears bodies that gravity does not pull at is one of them.
-        """
+        """Return forces and moments from outside, what bears weight among them, on the bodies and, last, the base."""
         tree = self.tree
         if not wrenches and not tree.shape.lifted:
             return None
@@ -391,9 +379,7 @@ def _turned_inertia(axes: Any, mass: Any, center: Any, tensor: Any) -> RigidIner
     return RigidInertia(mass[0], _combined(axes, center), turned)
 
 
-def _energies(
-    axes: Any, values: tuple[Any, ...], spin: Any, velocity: Any, position: Any, gravity: Any
-) -> tuple[Any, Any]:
+def _energies(axes: Any, values: tuple[Any, ...], spin: Any, velocity: Any, position: Any, gravity: Any) -> list[Any]:
     """Return the kinetic energy of bodies, or of one, and the potential energy, summed."""
     mass, center, tensor = _columns((values[0], values[1], values[2]), axes.ndim > 3)
     arm, w = _combined(axes, center), _local(axes, spin)
@@ -401,8 +387,7 @@ def _energies(
     down = jnp.reshape(jnp.asarray(gravity), (3,) + (1,) * (arm.ndim - 1))
     kinetic = 0.5 * jnp.sum(mass * moved * moved + w * momentum, axis=0)
     potential = -jnp.sum(mass * down * (position + arm), axis=0)
-    each = [jnp.sum(x.reshape(-1, x.shape[-1]), axis=0) for x in (kinetic, potential)]
-    return each[0], each[1]
+    return [jnp.sum(x.reshape(-1, x.shape[-1]), axis=0) for x in (kinetic, potential)]
 
 
 def _of_inertia(axes: Any, values: tuple[Any, ...], spin: Any, spin_rate: Any, acceleration: Any) -> tuple[Any, Any]:

@@ -15,7 +15,7 @@ from jaxtyping import Float
 from shapely.geometry import MultiPoint, Polygon
 from trimesh import Trimesh, creation
 
-from jounce.plot.drawings.geometry import frame_along
+from jounce.plot.drawings.frames import frame_along
 from jounce.viewer.shapes.appearance import Position
 
 __all__ = [
