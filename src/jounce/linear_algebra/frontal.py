@@ -11,6 +11,7 @@ from jounce.base.modules import Module
 from jounce.base.shapes import Numbers
 from jounce.linear_algebra.fronts import Fronts
 from jounce.linear_algebra.linear import Columns
+from jounce.linear_algebra.reflections import reflection
 
 
 class FrontalFactor(Module):
@@ -156,15 +157,10 @@ def _eliminated(front: Any, width: int) -> tuple[Any, Any, Any, Any, Any]:
     """
     vectors, factors, rows, inverted = [], [], [], []
     for k in range(width):
-        x = front[:, 0]
-        size = jnp.sqrt(jnp.sum(x * x, axis=0))
-        pivot = jnp.where(x[0] > 0, -size, size)
-        vector = jnp.concatenate([(x[0] - pivot)[None], x[1:]])
-        square = size * (size + jnp.abs(x[0]))
-        factor = jnp.where(square == 0, 0.0, 1.0 / jnp.where(square == 0, 1.0, square))
+        vector, pivot, factor = reflection(front[:, 0])
         along = jnp.sum(vector[:, None] * front[:, 1:], axis=0, keepdims=True)
         rest = front[:, 1:] - vector[:, None] * (factor[None, None] * along)
-        above = jnp.zeros((k, *x.shape[1:]))
+        above = jnp.zeros((k, *pivot.shape))
         vectors.append(jnp.concatenate([above, vector]))
         factors.append(factor)
         rows.append(jnp.concatenate([above, pivot[None], rest[0]]))

@@ -59,19 +59,11 @@ class LeastSquaresFactor(Module):
     def solve(self, right: Float[Numbers, "row batch"], *, refined: bool = True) -> Float[Numbers, "column batch"]:
         """Return the solutions of least squares, shape (columns, batch); not finite where columns are dependent."""
         del refined  # they are as good as can be
-        return self._back(jnp.sum(self.basis * right[:, None], axis=0))
+        return self._substituted(jnp.sum(self.basis * right[:, None], axis=0), 0)
 
     def solve_transposed(self, right: Float[Numbers, "column batch"]) -> Float[Numbers, "row batch"]:
         """Return the solutions of least norm with the transposed matrices, shape (rows, batch)."""
-        at, put, columns = jax.lax.dynamic_index_in_dim, jax.lax.dynamic_update_index_in_dim, len(self.triangle)
-
-        def substitute(k: Any, solved: Any) -> Any:
-            column = at(self.triangle, k, 1, False)
-            rest = at(right, k, 0, False) - jnp.sum(column * solved, axis=0)
-            return put(solved, rest / at(column, k, 0, False), k, 0)
-
-        solved = jax.lax.fori_loop(0, columns, substitute, jnp.zeros(right.shape))
-        return jnp.sum(self.basis * solved[None], axis=1)
+        return jnp.sum(self.basis * self._substituted(right, 1)[None], axis=1)
 
     def applied_inverse(self, matrix: Float[Numbers, "row k"]) -> Float[Numbers, "column k"]:
         """Return the products of the pseudo-inverse of the first matrix with the columns of another, (columns, k)."""
@@ -92,14 +84,15 @@ class LeastSquaresFactor(Module):
         seen = jnp.sum(before.basis[:, :, None] * self.basis[:, None], axis=0)
         return DenseFactor.of(seen).sign()
 
-    def _back(self, right: Float[Numbers, "column batch"]) -> Float[Numbers, "column batch"]:
+    def _substituted(self, right: Float[Numbers, "column batch"], axis: int) -> Float[Numbers, "column batch"]:
+        """Return the solutions with the triangle, row after row from the last, or with its columns, from the first."""
         at, put, columns = jax.lax.dynamic_index_in_dim, jax.lax.dynamic_update_index_in_dim, len(self.triangle)
 
         def substitute(i: Any, solved: Any) -> Any:
-            k = columns - 1 - i
-            row = at(self.triangle, k, 0, False)
-            rest = at(right, k, 0, False) - jnp.sum(row * solved, axis=0)
-            return put(solved, rest / at(row, k, 0, False), k, 0)
+            k = i if axis else columns - 1 - i
+            line = at(self.triangle, k, axis, False)
+            rest = at(right, k, 0, False) - jnp.sum(line * solved, axis=0)
+            return put(solved, rest / at(line, k, 0, False), k, 0)
 
         return jax.lax.fori_loop(0, columns, substitute, jnp.zeros(right.shape))
 

@@ -41,13 +41,7 @@ class ReflectedFactor(Module):
     def _of_ordered(cls, matrix: Float[Numbers, "row row batch"], order: Order) -> "ReflectedFactor":
         columns, pivots, shares, rows, rest = [], [], [], [], matrix
         for _ in range(len(matrix)):
-            first = rest[:, 0]
-            length = jnp.sqrt(jnp.sum(first * first, axis=0))
-            pivot = jnp.where(first[0] > 0, -length, length)
-            head = first[0] - pivot
-            square = length * (length + jnp.abs(first[0]))  # half the squared length of the reflection
-            share = jnp.where(square == 0, 0.0, 1.0 / jnp.where(square == 0, 1.0, square))
-            column = jnp.concatenate([head[None], first[1:]])
+            column, pivot, share = reflection(rest[:, 0])
             others = rest[:, 1:]
             part = jnp.sum(column[:, None] * others, axis=0) * share[None]
             others = others - column[:, None] * part[None]
@@ -115,6 +109,16 @@ class ReflectedFactor(Module):
         reflected = jnp.where(self.shares == 0, 1.0, -1.0)
         swaps = sum(later < index for order in self.order for k, index in enumerate(order) for later in order[k:])
         return jnp.prod(reflected * jnp.sign(self.pivots), axis=0) * (-1.0) ** swaps
+
+
+def reflection(first: Columns) -> tuple[Columns, Float[Numbers, " batch"], Float[Numbers, " batch"]]:
+    """Return the reflection that clears a column but for its first entry, that entry, and 2 over its square, or 0."""
+    length = jnp.sqrt(jnp.sum(first * first, axis=0))
+    pivot = jnp.where(first[0] > 0, -length, length)
+    head = first[0] - pivot
+    square = length * (length + jnp.abs(first[0]))  # half the squared length of the reflection
+    share = jnp.where(square == 0, 0.0, 1.0 / jnp.where(square == 0, 1.0, square))
+    return jnp.concatenate([head[None], first[1:]]), pivot, share
 
 
 def _ordered(matrix: Float[Numbers, "row row batch"], order: Order) -> Float[Numbers, "row row batch"]:
