@@ -140,21 +140,12 @@ class OnXla:
         axis = 0 if self.mapped.rows else -1
         lanes = jax.tree.map(np.asarray, lanes)
         count = jax.tree.leaves(lanes)[0].shape[axis]
-        width = self._block_width(count)
 
-        def computed(first: int) -> Any:
-            indices = np.minimum(np.arange(first, first + width), count - 1)
+        def computed(indices: Int[np.ndarray, " lane"]) -> Any:
             block = jax.tree.map(lambda x: _taken(x, indices, axis), lanes)
-            return jax.tree.map(np.asarray, self.mapped.on_xla(self.shared, block, self.how))
+            return self.mapped.on_xla(self.shared, block, self.how)
 
-        with Threads(threads) as pool:
-            parts = list(pool.map(computed, range(0, max(count, 1), width)))
-
-        def whole(*arrays: np.ndarray) -> np.ndarray:
-            joined = np.concatenate(arrays, axis)  # a copy that its user may write to
-            return joined[:count] if axis == 0 else joined[..., :count]
-
-        return jax.tree.map(whole, *parts)
+        return in_chunks(computed, count, (self._block_width(count),), axis, threads=threads)
 
     def prepare(self, lanes: Any, count: int) -> None:
         """Make the program for so many instants, of which some are given, or their shapes and types."""

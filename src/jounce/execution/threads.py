@@ -12,6 +12,7 @@ import jax
 
 from jounce.base.shapes import Refused
 from jounce.errors import MechanismError
+from jounce.execution.llvm.machine import core_count
 from jounce.settings import own_settings
 
 Item = TypeVar("Item")
@@ -30,7 +31,7 @@ def thread_count(given: int | Refused | None = None) -> int:
     """
     setting = os.environ.get(VARIABLE, "") if given is None else ""
     if given is None and not setting:
-        return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+        return core_count()
     count: Any = int(setting) if setting.isdecimal() else setting or given
     if not isinstance(count, numbers.Integral) or isinstance(count, bool) or count < 1:
         name = VARIABLE if setting else "threads"

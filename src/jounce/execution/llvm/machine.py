@@ -63,12 +63,13 @@ def compiled(text: str, *, hasty: bool = False, brief: bool = False) -> bytes:
         return _compiled_here(text, 0)
     lines = text.count("\n")
     hasty = hasty or lines > LONGEST
-    elsewhere = hasty or (lines > LONG and _cores() > 1)
+    elsewhere = hasty or (lines > LONG and core_count() > 1)
     result = _compiled_elsewhere(text, hasty) if elsewhere else None
     return _compiled_here(text) if result is None else result
 
 
-def _cores() -> int:
+def core_count() -> int:
+    """Return how many cores this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 

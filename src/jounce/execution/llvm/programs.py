@@ -12,7 +12,7 @@ import numpy as np
 
 from jounce.execution.buffer_pool import lend
 from jounce.execution.llvm.machine import MachineCode, vector_width
-from jounce.execution.llvm.rounds import Column, RoundRunner
+from jounce.execution.llvm.rounds import Column, RoundRunner, address_of
 
 
 class Layout:
@@ -82,7 +82,7 @@ class Single:
     def __call__(self, given: Sequence[np.ndarray]) -> Any:
         """Return the results, for the leaves of the arguments, of the shapes and types that the program is for."""
         memory = lend(self._results.end)
-        first = _address(memory)
+        first = address_of(memory)
         np.add(self._offsets, first, out=memory[: self._addresses].view(np.int64))
         self._given.put(memory, given)
         self._run(first, 1)
@@ -134,14 +134,14 @@ class Program:
         total = max(count, self.width)
         self._check(shared, lanes, count)
         if total > count:
-            lanes = [_filled(x, total, axis) for x in lanes]
+            lanes = [filled(x, total, axis) for x in lanes]
         given = [np.ascontiguousarray(x) for x in lanes]
         shapes = [((total, *shape) if self._rows else (*shape, total), dtype) for shape, dtype in self._results]
         result = [np.empty(*shape) for shape in shapes]
         memory = np.empty(self._layout.end, np.uint8)
         self._layout.put(memory, shared)
         arrays = [*given, *result]
-        addresses = [*(self._layout.offsets + _address(memory)).tolist(), *map(_address, arrays)]
+        addresses = [*(self._layout.offsets + address_of(memory)).tolist(), *map(address_of, arrays)]
         if not self._rows or (vectors := total // self.width) < 2 or parts == 1:
             self._run((ctypes.c_void_p * len(addresses))(*addresses), total)
         else:
@@ -213,10 +213,6 @@ class Program:
         _agree([*shared, *lanes], [*self._shared, *many])
 
 
-def _address(array: np.ndarray) -> int:
-    return array.__array_interface__["data"][0]
-
-
 def _agree(arrays: Sequence[Any], expected: Sequence[tuple[tuple[int, ...], Any]]) -> None:
     """Raise ValueError unless arrays are of the shapes and types wanted."""
     result = [(x.shape, x.dtype) for x in arrays]
@@ -224,9 +220,11 @@ def _agree(arrays: Sequence[Any], expected: Sequence[tuple[tuple[int, ...], Any]
         raise ValueError(f"arrays of {result}, where the program was made for {expected}")
 
 
-def _filled(x: np.ndarray, total: int, axis: int) -> np.ndarray:
+def filled(x: np.ndarray, total: int, axis: int = -1) -> np.ndarray:
     """Repeat the last instant until there are so many; zeros where there is none."""
     count = x.shape[axis]
+    if count == total:
+        return x
     result = np.zeros((total, *x.shape[1:]) if axis == 0 else (*x.shape[:-1], total), x.dtype)
     if count and axis == 0:
         result[:count], result[count:] = x, x[-1]

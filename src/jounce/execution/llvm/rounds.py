@@ -42,7 +42,7 @@ class Column(NamedTuple):
             raise ValueError(
                 f"an array of {whole.dtype}{whole.shape}, for {self.dtype}{self.shape} of {least} instants"
             )
-        indices = [_address(whole)]
+        indices = [address_of(whole)]
         for size, step in zip(whole.shape[:-1], whole.strides[:-1], strict=True):
             indices = [index + k * step for index in indices for k in range(size)]
         return indices
@@ -233,7 +233,7 @@ class RoundRunner:
         self._known = min((column.whole.shape[-1] for column in linked if column.whole is not None), default=0)
         self._check_sources()
         self._arrays = [np.ascontiguousarray(x) for x in shared], columns  # kept, since addresses do not keep them
-        self._common = np.array([_address(x) for x in self._arrays[0]], np.int64)
+        self._common = np.array([address_of(x) for x in self._arrays[0]], np.int64)
         ends = np.cumsum([0, *(column.room(width) for column in columns)])
         self._begins, self._blank = ends[:-1], np.zeros(ends[-1], np.uint8)
         begins = iter(self._begins.tolist())
@@ -265,12 +265,12 @@ class RoundRunner:
             raise ValueError(f"targets that are not {width} indices below {count} for each round")
         targets = np.ascontiguousarray(targets)
         memory = np.empty(len(self._blank) + LINE, np.uint8)  # of its own for each call, and so for each thread
-        first = -_address(memory) % LINE
+        first = -address_of(memory) % LINE
         memory[first : first + len(self._blank)] = self._blank
-        start = _address(memory) + first
+        start = address_of(memory) + first
         addresses, pairs = np.concatenate([self._common, start + self._begins]), self._pairs + start * self._within
-        indices = _address(self._sources), _address(targets)
-        self._run(_address(addresses), _address(pairs), *self._counts, *indices, len(targets))
+        indices = address_of(self._sources), address_of(targets)
+        self._run(address_of(addresses), address_of(pairs), *self._counts, *indices, len(targets))
 
     def _check_sources(self) -> None:
         """Raise ValueError unless sources are indices of the arrays that are read at them."""
@@ -288,5 +288,6 @@ def _pairs(columns: Sequence[Column], begins: Iterator[int], width: int, least: 
     return result
 
 
-def _address(array: np.ndarray) -> int:
+def address_of(array: np.ndarray) -> int:
+    """Return where the numbers of an array begin in memory."""
     return array.__array_interface__["data"][0]  # half as long as by its `ctypes`

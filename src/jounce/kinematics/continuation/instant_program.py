@@ -39,10 +39,8 @@ def round_width(system: System) -> int:
 
 def _of_many(shared: Any, instants: Any, *, pose_type: type[Pose], order: int) -> StepResult:
     """Solve many instants as `advance_instant` does one; those of one motion are not searched."""
-    (system, tolerance, refine, finite_order), ((coordinates, angles, sign), step, instant, own, search) = (
-        shared,
-        instants,
-    )
+    system, tolerance, refine, finite_order = shared
+    (coordinates, angles, sign), step, instant, own, search = instants
     system = of_design(system, own)
     given = coordinates, angles, sign, step, instant, tolerance, refine, finite_order
     arrival, factor, pose = solved_batch(system, *given, pose_type=pose_type, order=order)
@@ -74,25 +72,11 @@ def advance_instant(shared: Any, instants: Any, *, pose_type: type[Pose], order:
     pose_type, order
         As those of `advance`.
     """
-    (system, tolerance, refine, finite_order), ((coordinates, angles, sign), step, instant, own, search) = (
-        shared,
-        instants,
-    )
-    return advance(
-        with_fields(of_design(system, own), reflected=True),
-        coordinates,
-        angles,
-        sign,
-        step,
-        instant,
-        tolerance,
-        refine,
-        search[0],
-        finite_order,
-        pose_type=pose_type,
-        order=order,
-        with_det_rate=own is not None or finds_det_rate(system),
-    )
+    system, tolerance, refine, finite_order = shared
+    (coordinates, angles, sign), step, instant, own, search = instants
+    given = coordinates, angles, sign, step, instant, tolerance, refine, search[0], finite_order
+    how: Any = {"pose_type": pose_type, "order": order, "with_det_rate": own is not None or finds_det_rate(system)}
+    return advance(with_fields(of_design(system, own), reflected=True), *given, **how)
 
 
 def of_design(system: System, own: Mapping[int, Any] | None) -> System:

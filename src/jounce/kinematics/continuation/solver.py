@@ -8,8 +8,9 @@ from typing import Any
 
 import jax
 import numpy as np
-from jaxtyping import Float, Int, Shaped
+from jaxtyping import Float, Int
 
+from jounce.execution.llvm.programs import filled
 from jounce.execution.mapped import OnLlvm, OnXla, Rounds
 from jounce.execution.translated import WhenMade
 from jounce.kinematics.continuation.continuation_steps import NOWHERE, Settings, StepState, TakenSteps, take_steps
@@ -58,7 +59,7 @@ class Solver:
         """
         lanes = len(instant)
         if lanes <= SMALL_BATCH:
-            known, step, instant = jax.tree.map(lambda x: _filled(x, SMALL_BATCH), (needed, step, instant))
+            known, step, instant = jax.tree.map(lambda x: filled(x, SMALL_BATCH), (needed, step, instant))
             run = _run_from(known, (0.0,) * 4, away=step, instant=instant)
             arrival = self._take_steps(run, NO_GRID, _limits(0.0, 0.0), 1, search=search).last
         else:
@@ -130,7 +131,7 @@ class Solver:
         self, solved: SolvedState, expansion_point: Sequence[float], largest: float, crawled: int = 0
     ) -> StepState:
         """Return the run from a solved instant, an expansion point; the first step is at most `largest`, s."""
-        known = jax.tree.map(lambda x: _filled(x, SMALL_BATCH), self.needed(solved))
+        known = jax.tree.map(lambda x: filled(x, SMALL_BATCH), self.needed(solved))
         return _run_from(known, expansion_point, largest=largest, crawled=crawled)
 
     def beginning(self, coordinates: Mapping[str, Any], instant: float) -> StepState:
@@ -210,18 +211,9 @@ class Solver:
         window[: len(grid)] = grid[:length]
         settings, kind = self._settings._replace(search=np.asarray(search)), self.model.pose_type
         call = take_steps.prepare if only_made else take_steps
-        return call(
-            self.model.system,
-            run,
-            window,
-            limits,
-            settings,
-            np.asarray(most),
-            pose_type=kind,
-            order=self.order,
-            batches=self._batches,
-            native=WhenMade(self.hasty, lambda: self.program.name if isinstance(self.program, OnLlvm) else None),
-        )
+        native = WhenMade(self.hasty, lambda: self.program.name if isinstance(self.program, OnLlvm) else None)
+        how = {"pose_type": kind, "order": self.order, "batches": self._batches, "native": native}
+        return call(self.model.system, run, window, limits, settings, np.asarray(most), **how)
 
     def fault(self, arrival: StepResult, lane: int) -> str:
         """Return where to look for the fault: a driver without a permitted value, an output, the farthest body."""
@@ -265,13 +257,3 @@ def _run_from(
 
 def _limits(stop: float, smallest: float) -> StepLimits:
     return StepLimits(np.asarray(stop), np.asarray(smallest))
-
-
-def _filled(x: Shaped[np.ndarray, "*rest batch"], width: int) -> Shaped[np.ndarray, "*rest room"]:
-    """Repeat the last lane up to a width."""
-    lanes = x.shape[-1]
-    if lanes == width:
-        return x
-    filled = np.empty((*x.shape[:-1], width), x.dtype)
-    filled[..., :lanes], filled[..., lanes:] = x, x[..., -1:]
-    return filled

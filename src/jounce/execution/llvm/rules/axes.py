@@ -12,6 +12,8 @@ from jounce.execution.llvm.text.code import Code, flat
 from jounce.execution.llvm.text.values import DTYPES, UnsupportedOperationError, Value, kind_of
 
 MOST_SORTED = 16  # numbers
+REDUCED = {"sum": "add", "prod": "mul", "max": "max", "min": "min", "and": "and", "or": "or"}
+"""Operations on all numbers along axes, by JAX's names for what they give."""
 
 
 def nothing(operation: str, kind: str) -> Any:

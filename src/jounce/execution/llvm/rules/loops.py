@@ -275,11 +275,8 @@ def _gather(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Array
     result = new_storage(code, aval.shape, kind_of(aval.dtype), lanes=array.lanes or indices.lanes)
     offsets = list(numbers.offset_dims)
     batch = [axis for axis in range(result.ndim) if axis not in offsets]
-    taken = [
-        axis
-        for axis in range(array.ndim)
-        if axis not in (*numbers.collapsed_slice_dims, *numbers.operand_batching_dims)
-    ]
+    left_out = *numbers.collapsed_slice_dims, *numbers.operand_batching_dims
+    taken = [axis for axis in range(array.ndim) if axis not in left_out]
     sizes, named = p["slice_sizes"], {int(axis): k for k, axis in enumerate(numbers.start_index_map)}
     beyond = stored(code, filled((), [code.constant(filler(p, aval.dtype), result.kind)]))
 
@@ -313,11 +310,8 @@ def _scatter(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Arra
         return [result]
     windows = list(numbers.update_window_dims)
     batch = [axis for axis in range(updates.ndim) if axis not in windows]
-    remaining = [
-        axis
-        for axis in range(result.ndim)
-        if axis not in (*numbers.inserted_window_dims, *numbers.operand_batching_dims)
-    ]
+    left_out = *numbers.inserted_window_dims, *numbers.operand_batching_dims
+    remaining = [axis for axis in range(result.ndim) if axis not in left_out]
     sizes = [1] * result.ndim
     for axis, of in zip(remaining, windows, strict=True):
         sizes[axis] = updates.shape[of]
@@ -327,9 +321,8 @@ def _scatter(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Arra
         first, inside = _placed(code, p, result, indices, named, sizes, which)
         batching = [which[k] for k in numbers.scatter_indices_batching_dims]
         first = _at(code, result, numbers.operand_batching_dims, batching, first)
-        target = Stored(
-            result.region, tuple(sizes[a] for a in remaining), tuple(result.strides[a] for a in remaining), first
-        )
+        shape, strides = (tuple(its[a] for a in remaining) for its in (sizes, result.strides))
+        target = Stored(result.region, shape, strides, first)
         start = _at(code, updates, batch, which, updates.first)
         source = Stored(updates.region, target.shape, tuple(updates.strides[a] for a in windows), start)
 
@@ -348,15 +341,13 @@ STORED: Mapping[str, StoredRule] = {
     **dict.fromkeys(ELEMENTWISE, _each),
     **dict.fromkeys(("copy", "stop_gradient", "optimization_barrier"), _same),
     **REDUCTIONS,
-    "argmax": extreme,
-    "argmin": extreme,
+    **dict.fromkeys(("argmax", "argmin"), extreme),
+    **dict.fromkeys(("reshape", "squeeze", "expand_dims"), _reshape),
+    **dict.fromkeys(("scatter", "scatter-add"), _scatter),
     "dot_general": dot,
     "slice": _part,
     "broadcast_in_dim": _broadcast,
     "tile": _tile,
-    "reshape": _reshape,
-    "squeeze": _reshape,
-    "expand_dims": _reshape,
     "concatenate": _concatenate,
     "stack": _stack,
     "unstack": _unstack,
@@ -367,8 +358,6 @@ STORED: Mapping[str, StoredRule] = {
     "dynamic_slice": _dynamic_slice,
     "dynamic_update_slice": _dynamic_update_slice,
     "gather": _gather,
-    "scatter": _scatter,
-    "scatter-add": _scatter,
 }
 """Rules for operations of which an array is large; of others, the numbers are taken out of memory."""
 

@@ -4,7 +4,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any
 
-from jounce.execution.llvm.rules.axes import combination, is_better, nothing
+from jounce.execution.llvm.rules.axes import REDUCED, combination, is_better, nothing
 from jounce.execution.llvm.text.code import Code
 from jounce.execution.llvm.text.stored import counted, fill, nest, new_storage, put, result_storage, stored
 from jounce.execution.llvm.text.values import Value
@@ -64,14 +64,7 @@ def _in_vectors(code: Code, operation: str, array: Deferred) -> list[Deferred]:
     return [as_read(most), rest]
 
 
-REDUCTIONS = {
-    "reduce_sum": reduction("add"),
-    "reduce_prod": reduction("mul"),
-    "reduce_max": reduction("max"),
-    "reduce_min": reduction("min"),
-    "reduce_and": reduction("and"),
-    "reduce_or": reduction("or"),
-}
+REDUCTIONS = {f"reduce_{name}": reduction(operation) for name, operation in REDUCED.items()}
 
 
 def extreme(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Array]:
@@ -110,10 +103,8 @@ def dot(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Array]:
         [axis for axis in range(x.ndim) if axis not in (*batch, *summed)]
         for x, batch, summed in ((left, left_batch, left_sum), (right, right_batch, right_sum))
     )
-    left, right = (
-        transposed(left, (*left_batch, *left_free, *left_sum)),
-        transposed(right, (*right_batch, *right_free, *right_sum)),
-    )
+    left = transposed(left, (*left_batch, *left_free, *left_sum))
+    right = transposed(right, (*right_batch, *right_free, *right_sum))
     batch, summed = len(left_batch), len(left_sum)
     shape = (*result.shape, *left.shape[left.ndim - summed :])
     after, end = batch + len(left_free), len(shape) - summed

@@ -1,6 +1,7 @@
 """What each of JAX's operations is in scalar operations: those of each element here, with a table of all."""
 
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from typing import Any
 
 import jax
@@ -17,12 +18,8 @@ FUNCTIONS = {  # of C's library, by the names that JAX has for them, which are t
 }  # fmt: skip
 
 
-def _arithmetic(operation: str) -> Rule:
-    return lambda code, _, given: [each(lambda a, b: code.arithmetic(operation, a, b), *given)]
-
-
-def _compare(operation: str) -> Rule:
-    return lambda code, _, given: [each(lambda a, b: code.compare(operation, a, b), *given)]
+def _written_by(method: Callable[..., Value], operation: str) -> Rule:
+    return lambda code, _, given: [each(partial(method, code, operation), *given)]
 
 
 def _compare_in_total_order(operation: str) -> Rule:
@@ -40,20 +37,8 @@ def _position(code: Code, a: Value) -> Value:
     return code.select(below, code.logic("xor", digits, code.constant(2**63 - 1, "l")), digits)
 
 
-def _logic(operation: str) -> Rule:
-    return lambda code, _, given: [each(lambda a, b: code.logic(operation, a, b), *given)]
-
-
-def _intrinsic(operation: str) -> Rule:
-    return lambda code, _, given: [each(lambda a: code.intrinsic(operation, a), given[0])]
-
-
-def _function(name: str) -> Rule:
-    return lambda code, _, given: [each(lambda *a: code.call(name, *a), *given)]
-
-
 def _unary(function: Callable[[Code, Value], Value]) -> Rule:
-    return lambda code, _, given: [each(lambda a: function(code, a), given[0])]
+    return lambda code, _, given: [each(partial(function, code), given[0])]
 
 
 def _absolute(code: Code, a: Value) -> Value:
@@ -139,13 +124,13 @@ def _same(_: Code, __: Any, given: Sequence[Values]) -> Sequence[Values]:
 
 
 ELEMENTWISE: Mapping[str, Rule] = {
-    **{name: _arithmetic(name) for name in ("add", "sub", "mul", "div", "max", "min", "rem")},
-    **{name: _compare(name) for name in ("eq", "ne", "lt", "le", "gt", "ge")},
+    **{name: _written_by(Code.arithmetic, name) for name in ("add", "sub", "mul", "div", "max", "min", "rem")},
+    **{name: _written_by(Code.compare, name) for name in ("eq", "ne", "lt", "le", "gt", "ge")},
     **{f"{name}_to": _compare_in_total_order(name) for name in ("eq", "lt", "le")},
-    **{name: _logic(name) for name in ("and", "or", "xor")},
-    **{name: _intrinsic(name) for name in ("sqrt", "floor", "ceil")},
-    **{name: _function(name) for name in FUNCTIONS},
-    "add_any": _arithmetic("add"),
+    **{name: _written_by(Code.logic, name) for name in ("and", "or", "xor")},
+    **{name: _written_by(Code.intrinsic, name) for name in ("sqrt", "floor", "ceil")},
+    **{name: _written_by(Code.call, name) for name in FUNCTIONS},
+    "add_any": _written_by(Code.arithmetic, "add"),
     "neg": _unary(Code.negated),
     "not": _unary(Code.inverted),
     "abs": _unary(_absolute),
@@ -166,26 +151,15 @@ ELEMENTWISE: Mapping[str, Rule] = {
 RULES: Mapping[str, Rule] = {
     **ELEMENTWISE,
     **dict.fromkeys(("copy", "stop_gradient", "optimization_barrier"), _same),
-    "reduce_sum": axes.reduction("add"),
-    "reduce_prod": axes.reduction("mul"),
-    "reduce_max": axes.reduction("max"),
-    "reduce_min": axes.reduction("min"),
-    "reduce_and": axes.reduction("and"),
-    "reduce_or": axes.reduction("or"),
-    "argmax": axes.extreme,
-    "argmin": axes.extreme,
+    **{f"reduce_{name}": axes.reduction(operation) for name, operation in axes.REDUCED.items()},
+    **{f"cum{name}": axes.cumulative(axes.REDUCED[name]) for name in ("sum", "prod", "max", "min")},
+    **dict.fromkeys(("argmax", "argmin"), axes.extreme),
     "sort": axes.sorting,
-    "cumsum": axes.cumulative("add"),
-    "cumprod": axes.cumulative("mul"),
-    "cummax": axes.cumulative("max"),
-    "cummin": axes.cumulative("min"),
     "dot_general": axes.dot,
     "slice": indexing.part,
     "broadcast_in_dim": indexing.broadcast,
     "tile": indexing.tile,
-    "reshape": indexing.reshape,
-    "squeeze": indexing.reshape,
-    "expand_dims": indexing.reshape,
+    **dict.fromkeys(("reshape", "squeeze", "expand_dims"), indexing.reshape),
     "concatenate": indexing.concatenate,
     "stack": indexing.stack,
     "unstack": indexing.unstack,
@@ -197,6 +171,5 @@ RULES: Mapping[str, Rule] = {
     "dynamic_slice": indexing.dynamic_slice,
     "dynamic_update_slice": indexing.dynamic_update_slice,
     "gather": indexing.gather,
-    "scatter": indexing.scatter,
-    "scatter-add": indexing.scatter,
+    **dict.fromkeys(("scatter", "scatter-add"), indexing.scatter),
 }

@@ -138,9 +138,12 @@ class Code(Scalars):
         one, position, operand = IN_MEMORY[region.kind], self._address(region, index), self.operand(value, lanes=True)
         of = f"<{self.width} x {one}>"
         if region.kind == "b":
-            truth = self.type_of("b", lanes=True)
-            operand = self._emitted(f"zext {truth} {operand} to {of}", "b", lanes=True).name
+            operand = self._bytes(operand, of, lanes=True)
         self.lines.append(f"store {of} {operand}, ptr {position}, align {DTYPES[region.kind].itemsize}")
+
+    def _bytes(self, truths: str, of: str, *, lanes: bool) -> str:
+        """Return truth values as they are in memory, of a type."""
+        return self._emitted(f"zext {self.type_of('b', lanes=lanes)} {truths} to {of}", "b", lanes=True).name
 
     def _address(self, region: Region, index: int | Value) -> str:
         position = str(index) if isinstance(index, int) else self.operand(index, lanes=False)
@@ -172,9 +175,7 @@ class Code(Scalars):
         operand = self.operand(value, lanes=region.lanes)
         if region.kind == "b":
             of = f"<{self.width} x i8>" if region.lanes else "i8"
-            operand = self._emitted(
-                f"zext {self.type_of('b', lanes=region.lanes)} {operand} to {of}", "b", lanes=True
-            ).name
+            operand = self._bytes(operand, of, lanes=region.lanes)
         of, rest = self._place(region, index).split(", ", 1)
         self.lines.append(f"store {of} {operand}, {rest}")
 
@@ -197,8 +198,7 @@ class Code(Scalars):
         indices, of, kinds = self._addresses(region, index)
         operand, every = self.operand(value, lanes=True), self.operand(self.constant(True), lanes=True)
         if region.kind == "b":
-            truth = self.type_of("b", lanes=True)
-            operand = self._emitted(f"zext {truth} {operand} to {of}", "b", lanes=True).name
+            operand = self._bytes(operand, of, lanes=True)
         function = f"@llvm.masked.scatter.{kinds}.v{self.width}p0"
         self.intrinsics.add(f"declare void {function}({of}, <{self.width} x ptr>, i32, <{self.width} x i1>)")
         align = DTYPES[region.kind].itemsize

@@ -187,12 +187,12 @@ class Scalars:
             return self._division(operation, word, a, b)
         return self._pair(word, a, b)
 
-    def _pair(self, word: str, a: Value, b: Value) -> Value:
+    def _pair(self, word: str, a: Value, b: Value, kind: str | None = None) -> Value:
         lanes = a.lanes or b.lanes
         left, right = self.operand(a, lanes=lanes), self.operand(b, lanes=lanes)
         if word in ("maximum", "minimum", "smax", "smin", "umax", "umin"):
             return self._called(word, a.kind, a.kind, (left, right), lanes=lanes)
-        return self._emitted(f"{word} {self.type_of(a.kind, lanes=lanes)} {left}, {right}", a.kind, lanes=lanes)
+        return self._emitted(f"{word} {self.type_of(a.kind, lanes=lanes)} {left}, {right}", kind or a.kind, lanes=lanes)
 
     def _division(self, operation: str, word: str, a: Value, b: Value) -> Value:
         """Return a quotient or remainder of whole numbers as XLA has it, by divisors that do not end the process."""
@@ -212,9 +212,7 @@ class Scalars:
         if a.constant is not None and b.constant is not None:
             return self.constant(python(a.constant, b.constant), "b")
         word = f"fcmp {of_doubles}" if a.kind == "f" else f"icmp {unsigned if a.kind in 'bu' else of_integers}"
-        lanes = a.lanes or b.lanes
-        left, right = self.operand(a, lanes=lanes), self.operand(b, lanes=lanes)
-        return self._emitted(f"{word} {self.type_of(a.kind, lanes=lanes)} {left}, {right}", "b", lanes=lanes)
+        return self._pair(word, a, b, "b")
 
     def logic(self, operation: str, a: Value, b: Value) -> Value:
         """Return `and`, `or` or `xor` of two truth values, or of the digits of two whole numbers."""
