@@ -136,7 +136,7 @@ def recognized(mechanism: Mechanism, driver: str) -> Linkage | None:
     hinges, guides = _joints(mechanism)
     crank = law.bodies[1]
     if len(guides) == 0 and len(hinges) == 4:
-        loop = _loop(hinges, crank, 3)
+        loop = _loop(hinges, crank)
         return None if loop is None else _four_bar(loop)
     if len(guides) == 1 and len(hinges) == 3:
         return _slider_crank(hinges, guides[0], crank)
@@ -185,19 +185,19 @@ def _other(hinge: Hinge, body: str) -> str:
     return hinge[0][1 - hinge[0].index(body)]
 
 
-def _loop(hinges: list[Hinge], crank: str, links: int) -> list[tuple[str, Hinge, Hinge]] | None:
-    """Return the links of a loop from the crank on, each with its hinges, in order."""
+def _loop(hinges: list[Hinge], crank: str) -> list[tuple[str, Hinge, Hinge]] | None:
+    """Return the three links of a loop from the crank on, each with its hinges, in order."""
     first = [h for h in hinges if set(h[0]) == {GROUND, crank}]
     if len(first) != 1:
         return None
     members, body, hinge = [], crank, first[0]
-    while body != GROUND and len(members) < links:
+    while body != GROUND and len(members) < 3:
         following = [h for h in hinges if body in h[0] and h is not hinge]
         if len(following) != 1:
             return None
         members.append((body, hinge, following[0]))
         body, hinge = _other(following[0], body), following[0]
-    return members if body == GROUND and len(members) == links else None
+    return members if body == GROUND and len(members) == 3 else None
 
 
 def _four_bar(loop: list[tuple[str, Hinge, Hinge]]) -> FourBar | None:
@@ -218,7 +218,7 @@ def _slider_crank(hinges: list[Hinge], guide: Any, crank: str) -> SliderCrank | 
         return None
     rod = _other(closing[0], slider)
     between = [h for h in hinges if set(h[0]) == {crank, rod}]
-    if len(between) != 1 or GROUND in (rod,):
+    if len(between) != 1 or rod == GROUND:
         return None
     arm = _on(between[0], crank) - _on(start_of_curve[0], crank)
     length = float(np.linalg.norm(_on(closing[0], rod) - _on(between[0], rod)))

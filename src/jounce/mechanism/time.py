@@ -186,3 +186,8 @@ def nearest_instants(
     after = np.clip(np.searchsorted(rising, instants), 1, max(len(known) - 1, 1))
     before, after = after - 1, np.minimum(after, len(known) - 1)
     return order[np.where(instants - rising[before] <= rising[after] - instants, before, after)]
+
+
+def first_instant(time: TimeLike | None, parameters: Mapping[str, Any]) -> float:
+    """Return the first of the instants of a mechanism, s; 0 where it has none."""
+    return 0.0 if time is None else float(time_grid(time, parameters)[0])

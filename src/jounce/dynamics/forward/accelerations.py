@@ -38,6 +38,7 @@ from jounce.dynamics.friction.free_motion import FreeFriction, with_friction
 from jounce.dynamics.masses import Gravity, Masses
 from jounce.jet import Jet
 from jounce.jet.algebra import total
+from jounce.jet.coefficients import begun_series
 from jounce.jet.programs.series import Recursion
 from jounce.linear_algebra.least_squares import range_basis
 from jounce.linear_algebra.linear import DenseFactor
@@ -328,12 +329,6 @@ def conjugate(variation: Callable[[Pose], Any], pose: Pose, weights: Any) -> ByB
 def inverted(factor: Factor) -> Inverse:
     """Return what solves with factors for many right sides that come one by one."""
     return factor.inverted() if isinstance(factor, SaddleFactor) else DenseInverse(factor.inverse())
-
-
-def begun_series(coefficients: list[Any], levels: int) -> Any:
-    """Return the first coefficients of a series with room for the others."""
-    first = jnp.stack(coefficients)
-    return jnp.pad(first, ((0, levels - len(first)), *((0, 0),) * (first.ndim - 1)))
 
 
 def expand(

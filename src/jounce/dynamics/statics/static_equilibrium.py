@@ -23,9 +23,10 @@ from jounce.kinematics import Motion, Status
 from jounce.kinematics.assembly.assemble import assemble, freely_moving
 from jounce.kinematics.position_analysis.curve_ends import beyond_end, ends_of
 from jounce.kinematics.results.pose_outputs import output_values
-from jounce.mechanism import Body, Mechanism, build, check_mechanism, time_grid
+from jounce.mechanism import Body, Mechanism, build, check_mechanism
 from jounce.mechanism.building.preconditions import check_holonomic, concrete
 from jounce.mechanism.laws.law_checks import check_laws
+from jounce.mechanism.time import first_instant
 from jounce.robot import Robot
 from jounce.robot.closed_loops.closures import GivenCoordinates
 
@@ -343,8 +344,7 @@ def _outputs_without(mechanism: Mechanism, drivers: dict[str, Any]) -> dict[str,
 
 def _instant(mechanism: Mechanism, time: Any) -> float:
     if time is None:
-        given = mechanism.time
-        return 0.0 if given is None else float(time_grid(given, mechanism.parameter_values)[0])
+        return first_instant(mechanism.time, mechanism.parameter_values)
     try:
         instant = float(time)
     except (TypeError, ValueError):

@@ -20,6 +20,7 @@ from jounce.integrate.steps.events import pose_coordinates
 from jounce.integrate.steps.projection import projected
 from jounce.jet import Jet
 from jounce.jet.turns import brought_near
+from jounce.kinematics.families.design_values import differing_leaves
 from jounce.kinematics.status import Status
 from jounce.mechanism import Mechanism, Model, build
 from jounce.mechanism.building.starting_guess import starting_guess
@@ -108,11 +109,10 @@ class ParametricMechanism:
             system = dataclasses.replace(self.model.system, groups=build(varied).system.groups)
             like = dataclasses.replace(self.model, system=system)
             whole.append(jax.tree.leaves(self._made(varied, build(varied, like=like))))
-        columns = [[np.asarray(leaf, float) for leaf in column] for column in zip(*whole, strict=True)]
-        self._moved = [any(not np.array_equal(leaf, column[0]) for leaf in column) for column in columns]
-        pairs = zip(self._leaves, columns, self._moved, strict=True)
-        leaves = [np.concatenate(column, axis=-1) if moved else leaf for leaf, column, moved in pairs]
-        return jax.tree.unflatten(self._structure, leaves)
+        differing = differing_leaves(whole)
+        self._moved = [joined is not None for joined in differing]
+        pairs = zip(self._leaves, differing, strict=True)
+        return jax.tree.unflatten(self._structure, [leaf if joined is None else joined for leaf, joined in pairs])
 
     def picked(self, made: tuple[Equations, Any], runs: np.ndarray) -> tuple[Equations, Any]:
         """Return what `of` returned for all runs, for some of them."""

@@ -9,7 +9,6 @@ are divided until the series of every change of the state converges on them.
 
 import dataclasses
 import functools
-import math
 from collections.abc import Callable, Mapping
 from typing import Any, ParamSpec, TypeVar
 
@@ -22,11 +21,14 @@ from jounce.base.modules import with_fields
 from jounce.base.shapes import is_traced
 from jounce.errors import UnsupportedError
 from jounce.execution.compilation import compiled
+from jounce.integrate.marching.force_discontinuities import with_value
 from jounce.integrate.marching.robot_marching import RobotProblem
 from jounce.integrate.marching.robot_state import RobotState, at, polynomial_of
 from jounce.integrate.results.robot_simulation import RobotSimulation
 from jounce.integrate.steps.host_calls import recorded
+from jounce.jet.derivatives import plain_derivatives
 from jounce.rigid.inertia import Inertia, TracedInertia
+from jounce.robot.algorithms.forward_dynamics import coordinates_of
 from jounce.robot.robot import Robot
 
 ORDER = 24  # of the series of a step
@@ -136,10 +138,8 @@ def _traced_motion(
     more = -len(start) % PADDED  # steps of no length
     whole = np.append(start, np.full(more, start[-1] + length[-1])), np.append(length, np.zeros(more))
     series = _marched(problem, first, *whole, which, since, instants, levels=levels)
-    scale = np.array([float(math.factorial(k)) for k in range(len(series))])
-    changing = jnp.moveaxis(series * scale[:, None, None], -1, 0)[:, : simulation.order + 1]
-    q = simulation.q + (changing - jax.lax.stop_gradient(changing))
-    return TracedRobotMotion(robot, instants, simulation.order, q)
+    changing = jnp.moveaxis(plain_derivatives(series), -1, 0)[:, : simulation.order + 1]
+    return TracedRobotMotion(robot, instants, simulation.order, with_value(changing, simulation.q))
 
 
 def _begun(robot: Robot, problem: RobotProblem, first: RobotState, state: Any) -> RobotState:
@@ -243,5 +243,4 @@ def _marched(
     own = jax.tree.map(lambda x: jnp.moveaxis(x[which, :, 0], 0, -1), begun)
     there = at(series(own, start[which]), since)
     expanded = problem.series(there, instants[None], levels, reversible=True)
-    last = expanded.accelerations.joints[levels:] / ((levels + 1) * (levels + 2))
-    return jnp.concatenate([expanded.coordinates[: levels + 2], last])
+    return coordinates_of(expanded, levels)

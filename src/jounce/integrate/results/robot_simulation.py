@@ -21,9 +21,11 @@ from jounce.integrate.marching.robot_state import RobotState, at
 from jounce.integrate.results.simulation import at_steps, chosen_instants, steps_of
 from jounce.integrate.steps.methods import Lanes
 from jounce.jet import Jet, compose
+from jounce.jet.derivatives import plain_derivatives
 from jounce.kinematics import Status
 from jounce.kinematics.results.tables import Tabulated
 from jounce.robot.algorithms.base_motion import BaseMotion
+from jounce.robot.algorithms.forward_dynamics import coordinates_of
 from jounce.robot.algorithms.inverse_dynamics import inverse_dynamics
 from jounce.robot.algorithms.wrench_laws import WrenchPart
 from jounce.robot.algorithms.wrenches import Wrench
@@ -96,10 +98,11 @@ class RobotSimulation(Tabulated):
         (state, q, twist), backend = expanded_robot.at_instants(problem, lanes_of, len(instants), order=levels)
         self._state = state
         self.backend = joined({backend, *self._steps_backends})
-        self.q = _derivatives(q)[:, : order + 1]
+        self.q = plain_derivatives(q).transpose(2, 0, 1)[:, : order + 1]
         self.base: BaseMotion | None = None
         if twist is not None:
-            self.base = BaseMotion(state.position.T.copy(), state.quaternion.T.copy(), _derivatives(twist))
+            rates = plain_derivatives(twist).transpose(2, 0, 1)
+            self.base = BaseMotion(state.position.T.copy(), state.quaternion.T.copy(), rates)
         fine = np.isfinite(self.q).all(axis=(1, 2))
         self.status: Int[np.ndarray, " time"] = np.where(reached, int(Status.OK), int(Status.NOT_REACHED))
         self.faults: dict[int, str] = {}
@@ -245,12 +248,6 @@ class RobotSimulation(Tabulated):
         return xarray.Dataset(variables, axes, attrs=about)
 
 
-def _derivatives(coefficients: np.ndarray) -> np.ndarray:
-    """Return plain derivatives, the batch first, from Taylor coefficients, the batch last."""
-    factorials = np.array([math.factorial(k) for k in range(len(coefficients))], float)
-    return (coefficients * factorials[:, None, None]).transpose(2, 0, 1)
-
-
 @mapped(widths=WIDTHS)
 def expanded_robot(
     problem: RobotProblem, lanes: tuple[RobotState, Lanes, Lanes], order: int
@@ -270,8 +267,7 @@ def expanded_robot(
     polynomial, since, time = lanes
     state = at(polynomial, since)
     series = problem.series(state, time[None], order)
-    last = series.accelerations.joints[order:] / ((order + 1) * (order + 2))
-    q = jnp.concatenate([series.coordinates[: order + 2], last])
+    q = coordinates_of(series, order)
     if series.twist is None:
         return state, q, None
     rate = series.accelerations.base

@@ -95,7 +95,7 @@ def traced_simulation(simulate: Callable[..., Simulation], given: Mapping[str, A
     pieces = _pieces(simulation, equations, _model_of(made, simulation)[1], allowed, kinks)
     coordinates = _coordinates(simulation, equations, pieces, start, order)
     known = {name: np.asarray(x) for name, x in simulation.poses[1].items()}
-    coordinates = {name: known[name] + (x - jax.lax.stop_gradient(x)) for name, x in coordinates.items()}
+    coordinates = {name: with_value(x, known[name]) for name, x in coordinates.items()}
     solved = _solved(simulation, coordinates)
     return TracedMotion(mechanism, (model, model), simulation.time, simulation.order, solved)
 
@@ -238,11 +238,7 @@ def _jacobian(equations: Equations, state: State, instant: Instants) -> Float[Nu
 
 @compiled(narrow=True)
 def _assembled(
-    equations: Equations,
-    known: State,
-    guess: tuple[Any, Any],
-    inverse: Float[Numbers, "column row"],
-    instant: Instants,
+    equations: Equations, known: State, guess: tuple[Any, Any], inverse: Float[Numbers, "column row"], instant: Instants
 ) -> State:
     """Return a known state as it changes with positions and attitudes of the starting guess.
 

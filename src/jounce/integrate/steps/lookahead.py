@@ -15,15 +15,7 @@ import numpy as np
 from jaxtyping import Float
 
 from jounce.base.shapes import Numbers
-from jounce.dynamics.forward.accelerations import (
-    Equations,
-    Flags,
-    Indices,
-    Instants,
-    Inverse,
-    Lanes,
-    State,
-)
+from jounce.dynamics.forward.accelerations import Equations, Flags, Indices, Instants, Inverse, Lanes, State
 from jounce.dynamics.forward.ground import with_ground
 from jounce.integrate.steps.events import INTERPOLATION, NODES
 from jounce.integrate.steps.exact_programs import is_plain

@@ -20,9 +20,10 @@ from jounce.kinematics.assembly.initial_revolutions import Coordinates, Displace
 from jounce.kinematics.assembly.redundancy import Repetition, closed_nearby
 from jounce.kinematics.assembly.tangent_cone import LocalCurve, curves
 from jounce.linear_algebra.host_jacobian import HostJacobian
-from jounce.mechanism import Mechanism, Model, build, check_mechanism, time_grid
+from jounce.mechanism import Mechanism, Model, build, check_mechanism
 from jounce.mechanism.building.builder import with_reference
 from jounce.mechanism.building.preconditions import check_holonomic, concrete
+from jounce.mechanism.time import first_instant
 
 Kind = Literal["regular", "rigid", "shaky", "cusp", "singular", "change point"]
 HIGHEST_ORDER = 20
@@ -173,7 +174,7 @@ def mobility(mechanism: Mechanism, time: float | None = None, order: int = 10) -
     check_holonomic(mechanism, "mobility to a finite extent")
     order = whole_number("order", order, 2, HIGHEST_ORDER, error=MechanismError)
     if time is None:
-        time = 0.0 if mechanism.time is None else float(time_grid(mechanism.time, mechanism.parameter_values)[0])
+        time = first_instant(mechanism.time, mechanism.parameter_values)
     model, coordinates, attempt = _released(mechanism, time)
     columns, rows = model.system.shape[1], len(model.rows)
     if not rows:

@@ -5,7 +5,4 @@ from jounce.kinematics.cams.followers import (
     TranslatingFollower as TranslatingFollower,
 )
 from jounce.kinematics.cams.plate_cams import PlateCam as PlateCam, plate_cam as plate_cam
-from jounce.kinematics.cams.results import (
-    Extreme as Extreme,
-    Undercut as Undercut,
-)
+from jounce.kinematics.cams.results import Extreme as Extreme, Undercut as Undercut

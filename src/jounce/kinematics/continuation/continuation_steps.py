@@ -204,11 +204,7 @@ def _next_up(run: StepState, grid: Float[Numbers, " time"]) -> Float[Numbers, " 
 
 
 def _after(
-    run: StepState,
-    arrival: StepResult,
-    known: SolvedState,
-    grid: Float[Numbers, " time"],
-    limits: StepLimits,
+    run: StepState, arrival: StepResult, known: SolvedState, grid: Float[Numbers, " time"], limits: StepLimits
 ) -> tuple[StepState, ExpansionPoint, Bool[Numbers, ""]]:
     """Return the state of a run after a batch, where its first lane arrived, and whether that is the next anchor.
 

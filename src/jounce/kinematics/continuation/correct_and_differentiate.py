@@ -21,12 +21,7 @@ from jounce.jet.algebra import stacked
 from jounce.jet.turns import brought_near
 from jounce.kinematics.continuation.corrector import newton_raphson
 from jounce.kinematics.continuation.jacobian_factors import Factor, factored
-from jounce.kinematics.continuation.predictor import (
-    hidden_by_laws,
-    laws_predictable,
-    near_prediction,
-    travel_of,
-)
+from jounce.kinematics.continuation.predictor import hidden_by_laws, laws_predictable, near_prediction, travel_of
 from jounce.kinematics.continuation.singularity_distance import det_rate_of
 from jounce.kinematics.status import Status
 from jounce.linear_algebra.least_squares import LeastSquaresFactor

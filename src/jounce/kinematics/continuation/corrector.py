@@ -55,11 +55,7 @@ class _Iteration(NamedTuple):
 
 
 def newton_raphson(
-    system: System,
-    pose: Pose,
-    time: Float[Jet, "1 batch"],
-    tolerance: Float[Numbers, ""],
-    refine: Bool[Numbers, ""],
+    system: System, pose: Pose, time: Float[Jet, "1 batch"], tolerance: Float[Numbers, ""], refine: Bool[Numbers, ""]
 ) -> tuple[Pose, Factor, Correction]:
     """Return the assembled pose, the factored Jacobian there, and how large the corrections were.
 

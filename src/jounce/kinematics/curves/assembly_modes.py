@@ -1,7 +1,7 @@
 """All assemblies of a mechanism at one instant: from many starts, and along the curves through those found."""
 
 import dataclasses
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from typing import Any, overload
 
 import numpy as np
@@ -22,9 +22,9 @@ from jounce.kinematics.assembly.axis_directions import axis_signs, drawn_axis_si
 from jounce.kinematics.assembly.gauss_newton import assemble_from_guess
 from jounce.kinematics.curves.curve import Curve
 from jounce.kinematics.curves.path_tracker import PathTracker
-from jounce.kinematics.curves.start import first_instant, posed
+from jounce.kinematics.curves.start import posed
 from jounce.kinematics.curves.starts import assemble_side_by_side
-from jounce.kinematics.curves.tracing import check_number, traced
+from jounce.kinematics.curves.tracing import check_number, instant_of, traced
 from jounce.mechanism import Mechanism, build, check_mechanism
 from jounce.mechanism.building.preconditions import check_holonomic, concrete
 from jounce.mechanism.carriages import check_without_ends
@@ -117,9 +117,6 @@ class Assemblies(Displayed, Sequence[Assembly]):
     def __getitem__(self, index: Any) -> Any:
         return self._found[index]
 
-    def __iter__(self) -> Iterator[Assembly]:
-        return iter(self._found)
-
     def number(self, number: int) -> Assembly:
         """Return the assembly of a number, from 1.
 
@@ -192,10 +189,7 @@ def assemblies(
     check_holonomic(mechanism, "an assembly")
     check_number("count", count, 1, 10**7, whole=True)
     check_number("seed", seed, 0, 2**63 - 1, whole=True)
-    if time is not None:
-        check_number("time", time, -np.inf, np.inf)
-    instant = first_instant(mechanism) if time is None else float(time)
-    search = _Search(mechanism, instant)
+    search = _Search(mechanism, instant_of(mechanism, time))
     search.from_starts(count, np.random.default_rng(seed))
     curves: tuple[Curve, ...] = ()
     if circuits and (driver is not None or len(mechanism.drivers) == 1):

@@ -1,12 +1,9 @@
 """From a mechanism to its curve of configurations."""
 
-import math
-
 from jounce.base.shapes import Real
 from jounce.kinematics.curves.choice import chosen
 from jounce.kinematics.curves.curve import Curve
-from jounce.kinematics.curves.start import first_instant
-from jounce.kinematics.curves.tracing import check_number, traced
+from jounce.kinematics.curves.tracing import check_number, instant_of, traced
 from jounce.mechanism import Mechanism, check_mechanism
 from jounce.mechanism.building.preconditions import check_holonomic, concrete
 from jounce.mechanism.carriages import check_without_ends
@@ -73,7 +70,5 @@ def trace(
     check_number("order", order, 0, HIGHEST_ORDER, whole=True)
     check_number("count", count, 2, 10**7, whole=True)
     check_number("length", length, 1e-6, 1e6)
-    if time is not None:
-        check_number("time", time, -math.inf, math.inf)
-    instant = first_instant(mechanism) if time is None else float(time)
+    instant = instant_of(mechanism, time)
     return traced(chosen(mechanism, instant), instant, driver, (int(order), int(count), float(length)))

@@ -49,18 +49,13 @@ def _by_wish(candidates: Assemblies, wish: Mapping[str, str]) -> Assembly:
     for body, side in wish.items():
         axis, sign = SIDES[side]
         sizes = np.array([sign * _middle(assembly.mechanism, body)[axis] for assembly in left])
-        left = [
-            x for x, size in zip(left, sizes, strict=True) if size > sizes.max() - DIFFERENT * _size(left[0].mechanism)
-        ]
+        least = sizes.max() - DIFFERENT * build(left[0].mechanism).length
+        left = [x for x, size in zip(left, sizes, strict=True) if size > least]
     if len(left) > 1:
         numbers = " and ".join(str(x.number) for x in left)
         message = f"assemblies {numbers} fit equally well: add the side of another body, or give a number"
         raise AssemblyError(message, name="assembly", value=dict(wish))
     return left[0]
-
-
-def _size(mechanism: Mechanism) -> float:
-    return build(mechanism).length
 
 
 def _middle(mechanism: Mechanism, body: str) -> np.ndarray:

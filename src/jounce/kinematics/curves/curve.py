@@ -12,6 +12,7 @@ from jaxtyping import Float
 
 from jounce.base.display import Displayed
 from jounce.errors import MechanismError
+from jounce.jet.derivatives import plain_derivatives
 from jounce.jet.turns import WHOLE_TURN
 from jounce.kinematics.curves.crossings import ChangePoint, departed
 from jounce.kinematics.curves.limits import LimitPosition, limits_between, values_between
@@ -119,13 +120,17 @@ class Curve(Displayed):
         """Arc length from end to end, or once around."""
         return self.stop - self.start
 
+    @property
+    def _steps(self) -> list[tuple[CurvePoint, float]]:
+        """The points that were solved, and up to where the series of each is used."""
+        return list(zip(self._track, [*(point.arc_length for point in self._track[1:]), self.stop], strict=True))
+
     @cached_property
     def limits(self) -> tuple[LimitPosition, ...]:
         """Limit positions in the order of arc length, located to rounding; none where nothing is driven."""
         if self.driver is None:
             return ()
-        unit, stops = self._tracker.value_scale, [*(p.arc_length for p in self._track[1:]), self.stop]
-        positions = [x for p, stop in zip(self._track, stops, strict=True) for x in limits_between(p, stop, unit)]
+        positions = [x for step in self._steps for x in limits_between(*step, self._tracker.value_scale)]
         return tuple(sorted(positions, key=lambda x: x.arc_length))
 
     @property
@@ -210,9 +215,7 @@ class Curve(Displayed):
         if self.driver is None:
             return []
         period = WHOLE_TURN if self.unit == "rad" else None
-        stops = [*(point.arc_length for point in self._track[1:]), self.stop]
-        pairs = zip(self._track, stops, strict=True)
-        return [s for point, stop in pairs for s in values_between(point, stop, value, period)]
+        return [s for point, stop in self._steps for s in values_between(point, stop, value, period)]
 
     def branch_at(self, arc_length: float) -> int:
         """Return on which of the branches an arc length is, from 1."""
@@ -229,11 +232,8 @@ class Curve(Displayed):
 
     def passes(self, coordinates: dict[str, np.ndarray]) -> bool:
         """Tell whether the curve goes through a configuration."""
-        stops = [*(point.arc_length for point in self._track[1:]), self.stop]
-        pairs = zip(self._track, stops, strict=True)
-        return any(
-            step_to_configuration(self._tracker, p, stop - p.arc_length, coordinates) is not None for p, stop in pairs
-        )
+        steps = ((point, stop - point.arc_length) for point, stop in self._steps)
+        return any(step_to_configuration(self._tracker, *step, coordinates) is not None for step in steps)
 
     def connected(self) -> tuple["Curve", ...]:
         """Return this curve and those that cross it at change points, and those that cross these: the whole circuit."""
@@ -330,21 +330,16 @@ class Curve(Displayed):
     def _history(self) -> AttitudeHistory | None:
         if self._tracker.is_planar:
             return None
-        stops = [point.arc_length for point in self._track[1:]] + [self.stop]
-        parts = [
-            np.linspace(p.arc_length, stop, SAMPLES, endpoint=False) for p, stop in zip(self._track, stops, strict=True)
-        ]
-        begun = float(self._track[0].arc_length)
+        parts = [np.linspace(point.arc_length, stop, SAMPLES, endpoint=False) for point, stop in self._steps]
         instants = np.concatenate([*parts, [self.stop]])
-        instants = instants[(instants >= begun)]
+        instants = instants[instants >= self._track[0].arc_length]
         quaternions = [self._at(s).coordinates["quaternion"][0] for s in instants]
         return AttitudeHistory(np.stack(quaternions, axis=-1), instants)
 
     @cached_property
     def values(self) -> Float[np.ndarray, "point derivative"]:
         """Value of the driver and its derivatives with respect to arc length at the points."""
-        scale = np.cumprod(np.maximum(np.arange(self._order + 1.0), 1.0))
-        return (self._points[1][: self._order + 1] * scale[:, None]).T
+        return np.asarray(plain_derivatives(self._points[1][: self._order + 1])).T
 
     @cached_property
     def smallest_singular_values(self) -> Float[np.ndarray, " point"]:

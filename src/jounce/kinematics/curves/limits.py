@@ -5,6 +5,7 @@ from typing import Literal
 
 import numpy as np
 from jaxtyping import Float
+from numpy.polynomial.polynomial import polyroots, polyval
 
 from jounce.kinematics.curves.path_tracker import CurvePoint
 
@@ -72,28 +73,24 @@ def roots(coefficients: Float[np.ndarray, " order"]) -> list[float]:
     coefficients = coefficients[: significant[-1] + 1]
     slopes = (coefficients * np.arange(len(coefficients)))[1:]
     real_roots: list[float] = []
-    for root in np.polynomial.polynomial.polyroots(coefficients):
+    for root in polyroots(coefficients):
         if abs(root.imag) > ON_THE_CURVE or not -ON_THE_CURVE < root.real < 1 + ON_THE_CURVE:
             continue
         part = float(root.real)
         for _ in range(3):
-            slope = _value(slopes, part)
-            change = _value(coefficients, part) / slope if slope else 0.0
+            slope = float(polyval(part, slopes))
+            change = float(polyval(part, coefficients)) / slope if slope else 0.0
             if not abs(change) < ON_THE_CURVE:
                 break
             part -= change
-        vanishes = abs(_value(coefficients, part)) <= VANISHING * size
+        vanishes = abs(polyval(part, coefficients)) <= VANISHING * size
         if vanishes and all(abs(part - other) > 2 * ON_THE_CURVE for other in real_roots):
             real_roots.append(part)
     return sorted(real_roots)
 
 
-def _value(coefficients: Float[np.ndarray, " order"], part: float) -> float:
-    return float(np.polynomial.polynomial.polyval(part, coefficients))
-
-
 def _kind(slopes: Float[np.ndarray, " order"], part: float, size: float) -> Kind:
-    before, after = (_value(slopes, part + away) for away in (-1e-3, 1e-3))
+    before, after = (float(polyval(part + away, slopes)) for away in (-1e-3, 1e-3))
     if min(abs(before), abs(after)) <= FLAT * 1e-6 * size or before * after > 0:
         return "stationary"
     return "maximum" if before > 0 else "minimum"

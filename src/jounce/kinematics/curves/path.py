@@ -11,17 +11,10 @@ import enum
 
 import numpy as np
 from jaxtyping import Bool
+from numpy.polynomial.polynomial import polyval
 
 from jounce.kinematics.curves.crossings import PASSAGE_ORDER, ChangePoint, crossing
-from jounce.kinematics.curves.path_tracker import (
-    LANES,
-    ORDER,
-    TAIL,
-    CurvePoint,
-    PathTracker,
-    all_finite,
-    evaluate_series,
-)
+from jounce.kinematics.curves.path_tracker import LANES, ORDER, TAIL, CurvePoint, PathTracker, all_finite
 from jounce.kinematics.curves.series import CurvePoints
 
 LARGEST_DEPARTURE = 1e-8  # of the curve from the series, rad or sizes of the mechanism
@@ -131,7 +124,7 @@ def _closing_step(tracker: PathTracker, point: CurvePoint, start: CurvePoint, le
     step = step_to_configuration(tracker, point, length, {name: c[0] for name, c in start.coordinates.items()})
     if step is None:
         return None
-    if tracker.timed and abs(evaluate_series(point.value, step) - start.value[0]) > NEGLIGIBLE * tracker.value_scale:
+    if tracker.timed and abs(polyval(step, point.value) - start.value[0]) > NEGLIGIBLE * tracker.value_scale:
         return None
     ahead, first = (tracker.tangent(point)[: tracker.columns] for point in (point.recentered(step), start))
     return step if float(ahead @ first) > 1 - SAME_DIRECTION else None

@@ -1,11 +1,13 @@
 """Numerical continuation along a curve of configurations: its points, with Taylor series in arc length, on the host."""
 
 import dataclasses
+import math
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
+from numpy.polynomial.polynomial import polyval
 
 from jounce.base.shapes import Numbers
 from jounce.jet.turns import principal
@@ -17,15 +19,7 @@ ORDER = 20
 LANES = 8  # points solved side by side: a number compiles once
 TAIL = 1e-15  # of the series over a step, rad or sizes of the mechanism: rounding
 RANK_TOLERANCE = 1e-8  # of the largest singular value
-
-
-def comb(n: np.ndarray, k: np.ndarray) -> np.ndarray:
-    """Return binomial coefficients; zero where k is larger than n."""
-    table = np.zeros((ORDER + 1, ORDER + 1))
-    table[:, 0] = 1.0
-    for row in range(1, ORDER + 1):
-        table[row, 1:] = table[row - 1, 1:] + table[row - 1, :-1]
-    return table[n, k]
+BINOMIALS = np.array([[math.comb(n, k) for n in range(ORDER + 1)] for k in range(ORDER + 1)], float)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -55,13 +49,13 @@ class CurvePoint:
 
     def at(self, step: float) -> dict[str, np.ndarray]:
         """Return the coordinates that the series gives a step away."""
-        return {name: evaluate_series(c, step) for name, c in self.coordinates.items()}
+        return {name: np.asarray(polyval(step, c)) for name, c in self.coordinates.items()}
 
     def recentered(self, step: float, order: int = ORDER) -> "CurvePoint":
         """Return the point a step on that the series gives, with its terms up to an order."""
         power = np.arange(order + 1)
         away = power[None] - power[:, None]
-        shift = np.where(away >= 0, comb(power[None], power[:, None]) * step ** np.maximum(away, 0), 0.0)
+        shift = BINOMIALS[: order + 1, : order + 1] * step ** np.maximum(away, 0)
 
         def shifted(c: np.ndarray) -> np.ndarray:
             return np.concatenate([np.tensordot(shift, c[: order + 1], 1), np.zeros_like(c[order + 1 :])])
@@ -92,14 +86,6 @@ class CurvePoint:
 
         coordinates = {name: truncated(c) for name, c in self.coordinates.items()}
         return dataclasses.replace(self, coordinates=coordinates, value=truncated(self.value))
-
-
-def evaluate_series(coefficients: np.ndarray, step: float) -> np.ndarray:
-    """Return what a series gives a step away."""
-    value = np.zeros_like(coefficients[0])
-    for c in coefficients[::-1]:
-        value = value * step + c
-    return value
 
 
 @dataclasses.dataclass(frozen=True)
@@ -223,19 +209,9 @@ class PathTracker:
         coordinates = {name: lanes([p.coordinates[name] for p in several]) for name in several[0].coordinates}
         directions = [self.tangent(p)[: self.columns] for p in several] if tangent is None else [tangent]
         padded = np.concatenate([steps, np.full(LANES - count, steps[-1])])
-        solved = curve_points(
-            self.model.system,
-            coordinates,
-            lanes([p.value for p in several]),
-            lanes(directions),
-            padded,
-            np.asarray(corrected),
-            rows.astype(np.int32),
-            np.asarray(self.value_scale),
-            pose_type=self.model.pose_type,
-            order=ORDER,
-            driven=self.driven,
-        )
+        given = coordinates, lanes([p.value for p in several]), lanes(directions), padded, np.asarray(corrected)
+        scaled: Any = rows.astype(np.int32), np.asarray(self.value_scale)
+        solved = curve_points(self.model.system, *given, *scaled, pose_type=self.model.pose_type, driven=self.driven)
         cut = {name: np.asarray(x)[..., :count] for name, x in solved.coordinates.items()}
         others = [np.asarray(x)[..., :count] for x in solved[1:]]
         return CurvePoints(cut, *others)
@@ -244,11 +220,9 @@ class PathTracker:
 
     def column(self, positions: Numbers, turns: Numbers) -> np.ndarray:
         """Return shifts and turns of all bodies, shapes (components, bodies, ...), as scaled columns without ground."""
-        parts = np.concatenate([positions / self._scaled_lengths(positions), turns])[:, 1:]
+        lengths = self._lengths.reshape(-1, *[1] * (np.ndim(positions) - 1))
+        parts = np.concatenate([positions / lengths, turns])[:, 1:]
         return np.moveaxis(parts, 1, 0).reshape(self.columns, *parts.shape[2:])
-
-    def _scaled_lengths(self, positions: Numbers) -> np.ndarray:
-        return self._lengths.reshape(-1, *[1] * (np.ndim(positions) - 1))
 
     def rates(self, coordinates: dict[str, np.ndarray], value: np.ndarray) -> np.ndarray:
         """Return the direction of a curve from its series, in all unknowns, shape (unknowns, ...)."""

@@ -16,6 +16,7 @@ from jounce.base.shapes import Numbers
 from jounce.execution.compilation import compiled
 from jounce.jet import Jet
 from jounce.jet.algebra import total
+from jounce.jet.coefficients import begun_series
 from jounce.jet.programs.series import Recursion
 from jounce.linear_algebra.linear import DenseFactor
 from jounce.mechanism.building.starting_guess import pose_at
@@ -46,8 +47,6 @@ class CurvePoints(NamedTuple):
         Its derivative along the series that led there.
     first, last : array of shape (lanes,)
         Size of the first and the last correction, rad or sizes of the mechanism.
-    contraction : array of shape (lanes,)
-        Second correction with the Jacobian of the first, over the first.
     residual : array of shape (lanes,)
         Largest, of all rows.
     admissible : array of bool, shape (lanes,)
@@ -60,7 +59,6 @@ class CurvePoints(NamedTuple):
     slope: Any
     first: Lanes
     last: Lanes
-    contraction: Lanes
     residual: Lanes
     admissible: Bool[Numbers, " lane"]
 
@@ -94,11 +92,8 @@ class _Curve:
         value = value + self.value_scale * step[-1] if self.driven else value
         return pose.displaced(shift, turn), value
 
-    def sized(self, step: Any) -> Any:
-        return jnp.max(jnp.abs(step), axis=0)
 
-
-@compiled("pose_type", "order", "driven")
+@compiled("pose_type", "driven")
 def curve_points(
     system: System,
     coordinates: dict[str, Numbers],
@@ -110,7 +105,6 @@ def curve_points(
     value_scale: Float[Numbers, ""],
     *,
     pose_type: type[Pose],
-    order: int,
     driven: bool,
 ) -> CurvePoints:
     """Return points of a curve, each from the series at a point before it.
@@ -131,51 +125,45 @@ def curve_points(
         One less than there are unknowns, which are independent here.
     value_scale : float
         Unit in which the value counts as an unknown.
-    pose_type, order, driven
-        PlanarPose or SpatialPose; order of the series requested; whether a driver is free.
+    pose_type, driven
+        PlanarPose or SpatialPose; whether a driver is free.
     """
     curve = _Curve(system, rows, value_scale, driven)
     series = {name: Jet(tuple(c)) for name, c in coordinates.items()}
     pose = pose_type.predicted_from(series, step)
     reached = Jet(tuple(value)).evaluate(step)
-    pose, reached, sizes = _corrected(curve, pose, reached, tangent, corrected)
+    pose, reached, (first, last) = _corrected(curve, pose, reached, tangent, corrected)
     jacobian = curve.jacobian(pose, reached)
     factor = curve.bordered(jacobian, tangent)
     value_rate = Jet(tuple(value)).differentiate().evaluate(step)
-    solved, value = _differentiated(curve, pose, reached, factor, order)
-    slope = _slope(curve, pose, reached, _moved_on(series, step), value_rate)
+    solved, value = _differentiated(curve, pose, reached, factor, len(value) - 1)
+    rates = {name: jet.differentiate().evaluate(step) for name, jet in series.items()}
+    slope = _slope(curve, pose, reached, rates, value_rate)
     residual = jnp.max(jnp.abs(curve.residual(pose.truncate(0), reached)), axis=0, initial=0.0)
     admissible = jnp.all(system.admissible(Jet([reached[None]])), axis=0)
-    first, last, contraction = sizes
-    return CurvePoints(solved, value, jacobian, slope, first, last, contraction, residual, admissible)
+    return CurvePoints(solved, value, jacobian, slope, first, last, residual, admissible)
 
 
 def _corrected(curve: _Curve, pose: Any, value: Any, tangent: Any, corrected: Any) -> Any:
-    """Return pose and value on the curve, in the plane across a tangent through the prediction, and three sizes."""
+    """Return pose and value on the curve, in the plane across a tangent through the prediction, and two sizes."""
     none = jnp.zeros((1, value.shape[0]))
 
     def unfinished(state: Any) -> Any:
-        _, _, _, (_, last, _), before, count = state
+        _, _, (_, last), before, count = state
         done = (last <= ROUNDING) | (before <= QUADRATIC)
         return corrected & jnp.any(~done & (jnp.isfinite(last) | (count == 0))) & (count < MAX_CORRECTIONS)
 
     def iterate(state: Any) -> Any:
-        pose, value, factor, (first, last, again), _, count = state
+        pose, value, (first, last), _, count = state
         right = jnp.concatenate([-curve.residual(pose, value)[curve.rows], none])
-        simplified = curve.sized(factor.solve(right, refined=False))
-        again = jnp.where(count == 1, simplified, again)
-        factor = curve.bordered(curve.jacobian(pose, value), tangent)
-        step = factor.solve(right, refined=False)
-        size = curve.sized(step)
+        step = curve.bordered(curve.jacobian(pose, value), tangent).solve(right, refined=False)
+        size = jnp.max(jnp.abs(step), axis=0)
         pose, value = curve.moved(pose, value, step)
-        return pose, value, factor, (jnp.where(count == 0, size, first), size, again), last, count + 1
+        return pose, value, (jnp.where(count == 0, size, first), size), last, count + 1
 
-    lanes = value.shape[0]
-    unknown, zero = np.full(lanes, np.inf), np.zeros(lanes)
-    size = curve.rows.shape[0] + 1
-    start = (pose, value, DenseFactor.blank((size, size), lanes), (unknown, unknown, zero), unknown, 0)
-    pose, value, _, (first, last, again), _, _ = jax.lax.while_loop(unfinished, iterate, start)
-    return pose, value, (first, last, again / jnp.maximum(first, 1e-300))
+    unknown = np.full(value.shape[0], np.inf)
+    pose, value, sizes, *_ = jax.lax.while_loop(unfinished, iterate, (pose, value, (unknown, unknown), unknown, 0))
+    return pose, value, sizes
 
 
 def _differentiated(curve: _Curve, pose: Any, value: Any, factor: DenseFactor, order: int) -> Any:
@@ -201,8 +189,8 @@ def _differentiated(curve: _Curve, pose: Any, value: Any, factor: DenseFactor, o
     recursion = Recursion(program, (point, attitude, value), order)
     _, newest = recursion.advanced(recursion.history, 1, (shift, spun(turn), rate))
     history = recursion.noted(recursion.history, 1, newest)
-    series = tuple(begun_series([x, y], order) for x, y in ((point, shift), (attitude, spun(turn)), (value, rate)))
-    turns, rates = begun_series([turn], order - 1), begun_series([tangent], order - 1)
+    series = tuple(begun_series([x, y], order + 1) for x, y in ((point, shift), (attitude, spun(turn)), (value, rate)))
+    turns, rates = begun_series([turn], order), begun_series([tangent], order)
 
     def level(k: Any, carry: Any) -> Any:
         history, series, turns, rates = carry
@@ -252,17 +240,6 @@ def _convolved(left: Any, right: Any, order: Any, product: Any) -> Any:
     left = left[: len(right)]
     there = (counterparts >= 0).reshape(-1, *[1] * (right.ndim - 1))
     return product(left, jnp.where(there, jnp.take(right, jnp.clip(counterparts, 0, len(right) - 1), axis=0), 0.0))
-
-
-def begun_series(coefficients: list[Any], order: int) -> Any:
-    """Return the first coefficients of a series with room for the others."""
-    first = jnp.stack(coefficients)
-    return jnp.pad(first, ((0, order + 1 - len(first)), *((0, 0),) * (first.ndim - 1)))
-
-
-def _moved_on(series: dict[str, Jet], step: Any) -> dict[str, Any]:
-    """Return the rates of coordinates by their series, a step away."""
-    return {name: jet.differentiate().evaluate(step) for name, jet in series.items()}
 
 
 def _slope(curve: _Curve, pose: Any, value: Any, rates: dict[str, Any], value_rate: Any) -> Any:

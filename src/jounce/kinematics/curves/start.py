@@ -13,7 +13,7 @@ from jounce.execution.device import resident
 from jounce.jet import Jet
 from jounce.kinematics.assembly.assemble import check_assembled, find_assembly, freely_moving
 from jounce.kinematics.curves.path_tracker import CurvePoint, PathTracker
-from jounce.mechanism import Mechanism, build, time_grid
+from jounce.mechanism import Mechanism, build
 from jounce.trajectory import ExpressionMotion
 
 TIME = "time"
@@ -104,13 +104,6 @@ def _with_law(driver: Any, text: str) -> Any:
 
 def _unit(driver: Any) -> str:
     return {"angle": "rad", "length": "m"}.get(dimension_of_field(driver, "motion"), "")
-
-
-def first_instant(mechanism: Mechanism) -> float:
-    """Return the first instant of a mechanism's own time, s; 0 where it has none."""
-    if mechanism.time is None:
-        return 0.0
-    return float(time_grid(mechanism.time, mechanism.parameter_values)[0])
 
 
 def start_of_curve(free: Freed) -> tuple[PathTracker, CurvePoint]:

@@ -9,6 +9,7 @@ from jounce.kinematics.curves.curve import Curve
 from jounce.kinematics.curves.path import track_both_directions
 from jounce.kinematics.curves.start import freed, start_of_curve
 from jounce.mechanism import Mechanism
+from jounce.mechanism.time import first_instant
 
 BRIEF = 0, 2, 200.0
 
@@ -28,3 +29,11 @@ def check_number(name: str, value: Any, least: Any, most: Any, *, whole: bool = 
         what = "a whole number" if whole else "a finite number"
         bounds = "" if not math.isfinite(most) else f" from {least:g} to {most:g}"
         raise MechanismError(f"must be {what}{bounds}", name=name, value=value)
+
+
+def instant_of(mechanism: Mechanism, time: Any) -> float:
+    """Return an instant that was given, or the first of a mechanism's own time, s."""
+    if time is None:
+        return first_instant(mechanism.time, mechanism.parameter_values)
+    check_number("time", time, -math.inf, math.inf)
+    return float(time)

@@ -66,10 +66,9 @@ class Designs:
         self = object.__new__(cls)
         self.mechanism, self.model, self.names, self.rows = mechanism, without_forces(models[0]), names, rows
         whole = [jax.tree.leaves((model.system.groups, model.system.outputs)) for model in models]
-        columns = [[np.asarray(leaf, float) for leaf in column] for column in zip(*whole, strict=True)]
-        same = [all(np.array_equal(leaf, column[0]) for leaf in column) for column in columns]
-        fixed = [leaf if fixes else None for leaf, fixes in zip(whole[0], same, strict=True)]
-        self._set(fixed, [np.concatenate(c, axis=-1) for c, fixes in zip(columns, same, strict=True) if not fixes])
+        differing = differing_leaves(whole)
+        fixed = [leaf if joined is None else None for leaf, joined in zip(whole[0], differing, strict=True)]
+        self._set(fixed, [joined for joined in differing if joined is not None])
         return self
 
     def _set(self, fixed: list[Any], values: list[np.ndarray]) -> None:
@@ -123,6 +122,13 @@ class Designs:
                 entries = np.broadcast_to(entries, (*np.shape(entries)[:-1], len(lanes)))
                 bad |= _unfit(signs[name], entries)
         return bad
+
+
+def differing_leaves(trees: Sequence[Sequence[Any]]) -> list[np.ndarray | None]:
+    """Return the leaves of some trees, lane after lane; None for those that are the same in all of them."""
+    columns = [[np.asarray(leaf, float) for leaf in column] for column in zip(*trees, strict=True)]
+    same = [all(np.array_equal(leaf, column[0]) for leaf in column) for column in columns]
+    return [None if fixes else np.concatenate(c, axis=-1) for c, fixes in zip(columns, same, strict=True)]
 
 
 def without_forces(model: Model) -> Model:

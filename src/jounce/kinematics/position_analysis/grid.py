@@ -19,13 +19,7 @@ from jounce.execution.threads import Threads
 from jounce.jet.derivatives import plain_derivatives
 from jounce.kinematics.continuation.change_points import LARGEST_DISAGREEMENT, bridged, half_width, spoiled_width
 from jounce.kinematics.continuation.correct_and_differentiate import SolvedState, StepResult
-from jounce.kinematics.continuation.path_following import (
-    OK,
-    PASSABLE,
-    ChangePoint,
-    FollowedPath,
-    follow,
-)
+from jounce.kinematics.continuation.path_following import OK, PASSABLE, ChangePoint, FollowedPath, follow
 from jounce.kinematics.continuation.solver import SMALL_BATCH, Solver
 from jounce.kinematics.position_analysis.grid_blocks import LONG_GRID, blocks_for, neighbors, solve_blocks, stride_of
 from jounce.kinematics.status import Status
@@ -44,13 +38,7 @@ class GridSolver:
         For instants that failed, the body farthest from its prediction, or the driver without a permitted value.
     """
 
-    def __init__(
-        self,
-        solver: Solver,
-        path: FollowedPath,
-        time: Float[np.ndarray, " time"],
-        span: float,
-    ):
+    def __init__(self, solver: Solver, path: FollowedPath, time: Float[np.ndarray, " time"], span: float):
         self.solver, self.path, self.time, self.span = solver, path, time, span
         self.status = np.full(len(time), int(Status.NOT_REACHED))
         self.faults: dict[int, str] = {}

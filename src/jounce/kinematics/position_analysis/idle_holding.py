@@ -8,14 +8,7 @@ from typing import Any, ParamSpec, TypeVar, cast
 import numpy as np
 
 from jounce.constraints.spin_hold import SpinHold
-from jounce.errors import (
-    IdleMotionWarning,
-    JounceError,
-    MechanismError,
-    MobilityError,
-    UnsupportedError,
-    warn_caller,
-)
+from jounce.errors import IdleMotionWarning, JounceError, MechanismError, MobilityError, UnsupportedError, warn_caller
 from jounce.kinematics.assembly.assemble import assemble
 from jounce.kinematics.assembly.idle_motions import IdleMotions
 from jounce.kinematics.results.motion import Motion

@@ -30,14 +30,7 @@ from jounce.kinematics.results.output_programs import prepare_outputs
 from jounce.kinematics.sensitivity.sensitivities import differentiable_motion
 from jounce.kinematics.sensitivity.traced_motion import TracedMotion
 from jounce.kinematics.status import Status
-from jounce.mechanism import (
-    Mechanism,
-    Model,
-    build,
-    check_mechanism,
-    time_grid,
-    with_output_drivers,
-)
+from jounce.mechanism import Mechanism, Model, build, check_mechanism, time_grid, with_output_drivers
 from jounce.mechanism.building.belts import check_room
 from jounce.mechanism.building.builder import group_rows
 from jounce.mechanism.building.preconditions import check_holonomic, concrete, concrete_or

@@ -24,10 +24,7 @@ def check_output(output: AbstractQuantity, mechanism: Mechanism, name: str = "ou
 
 
 def output_group(
-    output: AbstractOutput | AbstractConstraint,
-    mechanism: Mechanism,
-    model: Model | None = None,
-    name: str = "output",
+    output: AbstractOutput | AbstractConstraint, mechanism: Mechanism, model: Model | None = None, name: str = "output"
 ) -> Group:
     """Return an output of poses, or a driver for its coordinate, as a group of one, on the pose of all bodies.
 

@@ -19,10 +19,11 @@ from jounce.jet.algebra import stacked
 from jounce.kinematics import Motion
 from jounce.kinematics.assembly.assemble import assemble
 from jounce.kinematics.curves.choice import chosen
-from jounce.mechanism import Mechanism, build, time_grid, with_output_drivers
+from jounce.mechanism import Mechanism, build, with_output_drivers
 from jounce.mechanism.building.starting_guess import starting_guess
 from jounce.mechanism.mechanism import GROUND
 from jounce.mechanism.system import POSITION_COMPONENTS
+from jounce.mechanism.time import first_instant
 from jounce.rigid import PlanarPose, SpatialPose
 
 __all__ = ["Frame", "assembled", "frame_along", "frames", "guessed", "points_at", "within"]
@@ -52,9 +53,7 @@ def assembled(mechanism: Mechanism) -> dict[str, Frame]:
     """
     fixed = with_output_drivers(mechanism)
     started = dataclasses.replace(fixed, drivers={**fixed.drivers, **fixed.initial}, initial={})
-    first = 0.0
-    if mechanism.time is not None:
-        first = float(time_grid(mechanism.time, mechanism.parameter_values)[0])
+    first = first_instant(mechanism.time, mechanism.parameter_values)
     model, coordinates = assemble(build(chosen(started, first)), first, ASSEMBLY_TOLERANCE, free=True)
     return _by_body(mechanism, _frames(model.pose_type, coordinates))
 

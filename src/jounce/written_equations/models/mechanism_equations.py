@@ -16,7 +16,7 @@ from jounce.mechanism import Mechanism, Model, build
 from jounce.mechanism.building.builder import group_rows
 from jounce.mechanism.laws.output_drivers import with_output_drivers
 from jounce.mechanism.system import Group, System
-from jounce.mechanism.time import time_grid
+from jounce.mechanism.time import first_instant
 from jounce.mechanism.transmissions.axis_angles import measures_angle
 from jounce.written_equations.models.inputs import Inputs
 from jounce.written_equations.models.mechanism_forces import check_forces, force_functions, output_function
@@ -116,9 +116,7 @@ def _constraints(mechanism: Mechanism, model: Model, inputs: Inputs, own: tuple[
 
 def put_together(mechanism: Mechanism) -> Model:
     """Return the model of a mechanism, with angles about axes counted from where it is assembled."""
-    instant = 0.0
-    if mechanism.time is not None:
-        instant = float(time_grid(mechanism.time, mechanism.parameter_values)[0])
+    instant = first_instant(mechanism.time, mechanism.parameter_values)
     model = build(chosen(with_output_drivers(mechanism), instant))
     if not any(map(measures_angle, model.system.groups)):
         return model
