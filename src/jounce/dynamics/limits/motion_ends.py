@@ -122,9 +122,8 @@ def end_jumps(followed: FollowedTrajectory, values: Float[np.ndarray, "time deri
         if len(law.samples.value[0]) <= FEW * law.degree + 1:
             continue
         errors = trajectory.estimate_error(order, [name])[:, 0]
-        wave = (
-            np.ptp(values[:, 0, column]) / 2 * (2 * np.pi / duration) ** np.arange(order + 1)
-        )  # as errors count peaks
+        # as errors count peaks
+        wave = np.ptp(values[:, 0, column]) / 2 * (2 * np.pi / duration) ** np.arange(order + 1)
         noise = np.where(errors > UNSUPPORTED, np.inf, SAFE * errors * np.maximum(sizes[:, column], wave))
         near[:, :, column] = np.maximum(near[:, :, column], noise)
         if noise[1] > SLOW * sizes[1, column]:

@@ -33,9 +33,8 @@ STUCK_STEP = 10 * SHORTEST  # of the run: joints that stick switch after steps t
 AGAIN = 10  # such steps over a jump that end where there is no number: others are tried
 SHORT = 1e-5  # of the step that the series alone would allow
 STEEP = 1e-3  # of that step: a force that cuts it shorter may jump
-UNSEEN = (
-    1e-12  # rad or sizes of the robot: what is overlooked on a step may move a joint by this; beside a jump by less
-)
+# rad or sizes of the robot: what is overlooked on a step may move a joint by this; beside a jump by less
+UNSEEN = 1e-12
 NOISE = 32.0  # times what the equations miss where the series begins is rounding on the way too
 
 
@@ -355,9 +354,8 @@ def march_robot(
         short = (step < SHORT * wished) & ~last
         stuck = steps_counted(current.stuck, step, duration, longest=STUCK_STEP)
         moves = known & (low > 0) & (stuck < STUCK)
-        again = (
-            known & (low == 0.0) & (stuck < STUCK) & (current.crossing < AGAIN)
-        )  # no number at the very end of a step over a jump
+        # no number at the very end of a step over a jump
+        again = known & (low == 0.0) & (stuck < STUCK) & (current.crossing < AGAIN)
         outcome = jnp.where(last, int(Outcome.ARRIVED), int(Outcome.RUNNING))
         failed = jnp.where(again, int(Outcome.RUNNING), jnp.where(known, int(Outcome.COLLAPSED), int(Outcome.LOST)))
         outcome = jnp.where(moves, outcome, failed)

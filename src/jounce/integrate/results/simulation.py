@@ -41,9 +41,8 @@ from jounce.mechanism import Mechanism
 from jounce.mechanism.system import Group
 from jounce.mechanism.transmissions.axis_angles import AttitudeHistory, measures_angle, with_turns
 
-MUCH_LONGER = (
-    1e3  # than the step over a jump or a kink are one of those before and the next; a steep force takes several
-)
+# than the step over a jump or a kink are one of those before and the next; a steep force takes several
+MUCH_LONGER = 1e3
 FEW_INSTANTS = 8  # evaluated together, where there are no more: the end of a long run, say
 APPROACH = 4  # steps to such a place, each much shorter than the one before
 

@@ -22,9 +22,8 @@ from jounce.jet import Jet, dot
 from jounce.mechanism.system import Group
 from jounce.rigid.pose import Pose
 
-ENERGY_TOLERANCE = (
-    1e-8  # of the largest kinetic energy and the largest change of the other: so much changes by rounding at most
-)
+# of the largest kinetic energy and the largest change of the other: so much changes by rounding at most
+ENERGY_TOLERANCE = 1e-8
 OFFSET = 1e-12  # of all energies, however little of them is exchanged
 EXCHANGED = 1e-13  # of the power of a force: what differs by more from the rate of what is stored is taken or given
 

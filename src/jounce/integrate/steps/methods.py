@@ -20,9 +20,8 @@ Sizes = Float[Numbers, "order batch"]
 
 MAX_ORDER = 40
 LOWEST_ORDER = 4
-NEEDED = (
-    LOWEST_ORDER + 2
-)  # coefficients that must be finite: beside a jump of a force higher ones are rounding, or none
+# coefficients that must be finite: beside a jump of a force higher ones are rounding, or none
+NEEDED = LOWEST_ORDER + 2
 FAINT = 1e-10  # what grows in the upper coefficients from an amplitude below is rounding, near a singular position
 BRACED = 20.0  # in multiples of the largest mass, by a gap of one: 30 and more where coefficients drown, else below 26
 NEAR = 1e-6  # rad or sizes of the mechanism: what a body moves within the radius of a series near a pole

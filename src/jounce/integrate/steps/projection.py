@@ -9,9 +9,8 @@ from jounce.dynamics.forward.accelerations import Attitudes, Equations, Instants
 from jounce.jet import Jet
 
 MOST_ITERATIONS = 10
-LARGEST_GAP = (
-    1e-9  # rad or sizes of the mechanism, that redundant constraints may leave: then they contradict each other
-)
+# rad or sizes of the mechanism, that redundant constraints may leave: then they contradict each other
+LARGEST_GAP = 1e-9
 CLOSE = 4e-15  # so near to where the matrix was inverted, in the same unit, the inverse is the same but for rounding
 ROUNDING = 1e-15  # a correction this small, in rad or sizes of the mechanism, leaves nothing to correct
 

@@ -33,9 +33,8 @@ PASSAGE_DEVIATION = 1e-8  # from that series, as a part of the way: two branches
 NEARLY_SINGULAR = 1e-6  # of the span: a motion that ends so short before a singular position ends at it
 LEAST_PASSAGE = 0.2  # of the way to a change point: how far the motion must go on beyond it
 NEARBY = 0.1  # radii: a singular position nearer than this spoils high derivatives, if the motion is smooth there
-SAMPLES_A_STEP = (
-    8  # in each step at which attitudes are looked at for turns: nowhere between them a body turns by half a turn
-)
+# in each step at which attitudes are looked at for turns: nowhere between them a body turns by half a turn
+SAMPLES_A_STEP = 8
 
 
 class Anchor(NamedTuple):
