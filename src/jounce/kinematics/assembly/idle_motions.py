@@ -13,10 +13,11 @@ from jaxtyping import Float
 from jounce.kinematics.assembly.initial_revolutions import Coordinates, Displace
 from jounce.kinematics.assembly.redundancy import Redundancy
 from jounce.mechanism import Model
-from jounce.mechanism.transmissions.axis_angles import turned
+from jounce.mechanism.transmissions.axis_angles import quaternion_product, turned
 
 TURNS = (0.9, -2.3)  # rad, by which bodies are spun
 RELATED = 1e-6  # part of a velocity: less is rounding
+_POSE = ("position", "quaternion")
 HELD = 1e-8  # rad or sizes of the mechanism, by which constraints may be open after a spin
 
 IdleMotions = dict[str, tuple[tuple[str, ...], tuple[float, float, float]]]
@@ -106,9 +107,6 @@ def _spin(
     return axis, np.cross(axis, at_origin[:, 0]) / size
 
 
-_POSE = ("position", "quaternion")
-
-
 def _is_finite(members: list[int], spin: tuple[Any, Any], coordinates: Coordinates, displace: Displace) -> bool:
     """Tell whether all constraints hold after large turns of bodies about a line, while the others stay in place."""
     axis, point = spin
@@ -117,15 +115,9 @@ def _is_finite(members: list[int], spin: tuple[Any, Any], coordinates: Coordinat
         turn = np.concatenate([[np.cos(angle / 2)], np.sin(angle / 2) * axis])[:, None]
         position, attitude = (np.array(coordinates[name]) for name in _POSE)
         position[:, bodies, 0] = point[:, None] + turned(turn, position[:, bodies, 0] - point[:, None])
-        attitude[:, bodies, 0] = _composed(turn, attitude[:, bodies, 0])
+        attitude[:, bodies, 0] = quaternion_product(turn, attitude[:, bodies, 0])
         nothing = np.zeros(6 * (position.shape[1] - 1)) if nothing is None else nothing
         residual = displace({**coordinates, "position": position, "quaternion": attitude}, nothing)[1]
         if not np.abs(residual).max(initial=0.0) < HELD:
             return False
     return True
-
-
-def _composed(p: Float[np.ndarray, "4 #body"], q: Float[np.ndarray, "4 body"]) -> Float[np.ndarray, "4 body"]:
-    """Return the Euler parameters of a turn p after turns q."""
-    scalar = p[0] * q[0] - (p[1:] * q[1:]).sum(axis=0)
-    return np.concatenate([scalar[None], p[:1] * q[1:] + q[:1] * p[1:] + np.cross(p[1:].T, q[1:].T).T])
