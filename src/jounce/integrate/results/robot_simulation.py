@@ -143,18 +143,11 @@ class RobotSimulation(Tabulated):
         Those of driven joints are what it takes to drive them. Where drives count, they are the torques before
         armature, damping and friction.
         """
-        torques = inverse_dynamics(
-            self.robot,
-            self.q,
-            drives=self._problem.equations.drives,
-            base=self._cut_base(),
-            wrenches=[
-                self._along_motion(*both) for both in zip(self._wrenches, self._problem.wrenches.parts, strict=True)
-            ],
-            time=self.time if self._wrenches else None,
-        )
-        torques = torques if self.base is None else torques[..., 6:]
-        return np.asarray(torques)
+        pairs = zip(self._wrenches, self._problem.wrenches.parts, strict=True)
+        wrenches = [self._along_motion(*both) for both in pairs]
+        how: Any = {"drives": self._problem.equations.drives, "base": self._cut_base(), "wrenches": wrenches}
+        torques = inverse_dynamics(self.robot, self.q, time=self.time if self._wrenches else None, **how)
+        return np.asarray(torques if self.base is None else torques[..., 6:])
 
     def _along_motion(self, wrench: Wrench, parts: Sequence[WrenchPart]) -> Wrench:
         """Return a wrench with its values along the motion where it depends on the state; functions as they were."""

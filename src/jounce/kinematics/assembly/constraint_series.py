@@ -98,13 +98,9 @@ class ReducedConstraints:
             some = series[first : first + LANES]
             filled = np.zeros((LANES, self.order, series.shape[2]))
             filled[: len(some), : some.shape[1]] = some
-            evaluated = _along(
-                self.model.system,
-                self.coordinates,
-                (self.free, self.dependent, self.inverse, self.held.astype(float)),
-                np.moveaxis(filled, 0, -1),
-                pose_type=self.model.pose_type,
-            )
+            given = self.coordinates, (self.free, self.dependent, self.inverse, self.held.astype(float))
+            lanes = np.moveaxis(filled, 0, -1)
+            evaluated = _along(self.model.system, *given, lanes, pose_type=self.model.pose_type)
             parts.append([np.moveaxis(np.asarray(x), -1, 0)[: len(some)] for x in evaluated])
         equations, sizes, moved = (np.concatenate(x) for x in zip(*parts, strict=True))
         return equations, sizes, moved
