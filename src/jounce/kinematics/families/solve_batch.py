@@ -263,8 +263,8 @@ class _Family:
         """Solve designs side by side; return those that are left to be solved individually."""
         count = len(self.rows)
         first, last = float(self.instants[0]), float(self.instants[-1])
-        found = ((k, assembled) for k in range(count) if (assembled := self._assembled(k)) is not None)
-        known, (model, _) = next(found, (0, (None, None)))
+        attempts = ((k, assembled) for k in range(count) if (assembled := self._assembled(k)) is not None)
+        known, (model, _) = next(attempts, (0, (None, None)))
         if model is None or model.system.rank is not None:
             return np.arange(count)
         lost = lost_orders(self.mechanism)
@@ -289,7 +289,7 @@ class _Family:
 
     def _individually_assembled(self, levels: int, threads: int) -> Int[np.ndarray, " design"]:
         """Assemble designs one by one, as angles about axes require, and follow them side by side."""
-        assembled = {k: found for k in range(len(self.rows)) if (found := self._assembled(k)) is not None}
+        assembled = {k: attempt for k in range(len(self.rows)) if (attempt := self._assembled(k)) is not None}
         models, positions = zip(*assembled.values(), strict=True)
         chosen = np.array(list(assembled))
         designs = Designs.of_models(self.held, models, self.names, self.rows[chosen])

@@ -51,8 +51,8 @@ def _row_scale(mechanism: Mechanism, driven: Model, instant: float) -> Float[np.
 
 def _counted(model: Model, driven: Model, row_scale: Float[np.ndarray, "row 1"]) -> Model:
     """Return the model of the drivers with all that was found when the outputs were held."""
-    groups, found = counted_as_in(model.system.groups, driven), driven.system
-    known = {"forces": found.forces, "outputs": found.outputs, "row_scale": row_scale, "rank": found.rank}
+    groups, held = counted_as_in(model.system.groups, driven), driven.system
+    known = {"forces": held.forces, "outputs": held.outputs, "row_scale": row_scale, "rank": held.rank}
     system = with_fields(model.system, groups=groups, **known)
     return dataclasses.replace(
         model, system=system, reference=driven.reference, prescribed=driven.prescribed, history=driven.history
