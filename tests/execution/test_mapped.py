@@ -22,7 +22,7 @@ needs_machine_code = pytest.mark.skipif(
 
 
 @pytest.fixture(autouse=True)
-def _wanted(monkeypatch):
+def _machine_code(monkeypatch):
     monkeypatch.delenv("JOUNCE_NATIVE", raising=False)  # as where all tests run without machine code
 
 
@@ -82,7 +82,7 @@ def test_threads_that_ask_at_once_get_one_program():
     assert len({id(prepared.machine_code) for prepared in found}) == 1
 
 
-@pytest.mark.parametrize("variable, installed", [("0", True), ("1", False)], ids=["not wanted", "not installed"])
+@pytest.mark.parametrize("variable, installed", [("0", True), ("1", False)], ids=["switched off", "not installed"])
 def test_there_may_be_none(variable, installed, monkeypatch):
     monkeypatch.setenv("JOUNCE_NATIVE", variable)
     monkeypatch.setattr(self_test, "is_usable", lambda: installed)

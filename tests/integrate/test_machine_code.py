@@ -12,7 +12,7 @@ pytestmark = pytest.mark.skipif(
 
 
 @pytest.fixture(autouse=True)
-def _wanted(monkeypatch):
+def _machine_code(monkeypatch):
     monkeypatch.delenv("JOUNCE_NATIVE", raising=False)  # as where all tests run without machine code
 
 

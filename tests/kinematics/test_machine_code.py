@@ -22,7 +22,7 @@ PLANAR = ["six_bar_watt", "jansen_leg", "quick_return", "gear_pair", "wolfrom_tr
 
 
 @pytest.fixture(autouse=True)
-def _wanted(monkeypatch):
+def _machine_code(monkeypatch):
     monkeypatch.delenv("JOUNCE_NATIVE", raising=False)  # as where all tests run without machine code
 
 

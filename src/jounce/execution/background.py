@@ -62,7 +62,7 @@ class ByKey:
             future.set_result(result)
         while not future.done() and _took_up_next():
             pass
-        if future.exception() is not None:  # of a thread whose program nobody may want any more
+        if future.exception() is not None:  # of a thread whose program may not be needed any more
             return self.get(key, make)
         return future.result()
 

@@ -128,7 +128,7 @@ class Compiled:
         Whether its arrays are short, as `compiler_options` has it.
     brief : bool, optional
         Whether a command calls it so seldom, or has it compute so little, that it waits longer for the compiler: then
-        LLVM optimizes nothing in machine code, in a seventh of the time; nor in XLA's where code is wanted soon, in
+        LLVM optimizes nothing in machine code, in a seventh of the time; nor in XLA's where code is needed soon, in
         half the time.
     single : bool or callable, optional
         Whether machine code, all in one piece, is better where there is a compiler for it; or what tells that from the

@@ -22,7 +22,7 @@ from jounce.execution.background import ByKey
 from jounce.execution.llvm.modules import object_file
 from jounce.execution.llvm.programs import Program, Single
 from jounce.execution.llvm.text.values import UnsupportedOperationError
-from jounce.execution.store.programs import current_store, made_or_kept
+from jounce.execution.store.programs import current_store, loaded_or_made
 from jounce.execution.structure import UndescribedError, cache_key, settings
 
 Group = tuple[Sequence[np.ndarray | jax.ShapeDtypeStruct], Any]  # leaves of a tree, or their forms, and its structure
@@ -168,7 +168,7 @@ class Translated:
             return binary, tuple(map(jax.tree.leaves, given)), results
 
         key = self._key(given, indices, dict(static) | how) if current_store() is not None else None
-        return made_or_kept(key, make, self._loaded)
+        return loaded_or_made(key, make, self._loaded)
 
     def _loaded(self, binary: bytes, given: Any, results: Any) -> Single | Program | str | None:
         if not binary:

@@ -16,7 +16,7 @@ Z = [0.0, 0.0, 1.0]
 
 
 @pytest.fixture(autouse=True)
-def _wanted(monkeypatch):
+def _machine_code(monkeypatch):
     monkeypatch.delenv("JOUNCE_NATIVE", raising=False)  # as where all tests run without machine code
 
 

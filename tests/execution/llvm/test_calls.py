@@ -62,7 +62,7 @@ def test_a_call(program, large):
         assert mine.dtype == theirs.dtype
 
 
-def test_calls_in_a_loop_with_parts_of_arrays_and_what_is_computed_where_it_is_wanted(program):
+def test_calls_in_a_loop_with_parts_of_arrays_and_what_is_computed_where_it_is_used(program):
     matrix, x, holds, count = given()
 
     def function(matrix, x, holds, count):

@@ -30,11 +30,11 @@ def test_programs_that_are_called_twice_have_names_of_their_own():
         np.testing.assert_array_equal(value, TABLE)
 
 
-def test_what_is_wanted_once_is_delayed_and_what_it_reads_is_kept():
+def test_what_is_used_once_is_delayed_and_what_it_reads_stays():
     def function(x, y):
-        product = x * y  # 0: wanted by 2
-        twice = x + x  # 1: wanted twice
-        difference = product - y  # 2: wanted by a sum
+        product = x * y  # 0: used by 2
+        twice = x + x  # 1: used twice
+        difference = product - y  # 2: used by a sum
         return difference.sum(axis=0), twice, jnp.sort(twice, axis=0)
 
     found = plan(function, np.ones((4, 1)), np.ones((4, 1)))

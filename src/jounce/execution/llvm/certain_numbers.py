@@ -1,4 +1,4 @@
-"""Which numbers a traced program finds for certain, whatever those are that nobody knows beforehand."""
+"""Which numbers a traced program computes for certain, whatever its unknown inputs are."""
 
 import math
 from collections.abc import Sequence

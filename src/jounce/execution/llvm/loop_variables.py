@@ -1,4 +1,4 @@
-"""Memory for the arrays that a loop changes, or that ways of which one is taken make."""
+"""Memory for the arrays that a loop changes, or that the ways of a branch make."""
 
 import math
 from collections.abc import Collection, Iterator, Mapping, Sequence

@@ -1,6 +1,6 @@
-"""In which order a program of JAX is written: calls within it are part of it, and numbers wanted once come late.
+"""In which order a program of JAX is written: calls within it are part of it, and numbers used once are written late.
 
-Where arrays may be in memory, what repeats is written once, and what nobody wants is not written: no one else would
+Where arrays may be in memory, what repeats is written once, and what no result needs is not written: no one else would
 find out. Of single values, the text and LLVM do, and those that repeat need not be kept.
 """
 
@@ -17,7 +17,7 @@ CALLS = ("jit", "pjit", "closed_call", "core_call", "custom_jvp_call", "custom_v
 """Operations that call a program, which is written in their place unless it is a subroutine."""
 
 VIEWS = ("broadcast_in_dim", "reshape", "squeeze", "expand_dims", "transpose")
-"""Operations that repeat where they do: they are no work, and what is wanted once need not be in memory."""
+"""Operations that repeat where they do: they are no work, and what is used once need not be in memory."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,11 +52,11 @@ class Plan:
         Of variables to the values of the programs that are called.
     delayed : mapping
         Of operations, by number, to the one that wants their numbers, once; they may be computed there. Results are
-        wanted after all of them.
+        used after all of them.
     last : mapping
         Of variables to the number of the last operation that reads them; results are read after all of them.
     ends : mapping
-        Of operations to the variables that nobody reads after them.
+        Of operations to the variables that are not read after them.
     """
 
     operations: Sequence[Operation]
@@ -82,7 +82,7 @@ def plan_of(program: Any, deferred: Collection[str], reading: Collection[str]) -
     ----------
     program : Jaxpr
     deferred : collection of str
-        Operations whose numbers may be computed where they are wanted.
+        Operations whose numbers may be computed where they are used.
     reading : collection of str
         Others that read a number once.
     """

@@ -175,7 +175,7 @@ class Program:
             Leaves of the arguments of an instant: those that it takes from its source, those that are its own, and
             those that all have the same; see `RoundRunner`.
         results : sequence of array
-            Where the leaves of the results go; None for those that nobody wants.
+            Where the leaves of the results go; None for those that are not needed.
         sources, links : sequence of int
             As `RoundRunner` has them.
         """
@@ -214,7 +214,7 @@ class Program:
 
 
 def _agree(arrays: Sequence[Any], expected: Sequence[tuple[tuple[int, ...], Any]]) -> None:
-    """Raise ValueError unless arrays are of the shapes and types wanted."""
+    """Raise ValueError unless arrays are of the requested shapes and types."""
     result = [(x.shape, x.dtype) for x in arrays]
     if result != expected:
         raise ValueError(f"arrays of {result}, where the program was made for {expected}")

@@ -21,7 +21,7 @@ ENTRY = 8  # bytes of a number that is copied
 class Column(NamedTuple):
     """An argument or a result of an instant, and the array of those of all instants, time last.
 
-    None where a result is not wanted.
+    None where a result is not needed.
     """
 
     shape: tuple[int, ...]

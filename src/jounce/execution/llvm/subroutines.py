@@ -1,4 +1,4 @@
-"""Functions of machine code for parts of a program that are wanted often: written once, and called.
+"""Functions of machine code for parts of a program that are used often: written once, and called.
 
 The numbers of their arguments and results are in memory, where those of what a loop or a branch has made are anyway.
 Constants that are known at a call are part of the function, so that a matrix of other certain zeros has another one.

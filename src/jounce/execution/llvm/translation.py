@@ -333,7 +333,7 @@ def _stacked(code: Code, parts: Sequence[Array]) -> Array:
 
 
 def _cond(code: Code, equation: Any, given: Sequence[Array]) -> list[Array]:
-    """Write ways of which each lane takes one: all that some lane takes are run."""
+    """Write the ways of a branch of which each lane takes one: all that some lane takes are run."""
     ways, which, inputs = equation.params["branches"], _number(code, given[0]), given[1:]
     which = code.converted(which, "i") if which.kind == "b" else which
     if len(ways) == 1 or which.constant is not None:

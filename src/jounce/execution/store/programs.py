@@ -82,7 +82,7 @@ def use_store(store: Store | None) -> None:
 
 
 def current_store() -> Store | None:
-    """Return the store that programs go to; the first time, the folder is opened that nobody had to choose."""
+    """Return the store that programs go to; the first time, the usual folder is opened."""
     if _store is _undecided:
         with _lock:
             if _store is _undecided:
@@ -157,7 +157,7 @@ def unpacked(content: bytes) -> Any:
     return Descriptions(io.BytesIO(zlib.decompress(content))).load()
 
 
-def made_or_kept(key: str | None, make: Callable[[], tuple[Any, ...]], load: Callable[..., Any]) -> Any:
+def loaded_or_made(key: str | None, make: Callable[[], tuple[Any, ...]], load: Callable[..., Any]) -> Any:
     """Return what is loaded from parts that the store has, or that are made, and kept there if they have a name.
 
     Parameters

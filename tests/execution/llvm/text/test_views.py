@@ -1,4 +1,4 @@
-"""Numbers that are computed where they are wanted: what they are computed from may have changed by then, or moved."""
+"""Numbers that are computed where they are used: what they are computed from may have changed by then, or moved."""
 
 from functools import partial
 
@@ -16,7 +16,7 @@ from tests.execution.llvm.lanes import FEW, ordinary
 assert_agree = partial(lanes.assert_agree, larges=(FEW,))
 
 
-def test_what_is_changed_before_they_are_wanted():
+def test_what_is_changed_before_they_are_used():
     def run(x, y):
         product, difference = x * y, x - y
         changed = x.at[0].set(5.0)

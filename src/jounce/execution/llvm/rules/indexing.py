@@ -131,7 +131,7 @@ def within(code: Code, index: Value, least: int, most: int) -> Value:
     return code.arithmetic("max", below, code.constant(least, index.kind))
 
 
-def kept_inside(code: Code, shape: Sequence[int], sizes: Sequence[int], starts: Sequence[Values]) -> list[Value]:
+def clamped_starts(code: Code, shape: Sequence[int], sizes: Sequence[int], starts: Sequence[Values]) -> list[Value]:
     """Return where a part of an array begins along each axis, moved so that all of it is in bounds."""
     return [
         within(code, start.item(), 0, whole - size) for whole, size, start in zip(shape, sizes, starts, strict=True)
@@ -167,7 +167,7 @@ def dynamic_update_slice(code: Code, _: Any, given: Sequence[Values]) -> Sequenc
     """Return an array with a part of it changed that starts at indices, moved so that all of it is in bounds."""
     array, new, *starts = given
     largest_starts = [whole - size for whole, size in zip(array.shape, new.shape, strict=True)]
-    indices = kept_inside(code, array.shape, new.shape, starts)
+    indices = clamped_starts(code, array.shape, new.shape, starts)
     moving = [axis for axis, index in enumerate(indices) if index.constant is None]
     firsts = [
         range(most + 1) if index.constant is None else (int(index.constant),)

@@ -8,7 +8,7 @@ from typing import Any
 
 from jax.lax import GatherScatterMode
 
-from jounce.execution.llvm.rules.indexing import filler, kept_inside, within
+from jounce.execution.llvm.rules.indexing import clamped_starts, filler, within
 from jounce.execution.llvm.rules.loops_along_axes import REDUCTIONS, StoredRule, dot, extreme
 from jounce.execution.llvm.rules.operations import ELEMENTWISE, RULES
 from jounce.execution.llvm.text.arrays import filled
@@ -49,7 +49,7 @@ MOST_READ = 16  # arrays, of which a number each is in registers at once
 
 
 def _each(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Array]:
-    """Return the results of an operation on each number: its rule for single values, where they are wanted."""
+    """Return the results of an operation on each number: its rule for single values, where they are used."""
     rule, aval = RULES[equation.primitive.name], equation.outvars[0].aval
     size = math.prod(aval.shape)  # an operand that is repeated is computed once
     operands = [x if isinstance(x, Deferred) and x.size == size else as_read(stored(code, x)) for x in given]
@@ -139,7 +139,7 @@ def _dynamic_slice(code: Code, equation: Any, given: Sequence[Array]) -> Sequenc
 
 def _window(code: Code, array: Stored, sizes: Sequence[int], starts: Sequence[Array]) -> Stored:
     """Return a part of an array, moved so that all of it is in bounds."""
-    indices = kept_inside(code, array.shape, sizes, [values_of(code, start) for start in starts])
+    indices = clamped_starts(code, array.shape, sizes, [values_of(code, start) for start in starts])
     for axis, (index, size) in enumerate(zip(indices, sizes, strict=True)):
         array = between(code, array, axis, index if index.constant is None else int(index.constant), size)
     return array
@@ -362,7 +362,7 @@ STORED: Mapping[str, StoredRule] = {
 """Rules for operations of which an array is large; of others, the numbers are taken out of memory."""
 
 DEFERRED = frozenset((*ELEMENTWISE, "broadcast_in_dim", "reshape", "squeeze", "expand_dims", "transpose"))
-"""Operations whose numbers may be computed where they are wanted."""
+"""Operations whose numbers may be computed where they are used."""
 
 READING = frozenset(("concatenate", "stack", "dynamic_update_slice", *REDUCTIONS))
 """Others that read a number of an array once."""

@@ -30,7 +30,7 @@ class Code(Scalars):
     constants : list of str
         Text of arrays of constants in memory.
     changeable : set of Region
-        Memory of one array alone, which may be changed where nobody reads it any more.
+        Memory of one array alone, which may be changed where it is not read any more.
     held : list of Region
         Memory of what loops carry that are being written, which is not given back.
     taken : list of Region
@@ -58,7 +58,7 @@ class Code(Scalars):
     _free: dict[tuple[int, str, bool], list[Region]] = field(default_factory=dict)  # that nobody uses any more
     _taken: dict[Region, tuple[int, str, bool]] = field(default_factory=dict)  # that somebody may, by what they hold
     _tables: dict[tuple[str, bytes], Region] = field(default_factory=dict)
-    _users: list[Callable[[Region], bool]] = field(default_factory=list)  # tell whether memory is wanted further on
+    _users: list[Callable[[Region], bool]] = field(default_factory=list)  # tell whether memory is used further on
 
     def room(self, size: int, kind: str, *, lanes: bool) -> Region:
         """Return memory for numbers of one kind."""
@@ -99,7 +99,7 @@ class Code(Scalars):
 
     @contextmanager
     def used(self, wants: Callable[[Region], bool]) -> Iterator[None]:
-        """Keep memory meanwhile that a function says is wanted further on."""
+        """Keep memory meanwhile that a function says is used further on."""
         self._users.append(wants)
         try:
             yield
@@ -107,7 +107,7 @@ class Code(Scalars):
             self._users.pop()
 
     def is_unshared(self, region: Region) -> bool:
-        """Tell whether what is in memory is wanted no more."""
+        """Tell whether what is in memory is no longer used."""
         return not any(wants(region) for wants in self._users)
 
     def constants_region(self, numbers: Sequence[Any], kind: str) -> Region:

@@ -14,13 +14,13 @@ def among(arrays: Sequence[Array]) -> Callable[[Region], bool]:
 
 
 def let_go(code: Code, known: dict[Any, Array], variables: Sequence[Any]) -> None:
-    """Forget variables that nobody reads any more, and give back what memory only they had."""
+    """Forget variables that are not read any more, and give back what memory only they had."""
     gone = [known.pop(variable, None) for variable in variables]
     give_back(code, [array for array in gone if array is not None])
 
 
 def give_back(code: Code, arrays: Sequence[Array]) -> None:
-    """Give back the memory of arrays that nobody reads any more, where nobody reads it by another one."""
+    """Give back the memory of arrays, unless others are in it, too."""
     for region in regions_of(arrays):
         if code.is_unshared(region):
             code.release(region)

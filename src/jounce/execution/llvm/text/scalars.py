@@ -99,7 +99,7 @@ class Scalars:
         return self._types[kind, lanes]
 
     def operand(self, value: Value, *, lanes: bool) -> str:
-        """Return a value as an operand, the same in all lanes where it is one number and a vector is wanted."""
+        """Return a value as an operand, the same in all lanes where it is one number and a vector is needed."""
         if value.constant is not None:
             text = literal(value)
             return self._repeated(value.kind, text) if lanes else text

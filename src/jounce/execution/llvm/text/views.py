@@ -1,8 +1,8 @@
 """Arrays that stay in memory, where they are too large to be single values, as places and strides.
 
 Parts, transposes and repetitions of such an array are views, as in NumPy: where numbers begin, and how far apart they
-lie. None of them takes an operation on numbers. Numbers that are wanted once need not be in memory at all: they are
-computed where they are wanted, from those that are.
+lie. None of them takes an operation on numbers. Numbers that are used once need not be in memory at all: they are
+computed where they are used, from those that are.
 """
 
 import math
@@ -67,7 +67,7 @@ class Stored:
 
 @dataclass(frozen=True, eq=False)
 class Deferred:
-    """An array whose numbers are computed where they are wanted, which is once.
+    """An array whose numbers are computed where they are used, which is once.
 
     Attributes
     ----------
@@ -118,7 +118,7 @@ class Deferred:
 
 
 def as_read(array: Stored) -> Deferred:
-    """Return an array as one whose numbers are read where they are wanted."""
+    """Return an array as one whose numbers are read where they are used."""
     return Deferred((array,), array.kind, lambda values: values[0])
 
 
