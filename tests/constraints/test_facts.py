@@ -75,7 +75,7 @@ def test_space_and_role_hold_without_a_type():
     class Winch(jn.joints.AbstractConstraint, space="planar", role="driver"):
         def residual(self, body_i, body_j, time): ...
 
-    assert (Rail.space, Rail.role, Winch.role) == ("planar", "", "driver")
+    assert (Rail.space, Rail.role, Winch.role) == ("planar", "joint", "driver")
     with pytest.raises(jn.errors.MechanismError, match="is planar, in a spatial mechanism"):
         jn.Mechanism(
             space="spatial", bodies={"a": jn.Body([0, 0, 0])}, joints={}, drivers={"w": Winch(("ground", "a"))}

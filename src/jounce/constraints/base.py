@@ -162,7 +162,7 @@ class AbstractConstraint(Module):
         if space:
             check_choice("space", space, SPACES, MechanismError)
             cls.space = space
-        if role == "driver":
+        if role == "driver" or not cls.role:
             cls.role = role
 
     def __check_init__(self):
