@@ -1,8 +1,10 @@
 """Elimination body by body: against NumPy on random patterns, and as the factorization of mechanisms."""
 
+import functools
 import itertools
 from collections import OrderedDict
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
@@ -50,15 +52,23 @@ def square(request):
     return drawn(*request.param)
 
 
+@functools.cache
 def drawn(count, width, redundant):
-    """A random factored matrix, that matrix, and what random numbers come from."""
+    """A random matrix, right-hand sides, and for both what comes of its factors, in one program."""
     random = np.random.default_rng(count + width)
     bodies = random_pattern(random, count, width, redundant)
     places = random.permutation(bodies.size * width).reshape(*bodies.shape, width)
     entries = random.standard_normal((places.size, LANES))
     fronts = Fronts.of(Pattern(bodies, places, count, places.size))
     matrix, scale = dense(bodies, places, entries, count), random.uniform(0.5, 2.0, (len(bodies), 1))
-    return FrontalFactor.of(fronts, jnp.asarray(entries), jnp.asarray(scale)), scale * matrix, random
+
+    @jax.jit
+    def found(entries, scale, right, transposed):
+        factor = FrontalFactor.of(fronts, entries, scale)
+        return factor.solve(right), factor.solve_transposed(transposed), factor.sign()
+
+    right, transposed = (random.standard_normal((size, LANES)) for size in matrix.shape[1:])
+    return scale * matrix, right, transposed, [np.asarray(x) for x in found(entries, scale, right, transposed)]
 
 
 def bound(matrix):
@@ -66,30 +76,26 @@ def bound(matrix):
 
 
 def test_solutions_are_those_of_least_squares(case):
-    factor, matrix, random = case
-    right = random.standard_normal((matrix.shape[1], LANES))
+    matrix, right, _, (found, _, _) = case
     expected = np.stack([np.linalg.lstsq(a, b, rcond=None)[0] for a, b in zip(matrix, right.T, strict=True)], axis=-1)
-    np.testing.assert_allclose(factor.solve(right), expected, atol=bound(matrix) * np.abs(expected).max())
+    np.testing.assert_allclose(found, expected, atol=bound(matrix) * np.abs(expected).max())
 
 
 def test_residuals_of_square_systems_are_rounding(square):
-    factor, matrix, random = square
-    right = random.standard_normal((matrix.shape[1], LANES))
-    found = np.asarray(factor.solve(right))
+    matrix, right, _, (found, _, _) = square
     residual = np.einsum("bij,jb->ib", matrix, found) - right
     assert np.abs(residual).max() < 1e-14 * np.abs(matrix).sum(axis=2).max() * np.abs(found).max()
 
 
 def test_transposed_systems_have_the_solution_of_least_norm(case):
-    factor, matrix, random = case
-    right = random.standard_normal((matrix.shape[2], LANES))
+    matrix, _, right, (_, found, _) = case
     expected = np.stack([np.linalg.lstsq(a.T, b, rcond=None)[0] for a, b in zip(matrix, right.T, strict=True)], axis=-1)
-    np.testing.assert_allclose(factor.solve_transposed(right), expected, atol=bound(matrix) * np.abs(expected).max())
+    np.testing.assert_allclose(found, expected, atol=bound(matrix) * np.abs(expected).max())
 
 
 def test_signs_are_those_of_the_determinants_or_all_turned_round(square):
-    factor, matrix, _ = square
-    product = np.asarray(factor.sign()) * np.linalg.slogdet(matrix)[0]
+    matrix, _, _, (_, _, sign) = square
+    product = sign * np.linalg.slogdet(matrix)[0]
     assert np.abs(product.sum()) == LANES
 
 
