@@ -69,7 +69,7 @@ def test_rows_are_read_as_they_were_written_and_the_file_tells_once_what_most_ha
     assert [line.get("circumstances") for line in whole["rows"]] == [None, None, {"processor": "two", "sizes": "small"}]
 
 
-def test_what_one_row_does_not_tell_is_not_reported_all(tmp_path):
+def test_sizes_of_one_section_are_not_said_of_all(tmp_path):
     small = ABOUT | {"sizes": "small"}
     rows = [row("rsur", "2026-01-01"), *(row("start", "2026-02-02", about=small, case=case) for case in "ab")]
     records.write(rows, tmp_path)

@@ -39,7 +39,7 @@ WORDS = {
 
 
 @pytest.mark.parametrize("command", TAKEN)
-def test_a_file_for_another_command_is_reported_what_it_is(run, command, tmp_path, monkeypatch):
+def test_a_file_for_another_command_is_refused_with_what_it_is(run, command, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     more = {"convert": ["new.yaml"], "check": [GOOD]}.get(command, [])
     for file, kind in KINDS.items():

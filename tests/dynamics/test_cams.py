@@ -282,7 +282,7 @@ def test_a_flat_face_has_no_path_and_is_named(tmp_path):
 
 
 @pytest.mark.slow
-def test_a_driver_is_reported_what_follows_it_as_a_signal(tmp_path):
+def test_a_driver_names_what_follows_it_as_a_signal(tmp_path):
     (follows,) = (line for line in FILE.splitlines() if line.startswith("  cam:"))
     text = FILE.replace(f"{follows}\n", "").replace("drivers:", f"drivers:\n{follows}")
     text = text.replace("joint: cam, quantity: contact", "driver: cam, quantity: force")

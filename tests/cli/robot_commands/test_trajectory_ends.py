@@ -78,7 +78,7 @@ def test_how_far_splines_are_from_straight_lines_is_reported(run, files, tmp_pat
 
 
 @pytest.mark.slow
-def test_a_path_of_samples_keeps_its_deviation_and_what_is_reported_as_kept_is_kept(run, files, tmp_path):
+def test_a_path_stays_as_close_to_samples_as_reported(run, files, tmp_path):
     limits, given, out = tmp_path / "limits.yaml", tmp_path / "dwells.csv", tmp_path / "fast.csv"
     limits.write_text("joints: {pin: {velocity: 2, acceleration: 10, jerk: 500}}")
     t = np.linspace(0.0, 4.0, 201)
