@@ -61,7 +61,7 @@ def test_a_condition_that_is_the_same_in_all_lanes():
 
     for n in (0, 1, 7):
         assert_agree(run, ordinary(), shared=(np.array([n]),), counts=COUNTS)
-        assert_agree(run, ordinary(), shared=(np.array([n]),), known=(0,))
+        assert_agree(run, ordinary(), shared=(np.array([n]),), knowns=((0,),))
 
 
 def test_a_condition_that_never_or_always_holds():
@@ -173,8 +173,7 @@ def test_branches_by_numbers_in_and_out_of_range(dtype, width):
         return lax.switch(n[0], ways, x), two, of_shared, lax.switch(n[0], ways[:1], x)
 
     shared = np.array([-1, 0, 1, 2, 5], dtype)
-    for known in ((), (0,)):
-        assert_agree(run, which, ordinary(2), shared=(shared,), known=known, width=width, counts=COUNTS)
+    assert_agree(run, which, ordinary(2), shared=(shared,), knowns=((), (0,)), width=width, counts=COUNTS)
 
 
 def test_branches_by_truth_values():
@@ -184,7 +183,7 @@ def test_branches_by_truth_values():
 
     for value in (True, False):
         assert_agree(run, TRUTH, ordinary(2), shared=(np.array([value]),), counts=COUNTS)
-        assert_agree(run, np.full(COUNT, value), ordinary(2), shared=(np.array([value]),), known=(0,))
+        assert_agree(run, np.full(COUNT, value), ordinary(2), shared=(np.array([value]),), knowns=((0,),))
 
 
 def test_branches_by_truth_values_that_are_not_converted():
@@ -359,9 +358,8 @@ def test_conversions_to_and_from_numbers_without_a_sign():
         whole = a.astype(jnp.int32) + n, n + n, a + a, jnp.stack([a, b]).max(0), shared[0] // shared[1] + a
         return of_other_kinds, whole, jnp.abs(x).astype(jnp.uint32), (a > b).astype(jnp.uint32)
 
-    for known in ((), (0,)):
-        given = WHOLE[None], LONG[None], 1e3 * ordinary()
-        assert_agree(run, *given, shared=(np.array([2**31 + 5, 3], np.uint32),), known=known, counts=COUNTS)
+    given = WHOLE[None], LONG[None], 1e3 * ordinary()
+    assert_agree(run, *given, shared=(np.array([2**31 + 5, 3], np.uint32),), knowns=((), (0,)), counts=COUNTS)
 
 
 @pytest.mark.parametrize("large", [None, 3])

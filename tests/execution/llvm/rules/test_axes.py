@@ -58,8 +58,7 @@ def test_places_of_extremes(name, dtype):
         both = shared | x if x.dtype == bool else shared + jnp.zeros_like(x)
         return [(lax.argmax(y, axis, dtype), lax.argmin(y, axis, dtype)) for y in (x, both) for axis in range(3)]
 
-    for known in ((), (0,)):
-        assert_agree(run, x, shared=(x[..., :1],), known=known)
+    assert_agree(run, x, shared=(x[..., :1],), knowns=((), (0,)))
 
 
 def test_the_first_extreme_that_is_not_a_number():
@@ -100,8 +99,9 @@ def test_products_of_matrices(dtype):
 
     numbers = ordinary if dtype is np.float64 else lambda *shape, seed: whole(*shape, seed=seed, dtype=dtype)
     shared = numbers(2, 4, seed=2)[..., 0]
-    for known in ((), (0,)):
-        assert_agree(run, numbers(2, 3, 4, seed=0), numbers(2, 4, 4, seed=1), shared=(shared,), known=known, rtol=1e-12)
+    assert_agree(
+        run, numbers(2, 3, 4, seed=0), numbers(2, 4, 4, seed=1), shared=(shared,), knowns=((), (0,)), rtol=1e-12
+    )
 
 
 def test_products_of_another_type():

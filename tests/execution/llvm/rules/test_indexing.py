@@ -83,8 +83,7 @@ def test_dynamic_slices(kind, width):
         return found
 
     x = ordinary(4, 3)
-    for known in ((), (0,)):
-        assert_agree(run, at, x, x > 0.0, shared=(at[[1, 7, 9, 14]],), known=known, width=width, counts=(3, COUNT))
+    assert_agree(run, at, x, x > 0.0, shared=(at[[1, 7, 9, 14]],), knowns=((), (0,)), width=width, counts=(3, COUNT))
 
 
 @pytest.mark.parametrize("kind, width", [("64 bits", 2), ("64 bits", 4), ("32 bits", 8)])
@@ -105,9 +104,8 @@ def test_dynamic_updates(kind, width):
         return found
 
     x = ordinary(4, 3)
-    for known in ((), (0,)):
-        given = (at, x, ordinary(4, 3, seed=1), x > 0.0)
-        assert_agree(run, *given, shared=(at[[1, 7, 9, 14]],), known=known, width=width, counts=(3, COUNT))
+    given = (at, x, ordinary(4, 3, seed=1), x > 0.0)
+    assert_agree(run, *given, shared=(at[[1, 7, 9, 14]],), knowns=((), (0,)), width=width, counts=(3, COUNT))
 
 
 @pytest.mark.parametrize("mode", MODES)
@@ -129,9 +127,8 @@ def test_elements_at_indices(kind, mode):
         return found
 
     x = ordinary(4, 3)
-    for known in ((), (0,)):
-        shared = (at[[1, 7, 9, 14]],)
-        assert_agree(run, at.reshape(1, -1), x, whole(4, 3), x > 0.0, shared=shared, known=known, counts=(3, COUNT))
+    shared = (at[[1, 7, 9, 14]],)
+    assert_agree(run, at.reshape(1, -1), x, whole(4, 3), x > 0.0, shared=shared, knowns=((), (0,)), counts=(3, COUNT))
 
 
 @pytest.mark.parametrize("mode", [*MODES.values(), GatherScatterMode.PROMISE_IN_BOUNDS])
@@ -152,8 +149,7 @@ def test_windows_at_indices(mode):
         return found
 
     shared = (at[[1, 2, 3, 7]],)
-    for known in ((), (0,)):
-        assert_agree(run, at.reshape(1, -1), ordinary(4, 3), shared=shared, known=known)
+    assert_agree(run, at.reshape(1, -1), ordinary(4, 3), shared=shared, knowns=((), (0,)))
 
 
 def test_batches_of_indices():
@@ -196,8 +192,7 @@ def test_changes_at_known_indices(mode):
 
     x, y = ordinary(4, 3), ordinary(4, 3, seed=1)
     for shared in ([1, 3], [1, 1], [-1, 7]):
-        for known in ((0,), ()):
-            assert_agree(run, x, y, whole(4, 3), shared=(np.array(shared),), known=known)
+        assert_agree(run, x, y, whole(4, 3), shared=(np.array(shared),), knowns=((), (0,)))
 
 
 @pytest.mark.parametrize("mode", [*MODES.values(), GatherScatterMode.PROMISE_IN_BOUNDS])
@@ -221,5 +216,4 @@ def test_windows_of_batches(mode):
         return [part[..., None] for part in found.values()]
 
     given = ordinary(3, 9, 3), ordinary(3, 4, 3, seed=1), ordinary(3, 2, 4, 3, seed=2)
-    for known in ((0,), ()):
-        assert_agree(run, *given, shared=(at,), known=known)
+    assert_agree(run, *given, shared=(at,), knowns=((), (0,)))

@@ -88,17 +88,19 @@ def test_one_operand_is_the_same_in_all_lanes(dtype):
         return found
 
     assert_agree(run, values, shared=shared)
-    for known in (range(len(shared)), (0, 3)):  # of a sum with nothing, neither XLA cares for the sign of zero
-        assert_agree(run, values, shared=shared, known=known, signs=False)
+    # of a sum with nothing, neither XLA cares for the sign of zero
+    assert_agree(run, values, shared=shared, knowns=(range(len(shared)), (0, 3)), signs=False)
 
 
 def test_functions_of_constants_and_of_what_all_lanes_share():
     functions = UNARY | EXACT
-    for known in ((), (0, 1, 2)):
-        shared = (np.array([0.75]), np.array([-1.5]), np.array([np.nan]))
-        assert_agree(
-            lambda a, b, c, x: [table(functions)(v) for v in (a, b, c)] + [x], SPECIAL, shared=shared, known=known
-        )
+    shared = (np.array([0.75]), np.array([-1.5]), np.array([np.nan]))
+    assert_agree(
+        lambda a, b, c, x: [table(functions)(v) for v in (a, b, c)] + [x],
+        SPECIAL,
+        shared=shared,
+        knowns=((), (0, 1, 2)),
+    )
 
 
 def test_powers_of_whole_exponents():
@@ -115,8 +117,7 @@ def test_conversions():
 
     assert_agree(run, beyond, LONG[:13], WHOLE[:13], TRUTH[:13])
     shared = (*beyond.reshape(-1, 1), LONG[12:13], LONG[13:14], WHOLE[13:14], TRUTH[:1])
-    for known in ((), range(len(shared))):
-        assert_agree(run, TRUTH, shared=shared, known=known)
+    assert_agree(run, TRUTH, shared=shared, knowns=((), range(len(shared))))
 
 
 @pytest.mark.parametrize("dtype", [np.int32, np.int64])
