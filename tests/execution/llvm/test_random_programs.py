@@ -252,7 +252,7 @@ def assert_exact(program, seed, unrolled, width=8, arrays=False):
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(translation, "MOST_UNROLLED", 12_000 if unrolled else -1)
         known = (1,) if seed % 3 == 0 else ()
-        options = {"width": width, "rtol": 0, "signs": False, "known": known}
+        options = {"width": width, "rtol": 0, "signs": False, "knowns": (known,)}
         if arrays:
             assert_agree(function, many[0], *lanes, shared=(*shared, many[1]), larges=(FEW,), **options)
         else:
