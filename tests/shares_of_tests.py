@@ -17,7 +17,9 @@ SLOW_EXAMPLES = frozenset(
     """
     jounce.design.optimization.optimize.optimize
     jounce.design.tolerances.spread.tolerance
+    jounce.dynamics.inverse.outputs.cam_springs.contact_spring
     jounce.dynamics.inverse.outputs.reactions.applied_force
+    jounce.dynamics.statics.holding_forces.holding_forces
     jounce.integrate.mechanisms.batch.simulate_batch
     jounce.integrate.mechanisms.diffrax_term.ode_term
     jounce.integrate.mechanisms.simulate.simulate
@@ -29,7 +31,9 @@ SLOW_EXAMPLES = frozenset(
     jounce.kinematics.position_analysis.solve.solve_in_chunks
     jounce.planning.tool_paths.follow_tool_path.follow_tool_path
     jounce.plot.charts.bands.draw_bands
+    jounce.plot.forces.draw_energy
     jounce.plot.forces.draw_power
+    jounce.reporting.facts.cam_facts.cam_facts
     jounce.reporting.facts.holding_facts.holding_facts
     jounce.robot.closed_loops.closed_loop.mechanism
     jounce.sweeps.sweeping.sweep

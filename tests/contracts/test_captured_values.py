@@ -278,6 +278,7 @@ def test_law_of_time_of_a_force():
         assert rate_after_half(torque) == pytest.approx(1 + 10 * wave.amplitude * np.sin(0.5), abs=1e-12)
 
 
+@pytest.mark.slow
 def test_two_laws_of_one_form_are_two(monkeypatch):
     values = [0.1, 0.2]
     torques = [jn.forces.Torque(GROUND, lambda x, v, t, k=k: -values[k] * v) for k in range(2)]
@@ -568,6 +569,7 @@ def test_class_and_residual_of_a_joint(monkeypatch):
     assert jn.solve(held, [0.0, 0.5], order=1).outputs["tip"][1, 0] == pytest.approx(right, abs=1e-14)
 
 
+@pytest.mark.slow
 def test_class_of_a_driver(monkeypatch):
     driven = crank(drivers={"motor": Geared(GROUND, motion="sin(t)")})
     for ratio in (1.0, 2.0):
@@ -594,6 +596,7 @@ def test_class_of_an_output_and_its_events_and_gradients(monkeypatch):
         assert run.events[0] == pytest.approx([0.6 / scale], abs=1e-12)
 
 
+@pytest.mark.slow
 def test_gradients_of_a_law_follow_its_function():
     cell = [1.0]
     moved = crank(
@@ -667,6 +670,7 @@ def last_angle(order: int = 1, **given: Any) -> float:
     return float(jn.simulate(ARM, [0.0, 1.0], order=order, state=START, **given).q[-1, 0, 0])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["torque", "single", "driven"])
 def test_controllers(name):
     controller = Controller()
@@ -859,6 +863,7 @@ def test_laws_with_other_numbers_compile_once(monkeypatch, kind):
     assert not found
 
 
+@pytest.mark.slow
 def test_another_operation_is_another_program():
     power = [2]
     for power[0], right in ((2, 0.25), (3, 0.125)):

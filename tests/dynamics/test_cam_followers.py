@@ -52,6 +52,7 @@ def contacts(theta, twist=-0.25, free=-0.03):
     return rocker, tappet
 
 
+@pytest.mark.slow
 def test_contacts_and_the_torque_of_the_shaft(mechanism):
     time = np.array([0.003, 0.02, 0.047, 0.09])
     found = jn.solve(mechanism, time, order=0).outputs

@@ -63,6 +63,7 @@ def gears(load=10.0, cut=(-20.0, 0.0), **outputs):
     )
 
 
+@pytest.mark.slow
 def test_a_ratio_acts_on_the_housing():
     motion = jn.solve(gears(bearing=jn.outputs.JointForceOutput("a")), INSTANTS, order=2)
 

@@ -96,6 +96,7 @@ def test_free_simulations_have_them_one_by_one_and_side_by_side():
     np.testing.assert_allclose(found["pole"][:, 0], one.outputs["pole"][:, 0], rtol=1e-6, atol=1e-9)
 
 
+@pytest.mark.slow
 def test_a_family_that_leaves_outputs_out_keeps_what_a_derivative_is_of():
     made = four_bar()
     single = dataclasses.replace(made, outputs={"ratio": made.outputs["ratio"]})

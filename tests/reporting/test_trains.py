@@ -1,5 +1,7 @@
 """Ratios of gear trains, as `jounce inspect` tells them, by the formulas of Willis."""
 
+import pytest
+
 import jounce as jn
 from jounce.mechanism import build
 from jounce.reporting.facts.mechanism.freedom_facts import StartingState
@@ -12,6 +14,7 @@ def ratios(mechanism):
     return {(x["driver"], x["body"]): x["fraction"] for x in facts}
 
 
+@pytest.mark.slow
 def test_a_bevel_differential_on_an_axle_that_leans():
     """The mean of both half shafts is the cage, 11/41 of the drive shaft; 16/10 of the rest is the pinion."""
     assert ratios(jn.load("examples/bevel_differential.yaml")) == {

@@ -70,6 +70,7 @@ def test_angular_velocity_and_derivatives_approach_the_truth(frame):
     np.testing.assert_array_less(errors(samples(81), 3, frame), bounds)
 
 
+@pytest.mark.slow
 def test_error_falls_with_the_spacing_as_stated():
     """Derivative n of the attitude, n - 1 of the angular velocity, as spacing^(degree + 1 - n)."""
     coarse, fine = errors(samples(41), 3), errors(samples(81), 3)

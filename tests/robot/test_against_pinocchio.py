@@ -39,7 +39,7 @@ class Case:
         return np.array([np.array(function(*sample)) for sample in self.theirs])  # copies: Pinocchio reuses its arrays
 
 
-@pytest.fixture(scope="module", params=NAMES)
+@pytest.fixture(scope="module", params=[NAMES[0], *(pytest.param(name, marks=pytest.mark.slow) for name in NAMES[1:])])
 def case(request):
     return Case(request.param)
 
@@ -149,6 +149,7 @@ def body_twist(sample):
         return place, attitude, np.array([[float(d) for d in x.derivatives()] for x in series]).T
 
 
+@pytest.mark.slow
 def test_floating_base():
     robot = load_robot(ROBOTS / "solo12.urdf", floating_base=True)
     model = pinocchio.buildModelFromUrdf(str(ROBOTS / "solo12.urdf"), pinocchio.JointModelFreeFlyer())

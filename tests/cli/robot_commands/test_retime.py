@@ -120,6 +120,7 @@ def cart(tmp_path):
     return tmp_path / "cart.urdf", tmp_path / "line.csv", "--limits", tmp_path / "limits.yaml"
 
 
+@pytest.mark.slow
 def test_a_duration_is_written_in_whole_periods(run, cart, tmp_path):
     out, figure = tmp_path / "slow.csv", tmp_path / "slow.png"
     status, printed, _ = run("retime", *cart, "--duration", "4s", "--out", out, "--figure", figure, "--json")

@@ -257,6 +257,7 @@ def test_designs_and_instants_whose_friction_locks_fail_alone_with_their_status(
     assert (caught.value.status, caught.value.motion.status.tolist()) == (12, [12, 12, 0])
 
 
+@pytest.mark.slow
 def test_a_sweep_keeps_which_designs_lock_and_the_statistics_of_the_others(tmp_path):
     time = np.array([0.0, 0.6, 1.5])
     found = jn.sweep(ladder(), {"mu": [0.1, 1.0, 0.2]}, tmp_path / "s.zarr", time, 2, workers=0, histories=True).load()

@@ -45,7 +45,7 @@ def pair(law="3*t", load="-10", friction=None, *, ring=False, ratio=False, **val
         {},
         pytest.param({"ring": True}, marks=pytest.mark.slow),
         pytest.param({"ratio": True}, marks=pytest.mark.slow),
-        {"pressure_angle": 0.35},
+        pytest.param({"pressure_angle": 0.35}, marks=pytest.mark.slow),
     ],
 )
 def test_power_that_leaves_is_power_that_enters_times_the_efficiency(kind):
@@ -86,6 +86,7 @@ def test_gears_that_lose_nothing_one_way_lock_neither_way(forward, backward):
         np.testing.assert_allclose(motion.outputs["torque"][:, 0], 0.5 * load * share, rtol=1e-12)
 
 
+@pytest.mark.slow
 def test_reactions_are_in_equilibrium_and_bearings_bear_the_tooth_force():
     motion = jn.solve(pair("3*t + sin(2*t)", pressure_angle=0.35), [0.4], order=3)
     by_ground = [jn.joint_reaction(motion, name, "ground").force.values for name in ("A", "B")]
@@ -99,7 +100,7 @@ def test_reactions_are_in_equilibrium_and_bearings_bear_the_tooth_force():
     assert abs(torques[1][0, 0] / torques[0][0, 0]) == pytest.approx(2 / 0.8, rel=1e-12)  # the load drives
 
 
-@pytest.mark.parametrize("crossed", [False, True])
+@pytest.mark.parametrize("crossed", [False, pytest.param(True, marks=pytest.mark.slow)])
 def test_a_belt_passes_on_its_share(crossed):
     friction = jn.joints.GearFriction(speed=1e-3, efficiency=0.96, backward=0.94)
     o, ratio = [0.0, 0.0], -0.5 if crossed else 0.5

@@ -91,6 +91,7 @@ def test_where_friction_locks_the_comment_says_so_also_without_a_load():
     np.testing.assert_array_equal(held(jn.Mechanism(**parts, joints=wedge(1.5).joints), "push"), [0, 0, 0])
 
 
+@pytest.mark.slow
 def test_a_wedge_that_friction_locks_one_way_moves_the_other_way():
     parts = vars_of(wedge(2.5))
     down = jn.drivers.CoordinateDriver(("ground", "wedge"), "x", motion="0.3*t")

@@ -93,6 +93,7 @@ def test_gears_resist_by_the_mean_of_what_they_lose_forward_and_backward(load):
     np.testing.assert_allclose(small.stiffness, 40.0, rtol=1e-11)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("load", [12.0, -7.0])
 def test_teeth_press_pins_that_resist(load):
     """Both pins bear the tooth force: a third of the load at 0.1 m, over the cosine of the pressure angle."""

@@ -105,7 +105,7 @@ def gears(tmp_path, friction):
     "friction, torque",
     [
         ("{efficiency: eta, speed: slow}", 4.0),
-        ("{efficiency: eta, backward: 0.1, speed: slow}", 4.0),
+        pytest.param("{efficiency: eta, backward: 0.1, speed: slow}", 4.0, marks=pytest.mark.slow),
         ("{coefficient: eta - 0.8, lead_angle: 45 deg, speed: slow}", 3.6 * 1.1 / 0.9),
     ],
 )

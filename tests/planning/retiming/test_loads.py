@@ -20,6 +20,7 @@ def cart(axis=(1, 0, 0), **limits):
     return jn.Robot("cart", [jn.Link("base"), jn.Link("cart", jn.Inertia(1.0))], [slide])
 
 
+@pytest.mark.slow
 def test_a_lift_stops_for_its_load_and_is_as_fast_as_its_force_allows():
     load = CarriedLoad("cart", jn.Inertia(0.5), 2, by="waypoint")
     found = jn.retime(cart((0, 0, 1), effort=30.0), {"slide": [0.0, 1.0, 3.0]}, loads=[load], order=1)
