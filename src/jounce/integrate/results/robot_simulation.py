@@ -145,8 +145,10 @@ class RobotSimulation(Tabulated):
         """
         pairs = zip(self._wrenches, self._problem.wrenches.parts, strict=True)
         wrenches = [self._along_motion(*both) for both in pairs]
-        how: Any = {"drives": self._problem.equations.drives, "base": self._cut_base(), "wrenches": wrenches}
-        torques = inverse_dynamics(self.robot, self.q, time=self.time if self._wrenches else None, **how)
+        torques = inverse_dynamics(
+            self.robot, self.q, drives=self._problem.equations.drives, base=self._cut_base(), wrenches=wrenches,
+            time=self.time if self._wrenches else None,
+        )  # fmt: skip
         return np.asarray(torques if self.base is None else torques[..., 6:])
 
     def _along_motion(self, wrench: Wrench, parts: Sequence[WrenchPart]) -> Wrench:

@@ -312,7 +312,8 @@ def solved_batch(
     consistent = jnp.all(gaps[1] <= 1.0, axis=0)
     status = _status(correction.last, predictable, pivot_ratio, admitted, defined, consistent, tolerance)
     body, deviation = jnp.argmax(departures, axis=0), departure / jnp.maximum(travel, 1e-300)
-    unsearched = {name: np.zeros(1) for name in ("safe_step", "radius", "det_rate")}
-    known = {"status": status, "body": body, "deviation": deviation, "sign": signs, "pivot_ratio": pivot_ratio}
-    arrival = StepResult(coordinates, outputs, **known, **unsearched, admissible=admissible, finite=finite, gaps=gaps)
+    arrival = StepResult(
+        coordinates, outputs, status, body, np.zeros(1), np.zeros(1), deviation, signs, np.zeros(1), pivot_ratio,
+        admissible, finite, gaps,
+    )  # fmt: skip
     return arrival, factor, pose

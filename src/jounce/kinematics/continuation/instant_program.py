@@ -74,9 +74,11 @@ def advance_instant(shared: Any, instants: Any, *, pose_type: type[Pose], order:
     """
     system, tolerance, refine, finite_order = shared
     (coordinates, angles, sign), step, instant, own, search = instants
-    given = coordinates, angles, sign, step, instant, tolerance, refine, search[0], finite_order
-    how: Any = {"pose_type": pose_type, "order": order, "with_det_rate": own is not None or finds_det_rate(system)}
-    return advance(with_fields(of_design(system, own), reflected=True), *given, **how)
+    return advance(
+        with_fields(of_design(system, own), reflected=True), coordinates, angles, sign, step, instant, tolerance,
+        refine, search[0], finite_order, pose_type=pose_type, order=order,
+        with_det_rate=own is not None or finds_det_rate(system),
+    )  # fmt: skip
 
 
 def of_design(system: System, own: Mapping[int, Any] | None) -> System:
