@@ -251,7 +251,9 @@ def test_gravity_that_is_switched_off(tmp_path):
     np.testing.assert_array_equal(robot.gravity, [0, 0, 0])
 
 
-@pytest.mark.parametrize("flag, kept", [("damper", (0.0, 2.0)), ("frictionloss", (5.0, 0.0))])
+@pytest.mark.parametrize(
+    "flag, kept", [("damper", (0.0, 2.0)), ("frictionloss", (5.0, 0.0)), ("constraint", (5.0, 0.0))]
+)
 def test_damping_and_friction_that_are_switched_off(tmp_path, flag, kept):
     inside = "<joint name='j' axis='0 1 0' damping='3' frictionloss='2'/>"
     drive = "<actuator><motor joint='j' damping='2'/></actuator>"
@@ -262,6 +264,15 @@ def test_damping_and_friction_that_are_switched_off(tmp_path, flag, kept):
     data.qvel[:] = 1
     mujoco.mj_forward(model, data)
     assert (-data.qfrc_passive[0], bool(data.nf)) == (kept[0], bool(kept[1]))
+
+
+@pytest.mark.parametrize("flag", ["equality", "constraint"])
+def test_equalities_that_are_switched_off(tmp_path, flag):
+    inside = "<joint name='j'/><joint name='k' type='slide'/>"
+    ties = "<equality><joint joint1='j' joint2='k'/><connect body1='a' body2='world' anchor='0 0 0'/></equality>"
+    robot = load_robot(written(tmp_path, inside, f"<option><flag {flag}='disable'/></option>{ties}"))
+    assert robot.joint_names == ("j", "k")
+    assert not robot.closures
 
 
 def test_a_linear_equality_of_joints_is_a_joint_that_follows(tmp_path):

@@ -9,6 +9,7 @@ import numpy as np
 
 from jounce.robot.model.couplings import BallDrive, Tendon
 
+OF_CONSTRAINTS = ("FRICTIONLOSS", "EQUALITY")  # which the flag of all constraints switches off, too
 OF_BALL = {"armature": "armature", "damping": "damping", "friction": "frictionloss"}
 
 
@@ -29,7 +30,7 @@ class Drives:
 
     def works(self, part: str) -> bool:
         """Whether no flag of the file takes a part of the dynamics away."""
-        return not self.model.opt.disableflags & int(getattr(self.mujoco.mjtDisableBit, f"mjDSBL_{part}"))
+        return works(self.model.opt.disableflags, part, self.mujoco)
 
     @property
     def passive(self) -> bool:
@@ -99,6 +100,12 @@ class Drives:
                 name = model.tendon(k).name or f"tendon_{k}"
                 made.append(Tendon(name, weights, rest=float(rest[0]), **given))
         return made
+
+
+def works(flags: int, part: str, mujoco: Any) -> bool:
+    """Whether the flags of a file leave a part of the dynamics, by MuJoCo's name of it, on."""
+    switches = (part, "CONSTRAINT") if part in OF_CONSTRAINTS else (part,)
+    return not any(flags & int(getattr(mujoco.mjtDisableBit, f"mjDSBL_{switch}")) for switch in switches)
 
 
 def single_spring(model: Any, j: int) -> bool:

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from jounce.io.robots.elements.faults import JOINT_SPRINGS
-from jounce.io.robots.mjcf.drives import single_spring
+from jounce.io.robots.mjcf.drives import single_spring, works
 from jounce.io.robots.mjcf.files import line_of
 
 COMPENSATION = "gravity compensation of bodies"
@@ -38,7 +38,7 @@ class LeftOut(NamedTuple):
 
 def left_out_of_spec(spec: Any, mujoco: Any) -> list[LeftOut]:
     """Return what is left out with tendons and their actuators, before these are taken away."""
-    works = _working(spec.option.disableflags, mujoco)
+    on = _working(spec.option.disableflags, mujoco)
     # MuJoCo itself refuses damping and armature of actuators of other kinds
     drives = [(k, x) for k, x in enumerate(spec.actuators) if x.trntype == mujoco.mjtTrn.mjTRN_TENDON]
     kinds = ((OF_TENDONS, "tendon", enumerate(spec.tendons)), (OF_DRIVES, "actuator", drives))
@@ -49,7 +49,7 @@ def left_out_of_spec(spec: Any, mujoco: Any) -> list[LeftOut]:
             read = _read_of(part, mujoco) if kind == "tendon" else ()
             for key, heading in headings.items():
                 value = np.ravel(getattr(part, key))
-                if value.any() and works(key) and (key not in read or value[1:].any()):
+                if value.any() and on(key) and (key not in read or value[1:].any()):
                     left.append(LeftOut(heading, name, line_of(part.info), f"{kind}s.{name}.{key}", _plain(value)))
     return left
 
@@ -78,14 +78,14 @@ def left_out_of_model(
     fixed : container of str
         Joints that an equality holds where they are, which no force moves.
     """
-    works = _working(model.opt.disableflags, mujoco)
+    on = _working(model.opt.disableflags, mujoco)
     free = [name not in fixed for name in joints]
     for j, name in enumerate(joints):
         stiffness = np.array([model.jnt_stiffness[j], *model.jnt_stiffnesspoly[j]])
-        if stiffness.any() and works("stiffness") and free[j] and not single_spring(model, j):
+        if stiffness.any() and on("stiffness") and free[j] and not single_spring(model, j):
             yield LeftOut(JOINT_SPRINGS, name, None, f"joints.{name}.stiffness", _plain(stiffness))
-    passive = works("stiffness") or works("damping")  # MuJoCo leaves out all such forces where it leaves out both
-    falls = model.opt.gravity.any() and works("gravity")
+    passive = on("stiffness") or on("damping")  # MuJoCo leaves out all such forces where it leaves out both
+    falls = model.opt.gravity.any() and on("gravity")
     matters = passive and falls and model.jnt_actgravcomp.any()  # else bodies feel less of gravity
     for k in np.flatnonzero((model.body_gravcomp != 0) & (model.body_mass > 0)).tolist() if matters else ():
         if any(free[j] and not model.jnt_actgravcomp[j] for j in _moved_by(model, k)):
@@ -107,14 +107,8 @@ def _moved_by(model: Any, body: int) -> Iterable[int]:
 
 def _working(flags: int, mujoco: Any) -> Callable[[str], bool]:
     """Return whether MuJoCo computes what belongs to an attribute, or the file switches it off."""
-    bits = mujoco.mjtDisableBit
-    switches = {
-        "stiffness": bits.mjDSBL_SPRING,
-        "damping": bits.mjDSBL_DAMPER,
-        "frictionloss": bits.mjDSBL_FRICTIONLOSS,
-        "gravity": bits.mjDSBL_GRAVITY,
-    }
-    return lambda key: key not in switches or not flags & int(switches[key])
+    parts = {"stiffness": "SPRING", "damping": "DAMPER", "frictionloss": "FRICTIONLOSS", "gravity": "GRAVITY"}
+    return lambda key: key not in parts or works(flags, parts[key], mujoco)
 
 
 def _plain(values: np.ndarray) -> object:

@@ -16,7 +16,7 @@ from jounce.errors import JounceError, RobotError, RobotFileError
 from jounce.io.robots.elements.faults import FIXED_ALREADY, Faults, left_out
 from jounce.io.robots.elements.followers import with_room
 from jounce.io.robots.elements.xml_elements import Element
-from jounce.io.robots.mjcf.drives import Drives
+from jounce.io.robots.mjcf.drives import Drives, works
 from jounce.io.robots.mjcf.files import check_assets, check_copies, included, line_of, quiet_mujoco
 from jounce.io.robots.mjcf.left_out import LeftOut, left_out_of_model, left_out_of_spec
 from jounce.io.robots.mjcf.ties import NO_CLOSURE, Ties, linear_tendons, tied_tendons
@@ -85,6 +85,9 @@ def read_mjcf(root: Element, faults: Faults, allow: Iterable[str | PathLike[str]
             spec = mujoco.MjSpec.from_file(root.path)
             scaled = spec.compiler.fusestatic and getattr(spec.compiler, "settotalmass", 0.0) > 0  # which is deprecated
             unread = left_out_of_spec(spec, mujoco)
+            if not works(spec.option.disableflags, "EQUALITY", mujoco):
+                for equality in spec.equalities:
+                    equality.active = False
             _strip(spec, mujoco, tied_tendons(spec, mujoco, root.path) | linear_tendons(spec, mujoco))
             check_assets(spec, parts, allow)
             model = spec.compile()
