@@ -21,6 +21,7 @@ from jounce.settings import under_own_settings
 
 SHAPES = ("visual", "collision")
 XACRO_SOURCE = ("xacro:include", "xacro:macro", "xacro:property", "xacro:arg", "xacro:if", "xacro:unless")
+OLD_XACRO = ("include", "macro", "property")  # as it was written before it had a prefix
 XACRO = "is a xacro file, which must first be expanded to a URDF; run: xacro FILE.urdf.xacro > FILE.urdf"
 
 
@@ -131,7 +132,7 @@ def _check_expanded(root: Element, faults: Faults) -> None:
     used = [root]
     source = any(child.tag in XACRO_SOURCE for child in root.children) or root.first("link") is None
     for child in root.children:
-        if child.tag.startswith("xacro:") and not source:
+        if child.tag in OLD_XACRO or (child.tag.startswith("xacro:") and not source):
             message = f"{child.tag} is not expanded, and what it stands for is left out; run xacro, or take it out"
             faults.leave_out(MACROS, f"<{child.tag}>", child.error(message, value=f"<{child.tag}>"))
             continue

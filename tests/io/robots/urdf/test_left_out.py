@@ -13,6 +13,9 @@ from jounce.io.robots.loader import load_robot
 MASS = '<mass value="1"/><inertia ixx="0.02" ixy="0" ixz="0" iyy="0.03" iyz="0" izz="0.04"/>'
 GAZEBO = '<gazebo reference="{}">{}</gazebo>'
 ROTOR = '<transmission name="t">{}<actuator name="m">{}</actuator></transmission>'
+CONTROL = '<ros2_control name="c"><joint name="{}"><param name="mimic">rigid</param></joint></ros2_control>'
+TWO = f"""<link name="k"><inertial>{MASS}</inertial><inertial>{MASS}</inertial></link>
+<joint name="k" type="fixed"><parent link="l"/><child link="k"/></joint>"""
 TURN = (0.2, 0.2, 0.2, 0.938083151964686)
 WEIGHTLESS = r"takes out of gravity, which other readers of URDF count: l \(line 4\)"
 CASES = {  # what follows the links and joints of a file; what is said of it, if it is
@@ -36,6 +39,10 @@ CASES = {  # what follows the links and joints of a file; what is said of it, if
     "a joint": ('<gazebo><joint name="k" type="ball"/></gazebo>', r"links and joints that <gazebo> adds: k "),
     "a follower": ("<gazebo><plugin><mimicJoint>j</mimicJoint></plugin></gazebo>", r"by a plugin: j \(line 4\)"),
     "a plugin": ("<gazebo><plugin><joint>j</joint><gravity>false</gravity></plugin></gazebo>", None),
+    "a follower of ros2_control": (CONTROL.format("j"), r"by a plugin: j \(line 4\)"),
+    "no joint of ros2_control": (CONTROL.format("rigid_"), None),
+    "an include": ('<include filename="arm.urdf"/>', r"xacro that are not expanded: <include> \(line 4\)"),
+    "two inertias": (TWO, r"elements that are given twice.*: links\.k \(line 4\)"),
     "contact": (GAZEBO.format("l", "<mu1>0.2</mu1><selfCollide>true</selfCollide>"), None),
     "two rotors in one": (
         ROTOR.format('<joint name="j"/><joint name="rigid"/>', '<drake:rotor_inertia value="2"/>'),

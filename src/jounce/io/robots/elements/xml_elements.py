@@ -12,7 +12,7 @@ from xml.parsers import expat
 from jounce.errors import RobotFileError, did_you_mean
 from jounce.io.files.located_data import dotted
 from jounce.io.files.reading import LARGEST_NUMBER, fault_of_number, read_file
-from jounce.io.robots.elements.faults import NOT_XML, UNKNOWN, Faults
+from jounce.io.robots.elements.faults import NOT_XML, TWICE, UNKNOWN, Faults
 
 MAX_DEPTH = 2000
 
@@ -37,6 +37,20 @@ class Element:
     def first(self, tag: str) -> Element | None:
         """Return the first child of a tag, None if there is none."""
         return next((child for child in self.children if child.tag == tag), None)
+
+    def only(self, tag: str, *name: str) -> Element | None:
+        """Return the first child of a tag, None if there is none; others are noted.
+
+        Raises
+        ------
+        RobotFileError
+            There are others, and the faults of the file are errors.
+        """
+        elements = self.every(tag)
+        if len(elements) > 1:
+            shown = ".".join(name) or f"<{self.tag}>"
+            elements[1].leave_out(TWICE, shown, f"<{tag}> is given twice, first in line {elements[0].line}", *name)
+        return elements[0] if elements else None
 
     def every(self, tag: str) -> list[Element]:
         """Return all children of a tag."""

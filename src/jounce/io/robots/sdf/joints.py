@@ -18,7 +18,6 @@ from jounce.io.robots.sdf.poses import (
     flag_of,
     needed,
     number_of,
-    only,
     text_of,
     vector_of,
 )
@@ -100,7 +99,7 @@ def pitch_of(element: Element, *where: str) -> float:
     RobotFileError
         A value is no number, or the older one is zero.
     """
-    if (old := only(element, "thread_pitch", *where)) and not only(element, "screw_thread_pitch", *where):
+    if (old := element.only("thread_pitch", *where)) and not element.only("screw_thread_pitch", *where):
         radians = number_of(element, "thread_pitch", *where, default=1.0)
         if radians == 0:
             raise old.error("must not be zero: it is in radians per meter", *where, "thread_pitch", value=radians)
@@ -126,14 +125,14 @@ def _axis(
     axis: Element, pose: FramePose, frames: Frames, version: tuple[int, ...], armature: float, *where: str
 ) -> SdfAxis:
     check_known(axis, AXIS, *where)
-    xyz = only(axis, "xyz", *where)
+    xyz = axis.only("xyz", *where)
     direction = np.array([0.0, 0.0, 1.0]) if xyz is None else vector_of(xyz, *where, "xyz")
     frame = "" if xyz is None else xyz.attributes.get("expressed_in", "")
     old = version < (1, 7)
     if old and flag_of(axis, "use_parent_model_frame", *where, default=version < (1, 5)):
         frame = MODEL
     rotation = frames.of(frame, xyz or axis, *where, "xyz").rotation if frame else pose.rotation
-    limit, dynamics = only(axis, "limit", *where), only(axis, "dynamics", *where)
+    limit, dynamics = axis.only("limit", *where), axis.only("dynamics", *where)
     for part, known in ((limit, LIMIT), (dynamics, DYNAMICS)):
         if part is not None:
             check_known(part, known, *where, part.tag)

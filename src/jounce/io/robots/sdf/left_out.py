@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from jounce.io.robots.elements.faults import BUSHINGS, JOINT_SPRINGS, LEAVE, PLUGINS, ROTORS, Faults, left_out
 from jounce.io.robots.elements.xml_elements import Element
 from jounce.io.robots.sdf.joints import ROTOR, SdfJoint, rotor_of
-from jounce.io.robots.sdf.poses import flag_of, needed, number_of, only
+from jounce.io.robots.sdf.poses import flag_of, needed, number_of
 
 STATIC = "<static>, which holds all joints of this model where they are"
 KINEMATIC = "<kinematic>, by which no force moves these links"
@@ -47,7 +47,7 @@ def note_left_out(
     for joint in closing:
         for axis in joint.axes:
             where, headings = ("joints", joint.name, axis.tag, "dynamics"), SPRING | IN_LOOPS
-            _note_numbers(only(needed(joint.element, axis.tag), "dynamics"), joint.name, headings, faults, *where)
+            _note_numbers(needed(joint.element, axis.tag).only("dynamics"), joint.name, headings, faults, *where)
     _note_extensions(model, tree, closing, faults)
     for name, link in links.items():
         if flag_of(link, "kinematic", "links", name):
@@ -55,7 +55,7 @@ def note_left_out(
                 left_out(KINEMATIC, "false"), "links", name, "kinematic", value=True
             )
             faults.leave_out(KINEMATIC, name, error)
-        _note_numbers(only(link, "velocity_decay"), name, DECAYS, faults, "links", name, "velocity_decay")
+        _note_numbers(link.only("velocity_decay"), name, DECAYS, faults, "links", name, "velocity_decay")
 
 
 def _note_extensions(model: Element, tree: Sequence[SdfJoint], closing: Sequence[SdfJoint], faults: Faults) -> None:

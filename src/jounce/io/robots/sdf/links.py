@@ -7,7 +7,7 @@ from jaxtyping import Float
 
 from jounce.io.robots.elements.faults import FLUID_MASS, PARTLY_INERTIAL, WITHOUT_INERTIAL, Faults, left_out
 from jounce.io.robots.elements.xml_elements import Element
-from jounce.io.robots.sdf.poses import Frames, check_known, number_of, only, pose_of
+from jounce.io.robots.sdf.poses import Frames, check_known, number_of, pose_of
 from jounce.io.robots.sdf.shapes import inertia_of_shapes
 from jounce.rigid.inertia import Inertia
 
@@ -23,7 +23,7 @@ def read_inertia(name: str, element: Element, frames: Frames, faults: Faults) ->
     """Return the inertia of a link in its frame, None where all of it is zero."""
     where = ("links", name)
     check_known(element, LINK, *where)
-    inertial = only(element, "inertial", *where)
+    inertial = element.only("inertial", *where)
     if inertial is None:
         message = "<inertial> is missing: SDF takes the link for 1 kg with moments of 1 kg m^2; give it its own"
         faults.add(WITHOUT_INERTIAL, name, element.error(message, *where))
@@ -35,7 +35,7 @@ def read_inertia(name: str, element: Element, frames: Frames, faults: Faults) ->
         inertia = inertia_of_shapes(name, element, inertial, frames, faults)
         faults.check(inertia, name, inertial.line)
         return inertia
-    moments = only(inertial, "inertia", *where)
+    moments = inertial.only("inertia", *where)
     if moments is not None:
         check_known(moments, TENSOR, *where, "inertia")
     _check_whole(name, inertial, moments, faults)
@@ -55,7 +55,7 @@ def read_inertia(name: str, element: Element, frames: Frames, faults: Faults) ->
 
 def _check_readable(name: str, inertial: Element, faults: Faults, *where: str) -> None:
     """Refuse an inertia that is placed elsewhere, and note the mass of a fluid, which is left out."""
-    pose, added = only(inertial, "pose", *where), only(inertial, "fluid_added_mass", *where)
+    pose, added = inertial.only("pose", *where), inertial.only("fluid_added_mass", *where)
     given = {} if pose is None else pose.attributes
     frame = given.get("relative_to") or given.get("frame") or name
     if pose is not None and frame != name:
@@ -86,6 +86,6 @@ def gravity_of(world: Element | None) -> Float[np.ndarray, "3"]:
     """
     holders = [] if world is None else [world, *world.every("physics")]  # up to SDF 1.5 it was a matter of the physics
     for holder in holders:
-        if (element := only(holder, "gravity", "world")) is not None:
+        if (element := holder.only("gravity", "world")) is not None:
             return np.array(element.content_numbers(3, "world", "gravity"))
     return np.array(GRAVITY)

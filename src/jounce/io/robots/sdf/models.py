@@ -21,7 +21,7 @@ from jounce.io.files.reading import named_file
 from jounce.io.robots.elements.faults import RENAMED, Faults
 from jounce.io.robots.elements.xml_elements import Element, read_markup
 from jounce.io.robots.sdf.joints import with_named_axes
-from jounce.io.robots.sdf.poses import MODEL, WORLD, FramePose, Frames, check_known, flag_of, only
+from jounce.io.robots.sdf.poses import MODEL, WORLD, FramePose, Frames, check_known, flag_of
 from jounce.io.robots.sdf.scopes import made, named, placed, reference_pose, scope, scoped
 
 MODEL_PARTS = ("static", "self_collide", "allow_auto_disable", "enable_wind", "pose", "link", "joint", "frame")
@@ -259,7 +259,7 @@ class _Models:
         if child.tag == "include":
             self.open.pop()
         name = model.text("name", "models")
-        return scoped(whole, name, reference_pose(whole), only(whole, "pose") or child, merged=merged)
+        return scoped(whole, name, reference_pose(whole), whole.only("pose") or child, merged=merged)
 
     def _included(self, include: Element, path: str) -> tuple[Element, tuple[int, ...]]:
         """Return an included model, with the name, the pose and the flag that the element gives it."""
@@ -274,16 +274,16 @@ class _Models:
             self.files[path] = models[0], version_of(root)
         model, version = self.files[path]
         attributes = dict(model.attributes)
-        if (given := only(include, "name", "include")) is not None:
+        if (given := include.only("name", "include")) is not None:
             attributes["name"] = given.content.strip()
-        replaced = {tag: part for tag in ("pose", "static") if (part := only(include, tag, "include")) is not None}
-        if (frame := only(include, "placement_frame", "include")) is not None:
+        replaced = {tag: part for tag in ("pose", "static") if (part := include.only(tag, "include")) is not None}
+        if (frame := include.only("placement_frame", "include")) is not None:
             attributes["placement_frame"] = frame.content.strip()
         children = [*replaced.values(), *(x for x in model.children if x.tag not in replaced)]
         return dataclasses.replace(model, attributes=attributes, children=children), version
 
     def _uri(self, include: Element) -> str:
-        uri = only(include, "uri", "include")
+        uri = include.only("uri", "include")
         if uri is None or not uri.content.strip():
             raise include.error("<include> has no <uri>", "include")
         return uri.content.strip()

@@ -10,7 +10,6 @@ import numpy as np
 from jaxtyping import Float
 
 from jounce.errors import no_such
-from jounce.io.robots.elements.faults import TWICE
 from jounce.io.robots.elements.xml_elements import Element
 
 MODEL = "__model__"
@@ -139,18 +138,9 @@ def pose_of(element: Element, *name: str) -> FramePose:
     return FramePose(np.array(position), Rotation.from_euler("xyz", [roll, pitch, yaw], degrees=degrees).as_matrix())
 
 
-def only(element: Element, tag: str, *name: str) -> Element | None:
-    """Return the first child of a tag, None if there is none; others are noted."""
-    elements = element.every(tag)
-    if len(elements) > 1:
-        shown = ".".join(name) or f"<{element.tag}>"
-        elements[1].leave_out(TWICE, shown, f"<{tag}> is given twice, first in line {elements[0].line}", *name)
-    return elements[0] if elements else None
-
-
 def needed(element: Element, tag: str, *name: str) -> Element:
     """Return the one child of a tag, which must be there."""
-    single = only(element, tag, *name)
+    single = element.only(tag, *name)
     if single is None:
         raise element.error(f"<{element.tag}> has no <{tag}>", *name)
     return single
@@ -167,13 +157,13 @@ def text_of(element: Element, tag: str, *name: str) -> str:
 
 def number_of(element: Element | None, tag: str, *name: str, default: float, infinite: bool = False) -> float:
     """Return the number in a child, or the default where there is none."""
-    child = None if element is None else only(element, tag, *name)
+    child = None if element is None else element.only(tag, *name)
     return default if child is None else child.content_numbers(1, *name, tag, infinite=infinite)[0]
 
 
 def flag_of(element: Element | None, tag: str, *name: str, default: bool = False) -> bool:
     """Return the truth value in a child, or the default where there is none."""
-    child = None if element is None else only(element, tag, *name)
+    child = None if element is None else element.only(tag, *name)
     if child is None:
         return default
     word = child.content.strip().lower()

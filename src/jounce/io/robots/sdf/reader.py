@@ -29,7 +29,6 @@ from jounce.io.robots.sdf.poses import (
     flag_of,
     needed,
     number_of,
-    only,
     text_of,
 )
 from jounce.io.robots.sdf.scopes import named
@@ -303,7 +302,7 @@ class _Reader:
         mimics: dict[str, Mimic] = {}
         for joint, tag in ((follower, axis.tag) for follower in tree for axis in follower.axes):
             name = self.coordinates.get((joint.name, tag), joint.name)
-            mimic = only(needed(joint.element, tag), "mimic", "joints", joint.name)
+            mimic = needed(joint.element, tag).only("mimic", "joints", joint.name)
             if mimic is not None:
                 where = ("joints", name, "mimic")
                 leader = self._leader(mimic, *where)
@@ -314,7 +313,7 @@ class _Reader:
                 mimics[name] = Mimic(leader, factor, offset - factor * reference)
                 self.lines.add(mimic, *where)
         for joint in tree:
-            if (given := only(joint.element, DRAKE_MIMIC, "joints", joint.name)) is not None:
+            if (given := joint.element.only(DRAKE_MIMIC, "joints", joint.name)) is not None:
                 self._drake_mimic(joint, given, mimics)
         for gear in gears:
             name, mimic = self._gearing(gear, tree)

@@ -9,7 +9,7 @@ import numpy as np
 
 from jounce.errors import no_such
 from jounce.io.robots.elements.xml_elements import Element
-from jounce.io.robots.sdf.poses import MODEL, WORLD, FramePose, Frames, only, pose_of
+from jounce.io.robots.sdf.poses import MODEL, WORLD, FramePose, Frames, pose_of
 
 NAMED = ("link", "joint", "frame")
 REFERENCES = ("relative_to", "expressed_in", "attached_to")  # attributes that name a frame
@@ -39,7 +39,7 @@ def named(model: Element) -> dict[str, Element]:
 
 def scope(name: str, model: Element) -> list[Element]:
     """Return the parts of a model by the names that they have in the world."""
-    return scoped(model, name, reference_pose(model), only(model, "pose") or model)
+    return scoped(model, name, reference_pose(model), model.only("pose") or model)
 
 
 def placed(model: Element) -> FramePose:
@@ -56,7 +56,7 @@ def placed(model: Element) -> FramePose:
 
 def reference_pose(model: Element) -> tuple[FramePose, str]:
     """Return the pose of a model and the frame that it is relative to, empty for the model that holds it."""
-    pose = only(model, "pose")
+    pose = model.only("pose")
     given = "" if pose is None else pose.attributes.get("relative_to") or pose.attributes.get("frame") or ""
     return placed(model), "" if given == WORLD else given
 

@@ -9,7 +9,7 @@ import numpy as np
 from jounce.errors import RobotError
 from jounce.io.robots.elements.faults import DEFAULT_DENSITY, OVERWRITTEN, Faults
 from jounce.io.robots.elements.xml_elements import Element
-from jounce.io.robots.sdf.poses import HERE, Frames, needed, number_of, only, pose_of
+from jounce.io.robots.sdf.poses import HERE, Frames, needed, number_of, pose_of
 from jounce.rigid.inertia import Inertia
 
 DENSITY = 1000.0  # of water, kg/m^3
@@ -55,7 +55,7 @@ def inertia_of_shapes(name: str, link: Element, inertial: Element, frames: Frame
         message = 'auto="true" computes the inertia from shapes, and ignores this; leave one of them out'
         faults.add(OVERWRITTEN, name, part.error(message, *where, part.tag))
     total = Inertia.total([_of_collision(name, x, inertial, frames, faults) for x in collisions])
-    if only(inertial, "mass", *where) is None:
+    if inertial.only("mass", *where) is None:
         return total
     mass = number_of(inertial, "mass", *where, default=1.0)
     if mass <= 0:
@@ -77,7 +77,7 @@ def _of_collision(name: str, collision: Element, inertial: Element, frames: Fram
         part = needed(shape, tag, *where)
         values = np.array(part.content_numbers(3 if key == "size" else 1, *where, tag)) * factor
         sizes[key] = values if key == "size" else float(values[0])
-    given = next((x for x in (only(collision, "density", *where), only(inertial, "density", *where)) if x), None)
+    given = next((x for x in (collision.only("density", *where), inertial.only("density", *where)) if x), None)
     if given is None and inertial.first("mass") is None:
         message = f"no density is given, and SDF takes {DENSITY:g} kg/m^3; give <density>"
         faults.add(DEFAULT_DENSITY, name, collision.error(message, *where))
@@ -87,7 +87,7 @@ def _of_collision(name: str, collision: Element, inertial: Element, frames: Fram
     except RobotError as error:
         raise shape.error(error.message, *where, error.name or "", value=error.value) from None
     middle = np.array([0.0, 0.0, -sizes["length"] / 4]) if shape.tag == "cone" else np.zeros(3)
-    pose = only(collision, "pose", *where)
+    pose = collision.only("pose", *where)
     relative = "" if pose is None else pose.attributes.get("relative_to") or pose.attributes.get("frame") or ""
     at = pose_of(collision, *where)
     if relative not in ("", name):

@@ -142,9 +142,10 @@ def note_left_out(root: Element, robot: Robot, names: Mapping[str, list[Joint]],
             for part in (part for actuator in element.every("actuator") for part in actuator.children):
                 if part.tag in OTHER_ROTORS:
                     _leave(faults, ROTORS, element.attributes.get("name") or part.tag, part, LEAVE)
+        elif element.tag == "ros2_control":
+            _note_control(element, elements, faults)
         elif element.tag == "mujoco":
-            for part in element.children:
-                _note_mujoco(part, faults)
+            _note_mujoco(element, faults)
 
 
 def _leave(faults: Faults, heading: str, shown: str, element: Element, message: str) -> None:
@@ -161,13 +162,24 @@ def _note_dynamics(joint: Element, faults: Faults) -> None:
             faults.leave_out(heading, name, dynamics.error(left_out(heading), *where, value=value))
 
 
-def _note_mujoco(part: Element, faults: Faults) -> None:
-    given = [key for key in ("gravity", "density", "viscosity") if part.tag == "option" and key in part.attributes]
-    for key in given:
-        _leave(faults, OF_MUJOCO, f"{key} {part.attributes[key]}", part, LEAVE)
-    shapes = part.attributes.get("inertiafromgeom") == "true" or "settotalmass" in part.attributes
-    if part.tag == "compiler" and shapes:
-        _leave(faults, MASS_OF_SHAPES, "<mujoco>", part, LEAVE)
+def _note_control(control: Element, joints: Mapping[str, Element], faults: Faults) -> None:
+    """Note the joints that a controller alone makes follow others."""
+    for interface in control.every("joint"):
+        joint = joints.get(interface.attributes.get("name", ""))
+        for part in interface.every("param") if joint is not None and joint.first("mimic") is None else ():
+            if part.attributes.get("name") == "mimic":
+                _leave(faults, PLUGINS, interface.attributes["name"], part, LEAVE)
+
+
+def _note_mujoco(element: Element, faults: Faults) -> None:
+    """Note what a file says to MuJoCo about forces and masses."""
+    for part in element.children:
+        given = [key for key in ("gravity", "density", "viscosity") if part.tag == "option" and key in part.attributes]
+        for key in given:
+            _leave(faults, OF_MUJOCO, f"{key} {part.attributes[key]}", part, LEAVE)
+        shapes = part.attributes.get("inertiafromgeom") == "true" or "settotalmass" in part.attributes
+        if part.tag == "compiler" and shapes:
+            _leave(faults, MASS_OF_SHAPES, "<mujoco>", part, LEAVE)
 
 
 def _of_gazebo(

@@ -168,10 +168,12 @@ def _link(name: str, element: Element, faults: Faults, gravity: float) -> Link:
     """Return a link; its inertia is turned from the axes of ``<inertial>`` to those of the link."""
     where = ("links", name)
     element.check_children(LINK_PARTS, *where)
-    inertial = element.first("inertial")
+    inertial = element.only("inertial", *where)
     if inertial is None:
         return Link(name)
     inertial.check_children(INERTIAL_PARTS, *where, "inertial")
+    for tag in INERTIAL_PARTS:
+        inertial.only(tag, *where, "inertial")
     pose = _pose(inertial, *where, "inertial")
     weight = _part(inertial, "mass", "; give it, or leave out <inertial>", *where, "inertial")
     mass = weight.number("value", *where, "mass")
@@ -225,6 +227,8 @@ def _parent(joint: Element) -> str:
 def _check_joint(element: Element, name: str, links: Collection[str]) -> None:
     where = ("joints", name)
     element.check_children(JOINT_PARTS, *where)
+    for tag in JOINT_PARTS:
+        element.only(tag, *where)
     kind = element.text("type", *where, "type")
     if kind not in TYPES:
         raise element.error(no_such("joint", kind, TYPES, "type"), *where, "type", value=kind)
