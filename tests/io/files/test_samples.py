@@ -20,6 +20,8 @@ def write(folder, text):
         ("lift,time\n1,0\n2.5,1\n", {}),
         ("t , lift\n0 , 1\n\n1 , 2.5\n", {}),
         ("0,1\n1,2.5\n", {}),
+        ("# a log, of today\n# 100 Hz\ntime,lift\n0,1\n1,2.5\n", {}),
+        ("# lift, time\n1,0\n2.5,1\n", {"time": "time"}),
         ("\ufefftime,lift\r\n0,1\r\n1,2.5\r\n", {}),
         ("a,b,c\n9,1,0\n9,2.5,1\n", {"time": "c", "value": "b"}),
         ("time,b,c\n0,9,1\n1,9,2.5\n", {"value": "c"}),

@@ -142,6 +142,16 @@ def test_what_does_not_agree_is_refused(tmp_path, header, columns, words):
             jn.load_trajectory(path)
 
 
+@pytest.mark.parametrize("speed, line", [(0.5, 631), (-1.3, 244)])
+def test_angles_within_one_turn_are_refused_where_they_start_again(tmp_path, speed, line):
+    times = np.arange(0.0, 9.0, 0.01)
+    noisy = speed * times + 1e-3 * np.random.default_rng(0).normal(size=len(times))
+    path = tmp_path / "log.csv"
+    np.savetxt(path, np.column_stack([times, (noisy + np.pi) % (2 * np.pi) - np.pi]), "%.9f", ",", header="time,a")
+    with pytest.raises(jn.errors.TrajectoryError, match=rf"log.csv, line {line}, a: goes by -?6\.2.* numpy\.unwrap"):
+        jn.load_trajectory(path)
+
+
 def test_a_single_outlier_of_a_velocity_is_refused_and_a_knock_is_not(tmp_path):
     generator = np.random.default_rng(3)
     noisy = [TIMES, Q[0] + 1e-5 * generator.normal(size=51), V[0] + 1e-3 * generator.normal(size=51)]

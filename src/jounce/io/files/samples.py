@@ -20,6 +20,9 @@ from jounce.units.shown_units import unit_size
 SEPARATORS = {";": "semicolons", "\t": "tabs", " ": "spaces"}
 """What other programs put between entries, and its name."""
 
+COMMENT = "# "
+"""What comments before the rows begin with, and the names of the columns where NumPy writes them."""
+
 ROW_NUMBER = "(row)"
 """Name of a first column without one that counts the rows, as pandas writes it; nothing is read of it."""
 
@@ -233,7 +236,7 @@ class Table:
             self._name(self.numbers.names)
             self._name_index()
             return
-        self.rows = [(line, row) for line, row in read_rows(path, error_type) if any(row)]
+        self.rows = _without_comments([(line, row) for line, row in read_rows(path, error_type) if any(row)])
         if not self.rows:
             raise self.error("the file of samples is empty")
         self._check_commas()
@@ -246,6 +249,7 @@ class Table:
             self._name_index()
 
     def _name(self, names: Sequence[str]) -> None:
+        names = [names[0].lstrip(COMMENT), *names[1:]]
         pairs = [name_and_unit(known_name(name)) for name in names]
         self.header, self.units = [name for name, _ in pairs], [unit for _, unit in pairs]
 
@@ -336,6 +340,14 @@ class Table:
                 raise self.error(fault, line=line, name=self.header[number], value=text)
             values.append(entry * size)
         return values
+
+
+def _without_comments(rows: list[tuple[int, list[str]]]) -> list[tuple[int, list[str]]]:
+    """Return rows without the comments before them, the last of which names the columns if numbers follow."""
+    first = next((k for k, (_, row) in enumerate(rows) if not row[0].startswith(COMMENT[0])), len(rows))
+    numbers = rows[first][1] if first < len(rows) else []
+    named = first > 0 and len(rows[first - 1][1]) == len(numbers) and all(_number(x) is not None for x in numbers)
+    return rows[first - named :]
 
 
 def _number(text: str) -> float | None:

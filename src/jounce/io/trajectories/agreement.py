@@ -1,4 +1,4 @@
-"""Whether velocities and accelerations of a recording are those of its positions."""
+"""Whether positions of a recording count whole turns, and velocities and accelerations are those of its positions."""
 
 from __future__ import annotations
 
@@ -18,6 +18,9 @@ FEWEST = 12  # samples, of which some may be outliers
 MOST = 3  # outliers in a row
 PARTS = 5
 OUTLYING = 0.05  # of the range of a derivative: a smaller distance is none of an outlier
+TURN = 2.0 * np.pi
+SMALL = 0.125 * TURN  # a step beside one of a turn: larger ones tell nothing of turns
+SAME = 1.5  # times the largest step beside: a step is no larger, but for whole turns
 BLOCK = 20_000  # samples that noise is estimated from
 
 
@@ -27,6 +30,31 @@ class _Difference:
     row: int  # where it is largest
     given: float  # the change there, by the derivative
     integral: float  # the change there, by the level below it
+
+
+def check_turns(recording: Recording) -> None:
+    """Check that no angle goes by a whole turn from one sample to the next, as angles do that are kept within one.
+
+    Raises
+    ------
+    TrajectoryError
+        If one does, and the steps beside are small: the message names the joint and the line.
+    """
+    for k, name in enumerate(recording.names):
+        rows = np.flatnonzero(~np.isnan(recording.values[:, 0, k]))
+        if recording.measures.get(name) == "length" or len(rows) < 4:
+            continue
+        steps = np.diff(recording.values[rows, 0, k])
+        rest = np.abs((steps + TURN / 2) % TURN - TURN / 2)
+        neighbors = np.maximum(np.append(0.0, rest[:-1]), np.append(rest[1:], 0.0))
+        whole = (np.abs(steps) > TURN - SMALL) & (neighbors < SMALL) & (rest <= SAME * neighbors + 1e-3)
+        if whole.any():
+            at = int(np.argmax(whole))
+            message = (
+                f"goes by {steps[at]:.6g} in one step, nearly a whole turn, as angles do that are kept within one; "
+                "count the turns, as numpy.unwrap does"
+            )
+            raise recording.error(message, int(rows[at + 1]), name=name)
 
 
 def check_agreement(recording: Recording) -> list[str]:

@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from jounce.errors import JounceError, RecordingWarning, TrajectoryError
-from jounce.io.trajectories.agreement import check_agreement
+from jounce.io.trajectories.agreement import check_agreement, check_turns
 from jounce.io.trajectories.recordings import Recording
 from jounce.trajectory import (
     AbstractMotion,
@@ -42,7 +42,8 @@ def trajectory_of(
     Raises
     ------
     TrajectoryError
-        If there are too few rows, or velocities and positions contradict each other: the message names the line.
+        If there are too few rows, angles are kept within one turn, or velocities and positions contradict each other:
+        the message names the line.
 
     Warns
     -----
@@ -57,6 +58,7 @@ def trajectory_of(
         raise error.located(path=recording.path) from None
     notes = list(recording.notes)
     if not recording.points:
+        check_turns(recording)
         notes += check_agreement(recording)
     if notes:
         warnings.warn(RecordingWarning(f"{recording.path}: {'; '.join(notes)}"), stacklevel=4)
