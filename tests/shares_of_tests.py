@@ -1,4 +1,4 @@
-"""Which of the collected tests run: dear examples of docstrings are slow tests, of which a run may take a share.
+"""Which of the collected tests run: the cases of a list are slow tests, of which a run may take a share.
 
 The slow tests take hours, nine tenths of them in JAX and XLA, which compile each mechanism anew. A check before
 each submission has not that long: it runs the share of the day, and the tests of what changed as far as another share
@@ -13,36 +13,9 @@ from collections import Counter
 
 import pytest
 
-SLOW_EXAMPLES = frozenset(
-    """
-    jounce.design.optimization.optimize.optimize
-    jounce.design.tolerances.spread.tolerance
-    jounce.dynamics.inverse.outputs.cam_springs.contact_spring
-    jounce.dynamics.inverse.outputs.reactions.applied_force
-    jounce.dynamics.statics.holding_forces.holding_forces
-    jounce.integrate.mechanisms.batch.simulate_batch
-    jounce.integrate.mechanisms.diffrax_term.ode_term
-    jounce.integrate.mechanisms.simulate.simulate
-    jounce.io.results.write_parts
-    jounce.kinematics.cams.plate_cams.plate_cam
-    jounce.kinematics.curves.assembly_modes.assemblies
-    jounce.kinematics.curves.limits.LimitPosition
-    jounce.kinematics.families.solve_batch.solve_batch
-    jounce.kinematics.position_analysis.solve.solve_in_chunks
-    jounce.planning.tool_paths.follow_tool_path.follow_tool_path
-    jounce.plot.charts.bands.draw_bands
-    jounce.plot.forces.draw_energy
-    jounce.plot.forces.draw_power
-    jounce.reporting.facts.cam_facts.cam_facts
-    jounce.reporting.facts.holding_facts.holding_facts
-    jounce.robot.closed_loops.closed_loop.mechanism
-    jounce.sweeps.sweeping.sweep
-    jounce.trajectory.laws.composed.OutputMotion
-    jounce.viewer.subjects.cams.cam_mechanism
-    jounce.viewer.subjects.slopes.peak_slopes
-    """.split()
-)
-"""Docstrings whose examples take more than a second and a half, most of them to compile."""
+LIST = pathlib.Path(__file__).with_name("slow_cases.txt")
+SLOW_CASES = frozenset(LIST.read_text().splitlines())
+"""Examples of docstrings, and some cases of tests with parameters, that take more than two seconds."""
 
 
 def share(text):
@@ -68,10 +41,13 @@ def pytest_addoption(parser):
 
 @pytest.hookimpl(tryfirst=True)  # before pytest selects by marks
 def pytest_collection_modifyitems(config, items):
-    """Mark dear examples, and leave out the files of other shares: those of one file share compiled programs."""
+    """Mark cases of the list, and leave out the files of other shares: those of one file share compiled programs."""
+    found = {item.nodeid for item in items}
     for item in items:
-        if item.name in SLOW_EXAMPLES:
+        if item.nodeid in SLOW_CASES:
             item.add_marker(pytest.mark.slow)
+    if not any("::" in word for word in config.args) and (gone := missing(found)):
+        raise pytest.UsageError(f"{LIST.name}: {gone[0]} is no test of its file: correct the list")
     slow = {item for item in items if item.get_closest_marker("slow")}
     which, count = config.getoption("share")
     left_out = slow & elsewhere(slow, which, count)
@@ -82,6 +58,12 @@ def pytest_collection_modifyitems(config, items):
     if left_out:
         config.hook.pytest_deselected(items=list(left_out))
         items[:] = [item for item in items if item not in left_out]
+
+
+def missing(found):
+    """Return the cases of the list that the files of the found ones do not have."""
+    files = {name.partition("::")[0] for name in found}
+    return sorted(name for name in SLOW_CASES - found if name.partition("::")[0] in files)
 
 
 def elsewhere(items, which, count):

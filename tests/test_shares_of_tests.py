@@ -1,14 +1,13 @@
-"""Shares of the slow tests leave none out, and the dear examples are those of docstrings that are there."""
+"""Shares of the slow tests leave none out, and the list of slow cases names tests that are there."""
 
 import argparse
-import importlib
 import pathlib
 import subprocess
 from collections import Counter
 
 import pytest
 
-from tests.shares_of_tests import SLOW_EXAMPLES, changed_lines, elsewhere, most_changed, share
+from tests.shares_of_tests import LIST, SLOW_CASES, changed_lines, elsewhere, missing, most_changed, share
 
 
 class Item:
@@ -61,7 +60,12 @@ def test_lines_are_counted_since_a_commit(tmp_path):
     assert changed_lines(tmp_path, "HEAD") == {"src/a.py": 3}
 
 
-@pytest.mark.parametrize("name", sorted(SLOW_EXAMPLES))
-def test_slow_examples_are_there(name):
-    room, _, thing = name.rpartition(".")
-    assert ">>> " in getattr(importlib.import_module(room), thing).__doc__
+def test_a_case_of_the_list_that_its_file_no_longer_has_is_found():
+    name = min(SLOW_CASES)
+    file = name.partition("::")[0]
+    assert missing({f"{file}::another"})[0] == name
+    assert missing({name for name in SLOW_CASES if name.startswith(file)}) == []
+
+
+def test_files_of_the_list_are_there():
+    assert [name for name in SLOW_CASES if not (LIST.parents[1] / name.partition("::")[0]).is_file()] == []

@@ -52,6 +52,7 @@ def test_torques_give_what_energy_gains_and_dampers_take_with_rates(robot):
     near(dot(torque, q[:, 1:])[:, :levels], gained + lost(robot, q)[:, :levels])
 
 
+@pytest.mark.slow
 def test_momentum_changes_by_weight_and_what_holds_a_free_base_with_rates(robot):
     """The base is at rest, but held: what holds it is all that acts from outside."""
     q = states(robot)

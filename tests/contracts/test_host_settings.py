@@ -193,6 +193,7 @@ for name in ("abacus", "cuda"):
 """
 
 
+@pytest.mark.slow
 def test_a_device_that_is_not_there_is_refused():
     done = run("-c", NO_SUCH_DEVICE)
     assert not done.returncode, done.stderr

@@ -106,6 +106,7 @@ def test_derivatives_follow_each_other(robot, data):
             assert np.abs(later[0, k] - result[1, k]).max() <= left_out
 
 
+@pytest.mark.slow
 @hypothesis.given(data=strategies.data())
 def test_spin_turns_the_axes(robot, data):
     q = data.draw(states(robot))

@@ -102,6 +102,7 @@ def expected(law, instants):
         return [np.array([[mpmath.diff(f, x, k) for k in range(5)] for x in instants], float) for f in (force, torque)]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("leader", ["shaft", pytest.param("theta", marks=pytest.mark.slow)])
 def test_contact_and_shaft_torque_with_rates(tmp_path, leader):
     instants = [-0.4, 0.02, 0.13, 1.07]

@@ -92,6 +92,7 @@ def test_all_equilibria_of_the_sprung_four_bar_are_zeros_of_the_slope_of_its_ene
         assert one.stable == (square > 0)
 
 
+@pytest.mark.slow
 def test_forces_of_joints_and_drivers_balance_weight_at_rest_though_the_driver_would_move():
     arm = jn.Mechanism(
         space="planar",

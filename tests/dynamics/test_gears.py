@@ -128,6 +128,7 @@ def test_a_rack_presses_its_pinion_away_whichever_way_it_is_loaded(load):
     np.testing.assert_allclose(jn.driver_force(motion, "motor").values[:, 0], 0.05 * load, rtol=1e-12)
 
 
+@pytest.mark.slow
 def test_a_pinion_off_the_pitch_line_of_its_rack_is_reported_with_how_far():
     with pytest.raises(jn.errors.MechanismError, match=r"-0\.052 m to the left of the line.*-0\.05 m"):
         jn.driver_force(jn.solve(rack("100", height=0.052), [0.0], 3), "motor")

@@ -89,11 +89,13 @@ def test_a_ratio_acts_on_the_housing():
         jn.joint_reaction(motion, "cut", "ground")
 
 
+@pytest.mark.slow
 def test_gears_without_load_are_not_reported():
     idle = gears(0.0, (0.0, -3.0), bearing=jn.outputs.JointForceOutput("a"))
     assert "comment" not in jn.solve(idle, INSTANTS, order=2).dataset["bearing"].attrs
 
 
+@pytest.mark.slow
 def test_the_total_is_unique_where_its_parts_are_not():
     pins = {f"pin_{x}": planar.Revolute(("ground", "lift"), [3.0 + x, 0], [float(x), 0]) for x in (0, 1)}
     motion = jn.solve(lift(joints=pins), [0.0], order=2)

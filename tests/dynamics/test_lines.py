@@ -84,6 +84,7 @@ def test_a_belt_on_a_swinging_arm_turns_its_pulley_and_pulls_as_its_strands_say(
     assert "not the tension with which it is put on" in motion.dataset["bearing"].attrs["comment"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("crossed", [False, pytest.param(True, marks=pytest.mark.slow)])
 def test_no_strand_of_a_belt_on_an_arm_becomes_longer(crossed):
     """From a mark on one pulley to a mark on the other, along the arcs and the tangent, over turns of the arm."""

@@ -242,6 +242,7 @@ def all_forces(components):
     return made | {"point": kind("a", p, law, frame="body"), "other": kind("b", q, law)}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("components", [2, pytest.param(3, marks=pytest.mark.slow)], ids=["planar", "spatial"])
 def test_power_is_that_of_the_loads_and_forces_of_a_kind_are_stacked(components):
     """Force times velocity, summed over forces, equals load times velocity of the bodies, with all rates."""

@@ -33,6 +33,7 @@ def velocity(mu=0.3, speed=0.05):
     return speed * np.arcsinh(np.sinh(2 / speed) * np.exp(-mu * 10 * TIME / speed))
 
 
+@pytest.mark.slow
 def test_a_sled_comes_to_rest_as_the_closed_form():
     simulated = jn.simulate(sled(), TIME)
     np.testing.assert_allclose(simulated.outputs["place"][:, 1, 0], velocity(), rtol=0, atol=1e-11)

@@ -126,6 +126,7 @@ def test_an_arm_with_a_wrench_a_law_and_damping_against_differences():
         np.testing.assert_allclose(slope, (4 * near - far) / 3, rtol=1e-6, atol=1e-7 * np.abs(slopes).max())
 
 
+@pytest.mark.slow
 def test_what_is_not_differentiated_is_reported():
     def stopped(mass):
         return jn.simulate(cart([1, 0, 0]).with_inertia("a", mass=mass), TIME, 2, state=[[1.0], [0.0]]).q[-1, 0, 0]

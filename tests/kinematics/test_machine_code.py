@@ -89,6 +89,7 @@ def test_other_orders(order, monkeypatch):
     agree(*both_ways(four_bar(), np.linspace(0, 2, 1500), monkeypatch, order=order))
 
 
+@pytest.mark.slow
 def test_instants_that_fail_are_the_same(monkeypatch):
     mechanism = four_bar(motion="30*deg + 3*t", AB=0.12)  # a rocker, which comes to a dead point
     found, expected = both_ways(mechanism, np.linspace(0, 2, 1500), monkeypatch, strict=False)

@@ -102,6 +102,7 @@ def test_a_small_lever_is_no_singular_position():
     np.testing.assert_allclose(motion.outputs["angle"], [[1.0, 1.0], [1.1, 1.0]], atol=1e-6)
 
 
+@pytest.mark.slow
 def test_of_a_family_those_at_a_change_point_are_singular():
     family = jn.solve_batch(four_bar(FLAT, guess=(0.8, 1.7)), {"crank": [0.04, 0.09]}, TIME, order=1)
     assert (family["status"].values == [[Status.OK] * 3, [Status.SINGULAR] * 3]).all()

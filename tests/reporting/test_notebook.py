@@ -160,6 +160,7 @@ def test_an_equilibrium_and_what_moves_about_it():
     assert matrices["Modes"][1][1] == Tables(shown(small.modes)).tables["Modes"][1][1] == "0.381526"
 
 
+@pytest.mark.slow
 def test_everything_that_shows_itself_has_a_table():
     arm = jn.load_robot(ROOT / "examples" / "robots" / "planar_arm.xml")
     cam = jn.cams.load_cam(ROOT / "examples" / "cams" / "intake.yaml")

@@ -91,6 +91,7 @@ def test_a_peak_at_a_knot_of_a_force_is_the_limit_from_its_side(shown, law):
     assert largest == pytest.approx([2.0, 6.0, 8.0], rel=1e-8)
 
 
+@pytest.mark.slow
 def test_the_end_of_a_law_at_the_end_of_the_time_is_seen_from_before():
     """A 3-4-5 profile ends with the jerk that it begins with, 60 by way and duration, where the law is at rest."""
     law = jn.laws.SegmentedMotion([jn.laws.Segment("polynomial_3_4_5", 0.5, by=0.1)], beyond="hold")

@@ -66,6 +66,7 @@ def test_torque_and_its_rate(case):
     assert error(torque[:, 1], expected) <= 1e-13
 
 
+@pytest.mark.slow
 def test_gravity_and_its_rate(case):
     model, data = case.model, case.data
     weight = jn.dynamics.gravity_forces(case.robot, case.q, rates=1)
@@ -86,6 +87,7 @@ def test_reactions(case):
     assert error(wrench, case.gathered(reactions)) <= 1e-13
 
 
+@pytest.mark.slow
 def test_frames_of_all_links(case):
     model, data = case.model, case.data
     links = [link for link in case.robot.link_names if model.existFrame(link)]
@@ -110,6 +112,7 @@ def test_frames_of_all_links(case):
         assert np.abs(rows - expected[:, k]).max() <= 1e-13 * max(1.0, np.abs(expected[:, k]).max())
 
 
+@pytest.mark.slow
 def test_center_of_mass(case):
     base = case.model.inertias[0]  # Pinocchio leaves the fixed base out of the center of mass
 

@@ -99,6 +99,7 @@ def test_energies_of_a_random_tree(p, order):
     assert np.all(errors(energy.total, expected) <= 1e-14)  # by the squares of large derivatives of axes
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("order", [2, pytest.param(8, marks=slow)])
 def test_jacobian_and_center_of_mass_of_a_random_tree(order):
     content = reference("tree")

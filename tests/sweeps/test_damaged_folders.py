@@ -148,8 +148,19 @@ def test_without_its_description_a_folder_is_no_sweep(copy, change):
     assert_refused(copy, r"not a sweep of jounce, or is a damaged one \(zarr.json: ")
 
 
-@pytest.mark.parametrize("name", FILES)
-@pytest.mark.parametrize("change", CHANGES)
+QUICK = {
+    (name, change) for i, name in enumerate(FILES) for change in CHANGES[i :: len(FILES)]
+}  # each file, each change
+
+
+@pytest.mark.parametrize(
+    "name, change",
+    [
+        pytest.param(name, change, marks=() if (name, change) in QUICK else pytest.mark.slow)
+        for change in CHANGES
+        for name in FILES
+    ],
+)
 def test_every_alteration_of_a_file_is_mended_or_refused(copy, whole, name, change):
     change(copy / name)
     if change in (make_folder, fill_folder):

@@ -455,6 +455,7 @@ def test_a_killed_worker_and_a_killed_client_lose_nothing(tmp_path):
     assert text.strip() == swept(tmp_path / "whole.zarr", chunk=4).attrs["checksum"]
 
 
+@pytest.mark.slow
 def test_peaks_at_the_knots_of_a_law_are_kept_of_every_design(tmp_path):
     """A 3-4-5 profile, whose jerk is 60 by way and duration at both ends, at instants that depend on the design."""
     law = jn.laws.SegmentedMotion(

@@ -41,6 +41,7 @@ def test_a_worker_finds_out_by_itself_whether_it_sees_the_folder(plan):
     assert not plan.folder.exists()
 
 
+@pytest.mark.slow
 def test_a_worker_whose_client_was_followed_by_another_writes_nothing(plan):
     sent = chunks._loaded(content(plan))
     assert sent.store.folder == plan.folder

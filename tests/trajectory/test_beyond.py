@@ -210,6 +210,7 @@ def test_noisy_samples_of_a_driver_warn_as_those_of_a_trajectory_do():
     check_laws(arm(None, law), TIMES, worst + 1, forces=True)
 
 
+@pytest.mark.slow
 def test_errors_of_very_many_samples_are_those_of_stretches():
     times = np.linspace(0.0, 20.0, 30_001)
     values = np.sin(3 * times) + 1e-9 * np.random.default_rng(4).standard_normal(len(times))

@@ -30,6 +30,7 @@ def test_bodies_are_where_the_law_puts_them(recording):
     assert not recording.position[:, 0].any()
 
 
+@pytest.mark.slow
 def test_the_first_point_that_has_arrows_moves():
     recording = MechanismSubject(jn.load("examples/belt_drive.yaml")).solve({}, 2)
     names = [point.name for point in recording.appearance.points]

@@ -135,6 +135,7 @@ LAWS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("law", [x if x == "samples" else pytest.param(x, marks=pytest.mark.slow) for x in LAWS])
 @pytest.mark.filterwarnings("ignore::jounce.errors.SampleWarning")
 def test_laws_with_tables_and_choices(law, tmp_path):

@@ -78,6 +78,7 @@ def test_accelerations_and_multipliers_follow_from_one_matrix():
     np.testing.assert_allclose(multipliers, equations.multipliers.values[0, :3], rtol=0, atol=1e-10)
 
 
+@pytest.mark.slow
 def test_forces_of_ones_own():
     """A magnet between two free bodies, with a law of tables, against its closed form."""
     with taken_back():

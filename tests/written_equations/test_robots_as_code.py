@@ -32,6 +32,7 @@ def arm():
     return jn.Robot("arm", [jn.Link("base"), *(jn.Link(x, body) for x in ("one", "two", "three"))], joints)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "name, order", [("arm", 3), *(pytest.param(name, 4, marks=pytest.mark.slow) for name in NAMES)]
 )

@@ -19,6 +19,7 @@ def run(run):
     return functools.partial(run, "equations")
 
 
+@pytest.mark.slow
 def test_code_is_written_with_the_values_of_options(run, tmp_path):
     out = tmp_path / "2-bars.py"
     assert run(FOUR_BAR, "--out", out, "--set", "BC=11 cm", "--joint", "BC", "--order", "2")[0] == 0

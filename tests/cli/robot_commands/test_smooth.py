@@ -3,6 +3,7 @@
 import json
 
 import numpy as np
+import pytest
 from jsonschema import Draft202012Validator
 
 import jounce as jn
@@ -56,6 +57,7 @@ def test_a_smoothed_log_is_reported_as_json_and_drawn(tmp_path, capsys):
     assert figure.read_bytes()[:4] == b"\x89PNG"
 
 
+@pytest.mark.slow
 def test_joints_of_a_log_that_are_read_are_chosen_and_unknown_ones_named(tmp_path, capsys):
     times = np.linspace(0, 2, 201)
     log, out = tmp_path / "log.csv", tmp_path / "smooth.csv"

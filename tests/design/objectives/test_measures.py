@@ -22,6 +22,7 @@ def test_the_largest_value_is_that_between_instants():
     assert np.abs(np.sin(3 * TIME)).max() < 1 - 1e-4  # no instant is there
 
 
+@pytest.mark.slow
 def test_a_window_ends_where_it_is_said_to():
     cells = Cells.of(TIME, 0.61, 1.03)
     assert float(jnp.max(largest(sine(TIME), cells))) == pytest.approx(np.sin(3 * 0.61), abs=1e-14)

@@ -41,6 +41,7 @@ def close(found, expected, size=1e-11):
     np.testing.assert_allclose(found, expected, rtol=0, atol=size * np.abs(expected).max())
 
 
+@pytest.mark.slow
 def test_a_free_body_feels_weight_and_spring():
     """By their closed forms, and by all forms of the equations alike."""
     motion = jn.simulate(puck(), TIMES)

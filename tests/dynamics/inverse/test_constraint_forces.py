@@ -99,6 +99,7 @@ class Stretched(jn.drivers.CoordinateDriver):
         return (self.evaluate(body_i, body_j) - law) * (2.0 + law * law)
 
 
+@pytest.mark.slow
 def test_a_law_that_slopes_may_depend_on_is_kept():
     """The torque is that of an ordinary driver: Jacobian and conjugate of the law are stretched alike."""
     plain = arm(mass=2.0, inertia=0.3, center_of_mass=[0.5, 0.0])

@@ -52,6 +52,7 @@ def turning_door():
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "name",
     [

@@ -120,6 +120,7 @@ def test_friction_that_locks_is_reported(mu):
         _ = jn.solve(wedge(mu), [0.0, 1.0], order=1).outputs["force"]
 
 
+@pytest.mark.slow
 def test_reactions_that_are_open_have_no_friction():
     twice = wedge(0.1)
     joints = dict(twice.joints) | {"again": jn.planar.Parallel1(("ground", "lift"), [0, 1], [0, 1])}

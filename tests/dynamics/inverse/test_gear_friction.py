@@ -100,6 +100,7 @@ def test_reactions_are_in_equilibrium_and_bearings_bear_the_tooth_force():
     assert abs(torques[1][0, 0] / torques[0][0, 0]) == pytest.approx(2 / 0.8, rel=1e-12)  # the load drives
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("crossed", [False, pytest.param(True, marks=pytest.mark.slow)])
 def test_a_belt_passes_on_its_share(crossed):
     friction = jn.joints.GearFriction(speed=1e-3, efficiency=0.96, backward=0.94)

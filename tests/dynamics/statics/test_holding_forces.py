@@ -55,6 +55,7 @@ def test_a_sled_on_a_slope_stays_by_itself_where_its_slope_is_less_than_friction
     assert (found[0] <= 1e-12) == (mu >= np.tan(0.4))
 
 
+@pytest.mark.slow
 def test_the_range_is_that_of_each_position_and_of_the_loads_there():
     found = jn.dynamics.holding_forces(jn.solve(sled(load="5*t*t"), [0.0, 2.0], order=0))["push"]
     size = [20 * np.cos(0.4), 20 * np.cos(0.4) + 20 * np.sin(0.4)]
@@ -81,6 +82,7 @@ def test_a_wedge_locks_where_friction_grows_as_fast_as_what_presses(mu):
     np.testing.assert_allclose(found, [-push, -15, -15 / (1 + 0.5 * mu)], rtol=1e-11)
 
 
+@pytest.mark.slow
 def test_where_friction_locks_the_comment_says_so_also_without_a_load():
     found = jn.dynamics.holding_forces(jn.solve(wedge(2.5), [0.0, 1.0], order=0))["push"]
     assert found.attrs["comment"] == "friction locks, no force moves it one way, at t = 0 s, 1 s"
@@ -265,6 +267,7 @@ def test_gears_hold_between_slow_motions_also_with_friction_in_their_bearings(lo
     np.testing.assert_allclose(found[1], held(frictionless, "turn")[1], rtol=1e-12)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("weight", [30.0, pytest.param(-30.0, marks=pytest.mark.slow)])
 def test_a_rack_and_a_belt_hold_between_their_efficiencies(weight):
     """A rack on a disc of 0.05 m, which a belt turns from a pulley of a third of its size: 0.5 N m at the disc."""

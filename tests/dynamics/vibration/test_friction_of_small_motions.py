@@ -52,6 +52,7 @@ def test_what_a_sled_does_in_small_motions_a_simulation_does():
     np.testing.assert_allclose(place + 20 * np.sin(0.4) / 50, expected, atol=1e-14, rtol=1e-5)
 
 
+@pytest.mark.slow
 def test_a_pendulum_has_the_moment_of_its_pin():
     pin = jn.joints.Friction(0.2, 0.05, radius=0.01)
     pendulum = jn.Mechanism(
@@ -66,6 +67,7 @@ def test_a_pendulum_has_the_moment_of_its_pin():
     np.testing.assert_allclose(small.stiffness / small.mass, 3.0 * 9.81 * 0.4 / inertia, rtol=1e-12)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("load", [6.0, -6.0])
 def test_gears_resist_by_the_mean_of_what_they_lose_forward_and_backward(load):
     """A load on the wheel is held by a spring on the pinion: T is a third of it."""

@@ -51,6 +51,7 @@ def test_they_are_those_of_the_run(made, monkeypatch, threads):
     assert found.outputs["angle"][0, 0] != again.outputs["angle"][0, 0]
 
 
+@pytest.mark.slow
 def test_xla_compiles_each_once(monkeypatch):
     monkeypatch.setenv("JOUNCE_NATIVE", "0")
     monkeypatch.setenv("JOUNCE_THREADS", "2")
@@ -69,6 +70,7 @@ def test_those_with_redundant_rows_begin_with_the_start(made, monkeypatch):
     assert sorted(made) == ["expanded", "march"]
 
 
+@pytest.mark.slow
 def test_a_start_that_is_refused_is_reported_whatever_is_made_beside(made, monkeypatch):
     monkeypatch.setenv("JOUNCE_THREADS", "2")
     pendulum = simple_pendulum(0.3, 1.0)

@@ -88,6 +88,7 @@ def test_figures_stack_short_columns(motion):
     assert axes[3].get_ylabel() == "torque\n$T$  (N m)"
 
 
+@pytest.mark.slow
 def test_the_command_shows_them(path, capsys):
     assert cli.main(["run", str(path), "--order", "1"]) == 0
     lines = capsys.readouterr().out.splitlines()

@@ -77,6 +77,7 @@ def test_strict_refuses_those_that_have_a_warning(pairs):
         assert any(caught.value.name.split(".", 1)[1].startswith(name) for name in pair.named)
 
 
+@pytest.mark.slow
 def test_torques_and_their_rates_are_those_of_pinocchio(pairs):
     whole = forest({name: pair.robot for name, pair in pairs.items()})
     q = random_states(whole)

@@ -80,6 +80,7 @@ def test_screw_driven_by_its_slide_turns():
     np.testing.assert_allclose(motion.outputs["angle"][:, 0], TURN * 20 * time, atol=1e-11)
 
 
+@pytest.mark.slow
 def test_one_instant():
     motion = jn.solve(crank(law(rate=1.0)), [0.5])
     np.testing.assert_allclose(motion.outputs["angle"], [[0.5, 1, 0, 0, 0]], atol=1e-15)

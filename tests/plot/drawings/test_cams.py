@@ -3,6 +3,7 @@
 import pathlib
 
 import numpy as np
+import pytest
 
 import jounce as jn
 from jounce.plot.drawings.cams import cam_disc, pitch_curve
@@ -11,6 +12,7 @@ from jounce.plot.drawings.frames import frames, points_at, within
 EXAMPLES = pathlib.Path(__file__).parents[3] / "examples"
 
 
+@pytest.mark.slow
 def test_the_pitch_curve_is_as_far_from_the_shaft_as_the_law_says():
     mechanism = jn.load(EXAMPLES / "camshaft.yaml")
     motion = jn.solve(mechanism, np.linspace(0, 0.3, 91), order=0)

@@ -125,6 +125,7 @@ def test_wheels_axes_and_parameters():
     np.testing.assert_array_equal(np.array(cross.axes), [[0, 1, 0], [0, 0, 1]])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["four_bar", pytest.param("rssr", marks=pytest.mark.slow)])
 def test_frames_agree_with_points_of_the_motion(name):
     mechanism = jn.load(ROOT / "examples" / f"{name}.yaml")

@@ -80,6 +80,7 @@ def test_drives_against_mujoco():
     assert error(jn.forward_dynamics(robot, state, torque, drives=True)[:, 2], np.array(expected)) <= 1e-13
 
 
+@pytest.mark.slow
 def test_free_base_against_pinocchio():
     robot = load_robot(ROBOTS / "solo12.urdf")
     model = pinocchio.buildModelFromUrdf(str(ROBOTS / "solo12.urdf"), pinocchio.JointModelFreeFlyer())
@@ -233,6 +234,7 @@ def test_a_lone_body_that_is_fixed_has_no_motion():
     assert jn.forward_dynamics(post, np.zeros((3, 2, 0)), np.zeros((3, 2, 0))).shape == (3, 4, 0)
 
 
+@pytest.mark.slow
 def test_free_base_without_inertia_is_reported():
     ball = jn.Inertia(1.0, center_of_mass=[0.1, 0, 0], tensor=[0.1, 0.1, 0.1])
     robot = jn.Robot("ball", [jn.Link("base"), jn.Link("ball", ball)], [jn.Joint("pin", "base", "ball")])

@@ -99,6 +99,7 @@ def test_payload_is_what_a_link_glued_on_would_be(torque):
     near(jn.inverse_dynamics(glued, Q), jn.inverse_dynamics(ROBOT.with_payload(link, load.moved(place, turned)), Q))
 
 
+@pytest.mark.slow
 def test_a_locked_joint_is_one_that_does_not_move(torque):
     still = Q.copy()
     still[:, :, 3] = 0.0
@@ -171,6 +172,7 @@ def test_nothing_holds_a_robot_that_falls():
     near(jn.inverse_dynamics(floating, q), np.zeros((3, ORDER - 1, 13)), 1e-13)
 
 
+@pytest.mark.slow
 def test_forces_on_a_floating_base_are_those_on_its_mass():
     """The sum of outer forces is the mass times the acceleration of its center, with rates."""
     floating = ROBOT.with_floating_base()
@@ -180,6 +182,7 @@ def test_forces_on_a_floating_base_are_those_on_its_mass():
     near(jn.inverse_dynamics(floating, q)[..., :3], expected)
 
 
+@pytest.mark.slow
 def test_more_orders_change_none_before(torque):
     for order in (2, 3):
         near(jn.inverse_dynamics(ROBOT, Q[:, : order + 1]), torque[:, : order - 1], 1e-15)

@@ -117,6 +117,7 @@ def shuffled(robot, seed):
     return jn.Robot("shuffled", links, joints, robot.gravity)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [pytest.param(0, marks=pytest.mark.slow), 2])
 def test_names_and_order_of_the_list_do_not_matter(seed):
     other = shuffled(ROBOT, seed)

@@ -40,6 +40,7 @@ CASES = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("text", [pytest.param(x, marks=pytest.mark.slow) if k else x for k, x in enumerate(CASES)])
 def test_the_integral_of_a_formula(text):
     exact, instants = CASES[text]
