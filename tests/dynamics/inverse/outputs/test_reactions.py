@@ -112,6 +112,12 @@ def test_frames_and_points_of_a_reaction_agree():
     np.testing.assert_allclose(own.force[:, 0], np.einsum("ijt,tj->ti", turn, plain.force[:, 0]), rtol=1e-12)
     named = jn.joint_reaction(motion, "B", frame="rod")
     np.testing.assert_array_equal(named.force, own.force)
+    ground = jn.joint_reaction(motion, "A")  # between bodies neither of which is the rod
+    speed = motion.angle("rod").values[:, 1]
+    across = np.stack([ground.force[:, 0, 1], -ground.force[:, 0, 0]], axis=1)
+    rate = ground.force[:, 1] + speed[:, None] * across
+    other = jn.joint_reaction(motion, "A", frame="rod").force
+    np.testing.assert_allclose(other[:, 1], np.einsum("ijt,tj->ti", turn, rate), rtol=1e-10)
     moved = jn.joint_reaction(motion, "B", point=[0.3, -0.1])
     lever = (motion.point("rod", [0.0, 0.0]) - motion.point("rod", [0.3, -0.1])).values[:, 0]
     shifted = plain.torque[:, 0] + cross(lever, plain.force[:, 0].values)

@@ -123,7 +123,7 @@ class _Reaction(AbstractForceOutput):
 class _JointOutput(_Reaction):
     joint: str = field(static=True)
     body: str | None = field(static=True, default=None)  # on which it acts; the second one of the joint unless given
-    frame: str = field(static=True, default="global")  # global, body, or the name of a body of the joint
+    frame: str = field(static=True, default="global")  # global, body, or the name of any body
 
     source = "joint"
 
@@ -135,7 +135,7 @@ class _JointOutput(_Reaction):
         if self.body is not None and self.body not in felt:
             message = f"is not joined by '{self.joint}'; {did_you_mean(self.body, felt)}"
             raise MechanismError(message, name="body", value=self.body)
-        check_choice("frame", self.frame, ("global", "body", *dict.fromkeys(felt)), MechanismError)
+        check_choice("frame", self.frame, ("global", "body", GROUND, *mechanism.bodies), MechanismError)
 
     def remark(self, motion: Motion, values: np.ndarray) -> str:
         """Return why values are NaN, which gears load no bearing of their bodies, and where loads change flanks."""

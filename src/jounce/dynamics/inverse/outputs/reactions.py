@@ -111,8 +111,8 @@ def joint_reaction(
     body : str, optional
         On which body; the second one of the joint unless given. ``"ground"`` is one of each.
     frame : str, default "global"
-        In whose axes: ``"global"``, ``"body"`` (that on which it acts), or the name of a body of the joint. The rates
-        are those of the components in these axes.
+        In whose axes: ``"global"``, ``"body"`` (that on which it acts), or the name of any body. The rates are those of
+        the components in these axes.
     point : sequence, optional
         About which point of the body the torque is taken, in its frame, m; that of the joint unless given, or the
         origin of the body where the joint has none on it.
@@ -129,7 +129,8 @@ def joint_reaction(
     Raises
     ------
     MechanismError
-        If no joint, driver or force has this name, the body or the frame is not one of its own, or nothing has a mass.
+        If no joint, driver or force has this name, the body is not one of its own, there is no such frame, or nothing
+        has a mass.
 
     Examples
     --------
