@@ -55,6 +55,7 @@ def test_rotors_are_armature_at_the_joint(tmp_path):
             {"more": "<plugin><mimicJoint>k</mimicJoint></plugin>"},
             r"joints that follow others by a plugin: k \(line 4\)",
         ),
+        ({"more": '<plugin name="gz::sim::LiftDrag"/>'}, r"air and water by plugins: gz::sim::LiftDrag \(line 4\)"),
     ],
 )
 def test_what_is_not_read_is_reported(tmp_path, settings, says):

@@ -43,6 +43,7 @@ CASES = {  # what follows the links and joints of a file; what is said of it, if
     "no joint of ros2_control": (CONTROL.format("rigid_"), None),
     "an include": ('<include filename="arm.urdf"/>', r"xacro that are not expanded: <include> \(line 4\)"),
     "two inertias": (TWO, r"elements that are given twice.*: links\.k \(line 4\)"),
+    "water": ('<gazebo><plugin name="w" filename="gz-sim-hydrodynamics-system"/></gazebo>', r"water by plugins: w "),
     "contact": (GAZEBO.format("l", "<mu1>0.2</mu1><selfCollide>true</selfCollide>"), None),
     "two rotors in one": (
         ROTOR.format('<joint name="j"/><joint name="rigid"/>', '<drake:rotor_inertia value="2"/>'),

@@ -2,9 +2,19 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Mapping, Sequence
 
-from jounce.io.robots.elements.faults import BUSHINGS, JOINT_SPRINGS, LEAVE, PLUGINS, ROTORS, Faults, left_out
+from jounce.io.robots.elements.faults import (
+    BUSHINGS,
+    FLUID_PLUGINS,
+    JOINT_SPRINGS,
+    LEAVE,
+    PLUGINS,
+    ROTORS,
+    Faults,
+    left_out,
+)
 from jounce.io.robots.elements.xml_elements import Element
 from jounce.io.robots.sdf.joints import ROTOR, SdfJoint, rotor_of
 from jounce.io.robots.sdf.poses import flag_of, needed, number_of
@@ -17,6 +27,7 @@ DECAYS = {"linear": DECAY, "angular": DECAY}
 MIMICS = ("mimic", "drake:mimic")
 OF_MODEL = {"drake:linear_bushing_rpy": BUSHINGS}
 SPRING = {"spring_stiffness": JOINT_SPRINGS}
+_OF_FLUIDS = re.compile("buoyancy|hydrodynamics|lift[-_]?drag|wind", re.IGNORECASE)
 
 
 def note_left_out(
@@ -71,6 +82,21 @@ def _note_extensions(model: Element, tree: Sequence[SdfJoint], closing: Sequence
         if inertia := rotor_of(joint.element, "joints", joint.name):
             error = joint.element.error(left_out(ROTORS), "joints", joint.name, ROTOR, value=inertia)
             faults.leave_out(ROTORS, joint.name, error)
+
+
+def note_fluids(holder: Element, faults: Faults) -> None:
+    """Note plugins of a world, a model or an element for Gazebo that compute forces of fluids.
+
+    Raises
+    ------
+    RobotFileError
+        There is one, and what is left out is an error.
+    """
+    for plugin in holder.every("plugin"):
+        given = [plugin.attributes.get(key, "") for key in ("name", "filename")]
+        if any(map(_OF_FLUIDS.search, given)):
+            error = plugin.error(LEAVE.format(FLUID_PLUGINS), "plugin", value=given[1] or given[0])
+            faults.leave_out(FLUID_PLUGINS, given[0] or given[1], error)
 
 
 def follower(plugin: Element) -> str:

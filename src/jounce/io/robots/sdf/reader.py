@@ -18,7 +18,7 @@ from jounce.io.robots.elements.followers import with_room
 from jounce.io.robots.elements.named_elements import NamedElements
 from jounce.io.robots.elements.xml_elements import Element
 from jounce.io.robots.sdf.joints import AXIS_TAGS, SdfJoint, pitch_of, read_joint
-from jounce.io.robots.sdf.left_out import note_left_out
+from jounce.io.robots.sdf.left_out import note_fluids, note_left_out
 from jounce.io.robots.sdf.links import gravity_of, read_inertia
 from jounce.io.robots.sdf.models import chosen_model
 from jounce.io.robots.sdf.poses import (
@@ -127,6 +127,8 @@ class _Reader:
             self._add(joint, mimics)
         closures = [self._closure(joint) for joint in closing] + self._ball_constraints()
         note_left_out(self.model, elements, tree, closing, self.faults)
+        for holder in (self.model,) if self.world is None else (self.world, self.model):
+            note_fluids(holder, self.faults)
         name = self.model.attributes.get("name", "robot")
         upright = self.pose.then(self._link_pose(base)).rotation if base != WORLD else np.eye(3)
         gravity = upright.T @ gravity_of(self.world)

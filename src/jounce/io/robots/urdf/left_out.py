@@ -22,7 +22,7 @@ from jounce.io.robots.elements.faults import (
 )
 from jounce.io.robots.elements.xml_elements import Element
 from jounce.io.robots.sdf.joints import RATIO, ROTOR
-from jounce.io.robots.sdf.left_out import DECAY, KINEMATIC, STATIC, follower
+from jounce.io.robots.sdf.left_out import DECAY, KINEMATIC, STATIC, follower, note_fluids
 from jounce.robot.model.links_and_joints import Joint
 from jounce.robot.robot import Robot
 
@@ -138,6 +138,7 @@ def note_left_out(root: Element, robot: Robot, names: Mapping[str, list[Joint]],
         elif element.tag == "gazebo":
             for heading, shown, part in _of_gazebo(element, elements, robot, names, moving=moving):
                 _leave(faults, heading, shown, part, LEAVE)
+            note_fluids(element, faults)
         elif element.tag == "transmission":
             for part in (part for actuator in element.every("actuator") for part in actuator.children):
                 if part.tag in OTHER_ROTORS:
