@@ -66,6 +66,14 @@ def test_each_law_as_if_alone():
     np.testing.assert_allclose(chosen, found[:, :, [10, 0]], rtol=1e-14, atol=1e-14)
 
 
+def test_a_law_may_be_a_function_which_is_read_at_each_call():
+    gain = [0.5]
+    trajectory = JointTrajectory({"a": lambda t: gain[0] * t**3, "b": 1.0}, 0.0, 2.0)
+    for gain[0] in (0.5, 2.0):
+        expected = gain[0] * np.array([8.0, 12.0, 12.0, 6.0])
+        np.testing.assert_allclose(trajectory.derivatives([2.0], order=3)[0, :, 0], expected, rtol=1e-15)
+
+
 def test_call_on_a_jet_with_any_batch():
     trajectory = JointTrajectory({"a": "sin(t)", "b": "t**3", "c": "cos(t)"}, 0.0, 2.0)
     jet = trajectory(Jet.variable(np.array([[0.1, 0.2], [0.3, 0.4]]), 2))
@@ -197,6 +205,7 @@ BAD = [
     (lambda: JointTrajectory({}, 0.0, 1.0), "at least one joint"),
     (lambda: JointTrajectory({"a": "sin(x)"}, 0.0, 1.0), r"laws\.a: .*'x'"),
     (lambda: JointTrajectory({"a": [1.0]}, 0.0, 1.0), r"laws\.a: a law is a motion"),
+    (lambda: JointTrajectory({"a": lambda t: np.sin(t)}, 0.0, 1.0), r"laws\.a: the motion law cannot be used: .*jax"),
     (lambda: JointTrajectory({"a": 1.0}, 1.0, 1.0), "stop: must come after the start, 1 s, got 1.0"),
     (lambda: JointTrajectory({"a": 1.0}, 0.0, 1.0, [0.0, 2.0]), r"times\[1\]: the trajectory goes from 0 to 1 s"),
     (lambda: JointTrajectory({"a": 1.0}, 0.0, 1.0).derivatives([0.5, 1.1], 1), r"times\[1\]: .* got 1.1"),

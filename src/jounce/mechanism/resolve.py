@@ -3,7 +3,7 @@
 import dataclasses
 import math
 import numbers
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from functools import cache, lru_cache
 from typing import Any
 
@@ -19,9 +19,9 @@ from jounce.errors import JounceError, MechanismError
 from jounce.forces import AbstractForce, AbstractLaw, ExpressionLaw, FunctionLaw, TimeLaw, VectorLaw
 from jounce.forces.laws import read_law
 from jounce.jet import Jet
-from jounce.trajectory import AbstractMotion, Expression, ExpressionMotion, FunctionMotion, SplineMotion
+from jounce.trajectory import AbstractMotion, Expression, ExpressionMotion, SplineMotion
 from jounce.trajectory.curves import resolve_curve
-from jounce.trajectory.laws.user_laws import read_laws
+from jounce.trajectory.laws.user_laws import read_laws, tried, tried_law
 
 _ROWS, _REAL = frozenset((list, tuple)), frozenset((int, float))  # read first: to ask for what is abstract takes long
 _NUMBERS = frozenset((float, np.float64, np.ndarray))
@@ -77,7 +77,7 @@ def resolve_motion(motion: Any, parameters: Mapping[str, Any]) -> AbstractMotion
         known = {name: parameters[name] for name in sorted(motion.names - {"t"})}
         return unchecked(ExpressionMotion, {"expression": motion, "parameters": known})
     if callable(motion):
-        return _traceable(FunctionMotion(motion))
+        return read_laws(tried_law(motion))
     raise MechanismError("a motion is an expression, a function of time or a motion law", value=motion)
 
 
@@ -91,20 +91,7 @@ def _traceable(motion: AbstractMotion) -> AbstractMotion:
     """Return a law after trying it once, on shapes only: Python functions can fail in ways that need words."""
     if type(motion).__call__ is SplineMotion.__call__ and is_ours(type(motion)):
         return motion  # numbers that were checked; to trace it takes longer than to solve a short grid
-    advice = "it must map a scalar time to a scalar with functions of jax.numpy"
-    _tried("motion law", advice, lambda t: motion(Jet([t])), np.zeros((1, 1)))
-    return read_laws(motion)
-
-
-def _tried(what: str, advice: str, function: Callable[..., Jet], *arguments: np.ndarray) -> tuple[int, ...]:
-    """Return the shape of the jet that a function of arrays returns; raise MechanismError where it cannot be used."""
-    try:
-        return jax.eval_shape(lambda *xs: function(*xs).coefficients[0], *arguments).shape
-    except JounceError:
-        raise
-    except (TypeError, ValueError, AttributeError, IndexError) as error:
-        reason = (str(error).strip() or type(error).__name__).splitlines()[0]
-        raise MechanismError(f"the {what} cannot be used: {reason}; {advice}") from error
+    return read_laws(tried_law(motion))
 
 
 def resolve_law(law: Any, force: AbstractForce, parameters: Mapping[str, Any], components: int | None) -> AbstractLaw:
@@ -134,7 +121,7 @@ def resolve_law(law: Any, force: AbstractForce, parameters: Mapping[str, Any], c
     def evaluated(x: Any, v: Any, t: Any) -> Jet:
         return force_law(Jet([x, v, v]), Jet([v, v]), Jet.variable(t, 2))
 
-    force_shape = _tried("law", advice, evaluated, np.zeros(shape), np.zeros(shape), np.zeros((1, 1)))
+    force_shape = tried("law", advice, evaluated, np.zeros(shape), np.zeros(shape), np.zeros((1, 1)))
     if force_shape != shape:
         raise MechanismError(f"the law cannot be used: its value has the shape {force_shape}, not {shape}; {advice}")
     return read_law(force_law, shape[:-2])

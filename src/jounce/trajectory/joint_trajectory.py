@@ -26,11 +26,11 @@ from jounce.trajectory.checks import (
 from jounce.trajectory.laws.profiles import motion_profile
 from jounce.trajectory.laws.stacking import evaluate_laws, law_derivatives
 from jounce.trajectory.laws.trapezoid import LIMITS
-from jounce.trajectory.motion import AbstractMotion, ExpressionMotion, SplineMotion
+from jounce.trajectory.laws.user_laws import given_law
+from jounce.trajectory.motion import SplineMotion
 from jounce.trajectory.sample_errors import TOLERANCE, unsupported_derivative, unsupported_words
 from jounce.trajectory.sampled.deferred import Laws, SampledLaw, law_through
 from jounce.trajectory.splines import check_odd
-from jounce.units.expression import Expression
 
 MAX_ORDER = 30
 
@@ -40,8 +40,8 @@ class JointTrajectory(Displayed):
 
     Parameters
     ----------
-    laws : dict of str to AbstractMotion, str or number
-        The law of each joint, m or rad: a motion, an expression of ``t``, or a constant.
+    laws : dict of str to AbstractMotion, str, callable or number
+        The law of each joint, m or rad: a motion, an expression of ``t``, a function of time, or a constant.
     start, stop : float
         First and last instant, s.
     times : array_like of shape (samples,), optional
@@ -76,7 +76,7 @@ class JointTrajectory(Displayed):
         if not isinstance(laws, Mapping) or not laws:
             raise TrajectoryError("a trajectory needs a law for at least one joint", name="laws", value=laws)
         given = laws.given() if isinstance(laws, Laws) else laws
-        self.laws = Laws({name: _law(name, x) for name, x in given.items()})
+        self.laws = Laws({name: given_law(name, x) for name, x in given.items()})
         self.start, self.stop = finite_numbers("start and stop", (start, stop), (2,), read=seconds).tolist()
         if self.stop <= self.start:
             raise TrajectoryError(f"must come after the start, {self.start:g} s", name="stop", value=self.stop)
@@ -378,19 +378,6 @@ class JointTrajectory(Displayed):
             message = f"the trajectory goes from {self.start:.9g} to {self.stop:.9g} s; choose instants within it"
             raise TrajectoryError(message, name=f"times[{first}]", value=float(times[first]))
         return np.clip(times, self.start, self.stop)
-
-
-def _law(name: Any, law: Any) -> AbstractMotion | SampledLaw:
-    if not isinstance(name, str) or not name:
-        raise TrajectoryError("the name of a joint must be text", name="laws", value=name)
-    if isinstance(law, AbstractMotion | SampledLaw):
-        return law
-    if isinstance(law, bool) or not isinstance(law, str | int | float | np.integer | np.floating | Expression):
-        raise TrajectoryError("a law is a motion, an expression of t, or a number", name=f"laws.{name}", value=law)
-    try:
-        return ExpressionMotion(law if isinstance(law, str | Expression) else repr(finite(f"laws.{name}", law)))
-    except JounceError as error:
-        raise TrajectoryError(error.message, name=f"laws.{name}", value=error.value) from None
 
 
 def _limits(limits: ArrayLike, count: int) -> list[Any]:

@@ -1,16 +1,23 @@
 """Motion laws of users, functions and classes of their own: what they compute is read off whenever they are used."""
 
+from collections.abc import Callable
 from typing import Any
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 
 from jounce.base.modules import changes_parts, is_ours
+from jounce.errors import JounceError, MechanismError, TrajectoryError
 from jounce.jet import Jet
 from jounce.jet.programs.composition import Composed
 from jounce.jet.programs.read_methods import ReadObject
-from jounce.trajectory.motion import AbstractMotion, FunctionMotion
+from jounce.trajectory.checks import finite
+from jounce.trajectory.motion import AbstractMotion, ExpressionMotion, FunctionMotion
+from jounce.trajectory.sampled.deferred import SampledLaw
+from jounce.units.expression import Expression
 
+GIVEN = (str, int, float, np.integer, np.floating, Expression)
 ORDER = 2  # to which laws are compared with what was read off
 
 
@@ -37,6 +44,54 @@ class ReadMotion(AbstractMotion):
         """Raise MechanismError if the law says nothing of some instants from a first to a last one, s."""
         if isinstance(self.computes, ReadObject):
             self.computes.source.value.check_instants(first, last)
+
+
+def tried(what: str, advice: str, function: Callable[..., Jet], *arguments: np.ndarray) -> tuple[int, ...]:
+    """Return the shape of the jet that a function of arrays returns; raise MechanismError where it cannot be used."""
+    try:
+        return jax.eval_shape(lambda *xs: function(*xs).coefficients[0], *arguments).shape
+    except JounceError:
+        raise
+    except (TypeError, ValueError, AttributeError, IndexError) as error:
+        reason = (str(error).strip() or type(error).__name__).splitlines()[0]
+        raise MechanismError(f"the {what} cannot be used: {reason}; {advice}") from error
+
+
+def tried_law(law: AbstractMotion | Callable[..., Any]) -> AbstractMotion:
+    """Return a law, or that of a function of time, after trying it on shapes: functions can fail in ways to explain.
+
+    Raises
+    ------
+    MechanismError
+        If it cannot be used.
+    """
+    motion = law if isinstance(law, AbstractMotion) else FunctionMotion(law)
+    advice = "it must map a scalar time to a scalar with functions of jax.numpy"
+    tried("motion law", advice, lambda t: motion(Jet([t])), np.zeros((1, 1)))
+    return motion
+
+
+def given_law(name: Any, law: Any) -> AbstractMotion | SampledLaw:
+    """Return the law of a joint that a motion, an expression, a function of time or a number stands for.
+
+    Raises
+    ------
+    TrajectoryError
+        If it is none of these, or cannot be used.
+    """
+    if not isinstance(name, str) or not name:
+        raise TrajectoryError("the name of a joint must be text", name="laws", value=name)
+    if isinstance(law, AbstractMotion | SampledLaw) and not isinstance(law, FunctionMotion):
+        return law
+    if isinstance(law, bool) or not (callable(law) or isinstance(law, GIVEN)):
+        message = "a law is a motion, an expression of t, a function of time, or a number"
+        raise TrajectoryError(message, name=f"laws.{name}", value=law)
+    try:
+        if callable(law):
+            return tried_law(law)
+        return ExpressionMotion(law if isinstance(law, str | Expression) else repr(finite(f"laws.{name}", law)))
+    except JounceError as error:
+        raise TrajectoryError(error.message, name=f"laws.{name}", value=error.value) from None
 
 
 def read_laws(tree: Any) -> Any:
