@@ -118,8 +118,8 @@ def resolve_law(law: Any, force: AbstractForce, parameters: Mapping[str, Any], c
     shape = (1, 1) if components is None else (components, 1, 1)
     advice = "it must map the jets of displacement, velocity and time to the jet of the force"
 
-    def evaluated(x: Any, v: Any, t: Any) -> Jet:
-        return force_law(Jet([x, v, v]), Jet([v, v]), Jet.variable(t, 2))
+    def evaluated(x: Any, v: Any, t: Any) -> Any:
+        return force_law(Jet([x, v, v]), Jet([v, v]), Jet.variable(t, 2)).coefficients[0]
 
     force_shape = tried("law", advice, evaluated, np.zeros(shape), np.zeros(shape), np.zeros((1, 1)))
     if force_shape != shape:

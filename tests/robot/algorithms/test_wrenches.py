@@ -182,6 +182,11 @@ FINGER = jn.Robot("one", [jn.Link("base"), jn.Link("rod", jn.Inertia(1.0))], [jn
             lambda: dynamics(jn.robot.Wrench(LINK, force=lambda t: (t, t)), time=[0.0, 1.0, 2.0]),
             "wrenches[0].force: the function must return three components, not the shape (2,)",
         ),
+        (
+            lambda: dynamics(jn.robot.Wrench(LINK, force=lambda _: "x"), time=[0.0, 1.0, 2.0]),
+            "wrenches[0].force: the function cannot be used: could not convert string to float: 'x'; it must map a "
+            "scalar time to three components with functions of jax.numpy",
+        ),
     ],
 )
 def test_refused(call, message):

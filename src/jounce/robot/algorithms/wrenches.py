@@ -10,11 +10,12 @@ import jax.numpy as jnp
 import numpy as np
 
 from jounce.base.shapes import ArrayLike, Refused, is_traced, seconds
-from jounce.errors import RobotError, check_choice, check_name
+from jounce.errors import MechanismError, RobotError, check_choice, check_name
 from jounce.jet import Jet, compose
 from jounce.rigid.inertia import finite_numbers
 from jounce.robot.model.arguments import floats
 from jounce.robot.robot import Robot
+from jounce.trajectory.laws.user_laws import tried
 
 FRAMES = ("base", "link")
 
@@ -107,7 +108,11 @@ def _derivatives(where: str, value: Any, lead: tuple[int, ...], levels: int, tim
             raise RobotError(
                 f"must have one instant for each sample, the shape {lead}, not {instants.shape}", name="time"
             )
-        given = jax.eval_shape(lambda t: jnp.asarray(value(t), float), jnp.zeros(())).shape
+        advice = "it must map a scalar time to three components with functions of jax.numpy"
+        try:
+            given = tried("function", advice, lambda t: jnp.asarray(value(t), float), np.zeros(()))
+        except MechanismError as error:
+            raise RobotError(error.message, name=where) from error
         if given != (3,):
             raise RobotError(f"the function must return three components, not the shape {given}", name=where)
         jet = Jet.variable(instants, levels - 1)

@@ -46,10 +46,10 @@ class ReadMotion(AbstractMotion):
             self.computes.source.value.check_instants(first, last)
 
 
-def tried(what: str, advice: str, function: Callable[..., Jet], *arguments: np.ndarray) -> tuple[int, ...]:
-    """Return the shape of the jet that a function of arrays returns; raise MechanismError where it cannot be used."""
+def tried(what: str, advice: str, function: Callable[..., Any], *arguments: np.ndarray) -> tuple[int, ...]:
+    """Return the shape of the array that a function of arrays returns; raise MechanismError where it cannot be used."""
     try:
-        return jax.eval_shape(lambda *xs: function(*xs).coefficients[0], *arguments).shape
+        return jax.eval_shape(function, *arguments).shape
     except JounceError:
         raise
     except (TypeError, ValueError, AttributeError, IndexError) as error:
@@ -67,7 +67,7 @@ def tried_law(law: AbstractMotion | Callable[..., Any]) -> AbstractMotion:
     """
     motion = law if isinstance(law, AbstractMotion) else FunctionMotion(law)
     advice = "it must map a scalar time to a scalar with functions of jax.numpy"
-    tried("motion law", advice, lambda t: motion(Jet([t])), np.zeros((1, 1)))
+    tried("motion law", advice, lambda t: motion(Jet([t])).coefficients[0], np.zeros((1, 1)))
     return motion
 
 
