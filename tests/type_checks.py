@@ -42,10 +42,10 @@ def checked(thing):
 def _checked_start(start):
     """Check the types of a dataclass's fields; text among them may name what only other modules know."""
     if hasattr(start, BUILTIN):
-        return _among_axes_of_its_own(start)
+        return start
     if any(isinstance(annotation, str) for annotation in start.__annotations__.values()):
         return jaxtyping.jaxtyped(start, typechecker=bare)
-    return _among_axes_of_its_own(_checked_function(start))
+    return _checked_function(start)
 
 
 def _among_axes_of_its_own(function):
