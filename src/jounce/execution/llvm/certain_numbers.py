@@ -44,7 +44,7 @@ def certain_numbers(program: Any, given: Sequence[Any]) -> list[np.ndarray]:
             return filled(array.shape, unknown)
         array = np.asarray(array)
         if array.dtype != float:
-            return constants(code, array)
+            return constants(array)
         return filled(array.shape, [_value(code, number) for number in array.ravel()])
 
     results: Any = translate(code, program.jaxpr, list(map(values, program.consts)), list(map(values, given)))

@@ -105,7 +105,7 @@ def _text(
     code, given = Code(width, most, large=large, single=single), []
     for number, variable in enumerate(closed.jaxpr.invars):
         if number in known:
-            given.append(constants(code, known[number]))
+            given.append(constants(known[number]))
             continue
         region = _region(code, number, kind_of(variable.aval.dtype), lanes=number >= shared and not single)
         shape = variable.aval.shape
@@ -118,7 +118,7 @@ def _text(
         else:
             array.ravel()[:] = [code.load(region, k) for k in range(array.size)]
         given.append(array)
-    results = translate(code, closed.jaxpr, [constants(code, number) for number in closed.consts], given)
+    results = translate(code, closed.jaxpr, [constants(number) for number in closed.consts], given)
     for number, array in enumerate(results, len(given)):
         _write(code, number, array, rows=rows)
     if code.memory > MOST_MEMORY or code.heap > MOST_HEAP:

@@ -4,8 +4,8 @@ Where arrays may be in memory, what repeats is written once, and what no result 
 find out. Of single values, the text and LLVM do, and those that repeat need not be kept.
 """
 
-from collections.abc import Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -20,14 +20,14 @@ VIEWS = ("broadcast_in_dim", "reshape", "squeeze", "expand_dims", "transpose")
 """Operations that repeat where they do: they are no work, and what is used once need not be in memory."""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False, slots=True)  # not frozen, as values are not: there are many
 class Variable:
     """What an operation has found, or a constant of a program."""
 
     aval: Any  # its shape and type
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False, slots=True)
 class Operation:
     """An operation, with the names that an equation of JAX has for its parts."""
 
@@ -54,7 +54,8 @@ class Plan:
         Of operations, by number, to the one that wants their numbers, once; they may be computed there. Results are
         used after all of them.
     last : mapping
-        Of variables to the number of the last operation that reads them; results are read after all of them.
+        Of variables to the number of the last operation that reads them; results are read after all of them. Where
+        nothing is delayed, no array is in memory, and nobody asks for it, nor for `ends`.
     ends : mapping
         Of operations to the variables that are not read after them.
     """
@@ -64,15 +65,7 @@ class Plan:
     constants: Mapping[Any, Any]
     delayed: Mapping[int, int]
     last: Mapping[Any, int]
-    ends: Mapping[int, Sequence[Any]] = field(init=False)
-
-    def __post_init__(self) -> None:
-        ends: dict[int, list[Any]] = {}
-        for variable, number in self.last.items():
-            ends.setdefault(number, []).append(variable)
-        for number, operation in enumerate(self.operations):
-            ends.setdefault(number, []).extend(x for x in operation.outvars if x not in self.last)
-        object.__setattr__(self, "ends", ends)
+    ends: Mapping[int, Sequence[Any]]
 
 
 def plan_of(program: Any, deferred: Collection[str], reading: Collection[str]) -> Plan:
@@ -89,9 +82,13 @@ def plan_of(program: Any, deferred: Collection[str], reading: Collection[str]) -
     operations: list[Operation] = []
     constants: dict[Any, Any] = {}
     results = _written(program, {}, operations, constants, {} if deferred else None, {}, whole=True)
-    operations = _needed(operations, results) if deferred else operations
-    delayed = _delayed(operations, results, deferred, reading)
-    return Plan(operations, results, constants, delayed, _last_reads(operations, results, delayed))
+    if not deferred:
+        return Plan(operations, results, constants, {}, {}, {})
+    operations = _needed(operations, results)
+    readers = _readers(operations, results)
+    delayed = _delayed(operations, readers, deferred, reading)
+    last = {variable: max([delayed.get(n, n) for n in numbers]) for variable, numbers in readers.items()}
+    return Plan(operations, results, constants, delayed, last, _ends(operations, last))
 
 
 def _written(
@@ -127,9 +124,12 @@ def _written(
     def name(variable: Any) -> Any:
         return variable if isinstance(variable, Literal) else names.get(variable, variable)
 
+    stack, marked = None, False
     for equation in program.eqns:
         given, result = [name(variable) for variable in equation.invars], list(equation.outvars)
-        here = sparse or is_by_certain_entries(equation)
+        if not sparse and equation.source_info.name_stack is not stack:  # one for many operations
+            stack, marked = equation.source_info.name_stack, is_by_certain_entries(equation)
+        here = sparse or marked
         if equation.primitive.name in CALLS and not is_subroutine(equation):
             called, values = _called(equation)
             inner = dict(zip(called.invars, given, strict=True))
@@ -140,7 +140,7 @@ def _written(
             names |= zip(result, written, strict=True)
             continue
         key = None if known is None else _key(equation, given, alike, here)
-        before = None if known is None else known.get(key)
+        before = None if known is None or key is None else known.get(key)
         if before is not None and equation.primitive.name not in VIEWS:
             names |= zip(result, before, strict=True)
             continue
@@ -158,9 +158,13 @@ def _key(equation: Any, given: Sequence[Any], alike: Mapping[Any, Any], sparse: 
     """Return what distinguishes an operation from others, None where that is not known."""
 
     def number(x: Any) -> Any:
-        return (str(x.aval), np.asarray(x.val).tobytes()) if isinstance(x, Literal) else alike.get(x, x)
+        if isinstance(x, Literal):
+            aval: Any = x.aval
+            return aval.shape, aval.dtype, np.asarray(x.val).tobytes()
+        return alike.get(x, x)
 
-    key = equation.primitive.name, sparse, *sorted(equation.params.items()), *map(number, given)
+    p = equation.params
+    key = equation.primitive.name, sparse, *(sorted(p.items()) if len(p) > 1 else p.items()), *map(number, given)
     try:
         hash(key)
     except TypeError:
@@ -186,20 +190,22 @@ def _called(equation: Any) -> tuple[Any, Sequence[Any]]:
     return (called.jaxpr, called.consts) if hasattr(called, "jaxpr") else (called, ())
 
 
-def _reads(operations: Sequence[Operation], results: Sequence[Any]) -> Iterator[tuple[int, Any]]:
-    """Yield the number of an operation and a variable that it reads, in their order."""
+def _readers(operations: Sequence[Operation], results: Sequence[Any]) -> dict[Any, list[int]]:
+    """Return the numbers of the operations that read each variable, in their order; results are read after all."""
+    readers: dict[Any, list[int]] = {}
     for number, read in enumerate([*(operation.invars for operation in operations), results]):
         for variable in read:
             if not isinstance(variable, Literal):
-                yield number, variable
+                readers.setdefault(variable, []).append(number)
+    return readers
 
 
 def _delayed(
-    operations: Sequence[Operation], results: Sequence[Any], deferred: Collection[str], reading: Collection[str]
+    operations: Sequence[Operation],
+    readers: Mapping[Any, Sequence[int]],
+    deferred: Collection[str],
+    reading: Collection[str],
 ) -> dict[int, int]:
-    readers: dict[Any, list[int]] = {}
-    for number, variable in _reads(operations, results):
-        readers.setdefault(variable, []).append(number)
     result: dict[int, int] = {}
     for number, operation in reversed([*enumerate(operations)]):
         if operation.primitive.name not in deferred or len(operation.outvars) != 1:
@@ -213,8 +219,10 @@ def _delayed(
     return result
 
 
-def _last_reads(operations: Sequence[Operation], results: Sequence[Any], delayed: Mapping[int, int]) -> dict[Any, int]:
-    last: dict[Any, int] = {}
-    for number, variable in _reads(operations, results):
-        last[variable] = max(last.get(variable, -1), delayed.get(number, number))
-    return last
+def _ends(operations: Sequence[Operation], last: Mapping[Any, int]) -> dict[int, list[Any]]:
+    ends: dict[int, list[Any]] = {}
+    for variable, number in last.items():
+        ends.setdefault(number, []).append(variable)
+    for number, operation in enumerate(operations):
+        ends.setdefault(number, []).extend(x for x in operation.outvars if x not in last)
+    return ends

@@ -76,21 +76,21 @@ def translate(
 
     def noted(variable: Any, array: Array) -> None:
         known[variable] = array
-        for region in regions_of([array]):
+        for region in regions_of([array]) if isinstance(array, InMemory) else ():
             read_last[region] = max(read_last.get(region, -1), plan.last.get(variable, -1))
 
     def read(variable: Any) -> Array:
         if isinstance(variable, Literal):
             aval: Any = variable.aval
-            return constants(code, np.asarray(variable.val, aval.dtype))
+            return constants(np.asarray(variable.val, aval.dtype))
         return known[variable]
 
     for variable, array in zip((*program.constvars, *program.invars), (*constants_, *given), strict=True):
         noted(variable, array)
     for variable, value in plan.constants.items():
-        noted(variable, constants(code, value))
+        noted(variable, constants(value))
     around = code.sparse
-    with code.used(lambda region: read_last.get(region, -1) > now):
+    with np.errstate(all="ignore"), code.used(lambda region: read_last.get(region, -1) > now):
         for now, operation in enumerate(plan.operations):
             inputs = [read(variable) for variable in operation.invars]
             before, code.sparse = len(code.taken), around or operation.sparse
@@ -112,13 +112,15 @@ def _results(code: Code, equation: Any, given: Sequence[Array], *, delayed: bool
         given = [stored(code, array) if isinstance(array, Deferred) else array for array in given]
     if (control := _CONTROL.get(name)) is not None:
         return control(code, equation, given)
-    large = any(is_large(code, variable.aval) for variable in equation.outvars)
-    if (large or any(isinstance(array, InMemory) for array in given)) and (rule := STORED.get(name)) is not None:
+    stays = code.large is not None and any(is_large(code, variable.aval) for variable in equation.outvars)
+    in_memory = stays or not all(isinstance(array, np.ndarray) for array in given)
+    if in_memory and (rule := STORED.get(name)) is not None:
         result = [settled(code, array) for array in rule(code, equation, given)]
         return [stored(code, x) if isinstance(x, Deferred) and not delayed else x for x in result]
     if (rule := RULES.get(name)) is None:
         raise UnsupportedOperationError(f"the operation {name!r} of JAX")
-    return rule(code, equation, [values_of(code, array) for array in given])
+    single: Any = [values_of(code, array) for array in given] if in_memory else given
+    return rule(code, equation, single)
 
 
 def _checked(values: Any, aval: Any) -> Array:
@@ -148,7 +150,7 @@ def _number(code: Code, array: Array) -> Value:
 
 
 def _closed(code: Code, closed: Any, *given: Sequence[Array], late: bool = False) -> list[Array]:
-    numbers = [constants(code, number) for number in closed.consts]
+    numbers = [constants(number) for number in closed.consts]
     return translate(code, closed.jaxpr, numbers, [array for some in given for array in some], late=late)
 
 

@@ -84,12 +84,12 @@ def pad(_: Code, equation: Any, given: Sequence[Values]) -> Sequence[Values]:
     return [result]
 
 
-def iota(code: Code, equation: Any, _: Sequence[Values]) -> Sequence[Values]:
+def iota(_: Code, equation: Any, __: Sequence[Values]) -> Sequence[Values]:
     """Return whole numbers that count along an axis."""
     p = equation.params
     numbers = np.arange(p["shape"][p["dimension"]]).astype(DTYPES[kind_of(p["dtype"])])
     line = numbers.reshape([-1 if axis == p["dimension"] else 1 for axis in range(len(p["shape"]))])
-    return [np.broadcast_to(constants(code, line), p["shape"])]
+    return [np.broadcast_to(constants(line), p["shape"])]
 
 
 def split(_: Code, equation: Any, given: Sequence[Values]) -> Sequence[Values]:

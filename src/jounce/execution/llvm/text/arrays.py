@@ -1,12 +1,13 @@
 """Arrays of a program that is written for LLVM: NumPy arrays whose elements are values."""
 
 from collections.abc import Callable, Sequence
+from itertools import repeat
 from typing import Any
 
 import numpy as np
 
 from jounce.execution.llvm.text.code import Code, flat
-from jounce.execution.llvm.text.values import Region, UnsupportedOperationError, Value
+from jounce.execution.llvm.text.values import Region, UnsupportedOperationError, Value, kind_of
 
 MOST_CONSTANTS = 2**20  # of an array
 Values = np.ndarray  # of objects, each a Value
@@ -20,7 +21,7 @@ def filled(shape: Sequence[int], values: Sequence[Value]) -> Values:
     return result
 
 
-def constants(code: Code, array: Any) -> Values:
+def constants(array: Any) -> Values:
     """Return an array of constants.
 
     Raises
@@ -31,16 +32,19 @@ def constants(code: Code, array: Any) -> Values:
     array = np.asarray(array)
     if array.size > MOST_CONSTANTS:
         raise UnsupportedOperationError(f"{array.size} constants")
-    return filled(array.shape, [code.constant(number) for number in array.ravel()])
+    kind = kind_of(array.dtype) if array.size else ""
+    return filled(array.shape, [Value("", kind, False, number) for number in array.ravel()])
 
 
 def each(function: Callable[..., Value], *arrays: Values) -> Values:
     """Return what a function gives for each element of arrays, which are spread to one shape."""
-    shape = arrays[0].shape
-    if any(array.shape != shape for array in arrays):
+    shape = max([array.shape for array in arrays], key=len)
+    if all(array.shape == shape or not array.ndim for array in arrays):
+        parts = [flat(array) if array.ndim or not shape else repeat(array.item()) for array in arrays]
+    else:
         arrays = np.broadcast_arrays(*arrays)
-        shape = arrays[0].shape
-    return filled(shape, list(map(function, *map(flat, arrays))))
+        shape, parts = arrays[0].shape, map(flat, arrays)
+    return filled(shape, list(map(function, *parts)))
 
 
 def in_memory(code: Code, values: Sequence[Value]) -> tuple[Region, int]:

@@ -240,7 +240,7 @@ class Code(Scalars):
         return (
             len(self.lines),
             len(self.entry),
-            len(self._known[-1]),
+            len(self._scopes[-1]),
             self.memory,
             self.heap,
             free_regions,
@@ -254,9 +254,10 @@ class Code(Scalars):
         lines, entry, known, self.memory, self.heap, free_regions, taken, count, subroutines = mark
         self._free, self._taken = {key: list(regions) for key, regions in free_regions.items()}, dict(taken)
         del self.lines[lines:], self.entry[entry:], self.taken[count:]
-        for written, number in ((self._known[-1], known), (self.subroutines, subroutines)):
-            while len(written) > number:
-                written.popitem()
+        self._forget(self._scopes[-1][known:])
+        del self._scopes[-1][known:]
+        while len(self.subroutines) > subroutines:
+            self.subroutines.popitem()
 
 
 def flat(array: np.ndarray) -> list[Value]:

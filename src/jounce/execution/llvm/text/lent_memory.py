@@ -5,7 +5,7 @@ from typing import Any
 
 from jounce.execution.llvm.text.code import Code
 from jounce.execution.llvm.text.values import Region
-from jounce.execution.llvm.text.views import Array, Deferred, Stored
+from jounce.execution.llvm.text.views import Array, Deferred, InMemory, Stored
 
 
 def among(arrays: Sequence[Array]) -> Callable[[Region], bool]:
@@ -16,19 +16,19 @@ def among(arrays: Sequence[Array]) -> Callable[[Region], bool]:
 def let_go(code: Code, known: dict[Any, Array], variables: Sequence[Any]) -> None:
     """Forget variables that are not read any more, and give back what memory only they had."""
     gone = [known.pop(variable, None) for variable in variables]
-    give_back(code, [array for array in gone if array is not None])
+    give_back(code, [array for array in gone if isinstance(array, InMemory)])
 
 
 def give_back(code: Code, arrays: Sequence[Array]) -> None:
     """Give back the memory of arrays, unless others are in it, too."""
-    for region in regions_of(arrays):
+    for region in regions_of(arrays) if arrays else ():
         if code.is_unshared(region):
             code.release(region)
 
 
 def give_back_but(code: Code, taken: Sequence[Region], arrays: Sequence[Array]) -> None:
     """Give back memory that was taken, but that of arrays."""
-    live = regions_of(arrays)
+    live = regions_of(arrays) if taken else {}
     for region in dict.fromkeys(taken):
         if region not in live:
             code.release(region)

@@ -1,5 +1,6 @@
 """Operations on numbers as text for LLVM, each on one number or side by side on a vector of lanes."""
 
+import itertools
 import math
 import operator
 from collections.abc import Iterator, Sequence
@@ -34,7 +35,13 @@ INTEGERS: dict[str, tuple[str, Any]] = {
 }
 UNSIGNED = {"sdiv": "udiv", "srem": "urem", "smax": "umax", "smin": "umin"}
 BOOLEANS = {"add": "or", "max": "or", "mul": "and", "min": "and"}
+CALLED = frozenset("maximum minimum smax smin umax umin".split())  # functions of LLVM, not instructions
 COMMUTATIVE = frozenset("add mul max min".split())
+PLAIN: dict[tuple[type, str | None], tuple[str, Any]] = {  # numbers whose type says their kind
+    **dict.fromkeys(itertools.product((float, np.float64), ("f", None)), ("f", np.float64)),
+    **dict.fromkeys(itertools.product((bool, np.bool_), ("b", None)), ("b", np.bool_)),
+    **dict.fromkeys(itertools.product((int, np.int64), ("l",)), ("l", np.int64)),
+}
 NEUTRAL = {"add": 0, "sub": 0, "mul": 1, "div": 1}
 TURNS = "sin", "cos"  # which of lanes are found together
 COMPARISONS: dict[str, tuple[str, str, str, Any]] = {  # of doubles, of whole numbers, without a sign, in Python
@@ -80,7 +87,8 @@ class Scalars:
     here: Value | None = None
     sparse: bool = False
     _count: int = 0
-    _known: list[dict[str, Value]] = field(default_factory=lambda: [{}])
+    _known: dict[str, Value] = field(default_factory=dict)  # what instructions give that need not be written again
+    _scopes: list[list[str]] = field(default_factory=lambda: [[]])  # which of these were first written in each scope
     _vectors: dict[tuple[str, str], str] = field(default_factory=dict)
 
     def __post_init__(self):
@@ -117,15 +125,21 @@ class Scalars:
 
     def _emitted(self, instruction: str, kind: str, *, lanes: bool) -> Value:
         """Return what an instruction without effects gives, written only if it has not been before."""
-        for known in reversed(self._known):
-            if (value := known.get(instruction)) is not None:
-                return value
+        if (known := self._known.get(instruction)) is not None:
+            return known
         if len(self.lines) > self.most:
             raise UnsupportedOperationError(f"a program of more than {self.most:,} lines")
-        name = self.fresh()
+        self._count += 1
+        name = f"%v{self._count}"  # as `fresh` gives it
         self.lines.append(f"{name} = {instruction}")
-        value = self._known[-1][instruction] = Value(name, kind, lanes)
+        value = self._known[instruction] = Value(name, kind, lanes)
+        self._scopes[-1].append(instruction)
         return value
+
+    def _forget(self, instructions: Sequence[str]) -> None:
+        """Write instructions again where they are needed next."""
+        for instruction in instructions:
+            del self._known[instruction]
 
     def _called(self, name: str, result: str, kinds: str, given: Sequence[str], *, lanes: bool) -> Value:
         """Return what a function of LLVM gives, whose name ends in the types of `kinds`."""
@@ -146,11 +160,11 @@ class Scalars:
         """
         around = self.here
         self.here = around if here is None else here
-        self._known.append({})
+        self._scopes.append([])
         try:
             yield
         finally:
-            self._known.pop()
+            self._forget(self._scopes.pop())
             self.here = around
 
     def among_here(self, choice: Value) -> Value:
@@ -159,6 +173,8 @@ class Scalars:
 
     def constant(self, number: Any, kind: str | None = None) -> Value:
         """Return a constant, of the kind of its type unless one is given."""
+        if (plain := PLAIN.get((type(number), kind))) is not None:
+            return Value("", plain[0], False, plain[1](number))
         scalar = (np.asarray(number) if kind is None else np.asarray(number).astype(DTYPES[kind]))[()]
         return Value("", kind or kind_of(scalar.dtype), False, scalar)
 
@@ -173,12 +189,12 @@ class Scalars:
         word, python = (DOUBLES if a.kind == "f" else INTEGERS)[operation]
         word = UNSIGNED.get(word, word) if a.kind == "u" else word
         if a.constant is not None and b.constant is not None:
-            with np.errstate(all="ignore"):
-                return self.constant(python(a.constant, b.constant), a.kind)
-        if (same := _neutral(operation, a, b)) is not None:
-            return same
-        if self.sparse and a.kind == "f" and _is_nothing(operation, a, b):
-            return self.constant(0.0)  # of no sign
+            return self.constant(python(a.constant, b.constant), a.kind)
+        if a.constant is not None or b.constant is not None:
+            if (same := _neutral(operation, a, b)) is not None:
+                return same
+            if self.sparse and a.kind == "f" and _is_nothing(operation, a, b):
+                return self.constant(0.0)  # of no sign
         if operation in COMMUTATIVE and a.name > b.name:
             a, b = b, a
         if operation == "rem" and a.kind == "f":
@@ -189,10 +205,11 @@ class Scalars:
 
     def _pair(self, word: str, a: Value, b: Value, kind: str | None = None) -> Value:
         lanes = a.lanes or b.lanes
-        left, right = self.operand(a, lanes=lanes), self.operand(b, lanes=lanes)
-        if word in ("maximum", "minimum", "smax", "smin", "umax", "umin"):
+        left = a.name if a.constant is None and a.lanes == lanes else self.operand(a, lanes=lanes)
+        right = b.name if b.constant is None and b.lanes == lanes else self.operand(b, lanes=lanes)
+        if word in CALLED:
             return self._called(word, a.kind, a.kind, (left, right), lanes=lanes)
-        return self._emitted(f"{word} {self.type_of(a.kind, lanes=lanes)} {left}, {right}", kind or a.kind, lanes=lanes)
+        return self._emitted(f"{word} {self._types[a.kind, lanes]} {left}, {right}", kind or a.kind, lanes=lanes)
 
     def _division(self, operation: str, word: str, a: Value, b: Value) -> Value:
         """Return a quotient or remainder of whole numbers as XLA has it, by divisors that do not end the process."""
