@@ -27,6 +27,7 @@ def run(**how):
 
 
 def test_haste_changes_no_digit(monkeypatch):
+    monkeypatch.setattr(machine, "LONG", 1)
     monkeypatch.setattr(machine, "_compiled_here", None)
     binary, hasty = run(hasty=True)
     monkeypatch.undo()
@@ -35,6 +36,11 @@ def test_haste_changes_no_digit(monkeypatch):
     np.testing.assert_array_equal(hasty, found)
     x = GIVEN[0]
     np.testing.assert_allclose(found, np.cos(x) * x[::-1] / (2 + x @ x), rtol=1e-14)
+
+
+def test_short_code_is_compiled_here_in_haste_too(monkeypatch):
+    monkeypatch.setattr(machine, "_compiled_elsewhere", None)
+    assert run(hasty=True)[0] == run()[0]
 
 
 def test_what_is_called_once_is_compiled_without_optimizing():
@@ -48,6 +54,7 @@ def test_where_there_is_no_other_process_this_one_compiles(trouble, monkeypatch)
     def refused(words, **_):
         raise OSError(2, "no such file") if trouble == "no process" else subprocess.CalledProcessError(1, words)
 
+    monkeypatch.setattr(machine, "LONG", 1)
     if trouble == "an application":
         monkeypatch.setattr(machine.sys, "executable", "/opt/editor/editor")
     else:

@@ -55,7 +55,8 @@ def compiled(text: str, *, hasty: bool = False, brief: bool = False) -> bytes:
     text : str
         Of the module.
     hasty : bool, default False
-        Whether a third of the time is worth more than code that is twice as fast. Its results are the same.
+        Whether a third of the time is worth more than code that is twice as fast. Its results are the same. What is
+        short is compiled as ever: the start of a process, which haste takes, would cost more than it saves.
     brief : bool, default False
         Whether it is called so seldom that a seventh of the time is worth more than that: LLVM optimizes nothing.
     """
@@ -63,7 +64,7 @@ def compiled(text: str, *, hasty: bool = False, brief: bool = False) -> bytes:
         return _compiled_here(text, 0)
     lines = text.count("\n")
     hasty = hasty or lines > LONGEST
-    elsewhere = hasty or (lines > LONG and core_count() > 1)
+    elsewhere = lines > LONG and (hasty or core_count() > 1)
     result = _compiled_elsewhere(text, hasty) if elsewhere else None
     return _compiled_here(text) if result is None else result
 
