@@ -1,6 +1,7 @@
 """Marching through time: steps chosen, taken, projected, checked, and kept as polynomials."""
 
 import enum
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import jax
@@ -11,6 +12,7 @@ from jaxtyping import Bool, Float, Int
 from jounce.base.shapes import Numbers
 from jounce.dynamics.forward.accelerations import Equations, Expansion, Flags, Indices, Lanes, State, expand
 from jounce.execution.compilation import compiled
+from jounce.execution.mapped import mapped
 from jounce.integrate.steps.energy_balance import (
     Balance,
     begun,
@@ -32,6 +34,7 @@ from jounce.integrate.steps.lookahead import (
 from jounce.integrate.steps.methods import MARGIN, NEEDED, AbstractMethod, Number, near_singular
 from jounce.integrate.steps.projection import projected
 from jounce.integrate.steps.revolution_counts import AnglesOfForces, followed, measured
+from jounce.kinematics.continuation.instant_program import of_design
 from jounce.mechanism.transmissions.axis_angles import measures_angle
 
 SMALLEST_STEP = FINEST / 8.0  # of the span, or of the time itself
@@ -40,6 +43,7 @@ SHORT = 1.0 / 4.0  # of the longest step so far: shorter ones leave out as much 
 STUCK = 64  # steps that hardly move on, one after the other: a force that switches without end
 AT_LEAST, AT_MOST = 64, 512  # steps tried between two looks at progress and events,
 NUMBERS = 2**15  # of their polynomials: to make room for more takes longer than another call
+FEW_RUNS, MANY_RUNS = 8, 64  # that XLA marches side by side: more fall out of the cache
 STUBBORN = 3  # steps refused one after the other: no series that is only too short for its step needs so many
 
 
@@ -171,6 +175,74 @@ def march(
     tried : int
         How many of them there are.
     """
+    attempt = _attempt(equations, current, stop, tolerance, longest, method)
+
+    def unfinished(carry: Any) -> Any:
+        current, _, tried = carry
+        return jnp.any(jnp.isin(current.outcome, MOVING)) & (tried < count)
+
+    def iterate(carry: Any) -> Any:
+        current, previous, tried = carry
+        current, steps = attempt(current)
+        previous = jax.tree.map(lambda k, s: jax.lax.dynamic_update_index_in_dim(k, s, tried, 0), previous, steps)
+        return current, previous, tried + 1
+
+    return jax.lax.while_loop(unfinished, iterate, (current, room_for_steps(method, current, count), 0))
+
+
+@mapped(widths=(FEW_RUNS, MANY_RUNS))
+def march_runs(
+    shared: tuple[Any, Number, Number, Float[Numbers, ""]],
+    lanes: tuple[dict[int, Any], IntegratorState],
+    *,
+    method: AbstractMethod,
+    steps: int,
+) -> tuple[IntegratorState, tuple[DenseOutput, Bool[Numbers, "steps batch"]]]:
+    """Do what `march` does for runs that differ in values of their mechanism, each until it has ended.
+
+    Parameters
+    ----------
+    shared : tuple
+        Equations, alone or first of others; and where to go, the tolerance and the longest step, as for `march`.
+    lanes : tuple
+        Of each run: its `own` values, as `of_design` has them, and where to go on from.
+    method, steps
+        As `method` and `count` of `march`.
+
+    Returns
+    -------
+    current : IntegratorState
+    steps : tuple
+        As `march` returns them; after its end, a run repeats its last step, which is not taken.
+    """
+    (values, stop, tolerance, longest), (own, current) = shared, lanes
+    equations, *_ = of_design(values, own)
+    attempt = _attempt(equations, current, stop, tolerance, longest, method)
+
+    def turn(k: Any, carry: Any) -> Any:
+        current, previous = carry
+
+        def stand(current: IntegratorState) -> tuple[IntegratorState, tuple[DenseOutput, Any]]:
+            before = jnp.maximum(k - 1, 0)
+            last, taken = (jax.tree.map(lambda part: part[before], x) for x in previous)
+            return current, (last, jnp.zeros_like(taken))
+
+        current, steps = jax.lax.cond(jnp.any(jnp.isin(current.outcome, MOVING)), attempt, stand, current)
+        put = jax.lax.dynamic_update_index_in_dim  # at one place for all runs, which would else go on to it alone
+        return current, jax.tree.map(lambda x, s: put(x, s, k, 0), previous, steps)
+
+    return jax.lax.fori_loop(0, steps, turn, (current, room_for_steps(method, current, steps)))
+
+
+def _attempt(
+    equations: Equations,
+    current: IntegratorState,
+    stop: Number,
+    tolerance: Number,
+    longest: Float[Numbers, "*batch"],
+    method: AbstractMethod,
+) -> Callable[[IntegratorState], tuple[IntegratorState, tuple[DenseOutput, Any]]]:
+    """Return what tries a step of each run that has not ended, with the arguments of `march`."""
     length = equations.system.column_scale[0]
     order, bodies = len(current.expansion.state.position) - 1, current.expansion.state.position.shape[2]
     here = current.expansion.state.map(lambda part: part[0])
@@ -243,17 +315,7 @@ def march(
         refused = refused._replace(balance=current.balance._replace(broken=broken))
         return jax.tree.map(lambda a, b: jnp.where(good | opening, a, b), onwards, refused), steps
 
-    def unfinished(carry: Any) -> Any:
-        current, _, tried = carry
-        return jnp.any(jnp.isin(current.outcome, MOVING)) & (tried < count)
-
-    def iterate(carry: Any) -> Any:
-        current, previous, tried = carry
-        current, steps = attempt(current)
-        previous = jax.tree.map(lambda k, s: jax.lax.dynamic_update_index_in_dim(k, s, tried, 0), previous, steps)
-        return current, previous, tried + 1
-
-    return jax.lax.while_loop(unfinished, iterate, (current, room_for_steps(method, current, count), 0))
+    return attempt
 
 
 def steps_between_looks(numbers: int, *, watched: bool) -> int:

@@ -1,9 +1,7 @@
 """Many simulations of one mechanism side by side: initial conditions, masses, forces and lengths by parameters."""
 
 import functools
-import os
 from collections.abc import Mapping
-from concurrent.futures import ThreadPoolExecutor
 from typing import Any, Unpack
 
 import jax
@@ -13,13 +11,12 @@ from jounce.base.shapes import ArrayLike
 from jounce.dynamics.forward.accelerations import Equations, State
 from jounce.dynamics.forward.initial_state import consistent_start, initial_as_drivers
 from jounce.errors import MechanismError
-from jounce.execution.backends import backend_of, joined
-from jounce.execution.threads import in_callers_context
-from jounce.integrate.marching.marching import MOVING, DenseOutput, IntegratorState, Outcome, march, unexpanded
+from jounce.execution.backends import joined
+from jounce.execution.threads import Threads, thread_count
+from jounce.integrate.marching.marching import MOVING, DenseOutput, IntegratorState, Outcome, march_runs, unexpanded
 from jounce.integrate.marching.user_methods import integrator
-from jounce.integrate.mechanisms.batch_equations import BatchStart, ParametricMechanism, Turns
+from jounce.integrate.mechanisms.batch_equations import BatchStart, ParametricMechanism, Turns, outputs_of_runs
 from jounce.integrate.results.batch import Batch
-from jounce.integrate.results.simulation import expanded
 from jounce.integrate.robot_batch import batch_of_robot, of_traced_robot_batches, simulate_robots
 from jounce.integrate.simulate_robot import RobotOptions
 from jounce.integrate.steps.events import pose_coordinates
@@ -40,7 +37,7 @@ from jounce.mechanism.transmissions.axis_angles import measures_angle, raw_angle
 from jounce.mechanism.transmissions.turn_counting import counted_along
 from jounce.robot.robot import Robot
 
-LANES = 64  # runs marched together: more fall out of the cache
+LANES = 128  # runs marched in one call: more take memory, of fewer Python takes longer
 STEPS = 16  # tried before runs that have ended make room for others
 
 
@@ -128,15 +125,11 @@ def simulate_batch(
     def depart(some: np.ndarray) -> None:
         runs.depart(some, *starts.of(some))
 
-    advance, depart_others = in_callers_context(runs.advance), in_callers_context(depart)
-    with ThreadPoolExecutor(os.cpu_count() or 1) as pool:  # XLA works outside of Python's lock
-        chunks = runs.chunks(np.arange(len(rows)))
-        depart(chunks[0])  # compiles, once for all threads; so does the first advance
-        list(pool.map(depart_others, chunks[1:]))
-        if len(runs.moving):
-            runs.advance(runs.chunks(runs.moving)[0])
+    with Threads(thread_count()) as pool:
+        list(pool.map(depart, runs.chunks(np.arange(len(rows)))))
+    with Threads(thread_count()) as pool:
         while len(runs.moving):
-            list(pool.map(advance, runs.chunks(runs.moving)))
+            list(pool.map(runs.advance, runs.chunks(runs.moving)))
     status = runs.status
     for run, reason in starts.failed.items():
         status[run, 0] = int(reason)
@@ -224,16 +217,17 @@ class _Runs:
 
     def advance(self, runs: np.ndarray) -> None:
         """March runs by some steps, and note what they pass."""
-        equations, _ = self.parametric.picked(self._made, runs)
         tolerance, longest, method = self.settings
         current = jax.tree.map(lambda x: x[..., runs], self._current)
-        method = integrator(method, equations, current)
-        marched = march(equations, current, self.instants[-1], tolerance, longest, method=method, count=STEPS)
-        self.backends.add(backend_of(marched[0]))
-        current, (steps, taken), tried = jax.tree.map(np.asarray, marched)
+        method = integrator(method, self.parametric.picked(self._made, runs)[0], current)
+        shared = tuple(map(np.asarray, (self.instants[-1], tolerance, longest)))
+        how: Any = {"method": method, "steps": STEPS}
+        marched, backend = self.parametric.mapped(march_runs, self._made, runs, shared, (current,), **how)
+        self.backends.add(backend)
+        current, (steps, taken) = marched
         self._put(runs, current)
         self.steps[runs] += taken.sum(axis=0)
-        angles = self._counted(runs, steps, int(tried))
+        angles = self._counted(runs, steps)
         begin, now = self._direction * steps.start, self._direction * self.instants
         end = self._direction * current.time + 1e-14 * np.abs(current.time)
         near = np.flatnonzero((now >= begin[0].min()) & (now <= end.max()))
@@ -266,10 +260,10 @@ class _Runs:
         for whole, part in zip(jax.tree.leaves(self._current), jax.tree.leaves(current), strict=True):
             whole[..., runs] = part
 
-    def _counted(self, runs: np.ndarray, steps: DenseOutput, tried: int) -> dict[int, np.ndarray]:
+    def _counted(self, runs: np.ndarray, steps: DenseOutput) -> dict[int, np.ndarray]:
         """Return the series of turning outputs where steps begin, turns counted on, steps and runs last."""
         counted = {}
-        time = np.concatenate([self._begun[runs][None], steps.start[:tried]])
+        time = np.concatenate([self._begun[runs][None], steps.start])
         self._begun[runs] = time[-1]
         every = np.tile(runs, len(steps.start))
         _, outputs = self._picked(every, Turns((), self._begun_with(every)))
@@ -278,7 +272,7 @@ class _Runs:
                 state = steps.polynomial.map(lambda part: np.moveaxis(part[:, :3], 0, -2))
                 state = state.map(lambda part: part.reshape(*part.shape[:-2], -1))
                 (series,) = output_series((group,), pose_coordinates(state), self.parametric.model.pose_type)
-                series = np.array(series).reshape(*series.shape[:-1], *steps.start.shape)[..., :tried, :]
+                series = np.array(series).reshape(*series.shape[:-1], *steps.start.shape)
                 last = self._angles.setdefault(which, np.full((*series.shape[:-2], len(self.steps)), np.nan))
                 whole = np.concatenate([last[..., runs][..., None, :], series], axis=-2)
                 series[0] -= np.cumsum(turned(whole[..., :-1, :], whole[..., 1:, :], np.diff(time, axis=0)), axis=-2)
@@ -334,13 +328,14 @@ class _Runs:
         """
         for lanes in self.chunks(np.arange(len(runs))):
             turned_by = tuple(angle[:, lanes] for angle in angles)
-            shared = self._picked(runs[lanes], Turns(turned_by, self._begun_with(runs[lanes])))
-            _, outputs = shared
             time = self.instants[at[lanes]]
             since = time - begin[lanes]
-            started = polynomial.map(lambda part, lanes=lanes: part[..., lanes])
-            *_, noted = expanded.on_xla(shared, (turned_by, started, since, time), (("order", self._expansion),))
-            for which, (group, series) in enumerate(zip(outputs, map(np.array, noted), strict=True)):
+            motion = turned_by, polynomial.map(lambda part, lanes=lanes: part[..., lanes]), since, time
+            given = self._begun_with(runs[lanes]), motion
+            how: Any = {"order": self._expansion}
+            noted, backend = self.parametric.mapped(outputs_of_runs, self._made, runs[lanes], (), given, **how)
+            self.backends.add(backend)
+            for which, (group, series) in enumerate(zip(self._made[1], map(np.array, noted), strict=True)):
                 if which in before and measures_angle(group):
                     series[0, 0] = brought_near(series[0, 0], before[which][:, lanes])
                 elif which in before:

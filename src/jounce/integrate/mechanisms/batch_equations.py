@@ -15,17 +15,22 @@ from jounce.dynamics.forward.initial_state import consistent_start, with_rates
 from jounce.dynamics.forward.saddle_fronts import SaddleFronts
 from jounce.dynamics.masses import gravity_of, masses_of
 from jounce.errors import JounceError, MobilityError
-from jounce.execution.compilation import compiled
+from jounce.execution.compilation import LARGE
+from jounce.execution.mapped import Mapped, mapped
+from jounce.execution.store.programs import is_in_haste
+from jounce.integrate.marching.marching import FEW_RUNS, MANY_RUNS
+from jounce.integrate.results.simulation import expanded
 from jounce.integrate.steps.events import pose_coordinates
 from jounce.integrate.steps.projection import projected
 from jounce.jet import Jet
 from jounce.jet.turns import brought_near
+from jounce.kinematics.continuation.instant_program import of_design
 from jounce.kinematics.families.design_values import differing_leaves
 from jounce.kinematics.status import Status
 from jounce.mechanism import Mechanism, Model, build
 from jounce.mechanism.building.starting_guess import starting_guess
 from jounce.mechanism.system import POSITION_COMPONENTS, Group
-from jounce.mechanism.transmissions.axis_angles import measures_angle, raw_angles
+from jounce.mechanism.transmissions.axis_angles import measures_angle, raw_angles, with_turns
 
 STAGES = 8  # in which parameters go from those of the first run to their own, so that positions follow
 LARGEST_STAGE = 0.5  # rad, by which a driver may turn in a stage: angles about axes count their turns on the way
@@ -119,6 +124,27 @@ class ParametricMechanism:
         pairs = zip(jax.tree.leaves(made), self._moved, strict=True)
         return jax.tree.unflatten(self._structure, [leaf[..., runs] if moved else leaf for leaf, moved in pairs])
 
+    def mapped(
+        self,
+        function: Mapped,
+        made: tuple[Equations, Any],
+        runs: np.ndarray,
+        shared: tuple[Any, ...],
+        lanes: tuple[Any, ...],
+        **static: Any,
+    ) -> tuple[Any, str]:
+        """Return what a function gives for some runs, and the name of what computes it.
+
+        What `of` returned for all runs is the first thing that they share, and what each has of its own the first of
+        its lane, as `of_design` takes it.
+        """
+        leaves, own = jax.tree.leaves(made), {}
+        for k in np.flatnonzero(self._moved).tolist():
+            own[k], leaves[k] = leaves[k][..., runs], leaves[k][..., :1]
+        shared, lanes = (jax.tree.unflatten(self._structure, leaves), *shared), (own, *lanes)
+        program = function.program(shared, lanes, large=LARGE, hasty=is_in_haste(), **static)
+        return program(lanes), program.backend
+
 
 class BatchStart:
     """Consistent states of runs at the start: positions followed from those of the first run, least velocities.
@@ -180,23 +206,18 @@ class BatchStart:
         equations, outputs = self._parametric.picked(self._made, runs)
         measuring = [group for group in (*equations.system.forces, *outputs) if measures_angle(group)]
         angles = [np.asarray(group.element.datum.near) for group in measuring]
-        clock = np.full((1, len(runs)), self._instant)
-        at_rest = self._state._replace(
-            velocity=np.zeros_like(self._state.velocity), spin=np.zeros_like(self._state.spin)
-        )
-        state = at_rest.map(lambda part: np.repeat(np.asarray(part), len(runs), axis=-1))
-        stages = [self._begun.picked(made, runs)[0] for made in self._stages]
+        state = self._state.map(lambda part: np.repeat(np.asarray(part), len(runs), axis=-1))
         together = np.ones(len(runs), bool)
-        for stage in stages:
-            state, reached = _followed(stage, state, clock)
-            together &= np.asarray(reached)
+        for made in self._stages:
+            (state, reached), _ = self._begun.mapped(followed, made, runs, (np.asarray(self._instant),), (state,))
+            together &= reached
             if measuring:
                 coordinates = pose_coordinates(state.map(lambda part: np.asarray(part)[None]))
                 raw = raw_angles(measuring, {"quaternion": coordinates["quaternion"][0]})
                 angles = [brought_near(angle, near) for near, angle in zip(angles, raw, strict=True)]
         count = len([group for group in equations.system.forces if measures_angle(group)])
         turns = Turns(tuple(angles[:count]), tuple(angles[count:]))
-        start = jax.tree.map(np.array, (with_rates(stages[-1], state, clock), turns))
+        start = jax.tree.map(np.array, (state, turns))
         for lane in np.flatnonzero(~together).tolist():
             self._put_one(start, lane, int(runs[lane]))
         return start
@@ -222,9 +243,45 @@ def _turns_of(forces: Sequence[Group], outputs: Sequence[Group]) -> Turns:
     return Turns(*map(tuple, parts))
 
 
-@compiled()
-def _followed(equations: Equations, state: State, clock: Any) -> tuple[State, Any]:
-    """Return states at rest on the constraints, and which of them could be put there."""
-    followed, distance, _ = projected(equations, state, clock)
-    at_rest = followed._replace(velocity=jnp.zeros_like(state.velocity), spin=jnp.zeros_like(state.spin))
-    return at_rest, jnp.isfinite(distance)
+@mapped(widths=(FEW_RUNS, MANY_RUNS))
+def followed(shared: tuple[Any, Any], lanes: tuple[dict[int, Any], State]) -> tuple[State, Any]:
+    """Return states on the constraints with least velocities, and which of them could be put there.
+
+    Parameters
+    ----------
+    shared : tuple
+        Equations, alone or first of others; and the instant, s.
+    lanes : tuple
+        Of each run: its `own` values, as `of_design` has them, and a state nearby.
+    """
+    (values, instant), (own, state) = shared, lanes
+    equations, *_ = of_design(values, own)
+    clock = jnp.broadcast_to(instant, (1, state.position.shape[-1]))
+
+    def at_rest(state: State) -> State:
+        return state._replace(velocity=jnp.zeros_like(state.velocity), spin=jnp.zeros_like(state.spin))
+
+    reached, distance, _ = projected(equations, at_rest(state), clock)
+    return with_rates(equations, at_rest(reached), clock), jnp.isfinite(distance)
+
+
+@mapped(widths=(FEW_RUNS, MANY_RUNS))
+def outputs_of_runs(
+    shared: tuple[tuple[Equations, Any]], lanes: tuple[dict[int, Any], tuple[Any, ...], tuple[Any, ...]], *, order: int
+) -> tuple[Any, ...]:
+    """Return the series of the outputs of runs, as `expanded` does.
+
+    Parameters
+    ----------
+    shared : tuple
+        Equations and outputs.
+    lanes : tuple
+        Of each run: its `own` values, as `of_design` has them; angles about axes that its outputs count from; and what
+        `expanded` takes.
+    order
+        As `expanded` has it.
+    """
+    ((values,), (own, angles, motion)) = shared, lanes
+    equations, outputs = of_design(values, own)
+    *_, series = expanded.function((equations, with_turns(outputs, angles)), motion, order)
+    return series

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, TypeVar
 
 import jax
 import jax.numpy as jnp
@@ -21,6 +21,7 @@ from jounce.kinematics.continuation.singularity_distance import det_rates_of
 from jounce.mechanism.system import System
 from jounce.rigid.pose import Pose
 
+Values = TypeVar("Values")
 WIDTHS = 128, 512  # instants that XLA solves side by side: as many as the cache holds, within these bounds
 CACHED_ENTRIES = 2**16  # of the factors of a round: half a megabyte
 
@@ -81,11 +82,11 @@ def advance_instant(shared: Any, instants: Any, *, pose_type: type[Pose], order:
     )  # fmt: skip
 
 
-def of_design(system: System, own: Mapping[int, Any] | None) -> System:
-    """Return the system of a design, whose `own` values have the place of some leaves of another, by index."""
+def of_design(values: Values, own: Mapping[int, Any] | None) -> Values:
+    """Return the system of a design, or more, whose `own` values have the place of some leaves of another, by index."""
     if not own:
-        return system
-    leaves, structure = jax.tree.flatten(system)
+        return values
+    leaves, structure = jax.tree.flatten(values)
     return jax.tree.unflatten(structure, [own.get(k, leaf) for k, leaf in enumerate(leaves)])
 
 
