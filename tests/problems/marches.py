@@ -11,6 +11,7 @@ from jounce.integrate.marching.marching import Outcome, march, unexpanded
 
 COUNT = 4096  # steps tried at most
 LENIENT = 1e-6  # tolerance where the steps are given
+march_side_by_side = jax.jit(march.function, static_argnames=("method", "count"))
 
 
 def widened(state, lanes):
@@ -37,7 +38,7 @@ def onwards(ready, method, current, stop, tolerance, longest=np.inf):
     """Go on from where other runs are to a time; return where they then are and the number of steps tried."""
     arrived = np.asarray(current.outcome) == Outcome.ARRIVED
     running = np.where(arrived, int(Outcome.RUNNING), current.outcome)
-    current, _, tried = march(
+    current, _, tried = march_side_by_side(
         ready.equations,
         current._replace(outcome=running),
         stop,

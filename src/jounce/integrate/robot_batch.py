@@ -2,9 +2,7 @@
 
 import functools
 import inspect
-import os
 from collections.abc import Callable, Mapping
-from concurrent.futures import ThreadPoolExecutor
 from typing import Any, ParamSpec, TypeVar
 
 import jax.numpy as jnp
@@ -13,7 +11,7 @@ import numpy as np
 from jounce.base.shapes import ArrayLike, is_traced
 from jounce.errors import JounceError, RobotError, no_such
 from jounce.execution.backends import joined
-from jounce.execution.threads import in_callers_context
+from jounce.execution.threads import Threads, thread_count
 from jounce.integrate.results.batch import Batch
 from jounce.integrate.results.robot_sensitivities import TracedRobotBatch, of_traced_robots
 from jounce.integrate.results.robot_simulation import RobotSimulation
@@ -122,9 +120,8 @@ def simulate_robots(
     def run(at: tuple[Robot, np.ndarray]) -> RobotSimulation:
         return simulate_robot(at[0], instants, order, state=at[1], strict=False, **options)
 
-    first = run(starts[0])  # compiles, once for all threads
-    with ThreadPoolExecutor(os.cpu_count() or 1) as pool:  # XLA works outside of Python's lock
-        return values, [first, *pool.map(in_callers_context(run), starts[1:])]
+    with Threads(thread_count()) as pool:
+        return values, list(pool.map(run, starts))
 
 
 def _nominal(robot: Robot, state: Any) -> Any:

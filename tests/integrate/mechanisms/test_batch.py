@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import jounce as jn
+from jounce.execution.backends import VARIABLE
 
 TIME = [0.0, 0.4, 1.0]
 
@@ -80,10 +81,12 @@ def test_a_run_that_fails_leaves_the_others():
 
 
 @pytest.mark.slow
-def test_runs_in_several_chunks():
-    values = spread(70)
+def test_runs_in_several_chunks_by_either_backend(monkeypatch):
+    values = spread(140)
     batch = jn.simulate_batch(pendulum(), values, TIME, order=1)
+    monkeypatch.setenv(VARIABLE, "0")
     again = jn.simulate_batch(pendulum(), {name: v[::-1] for name, v in values.items()}, TIME, order=1)
+    assert (batch.backend, again.backend) == ("llvm", "xla")
     np.testing.assert_allclose(again.outputs["tip"][::-1], batch.outputs["tip"], rtol=0, atol=1e-10)
 
 

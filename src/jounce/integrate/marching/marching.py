@@ -132,12 +132,7 @@ def _measured(equations: Equations, state: State) -> AnglesOfForces:
     return measured(equations, state)
 
 
-def _is_one(_: Equations, current: IntegratorState, *__: Any, **___: Any) -> bool:
-    """Tell whether there is one run."""
-    return current.time.shape[0] == 1
-
-
-@compiled("count", single=_is_one)
+@compiled("count", single=True)
 def march(
     equations: Equations,
     current: IntegratorState,
@@ -148,7 +143,7 @@ def march(
     method: AbstractMethod,
     count: int,
 ) -> tuple[IntegratorState, tuple[DenseOutput, Bool[Numbers, "steps batch"]], Int[Numbers, ""]]:
-    """Take up to `count` steps toward a time, all runs of a batch side by side.
+    """Take up to `count` steps of a run toward a time; `march_runs` is for many.
 
     Parameters
     ----------
