@@ -1,5 +1,7 @@
 """Simulations of robots in joint coordinates: closed forms, conservation, and the mechanism that a robot is."""
 
+import math
+
 import jax.numpy as jnp
 import numpy as np
 import pytest
@@ -147,7 +149,8 @@ def test_arm_is_the_mechanism_that_it_is():
 
 
 @pytest.mark.slow
-def test_driven_joint_and_feedback():
+@pytest.mark.parametrize("driving", ["0.3*sin(2*t)", lambda t: 0.3 * jnp.sin(2 * t)])
+def test_driven_joint_and_feedback(driving):
     robot = random_robot(3, 3, tree=False, prismatic=0.0)
     names = robot.joint_names
     law = "0.3*sin(2*t)"
@@ -155,7 +158,7 @@ def test_driven_joint_and_feedback():
     def damped(time, q, rate):
         return -0.2 * rate
 
-    found = jn.simulate(robot, TIME, 4, torque=damped, driven={names[1]: law}, drives=False)
+    found = jn.simulate(robot, TIME, 4, torque=damped, driven={names[1]: driving}, drives=False)
     expected = jn.laws.ExpressionMotion(law)(jn.Jet.variable(TIME, 4)).derivatives().T
     assert np.abs(found.q[:, :, 1] - expected).max() <= 1e-12
     free = [0, 2]
@@ -180,6 +183,10 @@ def test_free_base_keeps_its_momenta_and_energy():
 
 def test_bad_input_is_reported():
     robot = slider()
+    with pytest.raises(jn.errors.RobotError, match=r"driven.slide: the motion law cannot be used: .* of jax.numpy"):
+        jn.simulate(robot, TIME, driven={"slide": lambda t: math.sin(t)})
+    with pytest.raises(jn.errors.RobotError, match=r"driven.slide: must be a law of time"):
+        jn.simulate(robot, TIME, driven={"slide": [1.0]})
     with pytest.raises(jn.errors.RobotError, match="torque: no moving joint has this name"):
         jn.simulate(robot, TIME, torque={"slider": 1.0})
     with pytest.raises(jn.errors.RobotError, match=r"the function must return an array of 1 forces"):

@@ -134,9 +134,9 @@ def simulate(
         unless given. `torque`: the forces of its joints, N m or N: n numbers; a function of time, q and q' of one
         sample, by operations of JAX, that returns n; or a mapping of joints to numbers, expressions of ``t``, of the
         names of joints and of their rates as ``NAME_d1``, motion laws, and functions that return one force. `driven`: a
-        mapping of joints to laws of time that they follow, whatever it takes. `drives`: False leaves out armature,
-        damping and friction, which count otherwise. `base`: the `BaseMotion` with which a base that moves freely
-        begins. `wrenches`: a sequence of `Wrench`, whose forces and torques are constant, functions of time, or
+        mapping of joints to laws of time (motions, expressions, functions, numbers) that they follow at any force.
+        `drives`: False leaves out armature, damping and friction, which count otherwise. `base`: the `BaseMotion` with
+        which a base that moves freely begins. `wrenches`: a sequence of `Wrench`, of constants, functions of time, or
         functions of time, q and q', that return three components.
 
     Returns
