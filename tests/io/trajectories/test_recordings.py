@@ -152,6 +152,11 @@ def test_angles_within_one_turn_are_refused_where_they_start_again(tmp_path, spe
         jn.load_trajectory(path)
 
 
+def test_a_joint_that_turns_about_once_from_sample_to_sample_is_read(tmp_path):
+    path = table(tmp_path, "time,a", [TIMES, 6.1 * np.maximum(np.arange(51) - 3.0, 0.0)])
+    assert jn.load_trajectory(path).derivatives(TIMES[-1:], order=0)[0, 0, 0] == pytest.approx(6.1 * 47, abs=1e-12)
+
+
 def test_a_single_outlier_of_a_velocity_is_refused_and_a_knock_is_not(tmp_path):
     generator = np.random.default_rng(3)
     noisy = [TIMES, Q[0] + 1e-5 * generator.normal(size=51), V[0] + 1e-3 * generator.normal(size=51)]

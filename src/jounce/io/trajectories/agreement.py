@@ -47,7 +47,10 @@ def check_turns(recording: Recording) -> None:
         steps = np.diff(recording.values[rows, 0, k])
         rest = np.abs((steps + TURN / 2) % TURN - TURN / 2)
         neighbors = np.maximum(np.append(0.0, rest[:-1]), np.append(rest[1:], 0.0))
-        whole = (np.abs(steps) > TURN - SMALL) & (neighbors < SMALL) & (rest <= SAME * neighbors + 1e-3)
+        long = np.sign(steps) * (np.abs(steps) > TURN - SMALL)
+        again = long[:-1] * long[1:] > 0  # of one that turns so fast, or whose samples are so few
+        goes_on = np.append(False, again) | np.append(again, False)
+        whole = (long != 0) & ~goes_on & (neighbors < SMALL) & (rest <= SAME * neighbors + 1e-3)
         if whole.any():
             at = int(np.argmax(whole))
             message = (
