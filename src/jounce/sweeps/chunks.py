@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from jounce.base.padding import padded
 from jounce.design.tolerances.design_space import Grid, Sobol
 from jounce.errors import JounceError, MechanismFileError, OutputError
 from jounce.execution.threads import thread_count
@@ -128,10 +129,9 @@ class Plan:
     def _computed(self, designs: Designs, start: int, threads: int) -> dict[str, np.ndarray]:
         """Return all arrays of some designs, the first of which has a number."""
         count = len(designs[next(iter(designs))])
-        spare = self.chunk - count if self.chunks > 1 else 0  # one shape of all chunks compiles once
-        filled = {name: np.concatenate([x, np.repeat(x[-1:], spare)]) for name, x in designs.items()}
+        length = self.chunk if self.chunks > 1 else count  # one shape of all chunks compiles once
         try:
-            histories = self.problem.histories(filled, threads)
+            histories = self.problem.histories({k: padded(x, length) for k, x in designs.items()}, threads)
         except JounceError as error:
             error.message = _DESIGN.sub(lambda m: f"(design {int(m[1]) + start}:", error.message)
             raise

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
+from jounce.base.padding import power_of_two
 from jounce.design.tolerances.variations import Interval, Values, Variation, spreads
 from jounce.errors import MechanismError
 
@@ -104,7 +105,7 @@ def sobol_shares(dimension: int, start: int, stop: int) -> Float[np.ndarray, "po
     if start:
         sequence.fast_forward(start)
         return sequence.random(stop - start) + 2.0 ** -(BITS + 1)
-    whole = sequence.random(1 << max(stop - 1, 0).bit_length())  # SciPy warns for other numbers of first points
+    whole = sequence.random(power_of_two(stop))  # SciPy warns for other numbers of first points
     return whole[:stop] + 2.0 ** -(BITS + 1)
 
 

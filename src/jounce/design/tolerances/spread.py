@@ -10,6 +10,7 @@ import numpy as np
 from jaxtyping import Float
 
 from jounce.base.activity import Count
+from jounce.base.padding import padded
 from jounce.design.tolerances.design_space import Sobol
 from jounce.design.tolerances.variations import Variation, read_variations, reader_of, spreads
 from jounce.errors import MechanismError, UnsupportedError, check_name, no_such, whole_number
@@ -292,8 +293,8 @@ class _Spread:
     def _solved_designs(self, values: Mapping[str, np.ndarray]) -> tuple[Any, Sides]:
         """Return designs solved side by side, always the same number, so that programs are compiled once."""
         count = len(next(iter(values.values())))
-        filled = {name: np.concatenate([x, np.repeat(x[-1:], TOGETHER - count)]) for name, x in values.items()}
-        solved, sides = solve_with_sides(self.mechanism, filled, self.nominal.time, self.nominal.order)
+        designs = {name: padded(x, TOGETHER) for name, x in values.items()}
+        solved, sides = solve_with_sides(self.mechanism, designs, self.nominal.time, self.nominal.order)
         return solved.isel(design=slice(count)), sides
 
     def _peaks(

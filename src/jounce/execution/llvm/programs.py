@@ -10,6 +10,7 @@ from typing import Any
 import jax
 import numpy as np
 
+from jounce.base.padding import padded
 from jounce.execution.buffer_pool import lend
 from jounce.execution.llvm.machine import MachineCode, vector_width
 from jounce.execution.llvm.rounds import Column, RoundRunner, address_of
@@ -134,7 +135,7 @@ class Program:
         total = max(count, self.width)
         self._check(shared, lanes, count)
         if total > count:
-            lanes = [filled(x, total, axis) for x in lanes]
+            lanes = [padded(x, total, axis) for x in lanes]
         given = [np.ascontiguousarray(x) for x in lanes]
         shapes = [((total, *shape) if self._rows else (*shape, total), dtype) for shape, dtype in self._results]
         result = [np.empty(*shape) for shape in shapes]
@@ -218,16 +219,3 @@ def _agree(arrays: Sequence[Any], expected: Sequence[tuple[tuple[int, ...], Any]
     result = [(x.shape, x.dtype) for x in arrays]
     if result != expected:
         raise ValueError(f"arrays of {result}, where the program was made for {expected}")
-
-
-def filled(x: np.ndarray, total: int, axis: int = -1) -> np.ndarray:
-    """Repeat the last instant until there are so many; zeros where there is none."""
-    count = x.shape[axis]
-    if count == total:
-        return x
-    result = np.zeros((total, *x.shape[1:]) if axis == 0 else (*x.shape[:-1], total), x.dtype)
-    if count and axis == 0:
-        result[:count], result[count:] = x, x[-1]
-    elif count:
-        result[..., :count], result[..., count:] = x, x[..., -1:]
-    return result

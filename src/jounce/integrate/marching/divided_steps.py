@@ -14,6 +14,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from jounce.base.padding import power_of_two
 from jounce.base.shapes import Numbers
 from jounce.dynamics.forward.accelerations import Equations, State
 from jounce.errors import UnsupportedError
@@ -82,7 +83,7 @@ class Pieces(NamedTuple):
     def padded(self) -> "Pieces":
         """Return as many as a power of two, the last again and again with no length: few lengths are compiled."""
         count = len(self.start)
-        fill = np.minimum(np.arange(1 << (count - 1).bit_length()), count - 1)
+        fill = np.minimum(np.arange(power_of_two(count)), count - 1)
         return self.chosen(fill)._replace(length=np.where(np.arange(len(fill)) < count, self.length[fill], 0.0))
 
     def chosen(self, which: Int[np.ndarray, " chosen"]) -> "Pieces":

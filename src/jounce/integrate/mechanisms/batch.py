@@ -7,6 +7,7 @@ from typing import Any, Unpack
 import jax
 import numpy as np
 
+from jounce.base.padding import power_of_two
 from jounce.base.shapes import ArrayLike
 from jounce.dynamics.forward.accelerations import Equations, State
 from jounce.dynamics.forward.initial_state import consistent_start, initial_as_drivers
@@ -152,7 +153,7 @@ class _Runs:
         settings: tuple[float, float, AbstractMethod],
     ):
         self.parametric, self.instants, self.order, self.settings = parametric, instants, order, settings
-        self.width = min(LANES, 1 << (len(rows) - 1).bit_length())
+        self.width = min(LANES, power_of_two(len(rows)))
         self.steps, self.backends = np.zeros(len(rows), int), set[str]()
         self._made = parametric.of(rows)
         self._reached = np.zeros((len(rows), len(instants)), bool)

@@ -18,6 +18,7 @@ import numpy as np
 from jaxtyping import Float
 
 from jounce.base.modules import with_fields
+from jounce.base.padding import padded
 from jounce.base.shapes import is_traced
 from jounce.errors import UnsupportedError
 from jounce.execution.compilation import compiled
@@ -186,9 +187,9 @@ def _divided(problem: RobotProblem, simulation: RobotSimulation) -> tuple[np.nda
     steps = simulation.steps
     states = jax.tree.map(lambda c: np.moveaxis(np.asarray(c)[:, 0], 0, -1), steps.polynomial)
     count = len(steps.start)
-    more = -count % PADDED
-    wide = jax.tree.map(lambda x: np.concatenate([x, np.repeat(x[..., -1:], more, axis=-1)], axis=-1), states)
-    growth = np.asarray(_growth(problem, wide, np.append(steps.start, np.repeat(steps.start[-1:], more))))[:, :count]
+    length = count + -count % PADDED
+    wide, start = jax.tree.map(lambda x: padded(x, length), (states, steps.start))
+    growth = np.asarray(_growth(problem, wide, start))[:, :count]
     orders = np.arange(ORDER + 2 - LAST, ORDER + 2)
     with np.errstate(divide="ignore"):
         reach = ((CONVERGED / growth[-LAST:]) ** (1 / orders[:, None])).min(axis=0)

@@ -10,7 +10,7 @@ import jax
 import numpy as np
 from jaxtyping import Float, Int
 
-from jounce.execution.llvm.programs import filled
+from jounce.base.padding import padded
 from jounce.execution.mapped import OnLlvm, OnXla, Rounds
 from jounce.execution.translated import WhenMade
 from jounce.kinematics.continuation.continuation_steps import NOWHERE, Settings, StepState, TakenSteps, take_steps
@@ -59,7 +59,7 @@ class Solver:
         """
         lanes = len(instant)
         if lanes <= SMALL_BATCH:
-            known, step, instant = jax.tree.map(lambda x: filled(x, SMALL_BATCH), (needed, step, instant))
+            known, step, instant = jax.tree.map(lambda x: padded(x, SMALL_BATCH), (needed, step, instant))
             run = _run_from(known, (0.0,) * 4, away=step, instant=instant)
             arrival = self._take_steps(run, NO_GRID, _limits(0.0, 0.0), 1, search=search).last
         else:
@@ -131,7 +131,7 @@ class Solver:
         self, solved: SolvedState, expansion_point: Sequence[float], largest: float, crawled: int = 0
     ) -> StepState:
         """Return the run from a solved instant, an expansion point; the first step is at most `largest`, s."""
-        known = jax.tree.map(lambda x: filled(x, SMALL_BATCH), self.needed(solved))
+        known = jax.tree.map(lambda x: padded(x, SMALL_BATCH), self.needed(solved))
         return _run_from(known, expansion_point, largest=largest, crawled=crawled)
 
     def beginning(self, coordinates: Mapping[str, Any], instant: float) -> StepState:

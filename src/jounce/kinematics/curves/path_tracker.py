@@ -9,6 +9,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 from numpy.polynomial.polynomial import polyval
 
+from jounce.base.padding import padded
 from jounce.base.shapes import Numbers
 from jounce.jet.turns import principal
 from jounce.kinematics.curves.series import CurvePoints, curve_points, second_order
@@ -203,13 +204,12 @@ class PathTracker:
         rows, count = several[0].rows, len(steps)
 
         def lanes(parts: list[np.ndarray]) -> np.ndarray:
-            parts = [*parts, *[parts[-1]] * (LANES - len(parts))]
-            return np.stack(parts, axis=-1)
+            return padded(np.stack(parts, axis=-1), LANES)
 
         coordinates = {name: lanes([p.coordinates[name] for p in several]) for name in several[0].coordinates}
         directions = [self.tangent(p)[: self.columns] for p in several] if tangent is None else [tangent]
-        padded = np.concatenate([steps, np.full(LANES - count, steps[-1])])
-        given = coordinates, lanes([p.value for p in several]), lanes(directions), padded, np.asarray(corrected)
+        ahead = lanes(directions), padded(steps, LANES)
+        given = coordinates, lanes([p.value for p in several]), *ahead, np.asarray(corrected)
         scaled: Any = rows.astype(np.int32), np.asarray(self.value_scale)
         solved = curve_points(self.model.system, *given, *scaled, pose_type=self.model.pose_type, driven=self.driven)
         cut = {name: np.asarray(x)[..., :count] for name, x in solved.coordinates.items()}
@@ -325,9 +325,9 @@ class PathTracker:
         columns = []
         for first in range(0, directions.shape[1], LANES):
             some = directions[:, first : first + LANES]
-            padded = np.zeros((self.columns + 1, LANES))
-            padded[: self.unknowns, : some.shape[1]] = some
-            arguments = (self.model.system, coordinates, value, padded, scale)
+            wide = np.zeros((self.columns + 1, LANES))
+            wide[: self.unknowns, : some.shape[1]] = some
+            arguments = (self.model.system, coordinates, value, wide, scale)
             columns.append(np.asarray(second_order(*arguments, pose_type=self.model.pose_type))[:, : some.shape[1]])
         return np.concatenate(columns, axis=1)
 

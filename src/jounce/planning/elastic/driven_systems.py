@@ -10,6 +10,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
+from jounce.base.padding import power_of_two
 from jounce.base.shapes import Numbers
 from jounce.dynamics.inverse.outputs.reactions import driver_force
 from jounce.dynamics.limits.trajectories import FollowedTrajectory
@@ -166,5 +167,5 @@ class DrivenMechanism(DrivenSystem):
 
 def _filled_up(times: Float[np.ndarray, " time"]) -> Float[np.ndarray, " more"]:
     """Return instants with some between them, a power of two in all, so that few sizes are compiled."""
-    missing = (1 << (len(times) - 1).bit_length()) - len(times)
+    missing = power_of_two(len(times)) - len(times)
     return np.union1d(times, 0.5 * (times[:-1] + times[1:])[:missing])

@@ -8,6 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
+from jounce.base.padding import padded
 from jounce.execution.compilation import compiled
 from jounce.planning.tool_paths.path_equations import PathEquations
 
@@ -130,12 +131,12 @@ def followed(
 def _marched(equations: PathEquations, start: Any, time: Any, target: Any, order: int) -> list[np.ndarray]:
     """Return the results of `march` for nodes, which are padded to a multiple of the compiled length."""
     count = BLOCK * -(-len(time) // BLOCK)
-    filled = np.concatenate([time, np.full(count - len(time), time[-1])])
-    steps = np.append(np.diff(filled), 0.0)
-    series = {kind: _filled(array, ORDER) for kind, array in target(filled, min(order, ORDER)).items()}
+    nodes = padded(time, count)
+    steps = np.append(np.diff(nodes), 0.0)
+    series = {kind: _filled(array, ORDER) for kind, array in target(nodes, min(order, ORDER)).items()}
     targets = {kind: np.moveaxis(array, -1, 0)[..., None] for kind, array in series.items()}
     shares = np.arange(1, POINTS_IN_STEP + 1) / POINTS_IN_STEP
-    instants = np.minimum((filled[:, None] + shares * steps[:, None]).ravel(), time[-1])
+    instants = np.minimum((nodes[:, None] + shares * steps[:, None]).ravel(), time[-1])
     inner = {
         kind: np.moveaxis(array.reshape(*array.shape[:-1], count, POINTS_IN_STEP), -2, 0)
         for kind, array in target(instants, 0).items()

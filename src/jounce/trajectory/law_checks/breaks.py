@@ -7,6 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float, Int
 
+from jounce.base.padding import padded, power_of_two
 from jounce.settings import under_own_settings
 from jounce.trajectory.law_checks.seen_jumps import seen_jumps
 from jounce.trajectory.law_checks.smoothness import HIGHEST, SeenLeaders, known_jumps
@@ -144,9 +145,8 @@ def _seen(law: AbstractMotion, first: float, last: float, order: int) -> Times:
     level = min(order + 2, HIGHEST + 1)
 
     def evaluate(times: Times) -> Any:
-        filled = np.full(max(16, 1 << (len(times) - 1).bit_length()), last)  # few shapes, so that few are compiled
-        filled[: len(times)] = times
-        derivatives = np.asarray(law_derivatives([law], jnp.asarray(filled), level))[..., : len(times)]
+        wide = jnp.asarray(padded(times, power_of_two(len(times), 16)))
+        derivatives = np.asarray(law_derivatives([law], wide, level))[..., : len(times)]
         return np.nan_to_num(np.moveaxis(derivatives, -1, 0))
 
     looks = np.linspace(first, last, LOOKS)

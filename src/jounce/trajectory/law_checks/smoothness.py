@@ -6,6 +6,7 @@ import math
 import numpy as np
 from jaxtyping import Float, Int
 
+from jounce.base.padding import padded, power_of_two
 from jounce.jet import Jet
 from jounce.jet.programs.composition import Composed
 from jounce.trajectory.checks import whole_number
@@ -156,9 +157,8 @@ class SeenLeaders:
         """Return the Taylor coefficients of a leader at instants."""
         key = id(leader), order, instants.tobytes()
         if key not in self._values:
-            filled = np.full(max(16, 1 << (len(instants) - 1).bit_length()), instants[-1] if len(instants) else 0.0)
-            filled[: len(instants)] = instants  # few lengths, so that few programs are compiled
-            jet = leader(Jet.variable(filled, order) if order else Jet([filled])).dense()
+            wide = padded(instants, power_of_two(len(instants), 16))
+            jet = leader(Jet.variable(wide, order) if order else Jet([wide])).dense()
             self._values[key] = leader, [np.asarray(c)[: len(instants)] for c in jet.coefficients]
         return self._values[key][1]
 

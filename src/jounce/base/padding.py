@@ -1,0 +1,42 @@
+"""Arrays that are made longer, so that programs are compiled for few lengths."""
+
+import numpy as np
+
+
+def padded(array: np.ndarray, length: int, axis: int = -1) -> np.ndarray:
+    """Repeat the last entry along the first or the last axis up to a length; zeros where there is none.
+
+    Parameters
+    ----------
+    array : array
+        No longer than that.
+    length : int
+        Of the axis of the result.
+    axis : int, default -1
+        0 or -1.
+
+    Examples
+    --------
+    >>> padded(np.array([1.0, 2.0]), 4).tolist()
+    [1.0, 2.0, 2.0, 2.0]
+    """
+    count = array.shape[axis]
+    if count == length:
+        return array
+    result = np.zeros((length, *array.shape[1:]) if axis == 0 else (*array.shape[:-1], length), array.dtype)
+    if count and axis == 0:
+        result[:count], result[count:] = array, array[-1]
+    elif count:
+        result[..., :count], result[..., count:] = array, array[..., -1:]
+    return result
+
+
+def power_of_two(count: int, least: int = 1) -> int:
+    """Return the smallest power of two that is neither below a count nor below the least one.
+
+    Examples
+    --------
+    >>> power_of_two(5), power_of_two(5, 16)
+    (8, 16)
+    """
+    return max(least, 1 << max(count - 1, 0).bit_length())
