@@ -15,7 +15,13 @@ from jaxtyping import Bool, Float, Int
 from jounce.base.shapes import Numbers
 from jounce.execution.compilation import compiled
 from jounce.execution.mapped import called
-from jounce.kinematics.continuation.correct_and_differentiate import SolvedState, StepResult, advance, predictor
+from jounce.kinematics.continuation.correct_and_differentiate import (
+    Settings,
+    SolvedState,
+    StepResult,
+    advance,
+    predictor,
+)
 from jounce.kinematics.continuation.instant_program import finds_det_rate
 from jounce.kinematics.continuation.singularity_distance import det_rate_at
 from jounce.kinematics.continuation.step_control import (
@@ -30,17 +36,7 @@ from jounce.kinematics.continuation.step_control import (
 from jounce.mechanism.system import System
 from jounce.rigid.pose import Pose
 
-Number = Float[Numbers, ""]
 NOWHERE = ExpansionPoint(*[np.full((), np.nan)] * 4)
-
-
-class Settings(NamedTuple):
-    """Tolerances of the solution of instants; see `advance`."""
-
-    tolerance: Number
-    refine: Bool[Numbers, ""]
-    search: Bool[Numbers, ""]
-    finite_order: Int[Numbers, ""]
 
 
 class StepState(NamedTuple):
@@ -97,6 +93,7 @@ def take_steps(
     grid: Float[Numbers, " time"],
     limits: StepLimits,
     settings: Settings,
+    search: Bool[Numbers, ""],
     most: Int[Numbers, ""],
     *,
     pose_type: type[Pose],
@@ -114,8 +111,8 @@ def take_steps(
         Where to go on from.
     grid : array of shape (time,)
         The next instants of the grid, s; infinite beyond the last. At least one batch more than can be solved.
-    limits, settings
-        See there.
+    limits, settings, search
+        See `StepLimits` and `advance`.
     most : int
         Batches that it may solve.
     pose_type, order
@@ -128,25 +125,23 @@ def take_steps(
 
     def solved(run: StepState) -> Any:
         unknown = jnp.isnan(run.arrived.instant)
-        tolerance, refine, search, finite_order = settings._replace(search=settings.search & unknown)
-        arrival = arrived_at(run, tolerance, refine, search, finite_order)
+        arrival = arrived_at(run, search & unknown)
         names = "safe_step", "radius", "det_rate"
         return arrival._replace(
             **{name: jnp.where(unknown, getattr(arrival, name), getattr(run.arrived, name)) for name in names}
         )
 
-    def arrived_at(run: StepState, tolerance: Any, refine: Any, search: Any, finite_order: Any) -> Any:
+    def arrived_at(run: StepState, search: Any) -> Any:
         if native is not None:
             first = np.arange(len(run.instant)) == 0
             lanes = run.known, run.away, run.instant, None, search & first
-            arrival = called(native, (system, tolerance, refine, finite_order), lanes)
+            arrival = called(native, (system, settings), lanes)
             arrival = arrival._replace(safe_step=arrival.safe_step[:1], radius=arrival.radius[:1])
             if finds_det_rate(system):
                 return arrival._replace(det_rate=arrival.det_rate[:1])
             there = partial(det_rate_at, system, pose_type, arrival.coordinates, run.instant)
             return arrival._replace(det_rate=jax.lax.cond(search, there, lambda: jnp.zeros(1)))
-        how = tolerance, refine, search, finite_order
-        return _batch(system, *run.known, run.away, run.instant, *how, pose_type=pose_type, order=order)
+        return _batch(system, settings, run.known, run.away, run.instant, search, pose_type=pose_type, order=order)
 
     def going(state: TakenSteps) -> Any:
         return (state.run.control.ending == int(StopReason.UNFINISHED)) & (state.count < most)

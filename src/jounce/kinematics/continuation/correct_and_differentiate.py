@@ -42,6 +42,14 @@ GAP_TOLERANCES = 1e3
 LARGEST_CONTRADICTION = 1e-6  # of derivatives in redundant rows, as a part of what the motion's own could be
 
 
+class Settings(NamedTuple):
+    """How exactly instants are solved."""
+
+    tolerance: Float[Numbers, ""]  # largest correction of an accepted pose, rad or sizes of the mechanism
+    refine: Bool[Numbers, ""]  # whether accepted poses are corrected to rounding
+    finite_order: Int[Numbers, ""]  # highest derivative that must be finite
+
+
 class StepResult(NamedTuple):
     """Results of the instants of a batch; every array has the batch last."""
 
@@ -216,15 +224,11 @@ def _status(
 
 def advance(
     system: System,
-    coordinates: dict[str, Numbers],
-    angles: tuple[Numbers, ...],
-    sign: Lanes,
+    settings: Settings,
+    known: SolvedState,
     step: Lanes,
     instant: Lanes,
-    tolerance: Float[Numbers, ""],
-    refine: Bool[Numbers, ""],
     search: Bool[Numbers, ""],
-    finite_order: Int[Numbers, ""],
     *,
     pose_type: type[Pose],
     order: int,
@@ -236,28 +240,21 @@ def advance(
     ----------
     system : System
         The mechanism.
-    coordinates, angles
-        Jets of the neighbors, shape (order + 1, ..., batch): of the pose, by name, and of each group of outputs that
-        are angles known up to whole turns.
-    sign : array of shape (batch,)
-        Of the determinant of the Jacobian at the neighbors; 0 where it does not matter.
+    settings : Settings
+        Of all instants.
+    known : tuple
+        Of the neighbors, as `predictor` gives it, the batch last: jets of the pose and of turning angles, and the sign
+        of the determinant of the Jacobian, 0 where it does not matter.
     step, instant : array of shape (batch,)
         Time from the neighbor, and the time arrived at, s.
-    tolerance : float
-        Largest correction of an accepted pose, rad or sizes of the mechanism.
-    refine : bool
-        Whether to correct accepted poses to rounding.
     search : bool
         Whether to find how far the motion from the first lane can be predicted, and where it is singular next.
-    finite_order : int
-        Highest derivative that must be finite.
     pose_type, order
         PlanarPose or SpatialPose; derivatives requested.
     with_det_rate : bool, default True
         Whether the rate of the determinant is looked for here, too; else it is left at zero.
     """
-    given = coordinates, angles, sign, step, instant, tolerance, refine, finite_order
-    arrival, factor, pose = solved_batch(system, *given, pose_type=pose_type, order=order)
+    arrival, factor, pose = solved_batch(system, settings, known, step, instant, pose_type=pose_type, order=order)
     first = arrival.status[:1]
 
     def searched() -> Any:
@@ -273,21 +270,18 @@ def advance(
 
 def solved_batch(
     system: System,
-    coordinates: dict[str, Numbers],
-    angles: tuple[Numbers, ...],
-    sign: Lanes,
+    settings: Settings,
+    known: SolvedState,
     step: Lanes,
     instant: Lanes,
-    tolerance: Float[Numbers, ""],
-    refine: Bool[Numbers, ""],
-    finite_order: Int[Numbers, ""],
     *,
     pose_type: type[Pose],
     order: int,
 ) -> tuple[StepResult, Factor, Pose]:
     """Return what `advance` does but for what it searches, with the factored Jacobian and the pose."""
+    (jets, angles, sign), (tolerance, refine, finite_order) = known, settings
     # what a law makes infinite, such as the third derivative of t**2.5 at t = 0, is of no use to a prediction
-    moving = {name: Jet(tuple(jnp.where(jnp.isfinite(c), c, 0.0))) for name, c in coordinates.items()}
+    moving = {name: Jet(tuple(jnp.where(jnp.isfinite(c), c, 0.0))) for name, c in jets.items()}
     predicted = pose_type.predicted_from(moving, step)
     time = Jet.variable(instant[None], order)
     pose, factor, correction = newton_raphson(system, predicted, time.truncate(0), tolerance, refine)
@@ -295,7 +289,7 @@ def solved_batch(
 
     outputs = _outputs(system, pose, angles, step)
     reached = pose.coordinates()
-    coordinates = {name: stacked(jet) for name, jet in reached.items()}
+    coordinates: dict[str, Numbers] = {name: stacked(jet) for name, jet in reached.items()}
     departures = _departures(system, pose, predicted)
     departure = jnp.max(departures, axis=0)
     travel = travel_of(_terms(system, moving, pose_type.predictor), step)

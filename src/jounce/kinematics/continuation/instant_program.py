@@ -40,11 +40,9 @@ def round_width(system: System) -> int:
 
 def _of_many(shared: Any, instants: Any, *, pose_type: type[Pose], order: int) -> StepResult:
     """Solve many instants as `advance_instant` does one; those of one motion are not searched."""
-    system, tolerance, refine, finite_order = shared
-    (coordinates, angles, sign), step, instant, own, search = instants
+    (system, settings), (known, step, instant, own, search) = shared, instants
     system = of_design(system, own)
-    given = coordinates, angles, sign, step, instant, tolerance, refine, finite_order
-    arrival, factor, pose = solved_batch(system, *given, pose_type=pose_type, order=order)
+    arrival, factor, pose = solved_batch(system, settings, known, step, instant, pose_type=pose_type, order=order)
     nothing = jnp.zeros_like(step)
     if own is None:
         return arrival._replace(det_rate=nothing, safe_step=nothing, radius=nothing)
@@ -66,20 +64,17 @@ def advance_instant(shared: Any, instants: Any, *, pose_type: type[Pose], order:
     Parameters
     ----------
     shared : tuple
-        System, tolerance, whether to refine, and the highest derivative that must be finite.
+        System and `Settings`.
     instants : tuple
-        Coordinates, angles and sign of the neighbor, the time from there, the instant, s, the values of its design,
-        if there are many (see `of_design`), else None, and whether to search, as `advance` has it: each of length one.
+        What is known of the neighbor, the time from there, the instant, s, the values of its design, if there are many
+        (see `of_design`), else None, and whether to search, as `advance` has it: each of length one.
     pose_type, order
         As those of `advance`.
     """
-    system, tolerance, refine, finite_order = shared
-    (coordinates, angles, sign), step, instant, own, search = instants
-    return advance(
-        with_fields(of_design(system, own), reflected=True), coordinates, angles, sign, step, instant, tolerance,
-        refine, search[0], finite_order, pose_type=pose_type, order=order,
-        with_det_rate=own is not None or finds_det_rate(system),
-    )  # fmt: skip
+    (system, settings), (known, step, instant, own, search) = shared, instants
+    reflected = with_fields(of_design(system, own), reflected=True)
+    how: Any = {"pose_type": pose_type, "order": order, "with_det_rate": own is not None or finds_det_rate(system)}
+    return advance(reflected, settings, known, step, instant, search[0], **how)
 
 
 def of_design(values: Values, own: Mapping[int, Any] | None) -> Values:

@@ -13,8 +13,14 @@ from jaxtyping import Float, Int
 from jounce.base.padding import padded
 from jounce.execution.mapped import OnLlvm, OnXla, Rounds
 from jounce.execution.translated import WhenMade
-from jounce.kinematics.continuation.continuation_steps import NOWHERE, Settings, StepState, TakenSteps, take_steps
-from jounce.kinematics.continuation.correct_and_differentiate import LARGEST_GAP, SolvedState, StepResult, predictor
+from jounce.kinematics.continuation.continuation_steps import NOWHERE, StepState, TakenSteps, take_steps
+from jounce.kinematics.continuation.correct_and_differentiate import (
+    LARGEST_GAP,
+    Settings,
+    SolvedState,
+    StepResult,
+    predictor,
+)
 from jounce.kinematics.continuation.instant_program import advance_instant, round_width
 from jounce.kinematics.continuation.step_control import ExpansionPoint, StepLimits, initial_control
 from jounce.kinematics.status import Status
@@ -170,17 +176,15 @@ class Solver:
     @cached_property
     def program(self) -> OnLlvm | OnXla:
         """What solves many instants."""
-        system, (tolerance, refine, _, finite_order) = self.model.system, self._settings
+        system = self.model.system
         nothing, still = np.zeros(1), self.still(self.model.guess)
         instants = self.needed(still), nothing, nothing, self.own, np.zeros(1, bool)
-        kind = self.model.pose_type
         small = system.shape[1] <= FEW_COLUMNS and not self.hasty
         laws = [getattr(group.element, "motion", ()) for group in system.groups]
         tables = max(map(np.size, jax.tree.leaves(laws)), default=0) > LARGE
         how = {"large": (LARGE_BESIDE_TABLES if tables else None) if small else LARGE, "hasty": self.hasty}
-        shared = system, tolerance, refine, finite_order
-        how |= {"width": partial(round_width, system), "pose_type": kind, "order": self.order}
-        return advance_instant.program(shared, instants, **how)
+        how |= {"width": partial(round_width, system), "pose_type": self.model.pose_type, "order": self.order}
+        return advance_instant.program((system, self._settings), instants, **how)
 
     @cached_property
     def _batches(self) -> int:
@@ -194,7 +198,7 @@ class Solver:
 
     @cached_property
     def _settings(self) -> Settings:
-        return Settings(*map(np.asarray, (self.tolerance, self.refine, True, self.finite_order)))
+        return Settings(*map(np.asarray, (self.tolerance, self.refine, self.finite_order)))
 
     def _take_steps(
         self,
@@ -209,11 +213,11 @@ class Solver:
         length = (self._batches + 1) * (SMALL_BATCH - 1)
         window = np.full(length, np.inf)
         window[: len(grid)] = grid[:length]
-        settings, kind = self._settings._replace(search=np.asarray(search)), self.model.pose_type
         call = take_steps.prepare if only_made else take_steps
         native = WhenMade(self.hasty, lambda: self.program.name if isinstance(self.program, OnLlvm) else None)
-        how = {"pose_type": kind, "order": self.order, "batches": self._batches, "native": native}
-        return call(self.model.system, run, window, limits, settings, np.asarray(most), **how)
+        how = {"pose_type": self.model.pose_type, "order": self.order, "batches": self._batches, "native": native}
+        bounds = limits, self._settings, np.asarray(search), np.asarray(most)
+        return call(self.model.system, run, window, *bounds, **how)
 
     def fault(self, arrival: StepResult, lane: int) -> str:
         """Return where to look for the fault: a driver without a permitted value, an output, the farthest body."""
