@@ -7,7 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from jounce.dynamics.forward.accelerations import State, expand, inverted
-from jounce.integrate.marching.marching import Outcome, march, unexpanded
+from jounce.integrate.marching.marching import Outcome, RunLimits, march, unexpanded
 
 COUNT = 4096  # steps tried at most
 LENIENT = 1e-6  # tolerance where the steps are given
@@ -41,9 +41,7 @@ def onwards(ready, method, current, stop, tolerance, longest=np.inf):
     current, _, tried = march_side_by_side(
         ready.equations,
         current._replace(outcome=running),
-        stop,
-        tolerance,
-        jnp.broadcast_to(jnp.asarray(longest, float), current.time.shape),
+        RunLimits(stop, tolerance, jnp.broadcast_to(jnp.asarray(longest, float), current.time.shape)),
         method=method,
         count=COUNT,
     )

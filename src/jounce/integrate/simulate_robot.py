@@ -12,7 +12,7 @@ from jounce.errors import MechanismError, RobotError, UnsupportedError, check_na
 from jounce.execution.backends import backend_of
 from jounce.integrate.marching.exact_numbers import ExactNumbers
 from jounce.integrate.marching.joint_events import JointEvent, JointEventDetector
-from jounce.integrate.marching.marching import Outcome, steps_between_looks
+from jounce.integrate.marching.marching import Outcome, RunLimits, steps_between_looks
 from jounce.integrate.marching.robot_marching import STUCK, Progress, RobotProblem, RobotSteps, march_robot
 from jounce.integrate.marching.robot_state import RobotState
 from jounce.integrate.results.robot_simulation import RobotSimulation
@@ -202,7 +202,7 @@ class _Run:
             self.ending = self._explained(current)
 
     def _marched(self, current: Progress, begun: float, stop: float) -> Any:
-        limits = (np.float64(x) for x in (begun, stop, self.tolerance, self.longest))
+        limits = np.float64(begun), RunLimits(*map(np.float64, (stop, self.tolerance, self.longest)))
         try:
             how: Any = {"order": self.order, "count": self.count, "exact": self.exact}
             return march_robot(self.problem, current, *limits, **how)

@@ -81,6 +81,14 @@ class IntegratorState(NamedTuple):
     balance: Balance  # of the energy, where that is to be kept
 
 
+class RunLimits(NamedTuple):
+    """Where runs go, and in what steps."""
+
+    stop: Number  # s; steps end there exactly
+    tolerance: Number  # of the error of a step, rad or sizes of the mechanism
+    longest: Number | Float[Numbers, "*batch"]  # step, s
+
+
 class DenseOutput(NamedTuple):
     """Steps one after the other, as polynomials; while they are taken, the batch is the last axis.
 
@@ -134,14 +142,7 @@ def _measured(equations: Equations, state: State) -> AnglesOfForces:
 
 @compiled("count", single=True)
 def march(
-    equations: Equations,
-    current: IntegratorState,
-    stop: Number,
-    tolerance: Number,
-    longest: Float[Numbers, "*batch"],
-    *,
-    method: AbstractMethod,
-    count: int,
+    equations: Equations, current: IntegratorState, limits: RunLimits, *, method: AbstractMethod, count: int
 ) -> tuple[IntegratorState, tuple[DenseOutput, Bool[Numbers, "steps batch"]], Int[Numbers, ""]]:
     """Take up to `count` steps of a run toward a time; `march_runs` is for many.
 
@@ -151,12 +152,8 @@ def march(
         Of the mechanism.
     current : IntegratorState
         Where to go on from.
-    stop : float
-        Where to go, s; steps end there exactly.
-    tolerance : float
-        Of the error of a step, rad or sizes of the mechanism.
-    longest : float
-        Largest step, s.
+    limits : RunLimits
+        Where to go, and in what steps.
     method : AbstractMethod
         How steps are taken.
     count : int
@@ -170,7 +167,7 @@ def march(
     tried : int
         How many of them there are.
     """
-    attempt = _attempt(equations, current, stop, tolerance, longest, method)
+    attempt = _attempt(equations, current, limits, method)
 
     def unfinished(carry: Any) -> Any:
         current, _, tried = carry
@@ -187,7 +184,7 @@ def march(
 
 @mapped(widths=(FEW_RUNS, MANY_RUNS))
 def march_runs(
-    shared: tuple[Any, Number, Number, Float[Numbers, ""]],
+    shared: tuple[Any, RunLimits],
     lanes: tuple[dict[int, Any], IntegratorState],
     *,
     method: AbstractMethod,
@@ -198,7 +195,7 @@ def march_runs(
     Parameters
     ----------
     shared : tuple
-        Equations, alone or first of others; and where to go, the tolerance and the longest step, as for `march`.
+        Equations, alone or first of others; and limits, as for `march`.
     lanes : tuple
         Of each run: its `own` values, as `of_design` has them, and where to go on from.
     method, steps
@@ -210,9 +207,9 @@ def march_runs(
     steps : tuple
         As `march` returns them; after its end, a run repeats its last step, which is not taken.
     """
-    (values, stop, tolerance, longest), (own, current) = shared, lanes
+    (values, limits), (own, current) = shared, lanes
     equations, *_ = of_design(values, own)
-    attempt = _attempt(equations, current, stop, tolerance, longest, method)
+    attempt = _attempt(equations, current, limits, method)
 
     def turn(k: Any, carry: Any) -> Any:
         current, previous = carry
@@ -230,14 +227,10 @@ def march_runs(
 
 
 def _attempt(
-    equations: Equations,
-    current: IntegratorState,
-    stop: Number,
-    tolerance: Number,
-    longest: Float[Numbers, "*batch"],
-    method: AbstractMethod,
+    equations: Equations, current: IntegratorState, limits: RunLimits, method: AbstractMethod
 ) -> Callable[[IntegratorState], tuple[IntegratorState, tuple[DenseOutput, Any]]]:
     """Return what tries a step of each run that has not ended, with the arguments of `march`."""
+    stop, tolerance, longest = limits
     length = equations.system.column_scale[0]
     order, bodies = len(current.expansion.state.position) - 1, current.expansion.state.position.shape[2]
     here = current.expansion.state.map(lambda part: part[0])
@@ -253,8 +246,9 @@ def _attempt(
         angles = followed(equations, current.angles, start.state, look.step)
         duration = jnp.abs(stop - current.begun)
         if method.controlled:
-            limits = duration, allowed, finest(duration, current.time, current.crossing + current.refused)
-            look = look_ahead(equations, start.state, angles, current.mobility, current.time, look.step, *limits)
+            shortest = finest(duration, current.time, current.crossing + current.refused)
+            ahead = angles, current.mobility, current.time, look.step, duration, allowed, shortest
+            look = look_ahead(equations, start.state, *ahead)
         suspect = (look.kink >= 0) & (jnp.abs(look.step) < step) | (current.refused >= STUBBORN)
         step = jnp.abs(look.step)
         last = step >= 0.999 * jnp.abs(left)  # no sliver of a step at the end

@@ -16,7 +16,7 @@ from jounce.base.shapes import Numbers
 from jounce.execution.compilation import LARGE, compiled
 from jounce.execution.llvm.text.values import UnsupportedOperationError
 from jounce.integrate.marching.exact_numbers import ExactNumbers, forms_of
-from jounce.integrate.marching.marching import SHORT as UNUSUAL, Outcome
+from jounce.integrate.marching.marching import SHORT as UNUSUAL, Outcome, RunLimits
 from jounce.integrate.marching.robot_state import RobotState, at, polynomial_of, rates_at
 from jounce.integrate.steps.lookahead import HARMLESS, NEAR, POINTS, RUN_POINTS, SHORTEST, finest, steps_counted
 from jounce.integrate.steps.methods import MARGIN, NEEDED, ROUNDING, Lanes, furthest
@@ -234,9 +234,7 @@ def march_robot(
     problem: RobotProblem,
     current: Progress,
     begun: Any,
-    stop: Any,
-    tolerance: Any,
-    longest: Any,
+    limits: RunLimits,
     *,
     order: int,
     count: int,
@@ -250,12 +248,10 @@ def march_robot(
         What moves the robot.
     current : Progress
         Where to go on from.
-    begun, stop : float
-        The run, s; steps end at its end exactly.
-    tolerance : float
-        Of the error of a step, rad or sizes of the robot.
-    longest : float
-        Largest step, s.
+    begun : float
+        When the run began, s.
+    limits : RunLimits
+        Where it goes, and in what steps.
     order : int
         Of the series.
     count : int
@@ -272,6 +268,7 @@ def march_robot(
         How many there are.
     """
     problem, still = (problem, None) if exact is None else (problem.made_for(exact), problem.still(exact))
+    stop, tolerance, longest = limits
     duration = jnp.abs(stop - begun)
     points = SMOOTH_POINTS if problem.smooth else POINTS
 

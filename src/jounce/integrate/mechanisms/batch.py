@@ -14,7 +14,15 @@ from jounce.dynamics.forward.initial_state import consistent_start, initial_as_d
 from jounce.errors import MechanismError
 from jounce.execution.backends import joined
 from jounce.execution.threads import Threads, thread_count
-from jounce.integrate.marching.marching import MOVING, DenseOutput, IntegratorState, Outcome, march_runs, unexpanded
+from jounce.integrate.marching.marching import (
+    MOVING,
+    DenseOutput,
+    IntegratorState,
+    Outcome,
+    RunLimits,
+    march_runs,
+    unexpanded,
+)
 from jounce.integrate.marching.user_methods import integrator
 from jounce.integrate.mechanisms.batch_equations import BatchStart, ParametricMechanism, Turns, outputs_of_runs
 from jounce.integrate.results.batch import Batch
@@ -119,7 +127,8 @@ def simulate_batch(
     if first.initial:
         model, _ = with_reference(build(initial_as_drivers(first)), nominal.model.reference, float(instants[0]))
         begun = ParametricMechanism(initial_as_drivers(first), model, names)
-    runs = _Runs(parametric, rows, instants, order, (float(tolerance), float(longest_step), method))
+    limits = RunLimits(instants[-1], float(tolerance), float(longest_step))
+    runs = _Runs(parametric, rows, instants, order, limits, method)
 
     starts = BatchStart(parametric, begun, nominal.state, rows, float(instants[0]))
 
@@ -150,9 +159,16 @@ class _Runs:
         rows: np.ndarray,
         instants: np.ndarray,
         order: int,
-        settings: tuple[float, float, AbstractMethod],
+        limits: RunLimits,
+        method: AbstractMethod,
     ):
-        self.parametric, self.instants, self.order, self.settings = parametric, instants, order, settings
+        self.parametric, self.instants, self.order, self.limits, self.method = (
+            parametric,
+            instants,
+            order,
+            limits,
+            method,
+        )
         self.width = min(LANES, power_of_two(len(rows)))
         self.steps, self.backends = np.zeros(len(rows), int), set[str]()
         self._made = parametric.of(rows)
@@ -202,9 +218,8 @@ class _Runs:
     def depart(self, runs: np.ndarray, state: State, angles: Turns) -> None:
         """Set runs off from states on the constraints, with the turns that angles about axes have there."""
         equations, _ = self._picked(runs, angles)
-        tolerance, _, method = self.settings
         time = np.full(len(runs), self.instants[0])
-        current = unexpanded(equations, state, time, order=method.expansion_order(tolerance))
+        current = unexpanded(equations, state, time, order=self.method.expansion_order(float(self.limits.tolerance)))
         current = jax.tree.map(np.asarray, current)
         if self._current is None:
             self._current = jax.tree.map(lambda x: np.zeros((*x.shape[:-1], len(self.steps)), x.dtype), current)
@@ -218,11 +233,9 @@ class _Runs:
 
     def advance(self, runs: np.ndarray) -> None:
         """March runs by some steps, and note what they pass."""
-        tolerance, longest, method = self.settings
         current = jax.tree.map(lambda x: x[..., runs], self._current)
-        method = integrator(method, self.parametric.picked(self._made, runs)[0], current)
-        shared = tuple(map(np.asarray, (self.instants[-1], tolerance, longest)))
-        how: Any = {"method": method, "steps": STEPS}
+        method = integrator(self.method, self.parametric.picked(self._made, runs)[0], current)
+        shared, how = (RunLimits(*map(np.asarray, self.limits)),), {"method": method, "steps": STEPS}
         marched, backend = self.parametric.mapped(march_runs, self._made, runs, shared, (current,), **how)
         self.backends.add(backend)
         current, (steps, taken) = marched

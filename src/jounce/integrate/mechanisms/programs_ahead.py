@@ -14,7 +14,14 @@ from jounce.execution.background import prepare_later
 from jounce.execution.compilation import LARGE
 from jounce.execution.store.programs import is_in_haste
 from jounce.execution.threads import thread_count
-from jounce.integrate.marching.marching import IntegratorState, march, room_for_steps, steps_between_looks, unexpanded
+from jounce.integrate.marching.marching import (
+    IntegratorState,
+    RunLimits,
+    march,
+    room_for_steps,
+    steps_between_looks,
+    unexpanded,
+)
 from jounce.integrate.marching.user_methods import integrator
 from jounce.integrate.results.simulation import derivatives_of_motion, expanded
 from jounce.integrate.steps.methods import AbstractMethod
@@ -22,18 +29,12 @@ from jounce.kinematics.results.output_programs import prepare_outputs
 from jounce.mechanism import AbstractMotionOutput, Mechanism, Model
 
 
-def march_arguments(
-    equations: Equations,
-    current: IntegratorState,
-    stop: float,
-    limits: tuple[float, float],
-    method: AbstractMethod,
-    *,
-    watched: bool,
-) -> tuple[tuple[Any, ...], dict[str, Any]]:
-    """Return the arguments of `march` for a run, and those by name; the limits are of an error and of a step."""
+def march_settings(
+    equations: Equations, current: IntegratorState, method: AbstractMethod, *, watched: bool
+) -> dict[str, Any]:
+    """Return the static arguments of `march` for a run that begins with a state."""
     count = steps_between_looks(sum(map(np.size, current.expansion.state)), watched=watched)
-    return (equations, current, stop, *limits), {"method": integrator(method, equations, current), "count": count}
+    return {"method": integrator(method, equations, current), "count": count}
 
 
 def prepare_run(
@@ -42,7 +43,7 @@ def prepare_run(
     instants: Float[np.ndarray, " time"],
     order: int,
     method: AbstractMethod,
-    limits: tuple[float, float],
+    limits: RunLimits,
     *,
     watched: bool,
 ) -> None:
@@ -60,14 +61,14 @@ def prepare_run(
         Highest derivative of the outputs.
     method : AbstractMethod
         How steps are taken.
-    limits : tuple of float
-        Of the error of a step, and the longest one, s.
+    limits : RunLimits
+        Where the run goes, and in what steps.
     watched : bool
         Whether events are looked for.
     """
     if (model.system.rank_is_open and not mechanism.initial) or thread_count() < 2:
         return
-    motion_order, length = derivatives_of_motion(mechanism, order), method.expansion_order(limits[0])
+    motion_order, length = derivatives_of_motion(mechanism, order), method.expansion_order(float(limits.tolerance))
 
     @cache
     def free() -> Model:
@@ -87,8 +88,7 @@ def prepare_run(
 
     def steps() -> None:
         if (beginning := begun()) is not None:
-            arguments, named = march_arguments(*beginning, instants[-1], limits, method, watched=watched)
-            march.prepare(*arguments, **named)
+            march.prepare(*beginning, limits, **march_settings(*beginning, method, watched=watched))
 
     def motion() -> None:
         if (beginning := begun()) is not None:

@@ -20,8 +20,17 @@ from jounce.errors import JounceError, MechanismError, SolveError, did_you_mean
 from jounce.execution.backends import backend_of, joined
 from jounce.execution.compilation import compiled
 from jounce.execution.store.programs import expect
-from jounce.integrate.marching.marching import MOVING, STUCK, DenseOutput, IntegratorState, Outcome, march, unexpanded
-from jounce.integrate.mechanisms.programs_ahead import march_arguments, prepare_run
+from jounce.integrate.marching.marching import (
+    MOVING,
+    STUCK,
+    DenseOutput,
+    IntegratorState,
+    Outcome,
+    RunLimits,
+    march,
+    unexpanded,
+)
+from jounce.integrate.mechanisms.programs_ahead import march_settings, prepare_run
 from jounce.integrate.results.robot_sensitivities import of_traced_robots
 from jounce.integrate.results.robot_simulation import RobotSimulation
 from jounce.integrate.results.sensitivities import traced_simulation
@@ -192,7 +201,7 @@ def simulate(
     for event in events:
         _check_event(event, mechanism)
     first = float(instants[0])
-    limits = float(tolerance), float(longest_step)
+    limits = RunLimits(instants[-1], float(tolerance), float(longest_step))
 
     def prepare(model: Model) -> None:
         prepare_run(mechanism, model, instants, order, method, limits, watched=bool(events))
@@ -314,7 +323,7 @@ class _Run:
         self,
         start: ConsistentStart,
         method: AbstractMethod,
-        limits: tuple[float, float],
+        limits: RunLimits,
         detectors: Sequence[EventDetector],
         *,
         watched: bool,
@@ -335,12 +344,11 @@ class _Run:
         """March from the first to the last instant."""
         equations, watched = self.start.equations, self.watched
         self.direction = direction = np.sign(instants[-1] - instants[0])
-        order = self.method.expansion_order(self.limits[0])
+        order = self.method.expansion_order(float(self.limits.tolerance))
         current = unexpanded(equations, self.start.state, instants[:1], order=order)
-        given = equations, current, instants[-1], self.limits, self.method
-        (_, _, *how), options = march_arguments(*given, watched=watched)
+        settings = march_settings(equations, current, self.method, watched=watched)
         while current.outcome.item() in GOING and self.events.stopped_at is None:
-            current, (output, taken), attempts = march(equations, current, *how, **options)
+            current, (output, taken), attempts = march(equations, current, self.limits, **settings)
             self.backends.add(backend_of(output))
             taken = np.asarray(taken)[: int(attempts), 0]
             if taken.any():

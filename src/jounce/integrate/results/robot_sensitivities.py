@@ -187,8 +187,7 @@ def _divided(problem: RobotProblem, simulation: RobotSimulation) -> tuple[np.nda
     steps = simulation.steps
     states = jax.tree.map(lambda c: np.moveaxis(np.asarray(c)[:, 0], 0, -1), steps.polynomial)
     count = len(steps.start)
-    length = count + -count % PADDED
-    wide, start = jax.tree.map(lambda x: padded(x, length), (states, steps.start))
+    wide, start = jax.tree.map(lambda x: padded(x, -(-count // PADDED) * PADDED), (states, steps.start))
     growth = np.asarray(_growth(problem, wide, start))[:, :count]
     orders = np.arange(ORDER + 2 - LAST, ORDER + 2)
     with np.errstate(divide="ignore"):
