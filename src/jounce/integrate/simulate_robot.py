@@ -15,8 +15,8 @@ from jounce.integrate.marching.joint_events import JointEvent, JointEventDetecto
 from jounce.integrate.marching.marching import Outcome, RunLimits, steps_between_looks
 from jounce.integrate.marching.robot_marching import STUCK, Progress, RobotProblem, RobotSteps, march_robot
 from jounce.integrate.marching.robot_state import RobotState
+from jounce.integrate.marching.runs import AbstractRun
 from jounce.integrate.results.robot_simulation import RobotSimulation
-from jounce.integrate.steps.events import EventLog
 from jounce.integrate.steps.methods import AbstractMethod, Taylor
 from jounce.kinematics import Status
 from jounce.kinematics.position_analysis.solve import raise_for_status
@@ -77,14 +77,14 @@ def simulate_robot(
         longest_step = float(method.step)
     elif method is not None and not isinstance(method, Taylor):
         raise RobotError("robots are simulated by jn.Taylor", name="method", value=type(method).__name__)
-    terms = (method or Taylor()).expansion_order(tolerance)
-    run = _Run(problem, tolerance, longest_step, terms - 1, detectors)
+    order_of_series = (method or Taylor()).expansion_order(tolerance) - 1
+    limits = RunLimits(*map(np.float64, (instants[-1], tolerance, longest_step)))
+    run = RobotRun(problem, start, float(instants[0]), order_of_series, limits, detectors)
     with Count("simulating", report=progress) as tell:
-        run.go(start, instants, tell)
-    pushed = tuple(wrenches)
-    outcome = run.ending, run.events.happened, pushed, run.backends
+        run.go(instants, tell)
+    outcome = run.ending, run.happened, tuple(wrenches), run.backends
     simulation = RobotSimulation(robot, problem, run.steps, instants, order, *outcome)
-    if strict and run.events.stopped_at is None:
+    if strict and run.stopped_at is None:
         raise_for_status(simulation)
     return simulation
 
@@ -156,72 +156,59 @@ def _start(
     return RobotState(q, rates, pose[0, :3, None], pose[0, 3:, None], twist[0][:, None])
 
 
-class _Run:
-    """One run: its steps so far, the events in them, and how it ended."""
+class RobotRun(AbstractRun):
+    """A run of a robot, by series of an order."""
 
     def __init__(
-        self, problem: RobotProblem, tolerance: float, longest: float, order: int, detectors: list[JointEventDetector]
+        self,
+        problem: RobotProblem,
+        start: RobotState,
+        instant: float,
+        order: int,
+        limits: RunLimits,
+        detectors: list[JointEventDetector],
     ):
-        self.problem, self.tolerance, self.longest, self.order = problem, tolerance, longest, order
-        self.events, self.exact = EventLog(detectors), ExactNumbers.of_parallel(problem.equations)
-        numbers = (order + 2) * 2 * len(problem.scale)
-        self.count = steps_between_looks(numbers, watched=bool(detectors))
-        self.parts: list[RobotSteps] = []
-        self.ending = (Status.OK, "")
-        self.backends: set[str] = set()
+        running, none, nothing = np.asarray(int(Outcome.RUNNING)), np.asarray(0), np.zeros(1)
+        begun = Progress(np.array([instant]), start, running, none, none, nothing, nothing)
+        super().__init__(begun, limits, detectors)
+        self.problem, self.begun, self.taken = problem, np.float64(instant), 0
+        count = steps_between_looks((order + 2) * 2 * len(problem.scale), watched=bool(detectors))
+        self._settings: Any = {"order": order, "count": count, "exact": ExactNumbers.of_parallel(problem.equations)}
 
-    @property
-    def steps(self) -> RobotSteps:
-        """All steps taken."""
-        return jax.tree.map(lambda *parts: np.concatenate(parts), *self.parts)
-
-    def go(self, start: RobotState, instants: np.ndarray, progress: Callable[[int, int], None] | None) -> None:
-        """March from the first to the last instant."""
-        begun, stop = float(instants[0]), float(instants[-1])
-        direction = 1.0 if stop >= begun else -1.0
-        running, none = (np.asarray(value) for value in (int(Outcome.RUNNING), 0))
-        nothing = np.zeros(1)
-        current, total = Progress(np.array([begun]), start, running, none, none, nothing, nothing), 0
-        while int(current.outcome) == Outcome.RUNNING and self.events.stopped_at is None:
-            current, steps, taken = self._marched(current, begun, stop)
-            self.backends.add(backend_of(current))
-            count = int(taken)
-            total += count
-            if count:
-                cut = jax.tree.map(lambda x, count=count: np.asarray(x)[:count], steps)
-                self.parts.append(self.events.noted(cut))
-            if total > MOST:
-                self.ending = (Status.COLLAPSED, f"after {total} steps")
-                break
-            if progress is not None:
-                progress(int(np.sum(direction * instants <= direction * float(current.time[0]))), len(instants))
-        if not self.parts:
-            at_rest = jax.tree.map(lambda x: np.asarray(x)[None, None, :, 0], start)
-            self.parts.append(RobotSteps(np.array([begun]), np.zeros(1), at_rest, np.zeros(1, bool)))
-        if int(current.outcome) in (Outcome.COLLAPSED, Outcome.LOST):
-            self.ending = self._explained(current)
-
-    def _marched(self, current: Progress, begun: float, stop: float) -> Any:
-        limits = np.float64(begun), RunLimits(*map(np.float64, (stop, self.tolerance, self.longest)))
+    def march(self) -> RobotSteps | None:
+        """See `AbstractRun`."""
         try:
-            how: Any = {"order": self.order, "count": self.count, "exact": self.exact}
-            return march_robot(self.problem, current, *limits, **how)
+            current, steps, taken = march_robot(self.problem, self.current, self.begun, self.limits, **self._settings)
         except TypeError as error:
             if "has no rule for Taylor series" not in str(error):
                 raise
             message = f"{error}; a law of a joint uses it: write it with other operations"
             raise UnsupportedError(message, name="torque") from error
+        self.backends.add(backend_of(current))
+        count = int(taken)
+        self.taken += count
+        if self.taken > MOST and int(current.outcome) == Outcome.RUNNING:
+            current = current._replace(outcome=np.asarray(int(Outcome.COLLAPSED)))
+        self.current = current
+        return jax.tree.map(lambda x: np.asarray(x)[:count], steps) if count else None
 
-    def _explained(self, current: Progress) -> tuple[Status, str]:
-        """Return why steps did not go on."""
-        time = float(current.time[0])
-        if int(current.stuck) >= STUCK // 2:
+    def standing(self) -> RobotSteps:
+        """See `AbstractRun`."""
+        at_rest = jax.tree.map(lambda x: np.asarray(x)[None, None, :, 0], self.current.state)
+        return RobotSteps(np.array([self.begun]), np.zeros(1), at_rest, np.zeros(1, bool))
+
+    def explained(self) -> tuple[Status, str]:
+        """See `AbstractRun`."""
+        time = float(self.current.time[0])
+        if self.taken > MOST:
+            return Status.COLLAPSED, f"after {self.taken} steps"
+        if int(self.current.stuck) >= STUCK // 2:
             words = (
                 f"a force of a joint switches without end at t = {time:g} s, as friction of a joint that sticks does: "
                 "smooth it, as by tanh(v/v0)"
             )
             return Status.COLLAPSED, words
-        if int(current.outcome) == Outcome.LOST:
+        if int(self.current.outcome) == Outcome.LOST:
             words = f"accelerations at t = {time:g} s are not finite: a force is not, or nothing resists a joint"
             return Status.INADMISSIBLE, words
         return Status.COLLAPSED, f"at t = {time:g} s"

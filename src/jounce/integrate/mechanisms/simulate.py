@@ -6,47 +6,33 @@ from typing import Any, Unpack, overload
 
 import jax
 import numpy as np
-from jaxtyping import Bool
 
 from jounce.base.activity import Count
-from jounce.base.shapes import ArrayLike, Numbers
+from jounce.base.shapes import ArrayLike
 from jounce.constraints import AbstractConstraint
-from jounce.dynamics.forward.accelerations import Equations, Instants, State
 from jounce.dynamics.forward.ground import with_ground
 from jounce.dynamics.forward.initial_state import ConsistentStart, consistent_start
-from jounce.dynamics.friction.coupling import joints_with_friction
-from jounce.dynamics.motion_values import Coordinates, cut, pose_of
 from jounce.errors import JounceError, MechanismError, SolveError, did_you_mean
-from jounce.execution.backends import backend_of, joined
-from jounce.execution.compilation import compiled
+from jounce.execution.backends import joined
 from jounce.execution.store.programs import expect
 from jounce.integrate.marching.marching import (
-    MOVING,
-    STUCK,
-    DenseOutput,
-    IntegratorState,
-    Outcome,
     RunLimits,
-    march,
-    unexpanded,
 )
-from jounce.integrate.mechanisms.programs_ahead import march_settings, prepare_run
+from jounce.integrate.mechanisms.programs_ahead import prepare_run
+from jounce.integrate.mechanisms.run import MechanismRun, unsound_forces
 from jounce.integrate.results.robot_sensitivities import of_traced_robots
 from jounce.integrate.results.robot_simulation import RobotSimulation
 from jounce.integrate.results.sensitivities import traced_simulation
 from jounce.integrate.results.simulation import Simulation
 from jounce.integrate.simulate_robot import RobotOptions, simulate_robot
-from jounce.integrate.steps.events import Event, EventDetector, EventLog, pose_coordinates
-from jounce.integrate.steps.lookahead import hiding_names, watched_names
-from jounce.integrate.steps.methods import AbstractMethod, evaluated
+from jounce.integrate.steps.events import Event, EventDetector
+from jounce.integrate.steps.methods import AbstractMethod
 from jounce.integrate.steps.options import checked_options, instants_of
-from jounce.jet import Jet
 from jounce.kinematics import Status, raise_for_status
 from jounce.kinematics.position_analysis.curve_ends import beyond_end, ends_of
 from jounce.kinematics.results.pose_outputs import check_output, output_group
 from jounce.mechanism import Mechanism, Model, ParameterOutput, ParametersOutput, check_mechanism
 from jounce.mechanism.building.belts import check_room
-from jounce.mechanism.building.element_indices import force_names
 from jounce.mechanism.building.preconditions import concrete_or
 from jounce.mechanism.laws.law_checks import check_laws
 from jounce.mechanism.time import TimeLike
@@ -54,9 +40,6 @@ from jounce.robot import BaseMotion, Robot
 from jounce.robot.algorithms.wrenches import Wrench
 from jounce.robot.model.joint_laws import GivenLaws
 
-AHEAD = 1e-9  # of the time so far: where steps collapse, what is not finite lies that close
-FEW = 4  # derivatives that are looked at for one that is not finite
-GOING = frozenset(MOVING.tolist())
 ROBOT_OPTIONS = tuple(RobotOptions.__annotations__)
 
 
@@ -212,14 +195,14 @@ def simulate(
     watched = [*events, *_events_at_ends(start)]
     detectors = [_detector_of(event, mechanism, start) for event in watched]
     prepare(start.model)
-    run = _Run(start, method, limits, detectors, watched=bool(events))
+    run = MechanismRun(start, first, method, limits, detectors, watched=bool(events))
     with Count("simulating", report=progress) as tell:
         run.go(instants, tell)
     run.note_ends(len(events))
-    outcome = run.ending, run.events.happened[: len(events)], joined(run.backends)
-    simulation = Simulation(mechanism, start, run.dense_output, instants, order, *outcome)
+    outcome = run.ending, run.happened[: len(events)], joined(run.backends)
+    simulation = Simulation(mechanism, start, run.steps, instants, order, *outcome)
     check_room(simulation)
-    if strict and run.events.stopped_at is None:
+    if strict and run.stopped_at is None:
         raise_for_status(simulation)
     return simulation
 
@@ -275,133 +258,8 @@ def _check_ends(start: ConsistentStart, instant: float) -> None:
 
 def _check_forces(start: ConsistentStart, instant: float) -> None:
     """Raise SolveError where an applied force has no finite value at the start."""
-    names = _unsound(start, start.sound)
+    names = unsound_forces(start, start.sound)
     if names:
         status = Status.INADMISSIBLE
         message = f"t = {instant:g} s, {names}: the force is not finite: check its law and its parameters"
         raise SolveError(message, status=status)
-
-
-def _unfit(start: ConsistentStart, state: State, instant: float) -> str:
-    """Name the applied forces that are not finite in a state."""
-    system = start.equations.system
-    if not system.forces:
-        return ""
-    return _unsound(start, np.asarray(_finite_forces(start.equations, state, np.array([[instant]])))[:, 0])
-
-
-def _unsound(start: ConsistentStart, sound: Bool[np.ndarray, " force"]) -> str:
-    return ", ".join(f"forces.{n}" for n, good in zip(force_names(start.model), sound, strict=True) if not good)
-
-
-@compiled(narrow=True, brief=True, single=True)
-def _finite_forces(equations: Equations, state: State, time: Instants) -> Bool[Numbers, "force 1"]:
-    return equations.system.finite_forces(equations.pose(state), Jet.variable(time, 1))
-
-
-def _unfit_rates(start: ConsistentStart, coordinates: Coordinates, instant: float) -> str:
-    """Name the applied forces of which a low derivative is not finite at an instant, where their values may be."""
-    known = np.isfinite(coordinates["position"]).reshape(len(coordinates["position"]), -1).all(axis=1)
-    order = min(int(np.argmin(np.append(known, False))) - 1, FEW)
-    if order < 1:
-        return ""
-    pose = pose_of(cut(coordinates, order), start.model.pose_type)
-    clock, names = Jet.variable(np.array([[instant]]), order), []
-    for group, members in zip(start.equations.system.forces, start.model.forces, strict=True):
-        with np.errstate(all="ignore"):  # errors name what is not finite
-            sizes = np.stack([np.asarray(c) for c in group.force(pose, clock).dense().coefficients])
-        sizes = np.broadcast_to(sizes, (*sizes.shape[:2], len(members), 1))
-        good = np.atleast_1d(np.isfinite(sizes).all(axis=(0, 1, 3)))
-        names += [f"forces.{name}" for name, fit in zip(members, good, strict=True) if not fit]
-    return ", ".join(names)
-
-
-class _Run:
-    """One run: its steps so far, the events in them, and how it ended."""
-
-    def __init__(
-        self,
-        start: ConsistentStart,
-        method: AbstractMethod,
-        limits: RunLimits,
-        detectors: Sequence[EventDetector],
-        *,
-        watched: bool,
-    ):
-        self.start, self.method, self.limits, self.watched = start, method, limits, watched
-        self.events = EventLog(detectors)
-        self.parts: list[DenseOutput] = []
-        self.ending = (Status.OK, "")
-        self.backends: set[str] = set()
-        self.direction = 1.0  # of time
-
-    @property
-    def dense_output(self) -> DenseOutput:
-        """All steps taken."""
-        return jax.tree.map(lambda *parts: np.concatenate(parts), *self.parts)
-
-    def go(self, instants: np.ndarray, progress: Callable[[int, int], None] | None) -> None:
-        """March from the first to the last instant."""
-        equations, watched = self.start.equations, self.watched
-        self.direction = direction = np.sign(instants[-1] - instants[0])
-        order = self.method.expansion_order(float(self.limits.tolerance))
-        current = unexpanded(equations, self.start.state, instants[:1], order=order)
-        settings = march_settings(equations, current, self.method, watched=watched)
-        while current.outcome.item() in GOING and self.events.stopped_at is None:
-            current, (output, taken), attempts = march(equations, current, self.limits, **settings)
-            self.backends.add(backend_of(output))
-            taken = np.asarray(taken)[: int(attempts), 0]
-            if taken.any():
-                # a view, unless some were refused: they are joined, and so copied, at the end
-                chosen = slice(len(taken)) if taken.all() else np.flatnonzero(taken)
-                part = jax.tree.map(lambda x, k=chosen: np.asarray(x)[k, ..., 0], output)
-                self.parts.append(self.events.noted(part))
-            if progress is not None:
-                progress(int(np.sum(direction * instants <= direction * current.time.item())), len(instants))
-        if not self.parts:
-            self._stand(current)
-        if current.outcome.item() in (Outcome.COLLAPSED, Outcome.LOST, Outcome.UNBALANCED):
-            self.ending = self._explained(current)
-
-    def note_ends(self, first: int) -> None:
-        """Tell that the run ended at an end of a curve, if one of the events from the first on happened."""
-        for k, ends in enumerate(ends_of(self.start.model)):
-            for beyond_high in (False, True):
-                for instant in self.events.happened[first + 2 * k + beyond_high]:
-                    self.ending = Status.END_OF_CURVE, f"{ends.words(beyond_high)} at t = {instant:g} s"
-                    self.events.stopped_at = None
-
-    def _stand(self, current: IntegratorState) -> None:
-        """Keep the start as a step of no length."""
-        polynomial = current.expansion.state.map(lambda part: np.asarray(part)[None, ..., 0])
-        angles = tuple(np.asarray(part).T for part in current.angles)
-        self.parts.append(DenseOutput(np.asarray(current.time), np.zeros(1), polynomial, np.full(1, -1), angles))
-
-    def _explained(self, current: IntegratorState) -> tuple[Status, str]:
-        """Return why steps did not go on, and where to look: a force that is not finite, or the most urgent body."""
-        series, time = current.expansion.state, current.time.item()
-        here = dataclasses.replace(self.start, equations=self.start.equations.near(current.angles))
-        onwards = self.direction * AHEAD * max(abs(time), abs(time - current.begun.item()))
-        ahead = evaluated(series.map(lambda part: part[:2]), np.array([onwards]))
-        for state, instant in ((series.map(lambda part: part[0]), time), (ahead, time + onwards)):
-            finite = all(np.isfinite(part).all() for part in state)
-            if finite and (names := _unfit(here, state, instant)):
-                return Status.INADMISSIBLE, f"{names} at t = {instant:g} s"
-        if names := _unfit_rates(here, pose_coordinates(series), time):
-            return Status.INADMISSIBLE, f"a derivative of {names} at t = {time:g} s"
-        if current.outcome.item() == Outcome.UNBALANCED:
-            names = hiding_names(self.start.model, here.equations, series.map(lambda x: x[0]), np.array([[time]]))
-            return Status.UNBALANCED, f"{', '.join(names) or 'all joints'} at t = {time:g} s"
-        kink = int(self.parts[-1].kink[-1]) if self.parts else -1
-        if current.short.item() >= STUCK and kink >= 0:
-            words = "switches without end, as dry friction does at rest: smooth it, as by tanh(v/v0)"
-            return Status.COLLAPSED, f"{watched_names(self.start.model)[kink]} at t = {time:g} s {words}"
-        acceleration = np.abs(np.asarray(current.expansion.acceleration[0])[..., 0])
-        rubbing = joints_with_friction(self.start.model, self.start.model.system)
-        if rubbing and not np.isfinite(acceleration).all():
-            return Status.LOCKED, f"friction locks at t = {time:g} s: {', '.join(rubbing)}"
-        if (blocked := current.blocked.item()) >= 0:
-            return Status.COLLAPSED, f"{watched_names(self.start.model)[blocked]} at t = {time:g} s"
-        scale = np.asarray(self.start.equations.system.column_scale)[:, None]
-        sizes = np.nan_to_num(acceleration / scale, nan=np.inf).max(axis=0)
-        return Status.COLLAPSED, f"body {self.start.model.bodies[int(np.argmax(sizes))]}"

@@ -4,10 +4,9 @@ import abc
 import dataclasses
 import itertools
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable
 from typing import Any, NamedTuple
 
-import jax
 import numpy as np
 from jaxtyping import Float, Int
 
@@ -357,42 +356,3 @@ def _real_roots(polynomial: np.polynomial.Chebyshev) -> Float[np.ndarray, " root
         step = np.where(rate != 0, polynomial(real) / np.where(rate == 0, 1.0, rate), 0.0)
         real = real - np.where(np.abs(step) < NEIGHBORHOOD, step, 0.0)
     return np.unique(real)
-
-
-class EventLog:
-    """What happened along a run, and when a terminal event ended it.
-
-    Parameters
-    ----------
-    detectors : sequence
-        Each with its `event`, and `detect`, which takes steps and returns the crossings in them, each as the number of
-        the step and the time from its beginning.
-
-    Attributes
-    ----------
-    happened : list of list of float
-        For each event the times at which it happened, s.
-    stopped_at : float or None
-        When a terminal event ended the run, s.
-    """
-
-    def __init__(self, detectors: Sequence[Any]):
-        self.detectors = detectors
-        self.happened: list[list[float]] = [[] for _ in detectors]
-        self.stopped_at: float | None = None
-
-    def noted(self, part: Any) -> Any:
-        """Note the events in some steps; return those up to the first that is terminal, the last step cut there."""
-        events = [
-            (step, after, which)
-            for which, detector in enumerate(self.detectors)
-            for step, after in detector.detect(part)
-        ]
-        for step, after, which in sorted(events, key=lambda x: (x[0], abs(x[1]))):
-            instant = float(part.start[step] + after)
-            self.happened[which].append(instant)
-            if self.detectors[which].event.terminal:
-                self.stopped_at = instant
-                cut = jax.tree.map(lambda x, count=step + 1: x[:count], part)
-                return cut._replace(length=np.append(part.length[:step], after))
-        return part

@@ -1,0 +1,97 @@
+"""A run of a simulation: its steps, the events in them, and how it ends."""
+
+import abc
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import jax
+import numpy as np
+
+from jounce.integrate.marching.marching import MOVING, Outcome, RunLimits
+from jounce.integrate.steps.events import AbstractDetector
+from jounce.kinematics import Status
+
+GOING = frozenset(MOVING.tolist())
+FAILED = Outcome.COLLAPSED, Outcome.LOST, Outcome.UNBALANCED
+
+
+class AbstractRun(abc.ABC):
+    """One run: its steps so far, the events in them, and how it ended.
+
+    Parameters
+    ----------
+    current : IntegratorState or Progress
+        Where it begins.
+    limits : RunLimits
+        Where it goes, and in what steps.
+    detectors : sequence of AbstractDetector
+        Of the events that are looked for.
+
+    Attributes
+    ----------
+    current : IntegratorState or Progress
+        Where it has come to.
+    happened : list of list of float
+        For each event the times at which it happened, s.
+    stopped_at : float or None
+        When a terminal event ended the run, s.
+    ending : tuple of Status and str
+        Why steps did not go on, and where to look.
+    backends : set of str
+        What has computed.
+    """
+
+    def __init__(self, current: Any, limits: RunLimits, detectors: Sequence[AbstractDetector]):
+        self.current, self.limits, self.detectors = current, limits, detectors
+        self.direction = np.sign(limits.stop - current.time.item())  # of time
+        self.happened: list[list[float]] = [[] for _ in detectors]
+        self.stopped_at: float | None = None
+        self.ending = (Status.OK, "")
+        self.backends: set[str] = set()
+        self.parts: list[Any] = []
+
+    @abc.abstractmethod
+    def march(self) -> Any:
+        """Go on by some steps, and return those that were taken; None if there are none."""
+
+    @abc.abstractmethod
+    def standing(self) -> Any:
+        """Return the start as a step of no length."""
+
+    @abc.abstractmethod
+    def explained(self) -> tuple[Status, str]:
+        """Return why steps did not go on, and where to look."""
+
+    @property
+    def steps(self) -> Any:
+        """All steps taken."""
+        return jax.tree.map(lambda *parts: np.concatenate(parts), *self.parts)
+
+    def go(self, instants: np.ndarray, progress: Callable[[int, int], None] | None) -> None:
+        """March from the first to the last instant."""
+        while self.current.outcome.item() in GOING and self.stopped_at is None:
+            if (part := self.march()) is not None:
+                self.parts.append(self._until_stopped(part))
+            if progress is not None:
+                passed = self.direction * instants <= self.direction * self.current.time.item()
+                progress(int(np.sum(passed)), len(instants))
+        if not self.parts:
+            self.parts.append(self.standing())
+        if self.current.outcome.item() in FAILED:
+            self.ending = self.explained()
+
+    def _until_stopped(self, part: Any) -> Any:
+        """Note the events in some steps; return those up to the first that is terminal, the last step cut there."""
+        events = [
+            (step, after, which)
+            for which, detector in enumerate(self.detectors)
+            for step, after in detector.detect(part)
+        ]
+        for step, after, which in sorted(events, key=lambda x: (x[0], abs(x[1]))):
+            instant = float(part.start[step] + after)
+            self.happened[which].append(instant)
+            if self.detectors[which].event.terminal:
+                self.stopped_at = instant
+                cut = jax.tree.map(lambda x, count=step + 1: x[:count], part)
+                return cut._replace(length=np.append(part.length[:step], after))
+        return part

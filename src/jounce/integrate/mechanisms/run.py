@@ -1,0 +1,141 @@
+"""A run of a mechanism: marched step by step, and explained where it does not go on."""
+
+import dataclasses
+from collections.abc import Sequence
+
+import jax
+import numpy as np
+from jaxtyping import Bool
+
+from jounce.base.shapes import Numbers
+from jounce.dynamics.forward.accelerations import Equations, Instants, State
+from jounce.dynamics.forward.initial_state import ConsistentStart
+from jounce.dynamics.friction.coupling import joints_with_friction
+from jounce.dynamics.motion_values import Coordinates, cut, pose_of
+from jounce.execution.backends import backend_of
+from jounce.execution.compilation import compiled
+from jounce.integrate.marching.marching import STUCK, DenseOutput, Outcome, RunLimits, march, unexpanded
+from jounce.integrate.marching.runs import AbstractRun
+from jounce.integrate.mechanisms.programs_ahead import march_settings
+from jounce.integrate.steps.events import EventDetector, pose_coordinates
+from jounce.integrate.steps.lookahead import hiding_names, watched_names
+from jounce.integrate.steps.methods import AbstractMethod, evaluated
+from jounce.jet import Jet
+from jounce.kinematics import Status
+from jounce.kinematics.position_analysis.curve_ends import ends_of
+from jounce.mechanism.building.element_indices import force_names
+
+AHEAD = 1e-9  # of the time so far: where steps collapse, what is not finite lies that close
+FEW = 4  # derivatives that are looked at for one that is not finite
+
+
+class MechanismRun(AbstractRun):
+    """A run of a mechanism; `watched` where a user looks for events."""
+
+    def __init__(
+        self,
+        start: ConsistentStart,
+        instant: float,
+        method: AbstractMethod,
+        limits: RunLimits,
+        detectors: Sequence[EventDetector],
+        *,
+        watched: bool,
+    ):
+        order = method.expansion_order(float(limits.tolerance))
+        super().__init__(unexpanded(start.equations, start.state, np.array([instant]), order=order), limits, detectors)
+        self.start = start
+        self._settings = march_settings(start.equations, self.current, method, watched=watched)
+
+    def march(self) -> DenseOutput | None:
+        """See `AbstractRun`."""
+        self.current, (output, taken), attempts = march(
+            self.start.equations, self.current, self.limits, **self._settings
+        )
+        self.backends.add(backend_of(output))
+        taken = np.asarray(taken)[: int(attempts), 0]
+        if not taken.any():
+            return None
+        # a view, unless some were refused: they are joined, and so copied, at the end
+        chosen = slice(len(taken)) if taken.all() else np.flatnonzero(taken)
+        return jax.tree.map(lambda x: np.asarray(x)[chosen, ..., 0], output)
+
+    def standing(self) -> DenseOutput:
+        """See `AbstractRun`."""
+        current = self.current
+        polynomial = current.expansion.state.map(lambda part: np.asarray(part)[None, ..., 0])
+        angles = tuple(np.asarray(part).T for part in current.angles)
+        return DenseOutput(np.asarray(current.time), np.zeros(1), polynomial, np.full(1, -1), angles)
+
+    def note_ends(self, first: int) -> None:
+        """Tell that the run ended at an end of a curve, if one of the events from the first on happened."""
+        for k, ends in enumerate(ends_of(self.start.model)):
+            for beyond_high in (False, True):
+                for instant in self.happened[first + 2 * k + beyond_high]:
+                    self.ending = Status.END_OF_CURVE, f"{ends.words(beyond_high)} at t = {instant:g} s"
+                    self.stopped_at = None
+
+    def explained(self) -> tuple[Status, str]:
+        """Return why steps did not go on, and where to look: a force that is not finite, or the most urgent body."""
+        current = self.current
+        series, time = current.expansion.state, current.time.item()
+        here = dataclasses.replace(self.start, equations=self.start.equations.near(current.angles))
+        onwards = self.direction * AHEAD * max(abs(time), abs(time - current.begun.item()))
+        ahead = evaluated(series.map(lambda part: part[:2]), np.array([onwards]))
+        for state, instant in ((series.map(lambda part: part[0]), time), (ahead, time + onwards)):
+            finite = all(np.isfinite(part).all() for part in state)
+            if finite and (names := _unfit(here, state, instant)):
+                return Status.INADMISSIBLE, f"{names} at t = {instant:g} s"
+        if names := _unfit_rates(here, pose_coordinates(series), time):
+            return Status.INADMISSIBLE, f"a derivative of {names} at t = {time:g} s"
+        if current.outcome.item() == Outcome.UNBALANCED:
+            names = hiding_names(self.start.model, here.equations, series.map(lambda x: x[0]), np.array([[time]]))
+            return Status.UNBALANCED, f"{', '.join(names) or 'all joints'} at t = {time:g} s"
+        kink = int(self.parts[-1].kink[-1]) if self.parts else -1
+        if current.short.item() >= STUCK and kink >= 0:
+            words = "switches without end, as dry friction does at rest: smooth it, as by tanh(v/v0)"
+            return Status.COLLAPSED, f"{watched_names(self.start.model)[kink]} at t = {time:g} s {words}"
+        acceleration = np.abs(np.asarray(current.expansion.acceleration[0])[..., 0])
+        rubbing = joints_with_friction(self.start.model, self.start.model.system)
+        if rubbing and not np.isfinite(acceleration).all():
+            return Status.LOCKED, f"friction locks at t = {time:g} s: {', '.join(rubbing)}"
+        if (blocked := current.blocked.item()) >= 0:
+            return Status.COLLAPSED, f"{watched_names(self.start.model)[blocked]} at t = {time:g} s"
+        scale = np.asarray(self.start.equations.system.column_scale)[:, None]
+        sizes = np.nan_to_num(acceleration / scale, nan=np.inf).max(axis=0)
+        return Status.COLLAPSED, f"body {self.start.model.bodies[int(np.argmax(sizes))]}"
+
+
+def unsound_forces(start: ConsistentStart, sound: Bool[np.ndarray, " force"]) -> str:
+    """Name the applied forces that are not sound."""
+    return ", ".join(f"forces.{n}" for n, good in zip(force_names(start.model), sound, strict=True) if not good)
+
+
+def _unfit(start: ConsistentStart, state: State, instant: float) -> str:
+    """Name the applied forces that are not finite in a state."""
+    system = start.equations.system
+    if not system.forces:
+        return ""
+    return unsound_forces(start, np.asarray(_finite_forces(start.equations, state, np.array([[instant]])))[:, 0])
+
+
+@compiled(narrow=True, brief=True, single=True)
+def _finite_forces(equations: Equations, state: State, time: Instants) -> Bool[Numbers, "force 1"]:
+    return equations.system.finite_forces(equations.pose(state), Jet.variable(time, 1))
+
+
+def _unfit_rates(start: ConsistentStart, coordinates: Coordinates, instant: float) -> str:
+    """Name the applied forces of which a low derivative is not finite at an instant, where their values may be."""
+    known = np.isfinite(coordinates["position"]).reshape(len(coordinates["position"]), -1).all(axis=1)
+    order = min(int(np.argmin(np.append(known, False))) - 1, FEW)
+    if order < 1:
+        return ""
+    pose = pose_of(cut(coordinates, order), start.model.pose_type)
+    clock, names = Jet.variable(np.array([[instant]]), order), []
+    for group, members in zip(start.equations.system.forces, start.model.forces, strict=True):
+        with np.errstate(all="ignore"):  # errors name what is not finite
+            sizes = np.stack([np.asarray(c) for c in group.force(pose, clock).dense().coefficients])
+        sizes = np.broadcast_to(sizes, (*sizes.shape[:2], len(members), 1))
+        good = np.atleast_1d(np.isfinite(sizes).all(axis=(0, 1, 3)))
+        names += [f"forces.{name}" for name, fit in zip(members, good, strict=True) if not fit]
+    return ", ".join(names)
