@@ -12,6 +12,7 @@ from jounce.base.shapes import ArrayLike, is_traced
 from jounce.errors import JounceError, RobotError, no_such
 from jounce.execution.backends import joined
 from jounce.execution.threads import Threads, thread_count
+from jounce.integrate.marching.robot_state import start_levels
 from jounce.integrate.results.batch import Batch
 from jounce.integrate.results.robot_sensitivities import TracedRobotBatch, of_traced_robots
 from jounce.integrate.results.robot_simulation import RobotSimulation
@@ -20,7 +21,6 @@ from jounce.integrate.steps.methods import AbstractMethod
 from jounce.integrate.steps.options import checked_options, instants_of
 from jounce.kinematics.families.parameter_values import checked_values
 from jounce.mechanism import TimeGrid
-from jounce.robot.model.arguments import checked_state
 from jounce.robot.robot import Robot
 
 RATE, MASS = ".rate", ".mass"
@@ -88,7 +88,7 @@ def simulate_robots(
     state = options.pop("state", None)
     traced = is_traced((dict(parameters), robot.tree, state))
     values = _checked(robot, parameters)
-    start = _nominal(robot, state)
+    start = start_levels(robot, state)
 
     def begun(k: int) -> tuple[Robot, Any]:
         state, changed = start.copy(), robot
@@ -122,23 +122,6 @@ def simulate_robots(
 
     with Threads(thread_count()) as pool:
         return values, list(pool.map(run, starts))
-
-
-def _nominal(robot: Robot, state: Any) -> Any:
-    """Return the coordinates and rates that all runs begin with unless they differ in them, (2, n)."""
-    n = len(robot.joint_names)
-    if state is None:
-        return np.zeros((2, n))
-    if is_traced(state):
-        if isinstance(state, Mapping):
-            state = [[state.get(name, 0.0) for name in robot.joint_names], [0.0] * n]
-        return checked_state(robot, jnp.stack([jnp.stack([jnp.asarray(x, float) for x in row]) for row in state]))
-    if isinstance(state, Mapping):
-        return np.array([robot.coordinates(**state), np.zeros(n)])
-    levels = np.array(checked_state(robot, np.asarray(state, float)))
-    if levels.shape != (2, n):
-        raise RobotError(f"must hold q and q', the shape (2, {n})", name="state", value=list(levels.shape))
-    return levels
 
 
 def _checked(robot: Robot, parameters: Mapping[str, Any]) -> dict[str, Any]:

@@ -14,7 +14,7 @@ from jounce.integrate.marching.exact_numbers import ExactNumbers
 from jounce.integrate.marching.joint_events import JointEvent, JointEventDetector
 from jounce.integrate.marching.marching import Outcome, RunLimits, steps_between_looks
 from jounce.integrate.marching.robot_marching import STUCK, Progress, RobotProblem, RobotSteps, march_robot
-from jounce.integrate.marching.robot_state import RobotState
+from jounce.integrate.marching.robot_state import RobotState, start_levels
 from jounce.integrate.marching.runs import AbstractRun
 from jounce.integrate.results.robot_simulation import RobotSimulation
 from jounce.integrate.steps.methods import AbstractMethod, Taylor
@@ -23,7 +23,6 @@ from jounce.kinematics.position_analysis.solve import raise_for_status
 from jounce.robot.algorithms.base_motion import BaseMotion, base_arrays, base_body
 from jounce.robot.algorithms.wrench_laws import wrench_laws
 from jounce.robot.algorithms.wrenches import Wrench
-from jounce.robot.model.arguments import checked_state, floats
 from jounce.robot.model.joint_laws import GivenLaws, joint_laws
 from jounce.robot.model.robot_size import robot_size
 from jounce.robot.recursions.tree_equations import TreeEquations
@@ -134,18 +133,11 @@ def _start(
     base: BaseMotion | None,
     instant: float,
 ) -> RobotState:
-    """Return the state at the beginning: at rest at coordinates zero unless given, driven joints on their laws."""
-    n = len(robot.joint_names)
-    if isinstance(state, Mapping):
-        state = [robot.coordinates(**state), np.zeros(n)]
-    levels = np.zeros((2, n)) if state is None else np.asarray(floats("state", state))
-    levels = np.array(checked_state(robot, levels))
-    if levels.shape != (2, n) or not np.isfinite(levels).all():
-        raise RobotError(f"must hold finite q and q', the shape (2, {n})", name="state", value=levels.tolist())
-    mask = np.asarray(problem.equations.driven)
+    """Return the state at the beginning, driven joints on their laws."""
+    levels, mask = start_levels(robot, state), np.asarray(problem.equations.driven)
     if mask.any():
         time = np.array([[instant]])
-        laws = np.asarray(problem.prescribed_series(np.zeros((n, 1)), time, 1))[..., 0]
+        laws = np.asarray(problem.prescribed_series(np.zeros_like(levels[:1].T), time, 1))[..., 0]
         levels = np.where(mask > 0, laws, levels)
     q, rates = levels[0][:, None], levels[1][:, None]
     if base is None:

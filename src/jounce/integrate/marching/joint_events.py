@@ -12,9 +12,8 @@ import numpy as np
 from jounce.errors import RobotError, check_name
 from jounce.execution.chunks import in_chunks
 from jounce.integrate.marching.robot_marching import RobotSteps
-from jounce.integrate.steps.events import NODES, WIDTHS, AbstractDetector
+from jounce.integrate.steps.events import NODES, WIDTHS, AbstractDetector, check_crossing
 from jounce.jet.programs.composition import OfSample
-from jounce.robot.model.arguments import whole_number
 from jounce.robot.robot import Robot
 
 
@@ -57,14 +56,9 @@ class JointEvent:
 
     def __post_init__(self) -> None:
         if not (isinstance(self.of, str) or callable(self.of)):
-            raise RobotError(
-                "must be the name of a joint, or a function of time, q and rates", name="of", value=self.of
-            )
-        if not (isinstance(self.value, int | float) and math.isfinite(self.value)):
-            raise RobotError("must be a finite number", name="value", value=self.value)
-        whole_number("derivative", self.derivative, most=0 if callable(self.of) else 4, error=RobotError)
-        if self.direction not in (-1, 0, 1):
-            raise RobotError("must be -1, 0 or 1", name="direction", value=self.direction)
+            message = "must be the name of a joint, or a function of time, q and rates"
+            raise RobotError(message, name="of", value=self.of)
+        check_crossing(self, RobotError, derivative=0 if callable(self.of) else 4)
 
 
 class JointEventDetector(AbstractDetector):

@@ -1,12 +1,18 @@
 """Where a robot is and how it moves, as numbers and as polynomials in time."""
 
+from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 
+from jounce.base.shapes import is_traced
+from jounce.errors import RobotError
 from jounce.integrate.steps.methods import Lanes
 from jounce.robot.algorithms.motion_series import MotionSeries
+from jounce.robot.model.arguments import checked_state, floats
+from jounce.robot.robot import Robot
 
 
 class RobotState(NamedTuple):
@@ -25,6 +31,28 @@ class RobotState(NamedTuple):
     position: Any = None
     quaternion: Any = None
     twist: Any = None
+
+
+def start_levels(robot: Robot, state: Any) -> Any:
+    """Return the coordinates and rates at the start, (2, n): at rest at zero unless given; JAX may trace them.
+
+    Raises
+    ------
+    RobotError
+        If there is no joint of a name, or they are not finite or of another shape.
+    """
+    names = robot.joint_names
+    if isinstance(state, Mapping):
+        known = {name: 0.0 if is_traced(x) else x for name, x in state.items()}
+        q = robot.coordinates(**known)  # which checks them
+        state = [[state.get(name, x) for name, x in zip(names, q, strict=True)], np.zeros(len(names))]
+    shape = 2, len(names)
+    if is_traced(state):
+        return checked_state(robot, jnp.asarray(state, float))
+    levels = np.zeros(shape) if state is None else np.array(checked_state(robot, floats("state", state)))
+    if levels.shape != shape or not np.isfinite(levels).all():
+        raise RobotError(f"must hold finite q and q', the shape {shape}", name="state", value=levels.tolist())
+    return levels
 
 
 def polynomial_of(series: MotionSeries) -> RobotState:

@@ -24,7 +24,7 @@ from jounce.errors import UnsupportedError
 from jounce.execution.compilation import compiled
 from jounce.integrate.marching.force_discontinuities import with_value
 from jounce.integrate.marching.robot_marching import RobotProblem
-from jounce.integrate.marching.robot_state import RobotState, at, polynomial_of
+from jounce.integrate.marching.robot_state import RobotState, at, polynomial_of, start_levels
 from jounce.integrate.results.robot_simulation import RobotSimulation
 from jounce.integrate.steps.host_calls import recorded
 from jounce.jet.derivatives import plain_derivatives
@@ -147,11 +147,7 @@ def _begun(robot: Robot, problem: RobotProblem, first: RobotState, state: Any) -
     """Return the state at the start, with what JAX traces of it; driven joints are on their laws."""
     if not is_traced(state):
         return first
-    if isinstance(state, Mapping):
-        rows = [[state.get(name, 0.0) for name in robot.joint_names], [0.0] * len(robot.joint_names)]
-    else:
-        rows = state
-    q, rates = (jnp.stack([jnp.asarray(x, float) for x in row])[:, None] for row in rows)
+    q, rates = start_levels(robot, state)[..., None]
     held = jnp.asarray(problem.equations.driven)[:, None] > 0
     coordinates, velocities = (jnp.where(held, a, b) for a, b in ((first.coordinates, q), (first.rates, rates)))
     return first._replace(coordinates=coordinates, rates=velocities)

@@ -14,13 +14,12 @@ from jounce.base.shapes import is_traced
 from jounce.dynamics.forward.accelerations import State
 from jounce.dynamics.forward.ground import turns_with_ground, with_ground
 from jounce.dynamics.motion_values import Coordinates
-from jounce.errors import MechanismError
+from jounce.errors import JounceError, MechanismError, whole_number
 from jounce.execution.chunks import in_chunks
 from jounce.jet.turns import counted_by_rates
 from jounce.kinematics.results.pose_outputs import output_series
 from jounce.mechanism import AbstractOutput
 from jounce.mechanism.system import Group
-from jounce.robot.model.arguments import whole_number
 
 _ANGLES = np.pi * (np.arange(20)[::-1] + 0.5) / 20
 NODES = 0.5 + 0.5 * np.cos(_ANGLES)  # of Chebyshev, in a step or a piece of one
@@ -89,12 +88,17 @@ class Event:
                 "Euler angles jump by whole turns; watch an entry of the rotation matrix, or a RelativeAngleOutput"
             )
             raise MechanismError(message, name="output", value=type(self.output).__name__)
-        if not (isinstance(self.value, int | float) and math.isfinite(self.value)):
-            raise MechanismError("must be a finite number", name="value", value=self.value)
-        for name in ("derivative", "component"):
-            whole_number(name, getattr(self, name), most=4, error=MechanismError)
-        if self.direction not in (-1, 0, 1):
-            raise MechanismError("must be -1, 0 or 1", name="direction", value=self.direction)
+        check_crossing(self, MechanismError, derivative=4, component=4)
+
+
+def check_crossing(event: Any, error: type[JounceError], **most: int) -> None:
+    """Raise an error unless the value, the direction and whole numbers of an event, up to some limits, are valid."""
+    if not (isinstance(event.value, int | float) and math.isfinite(event.value)):
+        raise error("must be a finite number", name="value", value=event.value)
+    for name, limit in most.items():
+        whole_number(name, getattr(event, name), most=limit, error=error)
+    if event.direction not in (-1, 0, 1):
+        raise error("must be -1, 0 or 1", name="direction", value=event.direction)
 
 
 def pose_coordinates(state: State) -> dict[str, Any]:
