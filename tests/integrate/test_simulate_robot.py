@@ -187,6 +187,8 @@ def test_bad_input_is_reported():
         jn.simulate(robot, TIME, driven={"slide": lambda t: math.sin(t)})
     with pytest.raises(jn.errors.RobotError, match=r"driven.slide: must be a law of time"):
         jn.simulate(robot, TIME, driven={"slide": [1.0]})
+    with pytest.raises(jn.errors.RobotError, match=r"driven.slide: unknown name 'slide'"):
+        jn.simulate(robot, TIME, driven={"slide": "2*slide + t"})
     with pytest.raises(jn.errors.RobotError, match="torque: no moving joint has this name"):
         jn.simulate(robot, TIME, torque={"slider": 1.0})
     with pytest.raises(jn.errors.RobotError, match=r"the function must return an array of 1 forces"):

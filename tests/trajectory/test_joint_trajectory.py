@@ -204,7 +204,7 @@ def test_point_to_point_together_and_within_limits(profile):
 BAD = [
     (lambda: JointTrajectory({}, 0.0, 1.0), "at least one joint"),
     (lambda: JointTrajectory({"a": "sin(x)"}, 0.0, 1.0), r"laws\.a: .*'x'"),
-    (lambda: JointTrajectory({"a": [1.0]}, 0.0, 1.0), r"laws\.a: a law is a motion"),
+    (lambda: JointTrajectory({"a": [1.0]}, 0.0, 1.0), r"laws\.a: must be a law of time"),
     (lambda: JointTrajectory({"a": lambda t: np.sin(t)}, 0.0, 1.0), r"laws\.a: the motion law cannot be used: .*jax"),
     (lambda: JointTrajectory({"a": 1.0}, 1.0, 1.0), "stop: must come after the start, 1 s, got 1.0"),
     (lambda: JointTrajectory({"a": 1.0}, 0.0, 1.0, [0.0, 2.0]), r"times\[1\]: the trajectory goes from 0 to 1 s"),
@@ -234,7 +234,7 @@ BAD = [
     (lambda: JointTrajectory.point_to_point(["a"], [1.0], [1.0], limits=[1, 1, 1]), "the start is the end"),
     (lambda: JointTrajectory.from_samples(SAMPLES, np.full((101, 1), 1j), ["a"]), "values: must be real numbers, got"),
     (lambda: JointTrajectory.from_samples(SAMPLES + 0j, np.zeros((101, 1)), ["a"]), "times: must be real numbers, got"),
-    (lambda: JointTrajectory({"a": np.complex128(1j)}, 0.0, 1.0), r"laws\.a: a law is a motion"),
+    (lambda: JointTrajectory({"a": np.complex128(1j)}, 0.0, 1.0), r"laws\.a: must be a law of time"),
     (lambda: JointTrajectory({"a": 1.0}, 0.0, 1.0).derivatives(np.array([0.5j]), 1), "times: must be real numbers"),
     (lambda: JointTrajectory.point_to_point(["a"], np.array([1j]), [1.0], duration=1.0), "start: must be real numbers"),
 ]

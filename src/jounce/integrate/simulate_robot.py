@@ -8,7 +8,7 @@ import numpy as np
 
 from jounce.base.activity import Count
 from jounce.base.shapes import ArrayLike, is_traced
-from jounce.errors import MechanismError, RobotError, UnsupportedError, check_name, flag
+from jounce.errors import RobotError, UnsupportedError, check_name, flag
 from jounce.execution.backends import backend_of
 from jounce.integrate.marching.exact_numbers import ExactNumbers
 from jounce.integrate.marching.joint_events import JointEvent, JointEventDetector
@@ -27,8 +27,7 @@ from jounce.robot.model.joint_laws import GivenLaws, joint_laws
 from jounce.robot.model.robot_size import robot_size
 from jounce.robot.recursions.tree_equations import TreeEquations
 from jounce.robot.robot import Robot
-from jounce.trajectory.laws.user_laws import tried_law
-from jounce.trajectory.motion import AbstractMotion
+from jounce.trajectory.laws.user_laws import law_or_number
 
 MOST = 1_000_000
 
@@ -104,7 +103,8 @@ def _problem(
         raise RobotError("must be a mapping of joints to laws of time", name="driven", value=driven)
     for name in given:
         check_name("moving joint", name, names, RobotError, name="driven")
-    prescribed = joint_laws(names, {name: _law_of_time(name, law) for name, law in given.items()}, "driven")
+    laws = {name: law_or_number("driven", name, law, RobotError) for name, law in given.items()}
+    prescribed = joint_laws(names, laws, "driven")
     mask = np.array([float(name in given) for name in names])
     length = robot_size(robot)
     scale = np.array([1.0 if robot.joints[name].turning else length for name in names])
@@ -112,18 +112,6 @@ def _problem(
     pushes, frames, global_axes = wrench_laws(robot, wrenches, free=base is not None)
     equations = TreeEquations(tree, mask, body, frames, global_axes, drives)
     return RobotProblem(equations, joint_laws(names, torque), prescribed, scale, np.float64(length), pushes)
-
-
-def _law_of_time(name: str, law: Any) -> AbstractMotion | str | float:
-    if isinstance(law, AbstractMotion | str | int | float):
-        return law
-    if not callable(law):
-        message = "must be a law of time: a motion law, an expression of t, a function of time, or a number"
-        raise RobotError(message, name=f"driven.{name}", value=law)
-    try:
-        return tried_law(law)
-    except MechanismError as error:
-        raise RobotError(error.message, name=f"driven.{name}", value=law) from None
 
 
 def _start(

@@ -1,10 +1,15 @@
 """Simulations of elastic robots and mechanisms under their feedforward, which know nothing of the trajectory."""
 
+import math
+
+import jax.numpy as jnp
 import numpy as np
 import pytest
 
 import jounce as jn
 from jounce.planning import elastic_robot, link_errors
+from jounce.planning.elastic.driven_systems import robot_drives
+from jounce.planning.elastic.motor_torques import torques_of
 
 DRIVES = {
     "shoulder": jn.planning.Drive(stiffness=500.0, damping=2.0, rotor_inertia=1e-4, gear_ratio=50),
@@ -19,6 +24,16 @@ def test_rotors_are_links_on_the_base(arm):
     assert whole.joints["elbow_motor"].armature == pytest.approx(5e-5 * 6400)
     assert (whole.joints["elbow"].damping, whole.joints["elbow"].armature) == (0.2, 0.0)
     assert whole.mass == arm.mass
+
+
+def test_torques_of_motors_are_numbers_expressions_and_functions_of_time(arm):
+    arrays = robot_drives(arm, DRIVES, losses=True)
+    given = {"shoulder": lambda t: jnp.sin(3 * t), "elbow": np.array(0.4)}
+    constant, ((index, law),), feedback = torques_of(arrays, given)
+    assert (arrays.names[index], feedback) == ("shoulder", None)
+    assert dict(zip(arrays.names, constant, strict=True)) == {"shoulder": 0.0, "elbow": 0.4}
+    found = [float(x) for x in law(jn.Jet.variable(0.3, order=3)).derivatives()]
+    assert found == pytest.approx([math.sin(0.9), 3 * math.cos(0.9), -9 * math.sin(0.9), -27 * math.cos(0.9)])
 
 
 @pytest.mark.parametrize("change, words", [({"rotor_inertia": 0.0}, "no inertia"), ({}, "no inertia")])
@@ -36,6 +51,10 @@ def test_what_does_not_fit_is_refused(arm):
         jn.planning.simulate_elastic(arm, DRIVES, [0.0, 1.0], state=np.zeros((2, 2)) + 1j)
     with pytest.raises(jn.errors.RobotError, match="law of time"):
         jn.planning.simulate_elastic(arm, DRIVES, [0.0, 1.0], {"elbow": [1.0]})
+    with pytest.raises(jn.errors.RobotError, match=r"torque.elbow: the motion law cannot be used: .* of jax.numpy"):
+        jn.planning.simulate_elastic(arm, DRIVES, [0.0, 1.0], {"elbow": lambda t: math.sin(t)})
+    with pytest.raises(jn.errors.RobotError, match=r"torque.elbow: unknown name 'shoulder'"):
+        jn.planning.simulate_elastic(arm, DRIVES, [0.0, 1.0], {"elbow": "2*shoulder"})
     hinge = jn.load("examples/hooke_joint.yaml")
     (name,) = hinge.drivers
     spring = {name: jn.planning.Drive(stiffness=1.0, rotor_inertia=1.0)}

@@ -7,8 +7,8 @@ import numpy as np
 
 from jounce.errors import RobotError, check_name
 from jounce.planning.elastic.drives import DriveArrays
-from jounce.trajectory import AbstractMotion, ExpressionMotion
-from jounce.trajectory.laws.user_laws import read_laws
+from jounce.trajectory import AbstractMotion
+from jounce.trajectory.laws.user_laws import law_or_number, read_laws
 
 MOTOR = "_motor"  # what the joint or body of a rotor is called after what it moves
 
@@ -29,16 +29,11 @@ def torques_of(
     if not isinstance(torque, Mapping):
         raise RobotError("must be a mapping of names to laws of time, or a function", name="torque", value=torque)
     laws = []
-    for name, law in torque.items():
+    for name, given in torque.items():
         check_name("drive", str(name), arrays.names, RobotError, name="torque")
-        index = arrays.names.index(name)
-        if isinstance(law, str):
-            law = ExpressionMotion(law)
-        if isinstance(law, AbstractMotion):
-            laws.append((index, read_laws(law)))
-        elif isinstance(law, int | float) and np.isfinite(law):
+        index, law = arrays.names.index(name), law_or_number("torque", name, given, RobotError)
+        if isinstance(law, float):
             constant[index] = law
         else:
-            message = "must be a law of time: a motion law, an expression of t, or a finite number"
-            raise RobotError(message, name=f"torque.{name}", value=law)
+            laws.append((index, read_laws(law)))
     return constant, tuple(laws), None

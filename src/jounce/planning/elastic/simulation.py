@@ -69,9 +69,9 @@ def simulate_elastic(
     time : array_like of shape (time,)
         Instants, s; the first is the start. Those of the mechanism unless given.
     torque : mapping of str to law, or callable
-        Of the motors, seen at the joints, N m or N: for each name a law of time, an expression of ``t`` or a number, as
-        `Feedforward.torque_laws` gives them; none unless given. Of a robot also a function of time, q, q', theta and
-        theta' of one sample, by operations of JAX, that returns n torques.
+        Of the motors, seen at the joints, N m or N: for each name a law of time, an expression of ``t``, a function of
+        time by operations of JAX or a number, as `Feedforward.torque_laws` gives them; none unless given. Of a robot
+        also a function of time, q, q', theta and theta' of one sample, by operations of JAX, that returns n torques.
     state : array_like of shape (2, 2, n), optional
         At the start: q and q', and theta and theta', as `Feedforward.start` has them. Unless given, springs are
         relaxed, a robot is at rest at zero and a mechanism moves as its laws say. Of a robot also (2, n), with relaxed

@@ -71,27 +71,48 @@ def tried_law(law: AbstractMotion | Callable[..., Any]) -> AbstractMotion:
     return motion
 
 
-def given_law(name: Any, law: Any) -> AbstractMotion | SampledLaw:
-    """Return the law of a joint that a motion, an expression, a function of time or a number stands for.
+def law_or_number(
+    what: str, name: Any, law: Any, error: type[JounceError] = TrajectoryError
+) -> AbstractMotion | SampledLaw | float:
+    """Return the law of time, or the number, that a motion, an expression, a function of time or a number stands for.
+
+    Parameters
+    ----------
+    what : str
+        Name of the argument, for messages.
+    name : str
+        What the law is of, such as a joint.
+    law : AbstractMotion, SampledLaw, str, callable or number
+        What a user gives.
+    error : class of JounceError, default TrajectoryError
+        What is raised.
 
     Raises
     ------
-    TrajectoryError
-        If it is none of these, or cannot be used.
+    JounceError
+        Of the class given, if it is none of these, or cannot be used.
     """
-    if not isinstance(name, str) or not name:
-        raise TrajectoryError("the name of a joint must be text", name="laws", value=name)
+    where = f"{what}.{name}"
     if isinstance(law, AbstractMotion | SampledLaw) and not isinstance(law, FunctionMotion):
         return law
-    if isinstance(law, bool) or not (callable(law) or isinstance(law, GIVEN)):
-        message = "a law is a motion, an expression of t, a function of time, or a number"
-        raise TrajectoryError(message, name=f"laws.{name}", value=law)
+    scalar = np.ndim(law) == 0 and not isinstance(law, bool) and isinstance(law, (*GIVEN, np.ndarray, jax.Array))
+    if not (callable(law) or scalar):
+        message = "must be a law of time: a motion law, an expression of t, a function of time, or a number"
+        raise error(message, name=where, value=law)
     try:
-        if callable(law):
-            return tried_law(law)
-        return ExpressionMotion(law if isinstance(law, str | Expression) else repr(finite(f"laws.{name}", law)))
-    except JounceError as error:
-        raise TrajectoryError(error.message, name=f"laws.{name}", value=error.value) from None
+        if isinstance(law, str | Expression):
+            return ExpressionMotion(law)
+        return tried_law(law) if callable(law) else finite(where, law)
+    except JounceError as fault:
+        raise error(fault.message, name=where, value=fault.value) from None
+
+
+def given_law(name: Any, law: Any) -> AbstractMotion | SampledLaw:
+    """Return the law of a joint of a trajectory; see `law_or_number`."""
+    if not isinstance(name, str) or not name:
+        raise TrajectoryError("the name of a joint must be text", name="laws", value=name)
+    found = law_or_number("laws", name, law)
+    return ExpressionMotion(repr(found)) if isinstance(found, float) else found
 
 
 def read_laws(tree: Any) -> Any:
