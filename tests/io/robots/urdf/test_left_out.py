@@ -36,6 +36,16 @@ CASES = {  # what follows the links and joints of a file; what is said of it, if
         GAZEBO.format("l", "<velocity_decay><linear>0</linear><angular>0.1</angular></velocity_decay>"),
         r"decay of the velocities of links: l ",
     ),
+    "an inertia": (
+        GAZEBO.format("l", "<inertial><mass>5</mass></inertial>"),
+        r"inertia and poses that <gazebo> gives links: l \(line 4\)",
+    ),
+    "damping": (
+        GAZEBO.format("j", "<axis><dynamics><damping>5</damping></dynamics></axis>"),
+        r"axes, dynamics and poses that <gazebo> gives joints: j \(line 4\)",
+    ),
+    "damping of a fixed joint": (GAZEBO.format("rigid", "<dynamics><damping>5</damping></dynamics>"), None),
+    "a sensor": (GAZEBO.format("l", "<sensor><pose>0 0 1 0 0 0</pose></sensor>"), None),
     "a joint": ('<gazebo><joint name="k" type="ball"/></gazebo>', r"links and joints that <gazebo> adds: k "),
     "a follower": ("<gazebo><plugin><mimicJoint>j</mimicJoint></plugin></gazebo>", r"by a plugin: j \(line 4\)"),
     "a plugin": ("<gazebo><plugin><joint>j</joint><gravity>false</gravity></plugin></gazebo>", None),

@@ -27,9 +27,13 @@ from jounce.robot.model.links_and_joints import Joint
 from jounce.robot.robot import Robot
 
 IN_GAZEBO = "links and joints that <gazebo> adds"
+INTO_LINKS = "inertia and poses that <gazebo> gives links"
+INTO_JOINTS = "axes, dynamics and poses that <gazebo> gives joints"
 WEIGHT = "the weight of links that <gazebo> takes out of gravity, which other readers of URDF count"
 FORCE_ELEMENTS = "<force_element>, which is a force"
 QUATERNIONS = "quat_xyzw, which the version of this file does not have"
+LINK_PARTS = ("inertial", "mass", "inertia", "pose")
+JOINT_PARTS = ("axis", "axis2", "dynamics", "mimic", "pose", "gearbox_ratio")
 OF_MUJOCO = "settings of gravity and fluids in <mujoco>"
 OF_FILE = {
     "force_element": FORCE_ELEMENTS,
@@ -204,6 +208,8 @@ def _of_gazebo(
         "static": (STATIC, moving and not about, lambda x: x.content.strip() in YES),
         "dampingFactor": (DECAY, on_moving, _counts),
         "velocity_decay": (DECAY, on_moving, lambda x: any(map(_counts, x.children))),
+        **dict.fromkeys(LINK_PARTS, (INTO_LINKS, frame is not None, lambda _: True)),
+        **(dict.fromkeys(JOINT_PARTS, (INTO_JOINTS, True, lambda _: True)) if moves else {}),
         "joint": (IN_GAZEBO, not about, lambda x: x.attributes.get("name") not in robot.closures),
         "link": (IN_GAZEBO, not about, lambda _: True),
         "plugin": (PLUGINS, True, lambda x: _followed(x, joints)),
