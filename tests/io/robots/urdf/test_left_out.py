@@ -47,6 +47,7 @@ CASES = {  # what follows the links and joints of a file; what is said of it, if
     "damping of a fixed joint": (GAZEBO.format("rigid", "<dynamics><damping>5</damping></dynamics>"), None),
     "a sensor": (GAZEBO.format("l", "<sensor><pose>0 0 1 0 0 0</pose></sensor>"), None),
     "a joint": ('<gazebo><joint name="k" type="ball"/></gazebo>', r"links and joints that <gazebo> adds: k "),
+    "a joint, as it was": ('<gazebo><joint:hinge name="k"/></gazebo>', r"joints that <gazebo> adds: k "),
     "a follower": ("<gazebo><plugin><mimicJoint>j</mimicJoint></plugin></gazebo>", r"by a plugin: j \(line 4\)"),
     "a plugin": ("<gazebo><plugin><joint>j</joint><gravity>false</gravity></plugin></gazebo>", None),
     "a follower of ros2_control": (CONTROL.format("j"), r"by a plugin: j \(line 4\)"),

@@ -215,7 +215,7 @@ def _of_gazebo(
         "plugin": (PLUGINS, True, lambda x: _followed(x, joints)),
     }
     for part in gazebo.children:
-        heading, bears, counts = table.get(part.tag, ("", False, _counts))
+        heading, bears, counts = table.get(part.tag.partition(":")[0], ("", False, _counts))  # <joint:hinge>, as it was
         if bears and counts(part):
             shown = about or part.attributes.get("name") or robot.name
             yield heading, follower(part) if part.tag == "plugin" else shown, part
