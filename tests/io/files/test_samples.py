@@ -5,6 +5,7 @@ import pytest
 
 from jounce.errors import MechanismFileError
 from jounce.io.files.samples import read_points, read_samples
+from jounce.units.dimensions import ANGLE, LENGTH, TIME
 
 
 def write(folder, text):
@@ -57,6 +58,13 @@ def test_what_is_wrong_is_said_with_its_line(tmp_path, text, names, words):
         read_samples(path, **names)
     assert words in str(caught.value)
     assert str(caught.value).startswith(str(path))
+
+
+@pytest.mark.parametrize("names, said", [("time,lift_mm", "mm"), ("time_ms,lift", "ms"), ("time,theta_deg", "deg")])
+def test_units_in_names_alone_are_not_taken_for_those_of_si(tmp_path, names, said):
+    path, allowed = write(tmp_path, f"{names}\n0,1\n1,2.5\n"), ([TIME], [LENGTH, ANGLE])
+    with pytest.raises(MechanismFileError, match=rf"line 1: this name seems to say {said}.*: write NAME \[{said}\]"):
+        read_samples(path, allowed=allowed)
 
 
 def test_files_that_cannot_be_read(tmp_path, monkeypatch):

@@ -66,6 +66,14 @@ NANO = [x.replace(".", "") for x in EPOCH]
         ("elbow,shoulder,time,elbow_velocity,shoulder_velocity,elbow_effort", [*Q[::-1], TIMES, *V[::-1], A[0]], None),
         ("time,shoulder,elbow,shoulder_vel,elbow_vel,shoulder_acc,elbow_acc", [TIMES, *Q, *V, *A], JOINTS),
         ("time [ms],shoulder [deg],elbow [deg]", [1000 * TIMES, *np.rad2deg(Q)], JOINTS),
+        ("time (ms),shoulder (deg),elbow (mm)", [1000 * TIMES, np.rad2deg(Q[0]), 1000 * Q[1]], JOINTS),
+        ("time_ms,shoulder_deg,elbow_rad", [1000 * TIMES, np.rad2deg(Q[0]), Q[1]], JOINTS),
+        (
+            "t_us,shoulder_deg,elbow_mm,shoulder_deg_s",
+            [1e6 * TIMES, np.rad2deg(Q[0]), 1e3 * Q[1], np.rad2deg(V[0])],
+            JOINTS,
+        ),
+        ("t,shoulder_pos_deg,elbow_pos_deg,elbow_vel_deg_per_s", [TIMES, *np.rad2deg(Q), np.rad2deg(V[1])], JOINTS),
     ],
 )
 def test_tables_of_other_tools(tmp_path, header, columns, names):
@@ -82,10 +90,14 @@ def test_tables_of_other_tools(tmp_path, header, columns, names):
         assert all(law.degree == 7 for law in trajectory.laws.values())
 
 
-def test_epoch_stamps_lose_no_digits(tmp_path):
+@pytest.mark.parametrize(
+    "time, stamps, unit",
+    [("__time", EPOCH, "s"), ("time [s]", EPOCH, "s"), ("time [ns]", NANO, "ns"), ("stamp_ns", NANO, "ns")],
+)
+def test_epoch_stamps_lose_no_digits(tmp_path, time, stamps, unit):
     """In double precision 1732686000.123 s has 0.2 us: differences of the texts have none of that."""
-    path = table(tmp_path, "__time,/js/shoulder/position,/js/elbow/position", [EPOCH, *Q])
-    with pytest.warns(jn.errors.RecordingWarning, match=r"epoch, in s: t = 0 is 1732686000\.000000000 s"):
+    path = table(tmp_path, f"{time},/js/shoulder/position,/js/elbow/position", [stamps, *Q])
+    with pytest.warns(jn.errors.RecordingWarning, match=rf"epoch, in {unit}: t = 0 is 1732686000\.000000000 s"):
         trajectory = jn.load_trajectory(path)
     np.testing.assert_allclose(trajectory.times, TIMES, rtol=0, atol=1e-15)
 
@@ -125,6 +137,9 @@ def test_rows_out_of_order_and_repeated_ones_are_reported(tmp_path):
         ("time,a,a_d1", [TIMES, Q[0], 2 * V[0]], "line [0-9]+, a: velocities .* contradict"),
         ("__time,/a/j/position,/b/j/position", [TIMES, *Q], "line 1, j: two series are of this joint"),
         ("time,q_0,position_0", [TIMES, *Q], "line 1, position_0: two columns are of the same joint"),
+        ("time,a_deg,a_rad", [TIMES, *Q], "line 1, a: two columns are of the same joint, a_deg and a_rad"),
+        ("time,q_deg_0,q_deg_1", [TIMES, *Q], r"line 1: .* seems to say deg, .*'q_deg_0'.* write NAME \[deg\]"),
+        ("time,aDeg", [TIMES, Q[0]], "line 1: this name seems to say deg"),
         ("time,a,a_pos", [TIMES, *Q], "line 1, a: two columns are of the same joint"),
         ("%time,field.name0,field.position0", [NANO, ["a"] * 50 + ["b"], Q[0]], "line 52, field.name0: .* changes"),
         (

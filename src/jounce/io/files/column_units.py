@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING
 
 from jounce.errors import UnitError
 from jounce.settings import under_own_settings
+from jounce.units.dimensions import TIME, Dimension
 from jounce.units.shown_units import ShownUnits, unit_size
 
 if TYPE_CHECKING:
@@ -15,6 +16,16 @@ if TYPE_CHECKING:
 
 _WITH_INDEX = re.compile(r".*\S\[[0-9]+\]\s*")
 _WITH_UNIT = re.compile(r"(.*\S)\s*\[([^\[\]]*)\]\s*")
+_IN_PARENTHESES = re.compile(r"(.*\S)\s*\(([^()]*)\)\s*")
+_LAST_WORD = re.compile(
+    r"(?P<name>.*?[^\W_])_(?:(?P<unit>deg|degrees?|rad|mm)(?P<rate>(?:_|_per_|p)s(?P<power>2?))?|(?P<time>s|sec|ms|us|ns))",
+    re.IGNORECASE,
+)
+_SAID = {  # what measures something else than SI, where a name says it
+    "angle": re.compile(r"(?:(?<![a-z])deg(?:s|rees?)?|(?-i:(?<=[a-z0-9])Deg(?:s|rees?)?))(?![a-z])", re.IGNORECASE),
+    "length": re.compile(r"(?<![a-z])mm$", re.IGNORECASE),
+    "time": re.compile(r"(?<![a-z])[mun]s$", re.IGNORECASE),
+}
 
 
 @under_own_settings
@@ -92,3 +103,44 @@ def name_and_unit(text: str) -> tuple[str, str | None]:
     """
     match = None if _WITH_INDEX.fullmatch(text) else _WITH_UNIT.fullmatch(text)
     return (match[1], match[2].strip()) if match else (text, None)
+
+
+def name_and_last_word(text: str) -> tuple[str, str | None]:
+    """Return the name in the heading of a column that says its unit without brackets, and the unit, if it says one.
+
+    Examples
+    --------
+    >>> name_and_last_word("elbow_deg"), name_and_last_word("elbow_vel_deg_per_s"), name_and_last_word("time_ms")
+    (('elbow', 'deg'), ('elbow_vel', 'deg/s'), ('time', 'ms'))
+    >>> name_and_last_word("elbow (mm)"), name_and_last_word("elbow"), name_and_last_word("pin (left)")
+    (('elbow', 'mm'), ('elbow', None), ('pin (left)', None))
+    """
+    if match := _IN_PARENTHESES.fullmatch(text):
+        try:
+            moves = {base for base, _ in unit_size(match[2])[1]} <= {"angle", "length", "time"}
+        except UnitError:
+            moves = False
+        return (match[1], match[2]) if moves else (text, None)
+    if (match := _LAST_WORD.fullmatch(text)) is None:
+        return text, None
+    if match["time"]:
+        return match["name"], match["time"].lower()
+    power = f"^{match['power']}" if match["power"] else ""
+    return match["name"], match["unit"].lower() + (f"/s{power}" if match["rate"] else "")
+
+
+def unit_unread(name: str, dimensions: Iterable[Dimension]) -> str | None:
+    """Return the unit other than those of SI that a name seems to say of what has one of some dimensions.
+
+    Examples
+    --------
+    >>> from jounce.units.dimensions import ANGLE, TIME
+    >>> unit_unread("elbow_deg_0", [ANGLE]), unit_unread("elbowDeg", [ANGLE]), unit_unread("degree_of_freedom", [TIME])
+    ('deg', 'deg', None)
+    >>> unit_unread("time_ms", [TIME]), unit_unread("elbow", [ANGLE])
+    ('ms', None)
+    """
+    measured = {base for dimension in dimensions for base, _ in dimension if base != "time" or dimension == TIME}
+    found = (match for base, pattern in _SAID.items() if base in measured and (match := pattern.search(name)))
+    match = next(found, None)
+    return None if match is None else "deg" if match[0][0] in "dD" else match[0].lower()

@@ -11,7 +11,7 @@ import numpy as np
 from jaxtyping import Float
 
 from jounce.errors import JounceError, MechanismFileError, UnitError, did_you_mean, no_such
-from jounce.io.files.column_units import name_and_unit
+from jounce.io.files.column_units import name_and_unit, unit_unread
 from jounce.io.files.long_tables import Numbers, numbers_of
 from jounce.io.files.reading import LARGEST_NUMBER, fault_of_number, known_name, read_rows
 from jounce.units.dimensions import NUMBER, TIME, Dimension, describe_dimension, dimension_of
@@ -307,9 +307,13 @@ class Table:
     def unit(self, number: int, allowed: Sequence[Dimension] = ()) -> tuple[float, Dimension]:
         """Return the size of the unit that a column says, in SI units, and what it measures; one where it says none."""
         unit = self.units[number]
+        name = self.header[number]
         if unit is None:
+            if said := unit_unread(name, allowed):
+                message = f"this name seems to say {said}; units are read in brackets: write NAME [{said}], or another"
+                raise self.error(message, line=self.header_line, value=name)
             return 1.0, NUMBER
-        location = {"line": self.header_line, "name": self.header[number], "value": unit}
+        location = {"line": self.header_line, "name": name, "value": unit}
         try:
             size, dimension = unit_size(unit)
         except UnitError as error:

@@ -24,7 +24,10 @@ SAME = 1.5  # times the largest step beside: positions at one stamp differ by no
 
 
 def relative(
-    texts: Sequence[str], fail: Callable[[str, int], TrajectoryError], per_second: int = 1
+    texts: Sequence[str],
+    fail: Callable[[str, int], TrajectoryError],
+    per_second: int = 1,
+    unit: str | None = None,
 ) -> tuple[np.ndarray, str]:
     """Return stamps counted from the first one where they are counted from an epoch, and words about that.
 
@@ -37,6 +40,7 @@ def relative(
     fail : callable
         Given a message and a row, returns the error.
     per_second : int, default 1
+    unit : str, optional
         As for `epoch`.
 
     Raises
@@ -55,7 +59,7 @@ def relative(
         raise fail("must be a finite number", int(bad[0]))
     try:
         exact = [Decimal(text.strip()) for text in texts[:1]]
-        known = epoch(exact[0], per_second) if exact else None
+        known = epoch(exact[0], per_second, unit) if exact else None
         if known is None:
             return values, ""
         exact = [Decimal(text.strip()) for text in texts]
@@ -65,7 +69,7 @@ def relative(
     return np.array([float((stamp - exact[0]).scaleb(-digits)) for stamp in exact]), words
 
 
-def epoch(first: Decimal, per_second: int = 1) -> tuple[int, str] | None:
+def epoch(first: Decimal, per_second: int = 1, unit: str | None = None) -> tuple[int, str] | None:
     """Return of which power of ten of a second stamps are that are counted from an epoch, and words about that.
 
     Parameters
@@ -74,6 +78,8 @@ def epoch(first: Decimal, per_second: int = 1) -> tuple[int, str] | None:
         The first stamp.
     per_second : int, default 1
         Units of the stamps in a second, if they are known to be ns: small ones are those of a simulated clock then.
+    unit : str, optional
+        Of the stamps, if the file says one.
 
     Examples
     --------
@@ -84,6 +90,8 @@ def epoch(first: Decimal, per_second: int = 1) -> tuple[int, str] | None:
     True
     """
     scales = SCALES[:1] if per_second == NANO else SCALES
+    if unit is not None:
+        scales = [(EPOCH * 10**digits, digits, name) for _, digits, name in SCALES if name == unit]
     known = next(((digits, unit) for least, digits, unit in scales if abs(first) >= least), None)
     if known is None:
         return None

@@ -7,10 +7,13 @@ import re
 from collections.abc import Mapping, Sequence
 
 from jounce.errors import TrajectoryError
-from jounce.io.files.samples import ROW_NUMBER
+from jounce.io.files.column_units import name_and_last_word
+from jounce.io.files.samples import ROW_NUMBER, Table
 from jounce.io.trajectories.stamps import NANO
+from jounce.units.dimensions import NUMBER, TIME
+from jounce.units.shown_units import unit_size
 
-TIMES = ("time", "__time", "%time", "timestamp", "Time", "stamp", "t")
+TIMES = ("time", "__time", "%time", "timestamp", "Time", "stamp", "t", "TIME", "Timestamp")
 """Names of columns of times: of results, PlotJuggler, rostopic, controllers."""
 SPARE = (ROW_NUMBER, "seq", "frame_id", "success_rate", "control_command_success_rate", "robot_mode")
 POSITION, VELOCITY, ACCELERATION, OTHER = 0, 1, 2, 3
@@ -56,6 +59,30 @@ class Columns:
     checked: Mapping[str, int] = dataclasses.field(default_factory=dict)
     names: Mapping[str, int] = dataclasses.field(default_factory=dict)
     per_second: int = 1
+
+
+def take_units(table: Table) -> None:
+    """Take the units that names end in, as ``elbow_deg``, for those that stand in brackets, as ``elbow [deg]``.
+
+    Raises
+    ------
+    JounceError
+        If two columns are the same of one joint.
+    """
+    header, units = list(table.header), list(table.units)
+    read = [name_and_last_word(x) if unit is None else (x, None) for x, unit in zip(header, units, strict=True)]
+    names = [name for name, _ in read]
+    for k, (name, unit) in enumerate(read):
+        dimension = NUMBER if unit is None else unit_size(unit)[1]
+        level = -dict(dimension).get("time", 0)
+        if dimension == NUMBER or (dimension == TIME and (name not in TIMES or name in header)):
+            continue
+        rate = level > 0 and names.count(name) > 1  # elbow_deg_s beside elbow_deg
+        table.header[k], table.units[k] = f"{name}_{('vel', 'acc')[int(level) - 1]}" if rate else name, unit
+    for k, name in enumerate(table.header):
+        if (other := table.header.index(name)) != k:
+            message = f"two columns are of the same joint, {header[other]} and {header[k]}; leave one of them out"
+            raise table.error(message, line=table.header_line, name=name)
 
 
 def columns_of(header: Sequence[str]) -> Columns | None:

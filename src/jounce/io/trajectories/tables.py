@@ -14,7 +14,7 @@ from jounce.io.trajectories.agreement import check_agreement
 from jounce.io.trajectories.controller_formats import ControllerFormat, format_of, joint_count
 from jounce.io.trajectories.recordings import Recording
 from jounce.io.trajectories.stamps import NANO, epoch, in_sequence, relative
-from jounce.io.trajectories.table_columns import Columns, columns_of
+from jounce.io.trajectories.table_columns import Columns, columns_of, take_units
 from jounce.units.dimensions import TIME, Dimension
 
 NOTHING = ("", "nan", "NaN", "NAN")
@@ -38,6 +38,7 @@ def read_recording(path: str, joints: Iterable[str] | None = None) -> Recording:
     """
     table = Table(path, TrajectoryError)
     line = check_named(table)
+    take_units(table)
     known = format_of(table.header)
     try:
         columns = _of_controller(table, known) if known else columns_of(table.header)
@@ -151,24 +152,23 @@ def _numbers(table: Table, column: int, level: int, *, empty: bool) -> Float[np.
 
 def _times(table: Table, columns: Columns) -> tuple[Float[np.ndarray, " row"], str]:
     """Return the times, s, from the first one where they are counted from an epoch, and words about that."""
-    name = table.header[columns.time]
-    size, _ = table.unit(columns.time, (TIME,))
-    if table.units[columns.time] is not None:
-        return np.array(table.column(columns.time, (TIME,))), ""
+    name, unit = table.header[columns.time], table.units[columns.time]
+    size = table.unit(columns.time, (TIME,))[0]
     if table.numbers is not None:
         values, origin = np.array(table.column(columns.time)), table.numbers.offsets.get(columns.time)
-        per_second = _units(columns, values)
-        known = None if origin is None else epoch(origin, per_second)
+        known = None if origin is None else epoch(origin, _units(columns, values), unit)
         if known is None:
-            return values / per_second, ""
+            return (values / _units(columns, values) if unit is None else values), ""
         digits, words = known
         return table.numbers.values[:, columns.time] / 10**digits, words
 
     def fail(message: str, row: int) -> TrajectoryError:
         return table.error(message, line=table.line(row), name=name, value=table.rows[row][1][columns.time])  # type: ignore[return-value]
 
-    values, words = relative([row[columns.time] for _, row in table.rows], fail, columns.per_second)
-    return (values, words) if words else (values * size / _units(columns, values), "")
+    values, words = relative([row[columns.time] for _, row in table.rows], fail, columns.per_second, unit)
+    if words:
+        return values, words
+    return values / _units(columns, values) if unit is None else values * size, ""
 
 
 def _units(columns: Columns, stamps: Float[np.ndarray, " row"]) -> int:
