@@ -141,6 +141,6 @@ def unit_unread(name: str, dimensions: Iterable[Dimension]) -> str | None:
     ('ms', None)
     """
     measured = {base for dimension in dimensions for base, _ in dimension if base != "time" or dimension == TIME}
-    found = (match for base, pattern in _SAID.items() if base in measured and (match := pattern.search(name)))
-    match = next(found, None)
+    matches = (match for base, pattern in _SAID.items() if base in measured and (match := pattern.search(name)))
+    match = next(matches, None)
     return None if match is None else "deg" if match[0][0] in "dD" else match[0].lower()
