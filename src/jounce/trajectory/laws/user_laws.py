@@ -95,8 +95,8 @@ def law_or_number(
     where = f"{what}.{name}"
     if isinstance(law, AbstractMotion | SampledLaw) and not isinstance(law, FunctionMotion):
         return law
-    scalar = np.ndim(law) == 0 and not isinstance(law, bool) and isinstance(law, (*GIVEN, np.ndarray, jax.Array))
-    if not (callable(law) or scalar):
+    scalar = isinstance(law, (*GIVEN, np.ndarray, jax.Array)) and not isinstance(law, bool)
+    if not (callable(law) or (scalar and getattr(law, "ndim", 0) == 0)):
         message = "must be a law of time: a motion law, an expression of t, a function of time, or a number"
         raise error(message, name=where, value=law)
     try:
@@ -112,7 +112,7 @@ def given_law(name: Any, law: Any) -> AbstractMotion | SampledLaw:
     if not isinstance(name, str) or not name:
         raise TrajectoryError("the name of a joint must be text", name="laws", value=name)
     taken = law_or_number("laws", name, law)
-    return ExpressionMotion(repr(taken)) if isinstance(taken, float) else taken
+    return ExpressionMotion(repr(taken)) if isinstance(taken, int | float) else taken
 
 
 def read_laws(tree: Any) -> Any:
