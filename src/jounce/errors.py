@@ -342,6 +342,10 @@ class IdleMotionWarning(_BoundedWarning):
     """Bodies that may spin about an axis of themselves, which moves nothing else, are held by the least motion."""
 
 
+class PrecisionWarning(_BoundedWarning):
+    """A function given to this library computes in less than double precision, and derivatives are no better."""
+
+
 class MachineCodeWarning(_BoundedWarning):
     """XLA computes what there is no machine code for: the same results in two to fifty times the time."""
 

@@ -194,6 +194,17 @@ def test_order_zero_is_the_function():
 
 
 @pytest.mark.parametrize(
+    "function", [lambda t: jnp.sin(t.astype("f4")), jax.jit(lambda t: jnp.cos(2 * t).astype("f4"))]
+)
+def test_a_law_in_single_precision_is_told_of_once(function):
+    time = jn.Jet.variable(0.3, 1)
+    with pytest.warns(jn.errors.PrecisionWarning, match="computes in float32: results have 6 digits"):
+        first = jet.compose(function, time)
+    second = jet.compose(function, time)  # warnings are errors here
+    assert [float(x) for x in second.coefficients] == [float(x) for x in first.coefficients]
+
+
+@pytest.mark.parametrize(
     "function", [lambda t: jnp.stack([t, t]), lambda t: (t, t), lambda t: None], ids=["vector", "tuple", "none"]
 )
 def test_law_that_does_not_return_one_scalar(function):

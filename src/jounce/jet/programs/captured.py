@@ -23,6 +23,7 @@ import numpy as np
 from jax.core import Tracer
 from jax.extend.core import ClosedJaxpr, Jaxpr, JaxprEqn, Literal, jaxpr_as_fun
 
+from jounce.errors import PrecisionWarning, warn_caller
 from jounce.settings import under_own_settings
 
 MOST_TRACED = 1000  # programs at most, of functions read before
@@ -129,6 +130,10 @@ def read_off(function: Callable[..., Any], *examples: Any) -> ReadOff:
         given = [_shaped(x) for x in captured], [_shaped(v.aval) for v in closed.jaxpr.invars]
         whole = jax.make_jaxpr(lambda values, arguments: _Again(values).of(closed, arguments))(*given)
         program = Program(*key, tuple(np.shape(x) for x in captured), whole)
+        if kept := _narrowed(closed.jaxpr):
+            digits = int(jnp.finfo(kept).precision)
+            message = f"a function given here computes in {kept}: results have {digits} digits; convert nothing to it"
+            warn_caller(PrecisionWarning(message))
     with _lock:
         _known.pop(key, None)
         _known[key] = program  # the last one used is last
@@ -191,6 +196,19 @@ def _inner(equation: JaxprEqn) -> Iterator[Jaxpr]:
     for part in jax.tree.leaves(list(equation.params.values()), is_leaf=lambda x: isinstance(x, Jaxpr | ClosedJaxpr)):
         if isinstance(part, Jaxpr | ClosedJaxpr):
             yield part.jaxpr if isinstance(part, ClosedJaxpr) else part
+
+
+def _narrowed(jaxpr: Jaxpr) -> np.dtype | None:
+    """Return the type of less than double precision to which a program converts numbers; None if it does not."""
+    for equation in jaxpr.eqns:
+        if equation.primitive.name == "convert_element_type" and equation.invars[0].aval.dtype == np.float64:
+            made = np.dtype(equation.params["new_dtype"])
+            if jnp.issubdtype(made, jnp.floating) and made != np.float64:
+                return made
+        for inner in _inner(equation):
+            if kept := _narrowed(inner):
+                return kept
+    return None
 
 
 def _is_of_libraries(jaxpr: Jaxpr) -> bool:
