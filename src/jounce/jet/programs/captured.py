@@ -130,9 +130,9 @@ def read_off(function: Callable[..., Any], *examples: Any) -> ReadOff:
         given = [_shaped(x) for x in captured], [_shaped(v.aval) for v in closed.jaxpr.invars]
         whole = jax.make_jaxpr(lambda values, arguments: _Again(values).of(closed, arguments))(*given)
         program = Program(*key, tuple(np.shape(x) for x in captured), whole)
-        if kept := _narrowed(closed.jaxpr):
-            digits = int(jnp.finfo(kept).precision)
-            message = f"a function given here computes in {kept}: results have {digits} digits; convert nothing to it"
+        if dtype := _narrowed(closed.jaxpr):
+            digits = int(jnp.finfo(dtype).precision)
+            message = f"a function given here computes in {dtype}: results have {digits} digits; convert nothing to it"
             warn_caller(PrecisionWarning(message))
     with _lock:
         _known.pop(key, None)
@@ -206,8 +206,8 @@ def _narrowed(jaxpr: Jaxpr) -> np.dtype | None:
             if jnp.issubdtype(made, jnp.floating) and made != np.float64:
                 return made
         for inner in _inner(equation):
-            if kept := _narrowed(inner):
-                return kept
+            if dtype := _narrowed(inner):
+                return dtype
     return None
 
 
