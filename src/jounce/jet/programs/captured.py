@@ -201,8 +201,10 @@ def _inner(equation: JaxprEqn) -> Iterator[Jaxpr]:
 def _narrowed(jaxpr: Jaxpr) -> np.dtype | None:
     """Return the type of less than double precision to which a program converts numbers; None if it does not."""
     for equation in jaxpr.eqns:
-        if equation.primitive.name == "convert_element_type" and equation.invars[0].aval.dtype == np.float64:
-            made = np.dtype(equation.params["new_dtype"])
+        made: Any = equation.params.get("new_dtype")
+        taken: list[Any] = [v.aval for v in equation.invars]
+        if equation.primitive.name == "convert_element_type" and taken[0].dtype == np.float64:
+            made = np.dtype(made)
             if jnp.issubdtype(made, jnp.floating) and made != np.float64:
                 return made
         for inner in _inner(equation):
