@@ -147,6 +147,9 @@ def test_units_do_not_matter():
     np.testing.assert_allclose(second.followed_lift, 1e3 * first.followed_lift, rtol=1e-9, atol=1e-9)
 
 
+IN_DEGREES = jn.laws.SplineMotion(np.arange(0.0, 361.0, 30.0), np.zeros(13), beyond="repeat")
+
+
 @pytest.mark.parametrize(
     "law, follower, options, words",
     [
@@ -158,6 +161,7 @@ def test_units_do_not_matter():
         ("1/t", jn.cams.TranslatingFollower("flat_face"), {}, "no finite value"),
         ("0", jn.cams.TranslatingFollower("flat_face"), {"sense": "left"}, "unknown sense"),
         ("0", jn.cams.TranslatingFollower("flat_face"), {"count": 3}, "from 16"),
+        (IN_DEGREES, jn.cams.TranslatingFollower("flat_face"), {}, r"if that is in degrees, .* 'angle \[deg\]'"),
     ],
 )
 def test_what_is_wrong_is_named(law, follower, options, words):

@@ -93,6 +93,20 @@ def test_transposed_systems_have_the_solution_of_least_norm(case):
     np.testing.assert_allclose(found, expected, atol=bound(matrix) * np.abs(expected).max())
 
 
+def test_transposed_systems_of_many_bodies_sort_nothing():
+    """Machine code sorts few numbers only; of more, XLA would compute the whole balance of forces."""
+    bodies = random_pattern(np.random.default_rng(0), 20, 3)
+    places = np.arange(bodies.size * 3).reshape(*bodies.shape, 3)
+    fronts = Fronts.of(Pattern(bodies, places, 20, places.size))
+
+    def solved(entries, right):
+        return FrontalFactor.of(fronts, entries, np.ones((len(bodies), 1))).solve_transposed(right)
+
+    program = str(jax.make_jaxpr(solved)(np.ones((places.size, 1)), np.ones((60, 1))))
+    assert "scan[" in program
+    assert " sort[" not in program
+
+
 def test_signs_are_those_of_the_determinants_or_all_turned_round(square):
     matrix, _, _, (_, _, sign) = square
     product = sign * np.linalg.slogdet(matrix)[0]

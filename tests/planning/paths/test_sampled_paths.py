@@ -100,6 +100,13 @@ def test_samples_of_a_smooth_motion_still_have_splines_through_them():
     np.testing.assert_allclose(places[:, 1], 1 - 2 * places[:, 0] ** 2, atol=1e-8)
 
 
+def test_splines_through_positions_and_velocities_state_their_degree():
+    t = np.linspace(0.0, 3.0, 301)
+    law = jn.laws.HermiteSplineMotion(t, np.stack([np.sin(t), np.cos(t)], axis=1))
+    path = path_of(jn.JointTrajectory({"a": law}, 0.0, 3.0), None, 2)
+    assert path.words == "splines of degree 5 through 301 samples"
+
+
 @pytest.mark.parametrize("kind", ["rounded", "few", "noise", "corners"])
 def test_where_times_count_dwells_stay_still_and_each_instant_is_near(kind):
     times, points = samples(kind)

@@ -260,7 +260,9 @@ def _check(cam: PlateCam) -> None:
         period = float(cam.law.stop) - float(np.asarray(cam.law.breakpoints)[0])
         if abs(WHOLE_TURN / period - round(WHOLE_TURN / period)) > CLOSED * WHOLE_TURN / period:
             message = f"has a period of {period:.9g} rad, which does not go into a turn of the cam"
-            raise TrajectoryError(message, name="law", value=period)
+            if 360.0 % period == 0:
+                message += "; if that is in degrees, head the column of the angles 'angle [deg]'"
+            raise TrajectoryError(message, name="law")
     follower, start = cam.follower, cam.follower.start(cam.base_radius)
     lift = np.asarray(cam.law(Jet([cam.angle])).coefficients[0])
     if not np.isfinite(lift).all():

@@ -14,7 +14,7 @@ from jounce.planning.paths.path import Path
 from jounce.planning.paths.straight_lines import Lines, rounded
 from jounce.planning.paths.trajectory_paths import path_of_trajectory, turns_back_within
 from jounce.planning.smoothing.smooth import FEWEST, sampled, smooth
-from jounce.trajectory import JointTrajectory, SplineMotion
+from jounce.trajectory import HermiteSplineMotion, JointTrajectory, SplineMotion
 
 DEVIATION = 1e-3  # rad or m, from samples, unless given
 OF_SMOOTHING = 0.75  # of the deviation, where corners of what smoothing makes are rounded as well
@@ -94,7 +94,8 @@ def path_of_samples(
     if away <= allowed:
         path = own if timed else path_of_trajectory(trajectory, order)
         if path.deviation + away <= allowed:
-            degrees = sorted({law.degree for law in trajectory.laws.values() if type(law) is SplineMotion})
+            splines = [law for law in trajectory.laws.values() if isinstance(law, SplineMotion | HermiteSplineMotion)]
+            degrees = sorted({law.degree for law in splines})
             words = f"splines of degree {' and '.join(map(str, degrees))} through {len(lines.at)} samples"
             return dataclasses.replace(path, deviation=path.deviation + away, allowed=allowed, words=words)
     return rounded(lines, allowed, timed=timed) if few else _smoothed(trajectory, order, allowed, timed=timed)
