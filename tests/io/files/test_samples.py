@@ -60,7 +60,16 @@ def test_what_is_wrong_is_said_with_its_line(tmp_path, text, names, words):
     assert str(caught.value).startswith(str(path))
 
 
-@pytest.mark.parametrize("names, said", [("time,lift_mm", "mm"), ("time_ms,lift", "ms"), ("time,theta_deg", "deg")])
+@pytest.mark.parametrize(
+    "names, said",
+    [
+        ("time,lift_mm", "mm"),
+        ("time_ms,lift", "ms"),
+        ("time,theta_deg", "deg"),
+        ("time (s),lift (cm)", "cm"),
+        ("Time (ms),lift", "ms"),
+    ],
+)
 def test_units_in_names_alone_are_not_taken_for_those_of_si(tmp_path, names, said):
     path, allowed = write(tmp_path, f"{names}\n0,1\n1,2.5\n"), ([TIME], [LENGTH, ANGLE])
     with pytest.raises(MechanismFileError, match=rf"line 1: this name seems to say {said}.*: write NAME \[{said}\]"):

@@ -116,17 +116,21 @@ def name_and_last_word(text: str) -> tuple[str, str | None]:
     (('elbow', 'mm'), ('elbow', None), ('pin (left)', None))
     """
     if match := _IN_PARENTHESES.fullmatch(text):
-        try:
-            moves = {base for base, _ in unit_size(match[2])[1]} <= {"angle", "length", "time"}
-        except UnitError:
-            moves = False
-        return (match[1], match[2]) if moves else (text, None)
+        return (match[1], match[2]) if _moves(match[2]) else (text, None)
     if (match := _LAST_WORD.fullmatch(text)) is None:
         return text, None
     if match["time"]:
         return match["name"], match["time"].lower()
     power = f"^{match['power']}" if match["power"] else ""
     return match["name"], match["unit"].lower() + (f"/s{power}" if match["rate"] else "")
+
+
+def _moves(text: str) -> bool:
+    """Tell whether a text is a unit of angles, lengths, times or their rates."""
+    try:
+        return {base for base, _ in unit_size(text)[1]} <= {"angle", "length", "time"}
+    except UnitError:
+        return False
 
 
 def unit_unread(name: str, dimensions: Iterable[Dimension]) -> str | None:
@@ -137,9 +141,14 @@ def unit_unread(name: str, dimensions: Iterable[Dimension]) -> str | None:
     >>> from jounce.units.dimensions import ANGLE, TIME
     >>> unit_unread("elbow_deg_0", [ANGLE]), unit_unread("elbowDeg", [ANGLE]), unit_unread("degree_of_freedom", [TIME])
     ('deg', 'deg', None)
-    >>> unit_unread("time_ms", [TIME]), unit_unread("elbow", [ANGLE])
-    ('ms', None)
+    >>> unit_unread("time_ms", [TIME]), unit_unread("elbow", [ANGLE]), unit_unread("elbow (rad)", [ANGLE])
+    ('ms', None, None)
+    >>> unit_unread("lift (cm)", [])
+    'cm'
     """
+    match = _IN_PARENTHESES.fullmatch(name)
+    if match and _moves(match[2]):
+        return None if is_si(match[2]) else match[2]
     measured = {base for dimension in dimensions for base, _ in dimension if base != "time" or dimension == TIME}
     matches = (match for base, pattern in _SAID.items() if base in measured and (match := pattern.search(name)))
     match = next(matches, None)
