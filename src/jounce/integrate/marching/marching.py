@@ -124,15 +124,25 @@ def unexpanded(equations: Equations, state: State, time: Lanes, *, order: int) -
     *_, bodies, lanes = state.position.shape
     size, columns = equations.system.shape
     series = state.map(lambda known: np.concatenate([known[None], np.zeros((order, *known.shape))]))
-    rates = np.zeros((1, columns // bodies, bodies, lanes)), np.zeros((1, size, lanes))
-    opening, none = (np.full(time.shape, value) for value in (int(Outcome.UNEXPANDED), -1))
-    nothing = np.zeros(time.shape)
-    known = np.zeros((bodies + 1, lanes)), np.zeros(time.shape, bool)
-    angles = _measured(equations, state) if any(map(measures_angle, equations.system.forces)) else ()
-    expansion, refused = Expansion(series, *rates), np.zeros(time.shape, int)
-    count = np.zeros(time.shape, int)
-    counts = nothing, count, count, unknown(nothing)
-    return IntegratorState(time, nothing, expansion, refused, opening, nothing, time, *known, none, angles, *counts)
+    expansion = Expansion(series, np.zeros((1, columns // bodies, bodies, lanes)), np.zeros((1, size, lanes)))
+    nothing, none = np.zeros(time.shape), np.zeros(time.shape, int)
+    return IntegratorState(
+        time=time,
+        rest=nothing,
+        expansion=expansion,
+        refused=none,
+        outcome=np.full(time.shape, int(Outcome.UNEXPANDED)),
+        drift=nothing,
+        begun=time,
+        mobility=np.zeros((bodies + 1, lanes)),
+        singular=np.zeros(time.shape, bool),
+        blocked=np.full(time.shape, -1),
+        angles=_measured(equations, state) if any(map(measures_angle, equations.system.forces)) else (),
+        longest=nothing,
+        crossing=none,
+        short=none,
+        balance=unknown(nothing),
+    )
 
 
 @compiled(narrow=True, single=True)
@@ -237,37 +247,44 @@ def _attempt(
     checked = method.controlled and is_balanced(equations, here, current.time[None])
 
     def attempt(current: IntegratorState) -> tuple[IntegratorState, tuple[DenseOutput, Any]]:
-        left = stop - current.time - current.rest
+        running, opening = (current.outcome == int(x) for x in (Outcome.RUNNING, Outcome.UNEXPANDED))
+        left, duration = stop - current.time - current.rest, jnp.abs(stop - current.begun)
+
+        # how long the step is: as the series carries, and as what lies ahead permits
         usual = SHORT * current.longest
         start, reach, allowed = method.prepared(current.expansion, length, tolerance, current.singular, usual)
         wished = jnp.minimum(reach, jnp.minimum(longest, jnp.abs(left)))
-        step = wished * REFUSED ** current.refused.astype(float)
-        look = Lookahead(jnp.sign(left) * step, jnp.ones(step.shape, bool), jnp.full(step.shape, -1), current.blocked)
-        angles = followed(equations, current.angles, start.state, look.step)
-        duration = jnp.abs(stop - current.begun)
+        tried = wished * REFUSED ** current.refused.astype(float)
+        step = jnp.sign(left) * tried
+        angles = followed(equations, current.angles, start.state, step)
         if method.controlled:
             shortest = finest(duration, current.time, current.crossing + current.refused)
-            ahead = angles, current.mobility, current.time, look.step, duration, allowed, shortest
-            look = look_ahead(equations, start.state, *ahead)
-        suspect = (look.kink >= 0) & (jnp.abs(look.step) < step) | (current.refused >= STUBBORN)
-        step = jnp.abs(look.step)
-        last = step >= 0.999 * jnp.abs(left)  # no sliver of a step at the end
-        step = jnp.where(last, left, jnp.sign(left) * step)
+            how = current.mobility, current.time, step, duration, allowed, shortest
+            look = look_ahead(equations, start.state, angles, *how)
+        else:
+            look = Lookahead(step, jnp.ones(step.shape, bool), jnp.full(step.shape, -1), current.blocked)
+        size = jnp.abs(look.step)
+        last = size >= 0.999 * jnp.abs(left)  # no sliver of a step at the end
+        step = jnp.where(last, left, jnp.sign(left) * size)
         since = step + current.rest
         time = jnp.where(last, stop, current.time + since)
         rest = jnp.where(last, 0.0, since - (time - current.time))
-        running, opening = (current.outcome == int(x) for x in (Outcome.RUNNING, Outcome.UNEXPANDED))
         step = jnp.where(running, step, 0.0)
         time, rest = (jnp.where(running, x, y) for x, y in ((time, current.time), (rest, current.rest)))
 
+        # where it leads
         there = equations.near(angles.at(step))
         arrived = method.arrive(there, start, current.time, step)
         state, distance, inverse = projected(there, arrived, time[None])
         state = jax.tree.map(lambda a, b: jnp.where(opening, a, b), arrived, state)  # it is on the constraints already
         expansion = _without_unused(expand(there, state, time[None], order, inverse))
         error = method.error(start, expansion, step, length)
+        polynomial = method.polynomial(start, expansion, step)
+
+        # whether it is taken
         good = _finite(expansion) & jnp.isfinite(distance) & (error <= MARGIN * allowed) & running & look.resolved
         if method.controlled:
+            suspect = (look.kink >= 0) & (size < tried) | (current.refused >= STUBBORN)
             kick = 0.5 * order * (order + 1) * error
             good = good & ~(suspect & _lasting(kick, step, duration, MARGIN * allowed, current))
         balanced, balance = jnp.ones(step.shape, bool), current.balance
@@ -278,30 +295,42 @@ def _attempt(
             balance, balanced = follow_balance(current.balance, energies_there, leeway)
             balance = jax.tree.map(lambda a, b: jnp.where(opening, a, b), begun(energies_there), balance)
             good = good & balanced
+
+        # what becomes of the run
         tiny = jnp.abs(step) < SMALLEST_STEP * jnp.maximum(jnp.abs(current.time), jnp.abs(stop - current.time))
-        polynomial = method.polynomial(start, expansion, step)
-        steps = DenseOutput(current.time, step, polynomial, look.kink, current.angles), good
-        outcome = jnp.where(good & last, int(Outcome.ARRIVED), current.outcome)
         broken = current.balance.broken | (running & ~balanced)
         stopped = jnp.where(~broken, int(Outcome.COLLAPSED), int(Outcome.UNBALANCED))
-        outcome = jnp.where(running & ((~good & tiny) | (current.short >= STUCK)), stopped, outcome)
         opened = jnp.where(_finite(expansion), int(Outcome.RUNNING), int(Outcome.LOST))
+        outcome = jnp.where(good & last, int(Outcome.ARRIVED), current.outcome)
+        outcome = jnp.where(running & ((~good & tiny) | (current.short >= STUCK)), stopped, outcome)
         outcome = jnp.where(opening, opened, outcome)
-        drift = jnp.where(opening, current.drift, jnp.maximum(current.drift, distance))
-        known = mobility_of(equations, inverse), near_singular(equations, inverse)
-        fresh, reached = jnp.zeros_like(current.refused), measured(there, state)
         farthest = jnp.where(reach > longest, jnp.minimum(jnp.minimum(reach, longest / SHORT), duration), jnp.abs(step))
-        farthest = jnp.maximum(current.longest, farthest)
-        crossing = steps_counted(current.crossing, step, duration, look.kink >= 0)
         short = steps_counted(current.short, step, duration)
-        balance = balance._replace(broken=balance.broken & (short > 0))
-        reaching = time, rest, expansion, fresh, outcome, drift, current.begun
-        ahead = jnp.where(look.limiting >= 0, look.limiting, current.blocked)
-        ahead = jnp.where(short > 0, ahead, -1)
-        onwards = IntegratorState(*reaching, *known, ahead, reached, farthest, crossing, short, balance)
-        blocked = jnp.where(look.resolved, current.blocked, look.limiting)
-        refused = current._replace(refused=current.refused + 1, outcome=outcome, blocked=blocked)
-        refused = refused._replace(balance=current.balance._replace(broken=broken))
+        limiting = jnp.where(look.limiting >= 0, look.limiting, current.blocked)
+        onwards = IntegratorState(
+            time=time,
+            rest=rest,
+            expansion=expansion,
+            refused=jnp.zeros_like(current.refused),
+            outcome=outcome,
+            drift=jnp.where(opening, current.drift, jnp.maximum(current.drift, distance)),
+            begun=current.begun,
+            mobility=mobility_of(equations, inverse),
+            singular=near_singular(equations, inverse),
+            blocked=jnp.where(short > 0, limiting, -1),
+            angles=measured(there, state),
+            longest=jnp.maximum(current.longest, farthest),
+            crossing=steps_counted(current.crossing, step, duration, look.kink >= 0),
+            short=short,
+            balance=balance._replace(broken=balance.broken & (short > 0)),
+        )
+        refused = current._replace(
+            refused=current.refused + 1,
+            outcome=outcome,
+            blocked=jnp.where(look.resolved, current.blocked, look.limiting),
+            balance=current.balance._replace(broken=broken),
+        )
+        steps = DenseOutput(current.time, step, polynomial, look.kink, current.angles), good
         return jax.tree.map(lambda a, b: jnp.where(good | opening, a, b), onwards, refused), steps
 
     return attempt
