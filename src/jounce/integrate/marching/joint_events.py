@@ -71,8 +71,7 @@ class JointEventDetector(AbstractDetector):
             check_name("moving joint", event.of, robot.joint_names, RobotError, name="events.of")
         else:
             n, function = len(robot.joint_names), event.of
-            state = jnp.zeros(()), jnp.zeros(n), jnp.zeros(n)
-            self._function = OfSample.of(function, *state)
+            self._function = OfSample.of(function, jnp.zeros(()), jnp.zeros(n), jnp.zeros(n))
             if self._function.shape != ():
                 message = f"the function must return one number, not the shape {self._function.shape}"
                 raise RobotError(message, name="events.of")

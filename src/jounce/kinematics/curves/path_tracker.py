@@ -2,6 +2,7 @@
 
 import dataclasses
 import math
+from collections.abc import Callable
 from functools import cached_property
 from typing import Any
 
@@ -61,9 +62,7 @@ class CurvePoint:
         def shifted(c: np.ndarray) -> np.ndarray:
             return np.concatenate([np.tensordot(shift, c[: order + 1], 1), np.zeros_like(c[order + 1 :])])
 
-        coordinates = {name: shifted(c) for name, c in self.coordinates.items()}
-        known = {"arc_length": self.arc_length + step, "value": shifted(self.value)}
-        return dataclasses.replace(self, coordinates=coordinates, **known)
+        return self._with_series(shifted, arc_length=self.arc_length + step)
 
     def reversed(self) -> "CurvePoint":
         """Return the point with its series in the opposite direction."""
@@ -71,9 +70,7 @@ class CurvePoint:
         def alternated(c: np.ndarray) -> np.ndarray:
             return c * ((-1.0) ** np.arange(len(c))).reshape(-1, *[1] * (c.ndim - 1))
 
-        coordinates = {name: alternated(c) for name, c in self.coordinates.items()}
-        known = {"arc_length": -self.arc_length, "value": alternated(self.value), "slope": -self.slope}
-        return dataclasses.replace(self, coordinates=coordinates, **known)
+        return self._with_series(alternated, arc_length=-self.arc_length, slope=-self.slope)
 
     def shifted(self, arc_length: float) -> "CurvePoint":
         """Return the point with its arc length increased by that of another start."""
@@ -85,8 +82,12 @@ class CurvePoint:
         def truncated(c: np.ndarray) -> np.ndarray:
             return np.concatenate([c[: order + 1], np.zeros_like(c[order + 1 :])])
 
-        coordinates = {name: truncated(c) for name, c in self.coordinates.items()}
-        return dataclasses.replace(self, coordinates=coordinates, value=truncated(self.value))
+        return self._with_series(truncated)
+
+    def _with_series(self, change: Callable[[np.ndarray], np.ndarray], **others: Any) -> "CurvePoint":
+        """Return the point with its series changed, and with other attributes."""
+        coordinates = {name: change(c) for name, c in self.coordinates.items()}
+        return dataclasses.replace(self, coordinates=coordinates, value=change(self.value), **others)
 
 
 @dataclasses.dataclass(frozen=True)

@@ -90,8 +90,7 @@ def driver_of_output(mechanism: Any, motion: OutputMotion, location: str) -> Abs
         case PlanarRelativeAngleOutput():
             return CoordinateDriver(output.bodies, "angle", law)
         case RelativeAngleOutput():
-            vectors = {"vector_i": output.vector_i, "vector_j": output.vector_j}
-            return RotationDriver(output.bodies, output.axis, law, **vectors)
+            return RotationDriver(output.bodies, output.axis, law, vector_i=output.vector_i, vector_j=output.vector_j)
         case DistanceOutput():
             kind = SpatialDistanceDriver if spatial else DistanceDriver
             return kind(output.bodies, output.point_i, output.point_j, law)

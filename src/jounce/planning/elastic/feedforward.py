@@ -145,8 +145,7 @@ def _along(system: DrivenSystem, instants: np.ndarray, rates: int) -> Feedforwar
     deflection = None
     if len(elastic):
         names = tuple(arrays.names[k] for k in elastic)
-        constants = arrays.stiffness[elastic], arrays.time_constant[elastic]
-        deflection = SpringDeflection(torques, *constants, nodes, names)
+        deflection = SpringDeflection(torques, arrays.stiffness[elastic], arrays.time_constant[elastic], nodes, names)
     return Feedforward(system, instants, levels, deflection)
 
 

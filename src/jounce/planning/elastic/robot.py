@@ -113,8 +113,7 @@ class _ElasticForces(AbstractJointLaws):
             values = {k: law(Jet([time[0]])).coefficients[0] for k, law in zip(self.indices, self.laws, strict=True)}
             own = own + jnp.stack([values.get(k, zero) for k in range(len(links))])
         if self.feedback is not None:
-            parts = time[0], q[links], rate[links], q[motors], rate[motors]
-            own = own + self.feedback(*parts)
+            own = own + self.feedback(time[0], q[links], rate[links], q[motors], rate[motors])
         spring = jnp.asarray(self.stiffness)[:, None] * (q[motors] - q[links])
         spring = spring + jnp.asarray(self.damping)[:, None] * (rate[motors] - rate[links])
         forces = jnp.zeros(q.shape)

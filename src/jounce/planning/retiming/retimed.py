@@ -67,8 +67,7 @@ class RetimedTrajectory(JointTrajectory):
         return RetimedTrajectory(laws, slow.duration, self.path, progress, self.report, self.active, loads)
 
     def __reduce__(self) -> tuple[Any, ...]:
-        ends = self.report, self.active, self.loads
-        return type(self), (dict(self.laws), self.stop, self.path, self.progress, *ends)
+        return type(self), (dict(self.laws), self.stop, self.path, self.progress, self.report, self.active, self.loads)
 
     def __repr__(self) -> str:
         return f"RetimedTrajectory({', '.join(self.names)}; {self.stop:g} s)"

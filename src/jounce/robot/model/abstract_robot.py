@@ -47,8 +47,8 @@ class AbstractRobot(Displayed, abc.ABC):
         self.couplings: Mapping[str, Coupling] = MappingProxyType(_by_name("couplings", couplings, (Tendon, BallDrive)))
         for coupling in self.couplings.values():
             check_coupling(coupling, self.joints, self.joint_names)
-        parts = (in_order, self.gravity, list(self.couplings.values()))
-        self._tree, self.frames = arrange(self.base, self.links, *parts)
+        couplings = list(self.couplings.values())
+        self._tree, self.frames = arrange(self.base, self.links, in_order, self.gravity, couplings)
         if strict and (massless := self.massless_joints):
             message = (
                 "this joint moves no mass; give its link, or one that it carries, an inertia, or keep it with "
