@@ -15,6 +15,7 @@ from jounce.integrate import Simulation
 from jounce.kinematics import ChunkedMotion, Motion, solve
 from jounce.mechanism import AbstractQuantity
 from jounce.mechanism.laws.law_breaks import breaks_of_laws
+from jounce.mechanism.outputs.base import lost_orders
 from jounce.mechanism.user_code import holds_users_code
 from jounce.reporting.maxima import Curves, Peaks, RunningMaxima, Times, alike
 from jounce.trajectory.law_checks.breaks import both_sides
@@ -307,8 +308,7 @@ def _one_sided(motion: Motion | ChunkedMotion) -> tuple[Times, Times, Curves]:
     if not len(motion.time):
         return np.zeros(0), np.zeros(0), np.zeros((0, 0))
     first, last = sorted((float(motion.time[0]), float(motion.time[-1])))  # a simulation may go backward
-    outputs = motion.mechanism.outputs.values()
-    lost = max((output.lost_orders for output in outputs), default=0)
+    lost = lost_orders(motion.mechanism.outputs.values())
     forces = isinstance(motion, Simulation) or None  # they move all bodies
     breaks = breaks_of_laws(motion.mechanism, first, last, motion.order + lost, forces=forces)
     if isinstance(motion, Simulation):

@@ -26,6 +26,7 @@ from jounce.kinematics.results.pose_outputs import output_values
 from jounce.mechanism import Body, Mechanism, build, check_mechanism
 from jounce.mechanism.building.preconditions import check_holonomic, concrete
 from jounce.mechanism.laws.law_checks import check_laws
+from jounce.mechanism.outputs.base import lost_orders
 from jounce.mechanism.time import first_instant
 from jounce.robot import Robot
 from jounce.robot.closed_loops.closures import GivenCoordinates
@@ -156,7 +157,7 @@ class Equilibrium(Displayed):
     def motion(self) -> Motion:
         """The mechanism at rest, as a motion of one instant, of order 2."""
         point, model = self.point, self.point.model
-        lost = max((output.lost_orders for output in self.mechanism.outputs.values()), default=0)
+        lost = lost_orders(self.mechanism.outputs.values())
         coordinates = {name: _padded(x, lost) for name, x in point.coordinates.items()}
         groups = output_values(model.system.outputs, coordinates, model.pose_type)
         status = np.array([int(Status.OK)])

@@ -26,6 +26,7 @@ from jounce.integrate.marching.marching import (
 from jounce.integrate.marching.user_methods import integrator
 from jounce.integrate.mechanisms.batch_equations import BatchStart, ParametricMechanism, Turns, outputs_of_runs
 from jounce.integrate.results.batch import Batch
+from jounce.integrate.results.simulation import derivatives_of_motion
 from jounce.integrate.robot_batch import batch_of_robot, of_traced_robot_batches, simulate_robots
 from jounce.integrate.simulate_robot import RobotOptions
 from jounce.integrate.steps.events import pose_coordinates
@@ -174,8 +175,7 @@ class _Runs:
         self._made = parametric.of(rows)
         self._reached = np.zeros((len(rows), len(instants)), bool)
         self._direction = 1.0 if instants[-1] >= instants[0] else -1.0
-        lost = max((output.lost_orders for output in parametric.mechanism.outputs.values()), default=0)
-        self._expansion = max(order + max(lost, 1), 2)  # turns of angles are counted by two derivatives
+        self._expansion = max(derivatives_of_motion(parametric.mechanism, order), 2)  # two, by which turns are counted
         self._current: Any = None
         self._values: dict[int, np.ndarray] = {}  # of each group, (runs, time, order + 1, components, outputs)
         self._begun = np.full(len(rows), instants[0])  # the time at which the last step began

@@ -41,7 +41,7 @@ from jounce.integrate.steps.methods import Taylor, evaluated
 from jounce.integrate.steps.options import instants_of
 from jounce.integrate.steps.projection import normalized
 from jounce.jet import Jet
-from jounce.kinematics.position_analysis.solve import checked_order, lost_orders
+from jounce.kinematics.position_analysis.solve import checked_order
 from jounce.kinematics.sensitivity.jacobian_series import solver
 from jounce.kinematics.sensitivity.sensitivities import Solved, check_not_redundant, failed, first_of, solved_shapes
 from jounce.kinematics.sensitivity.traced_motion import TracedMotion
@@ -49,6 +49,7 @@ from jounce.kinematics.status import Status
 from jounce.mechanism import Mechanism, Model
 from jounce.mechanism.building.preconditions import check_holonomic
 from jounce.mechanism.building.traced import Angles, angles_of, template, traced_model, traced_values
+from jounce.mechanism.outputs.base import lost_orders
 from jounce.mechanism.transmissions.axis_angles import measures_angle
 
 AT_REST = 1e-12  # m/s and rad/s
@@ -125,7 +126,7 @@ def _called(simulate: Callable[..., Any], mechanism: Mechanism, options: Mapping
         instants = instants_of(time, mechanism.parameter_values)
     except ConcretizationTypeError:
         raise UnsupportedError("the instants depend on values that JAX traces; give them", name="time") from None
-    made, levels = template(mechanism), order + max(lost_orders(mechanism), 1) + 1
+    made, levels = template(mechanism), order + max(lost_orders(mechanism.outputs.values()), 1) + 1
     shapes = solved_shapes(mechanism, len(instants), levels)
     options = {**options, "time": instants, "strict": False}
 

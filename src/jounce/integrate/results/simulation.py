@@ -38,6 +38,7 @@ from jounce.jet.turns import brought_near, counted_by_rates
 from jounce.kinematics import Motion, Status
 from jounce.kinematics.results.pose_outputs import output_series
 from jounce.mechanism import Mechanism
+from jounce.mechanism.outputs.base import lost_orders
 from jounce.mechanism.system import Group
 from jounce.mechanism.transmissions.axis_angles import AttitudeHistory, measures_angle, with_turns
 
@@ -270,7 +271,7 @@ def at_steps(part: np.ndarray, chosen: Int[np.ndarray, " batch"]) -> np.ndarray:
 
 def derivatives_of_motion(mechanism: Mechanism, order: int) -> int:
     """Return the highest derivative of the motion that outputs up to an order need."""
-    return order + max([1, *(output.lost_orders for output in mechanism.outputs.values())])
+    return order + max(1, lost_orders(mechanism.outputs.values()))
 
 
 def motion_at(

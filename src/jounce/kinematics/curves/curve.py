@@ -23,7 +23,7 @@ from jounce.kinematics.results.motion import Motion
 from jounce.kinematics.results.pose_outputs import output_values
 from jounce.kinematics.status import Status
 from jounce.mechanism import AbstractOutput, Mechanism
-from jounce.mechanism.outputs.base import AbstractMotionOutput
+from jounce.mechanism.outputs.base import AbstractMotionOutput, lost_orders
 from jounce.mechanism.transmissions.axis_angles import AttitudeHistory
 
 if TYPE_CHECKING:
@@ -317,8 +317,7 @@ class Curve(Displayed):
             message = f"the name '{min(taken)}' is that of an axis of a curve"
             raise MechanismError(message, name=f"outputs.{min(taken)}")
         mechanism = dataclasses.replace(self._free.mechanism, outputs=posed_outputs)
-        lost = max((output.lost_orders for output in posed_outputs.values()), default=0)
-        levels = self._order + lost + 1
+        levels = self._order + lost_orders(posed_outputs.values()) + 1
         coordinates = with_angular_velocity({name: c[:levels] for name, c in self._points[0].items()})
         model, instants, history = self._tracker.model, self.arc_lengths, self._history
         groups = model.system.outputs if history is None else history.counting(model.system.outputs, instants)

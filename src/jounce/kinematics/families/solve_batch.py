@@ -24,7 +24,7 @@ from jounce.kinematics.families.known_outputs import with_outputs
 from jounce.kinematics.families.labels import labeled_family
 from jounce.kinematics.families.parameter_values import check_parameter, checked_values
 from jounce.kinematics.position_analysis.idle_holding import with_idle_held_in_family
-from jounce.kinematics.position_analysis.solve import LOWEST_ORDER, checked_settings, lost_orders, solve
+from jounce.kinematics.position_analysis.solve import LOWEST_ORDER, checked_settings, solve
 from jounce.kinematics.results.motion import Motion
 from jounce.kinematics.status import Status
 from jounce.mechanism import (
@@ -40,6 +40,7 @@ from jounce.mechanism.building.preconditions import concrete
 from jounce.mechanism.carriages import has_ends
 from jounce.mechanism.laws.law_breaks import laws_may_break, laws_of
 from jounce.mechanism.laws.law_checks import check_laws
+from jounce.mechanism.outputs.base import lost_orders
 from jounce.mechanism.time import TimeLike
 from jounce.mechanism.transmissions.axis_angles import measures_angle
 from jounce.settings import under_own_settings
@@ -199,7 +200,7 @@ class _Family:
     def add_sides_of_breaks(self) -> None:
         """Add the instants on both sides of each jump or bend of the laws of each design."""
         first, last = float(self.instants[0]), float(self.instants[-1])
-        level = self.order + lost_orders(self.mechanism)
+        level = self.order + lost_orders(self.mechanism.outputs.values())
         designs = dict(zip(self.names, self.rows.T, strict=True))
         breaks, side_instants = sides_of_designs(self.mechanism, designs, first, last, level)
         self._set_instants(side_instants, breaks)
@@ -267,7 +268,7 @@ class _Family:
         known, (model, _) = next(attempts, (0, (None, None)))
         if model is None or model.system.rank is not None:
             return np.arange(count)
-        lost = lost_orders(self.mechanism)
+        lost = lost_orders(self.mechanism.outputs.values())
         check_laws(self.design(known), np.array([first, last]), self.order + lost, forces=False)
         levels = max(self.order + lost, LOWEST_ORDER)
         system = model.system

@@ -37,6 +37,7 @@ from jounce.mechanism.building.preconditions import check_holonomic, concrete, c
 from jounce.mechanism.laws.cam_laws import check_turns
 from jounce.mechanism.laws.law_checks import check_laws
 from jounce.mechanism.laws.output_drivers import output_laws
+from jounce.mechanism.outputs.base import lost_orders
 from jounce.mechanism.time import Instants, TimeLike, instants_of
 from jounce.mechanism.transmissions.axis_angles import lost_count
 
@@ -60,18 +61,13 @@ def _differentiated(solve: Callable[..., Motion], given: Mapping[str, Any]) -> M
             "the instants depend on values that JAX traces, and are held when a motion is differentiated; give them"
         )
         raise UnsupportedError(message, name="time") from None
-    levels = max(order + lost_orders(mechanism), LOWEST_ORDER) + 1
+    levels = max(order + lost_orders(mechanism.outputs.values()), LOWEST_ORDER) + 1
 
     def solved(mechanism: Mechanism, known: bool) -> Motion:
         return solve(mechanism, instants, order, **options, strict=known and given.get("strict", True))
 
     arrays, models = differentiable_motion(mechanism, instants, levels, solved)
     return TracedMotion(mechanism, models, instants, order, arrays)
-
-
-def lost_orders(mechanism: Mechanism) -> int:
-    """Return by how many derivatives the outputs are shorter than the motion, at most."""
-    return max((output.lost_orders for output in mechanism.outputs.values()), default=0)
 
 
 @holding_idle(lambda: solve)
@@ -230,7 +226,7 @@ def _followed(
 ) -> tuple[Solver, FollowedPath]:
     """Return the solver of the instants of a grid, and the motion followed from the first instant to the last."""
     first, last = float(instants[0]), float(instants[-1])
-    lost = lost_orders(mechanism)
+    lost = lost_orders(mechanism.outputs.values())
     of_forces = any(output.of_forces for output in mechanism.outputs.values())
     check_laws(mechanism, np.array([first, last]), order + lost, forces=of_forces)
     guessed = build(chosen(with_output_drivers(mechanism), first))

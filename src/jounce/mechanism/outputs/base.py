@@ -1,7 +1,7 @@
 """Outputs of a motion, each one a function on the jets of its bodies."""
 
 import abc
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from types import MappingProxyType
 from typing import Any, ClassVar
 
@@ -48,6 +48,11 @@ class AbstractQuantity(Module):
         if self.axes:
             return tuple(self.labels)
         return tuple(self.labels[: 2 if mechanism.space == "planar" else 3]) if self.is_vector(mechanism) else ()
+
+
+def lost_orders(outputs: Iterable[AbstractQuantity]) -> int:
+    """Return by how many derivatives some outputs are shorter than the motion, at most."""
+    return max((output.lost_orders for output in outputs), default=0)
 
 
 class AbstractMotionOutput(AbstractQuantity):
