@@ -215,7 +215,7 @@ def nearest_to_guess(model: Model, attempt: AssemblyAttempt, instant: float) -> 
     """Return planar bodies assembled, with every angle shifted by whole turns to be nearest to the guess."""
 
     def residual_at(angle: np.ndarray) -> np.ndarray:
-        return attempt.scale * Displacements(model, instant).at({**attempt.coordinates, "angle": angle})[1]
+        return attempt.scale * Displacements(model, instant).at({**attempt.coordinates, "angle": angle}).residual
 
     return attempt._replace(coordinates=nearest_turns(model.guess, attempt.coordinates, residual_at))
 
@@ -271,7 +271,7 @@ def _structural_excess(model: Model, attempt: AssemblyAttempt, instant: float) -
     Bodies that do not reach each other come to rest where equations depend on each other too, but only there.
     """
     anywhere = 0.1 * np.random.default_rng(1).standard_normal(model.system.shape[1])
-    jacobian = Displacements(model, instant)(attempt.coordinates, anywhere)[2]
+    jacobian = Displacements(model, instant)(attempt.coordinates, anywhere).jacobian
     return len(model.rows) - jacobian.scaled(jacobian.row_scale).rank if jacobian.finite().all() else 0
 
 

@@ -140,7 +140,7 @@ class Displacements:
         The position with those coordinates comes last, where none of its steps was tried: the one to go on from.
         """
         there, begun, closed = self._moved(start, self._still, MAX_STEPS if self._dense else 0, tolerance)
-        attempt = _trial(*there, there[2].row_scale, tolerance) if closed else None
+        attempt = _attempt(there, tolerance) if closed else None
         return begun, attempt, None if self._dense else there
 
     def at(self, coordinates: Coordinates) -> Displaced:
@@ -157,7 +157,7 @@ class Displacements:
         begun, closed = ending or (residual, False)
         system = self._model.system
         jacobian = HostJacobian.of(system.pattern, entries).scaled(np.asarray(system.row_scale)[:, 0])
-        return (to, residual, jacobian), begun, bool(closed)
+        return Displaced(to, residual, jacobian), begun, bool(closed)
 
     @cached_property
     def _system(self) -> System:
@@ -189,13 +189,13 @@ def assemble_from_guess(
         Coordinates to start from instead of the guess.
     lag : DriverLag, optional
         What drivers may still lack.
-    known : Place, optional
+    known : Displaced, optional
         Where to start from, in the place of coordinates, if it is known whole.
     """
     displace = Displacements(model, instant)
 
     def opened(displaced: Displaced) -> Displaced:
-        return displaced if lag is None else (displaced[0], lag.open(displaced[1], 1.0), displaced[2])
+        return displaced if lag is None else displaced._replace(residual=lag.open(displaced.residual, 1.0))
 
     if known is None:
         begin = model.guess if start is None else start
@@ -204,37 +204,30 @@ def assemble_from_guess(
             if attempt is not None:
                 return attempt
         known = displace.at(begin) if known is None else known
-    coordinates, residual, jacobian = opened(known)
-    scale = jacobian.row_scale
+    there = opened(known)
     for _ in range(MAX_STEPS):
-        step = jacobian.step(residual)
+        step, scale = there.jacobian.step(there.residual), there.jacobian.row_scale
         if step is None:
             break  # the error names the rows
         size = np.max(np.abs(step), initial=0.0)
         step *= min(1.0, LONGEST_STEP / max(size, 1e-300))
-        now = np.linalg.norm(scale * residual)
+        now = np.linalg.norm(scale * there.residual)
         for _halving in range(12):
-            trial = opened(displace(coordinates, step))
-            left = np.linalg.norm(scale * trial[1])
+            trial = opened(displace(there.coordinates, step))
+            left = np.linalg.norm(scale * trial.residual)
             if left < now or size <= tolerance:
                 break
             step *= 0.5
         else:
             break
-        coordinates, residual, jacobian = trial
-        scale = jacobian.row_scale
+        there = trial
         if size <= tolerance or size * left <= NEXT_STEP * tolerance * now:
             break
-    return _trial(coordinates, residual, jacobian, scale, tolerance)
+    return _attempt(there, tolerance)
 
 
-def _trial(
-    coordinates: Coordinates,
-    residual: Float[np.ndarray, " row"],
-    jacobian: HostJacobian,
-    scale: Float[np.ndarray, " row"],
-    tolerance: float,
-) -> AssemblyAttempt:
-    gaps = np.where(jacobian.finite(), scale * residual, np.nan)
+def _attempt(there: Displaced, tolerance: float) -> AssemblyAttempt:
+    jacobian, scale = there.jacobian, there.jacobian.row_scale
+    gaps = np.where(jacobian.finite(), scale * there.residual, np.nan)
     closed = bool(np.all(np.abs(gaps) <= max(1e3 * tolerance, 1e-9)))
-    return AssemblyAttempt(coordinates, scale, gaps, jacobian.scaled(scale), closed)
+    return AssemblyAttempt(there.coordinates, scale, gaps, jacobian.scaled(scale), closed)

@@ -110,14 +110,13 @@ def _spin(
 def _is_finite(members: list[int], spin: tuple[Any, Any], coordinates: Coordinates, displace: Displace) -> bool:
     """Tell whether all constraints hold after large turns of bodies about a line, while the others stay in place."""
     axis, point = spin
-    bodies, nothing = [k + 1 for k in members], None
+    bodies, still = [k + 1 for k in members], np.zeros(6 * (np.shape(coordinates["position"])[1] - 1))
     for angle in TURNS:
         turn = np.concatenate([[np.cos(angle / 2)], np.sin(angle / 2) * axis])[:, None]
         position, attitude = (np.array(coordinates[name]) for name in _POSE)
         position[:, bodies, 0] = point[:, None] + turned(turn, position[:, bodies, 0] - point[:, None])
         attitude[:, bodies, 0] = quaternion_product(turn, attitude[:, bodies, 0])
-        nothing = np.zeros(6 * (position.shape[1] - 1)) if nothing is None else nothing
-        residual = displace({**coordinates, "position": position, "quaternion": attitude}, nothing)[1]
+        residual = displace({**coordinates, "position": position, "quaternion": attitude}, still).residual
         if not np.abs(residual).max(initial=0.0) < HELD:
             return False
     return True

@@ -27,8 +27,16 @@ SMALLEST_PERIOD, LARGEST_PERIOD = 1, 60  # whole turns, among which those are so
 
 Coordinates = dict[str, np.ndarray]
 """Coordinates of all bodies by name, the ground first, (..., bodies, 1)."""
-Displaced = tuple[Coordinates, np.ndarray, HostJacobian]
-"""Coordinates, with residual and Jacobian there."""
+
+
+class Displaced(NamedTuple):
+    """A position, after a displacement of the bodies."""
+
+    coordinates: Coordinates
+    residual: Float[np.ndarray, " row"]
+    jacobian: HostJacobian
+
+
 Displace = Callable[[Coordinates, np.ndarray], Displaced]
 
 
@@ -141,12 +149,12 @@ def _corrected(
     """Return the coordinates after a step, and the step; None where Newton-Raphson does not converge."""
     whole, trial = increment, displace(coordinates, increment)
     for _ in range(CORRECTIONS):
-        step = trial[2].step(opened(trial[1]))
+        step = trial.jacobian.step(opened(trial.residual))
         if step is None or (size := np.max(np.abs(step), initial=0.0)) > 0.5:
             return None
-        whole, trial = whole + step, displace(trial[0], step)
+        whole, trial = whole + step, displace(trial.coordinates, step)
         if size < 1e-9:
-            return trial[0], whole
+            return trial.coordinates, whole
     return None
 
 

@@ -137,7 +137,7 @@ def _next_to_singular(coordinates: Coordinates, jacobian: HostJacobian, displace
     zero = 0.0
     for k in np.flatnonzero(sizes > jacobian.tolerance * jacobian.largest):
         size, velocity = sizes[k], columns[:, k]
-        there, back = (displace(coordinates, sign * STEP * velocity)[2] for sign in (1.0, -1.0))
+        there, back = (displace(coordinates, sign * STEP * velocity).jacobian for sign in (1.0, -1.0))
         change = rows.T @ (there.times(columns) - back.times(columns)) / (2 * STEP)
         if size**2 <= 2 * ROUNDING * np.linalg.norm(change):
             zero = max(zero, float(size))
@@ -194,17 +194,17 @@ def closed_nearby(
     displace : callable
         As `redundancy` takes it.
     """
-    displaced, step, total = displace(coordinates, sway), sway, sway
+    displaced, total = displace(coordinates, sway), sway
     for _ in range(MOST_STEPS):
-        correction = displaced[2].take(joints).step(displaced[1][joints])
+        correction = displaced.jacobian.take(joints).step(displaced.residual[joints])
         if correction is None or np.abs(correction).max(initial=0.0) > 1.0:
             return None
-        displaced, step, total = displace(displaced[0], correction), correction, total + correction
-        if np.abs(step).max(initial=0.0) < 1e-12:
+        displaced, total = displace(displaced.coordinates, correction), total + correction
+        if np.abs(correction).max(initial=0.0) < 1e-12:
             break
     away = np.abs(total).max(initial=0.0)
-    open_ = np.abs(displaced[1][joints]).max(initial=0.0)
-    return displaced[2] if open_ <= CLOSED and away > 0.1 * np.abs(sway).max() else None
+    open_ = np.abs(displaced.residual[joints]).max(initial=0.0)
+    return displaced.jacobian if open_ <= CLOSED and away > 0.1 * np.abs(sway).max() else None
 
 
 def repetitions(rows: tuple[str, ...], combinations: Float[np.ndarray, "row combination"]) -> tuple[Repetition, ...]:

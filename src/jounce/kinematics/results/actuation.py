@@ -45,8 +45,8 @@ def _row_scale(mechanism: Mechanism, driven: Model, instant: float) -> Float[np.
 
     Laws do not matter to them, and those found have as many pieces as there were instants: a program for each number.
     """
-    _, _, jacobian = Displacements(build(without_output_laws(mechanism)), instant).at(driven.reference)
-    return jacobian.row_scale[:, None]
+    displace = Displacements(build(without_output_laws(mechanism)), instant)
+    return displace.at(driven.reference).jacobian.row_scale[:, None]
 
 
 def _counted(model: Model, driven: Model, row_scale: Float[np.ndarray, "row 1"]) -> Model:
