@@ -215,7 +215,5 @@ def _after(
     taken = good & (behind <= jnp.where(target < limits.stop, lanes // 2, 0))  # else the same step with those left
     known = jax.tree.map(lambda new, old: jnp.where(taken, new[..., :1], old), known, run.known)
     again = jax.tree.map(lambda x: jnp.where(good & ~taken, x, jnp.nan), arrived)
-    run = _aimed(
-        run._replace(known=known, arrived=again), next_control(control, status, arrived, limits, (good, taken)), grid
-    )
-    return run, arrived, taken
+    control = next_control(control, status, arrived, limits, good, taken)
+    return _aimed(run._replace(known=known, arrived=again), control, grid), arrived, taken

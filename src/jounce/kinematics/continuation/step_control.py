@@ -116,13 +116,13 @@ def next_control(
     status: Int[Numbers, "*batch"],
     there: ExpansionPoint,
     limits: StepLimits,
-    chosen: tuple[Truths, Truths],
+    good: Truths,
+    taken: Truths,
 ) -> StepControl:
-    """Return the step after one, which was `chosen` to be accepted, and to be taken.
+    """Return the step after one that was accepted, `good`, and taken, or not.
 
     One that was accepted but not taken is made again; see `is_accepted` for what is known of it.
     """
-    good, taken = chosen
     stuck = ~good & ((control.step < limits.smallest) | (control.target <= control.expansion_point.instant))
     inadmissible = ~good & (status == int(Status.INADMISSIBLE)) & jnp.isnan(control.refused)
     control = control._replace(
@@ -154,4 +154,4 @@ def next_controls(
     """
     control, status, there = lanes
     good = is_accepted(control, status, there)
-    return next_control(control, status, there, limits, (good, good)), good
+    return next_control(control, status, there, limits, good, good), good

@@ -2,7 +2,7 @@
 
 from jounce.base.shapes import Real
 from jounce.kinematics.curves.choice import chosen
-from jounce.kinematics.curves.curve import Curve
+from jounce.kinematics.curves.curve import Curve, CurveSettings
 from jounce.kinematics.curves.tracing import check_number, instant_of, traced
 from jounce.mechanism import Mechanism, check_mechanism
 from jounce.mechanism.building.preconditions import check_holonomic, concrete
@@ -71,4 +71,4 @@ def trace(
     check_number("count", count, 2, 10**7, whole=True)
     check_number("length", length, 1e-6, 1e6)
     instant = instant_of(mechanism, time)
-    return traced(chosen(mechanism, instant), instant, driver, (int(order), int(count), float(length)))
+    return traced(chosen(mechanism, instant), instant, driver, CurveSettings(int(order), int(count), float(length)))

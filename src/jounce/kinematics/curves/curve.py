@@ -5,7 +5,7 @@ import dataclasses
 import itertools
 from collections.abc import Mapping
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from jaxtyping import Float
@@ -53,6 +53,14 @@ class CurveBranch:
     high: float
 
 
+class CurveSettings(NamedTuple):
+    """How a curve is followed and shown."""
+
+    order: int = 0  # of derivatives of outputs with respect to arc length
+    count: int = 2  # of points of the dataset
+    length: float = 200.0  # arc length up to which a curve that does not close is followed
+
+
 class Curve(Displayed):
     """A curve of configurations of a mechanism with the value of one driver free, by arc length.
 
@@ -81,11 +89,10 @@ class Curve(Displayed):
         free: Freed,
         tracker: PathTracker,
         paths: tuple[Path, Path | None],
-        settings: tuple[int, int, float],
+        settings: CurveSettings,
     ):
         self.mechanism, self.driver, self.unit = mechanism, free.driver, free.unit
         self._free, self._tracker, self._settings = free, tracker, settings
-        self._order, self._count, self._longest = settings
         self.first_value = free.value
         self._paths = paths
         forward, backward = paths
@@ -108,7 +115,9 @@ class Curve(Displayed):
 
     def sampled(self, order: int, count: int) -> "Curve":
         """Return the curve with outputs to another order at another number of points."""
-        return Curve(self.mechanism, self._free, self._tracker, self._paths, (order, count, self._longest))
+        return Curve(
+            self.mechanism, self._free, self._tracker, self._paths, CurveSettings(order, count, self._settings.length)
+        )
 
     @property
     def size(self) -> float:
@@ -269,7 +278,7 @@ class Curve(Displayed):
         point = _one_of(self.change_points, change_point, "change_point", "change points")
         _one_of(point.tangents, branch, "branch", "branches")
         start = departed(self._tracker, point, branch)
-        paths = track_both_directions(self._tracker, start, self._longest)
+        paths = track_both_directions(self._tracker, start, self._settings.length)
         return Curve(self.mechanism, self._free, self._tracker, paths, self._settings)
 
     def directions(self, change_point: int) -> list[dict[str, tuple[np.ndarray, np.ndarray]]]:
@@ -295,8 +304,8 @@ class Curve(Displayed):
     def arc_lengths(self) -> Float[np.ndarray, " point"]:
         """Arc lengths of the points of the dataset, evenly spaced, with the limit positions and change points."""
         special = [x.arc_length for x in (*self.limits, *self.change_points)]
-        even = np.linspace(self.start, self.stop, self._count)
-        spacing = self.length / max(1, self._count - 1)
+        even = np.linspace(self.start, self.stop, self._settings.count)
+        spacing = self.length / max(1, self._settings.count - 1)
         there = np.array([s for s in special if np.min(np.abs(even - s)) > 1e-9 * spacing])
         return np.sort(np.concatenate([even, there]))
 
@@ -317,13 +326,14 @@ class Curve(Displayed):
             message = f"the name '{min(taken)}' is that of an axis of a curve"
             raise MechanismError(message, name=f"outputs.{min(taken)}")
         mechanism = dataclasses.replace(self._free.mechanism, outputs=posed_outputs)
-        levels = self._order + lost_orders(posed_outputs.values()) + 1
+        order = self._settings.order
+        levels = order + lost_orders(posed_outputs.values()) + 1
         coordinates = with_angular_velocity({name: c[:levels] for name, c in self._points[0].items()})
         model, instants, history = self._tracker.model, self.arc_lengths, self._history
         groups = model.system.outputs if history is None else history.counting(model.system.outputs, instants)
         series = output_values(groups, coordinates, model.pose_type)
         status = np.full(len(instants), int(Status.OK))
-        return Motion(mechanism, model, instants, self._order, (coordinates, series), status, {}, (), history)
+        return Motion(mechanism, model, instants, order, (coordinates, series), status, {}, (), history)
 
     @cached_property
     def _history(self) -> AttitudeHistory | None:
@@ -338,7 +348,7 @@ class Curve(Displayed):
     @cached_property
     def values(self) -> Float[np.ndarray, "point derivative"]:
         """Value of the driver and its derivatives with respect to arc length at the points."""
-        return np.asarray(plain_derivatives(self._points[1][: self._order + 1])).T
+        return np.asarray(plain_derivatives(self._points[1][: self._settings.order + 1])).T
 
     @cached_property
     def smallest_singular_values(self) -> Float[np.ndarray, " point"]:

@@ -5,20 +5,19 @@ import numbers
 from typing import Any
 
 from jounce.errors import MechanismError
-from jounce.kinematics.curves.curve import Curve
+from jounce.kinematics.curves.curve import Curve, CurveSettings
 from jounce.kinematics.curves.path import track_both_directions
 from jounce.kinematics.curves.start import freed, start_of_curve
 from jounce.mechanism import Mechanism
 from jounce.mechanism.time import first_instant
 
-BRIEF = 0, 2, 200.0
 
-
-def traced(mechanism: Mechanism, instant: float, driver: str | None, settings: tuple[int, int, float] = BRIEF) -> Curve:
-    """Return the curve through the starting guess: settings are the order, the number of points and the length."""
+def traced(mechanism: Mechanism, instant: float, driver: str | None, settings: CurveSettings | None = None) -> Curve:
+    """Return the curve through the starting guess."""
+    settings = settings or CurveSettings()
     free = freed(mechanism, instant, driver)
     tracker, start = start_of_curve(free)
-    return Curve(mechanism, free, tracker, track_both_directions(tracker, start, settings[2]), settings)
+    return Curve(mechanism, free, tracker, track_both_directions(tracker, start, settings.length), settings)
 
 
 def check_number(name: str, value: Any, least: Any, most: Any, *, whole: bool = False) -> None:

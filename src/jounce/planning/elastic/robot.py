@@ -126,13 +126,15 @@ def simulate_elastic_robot(
     time: Any,
     torque: object,
     state: object,
-    losses: tuple[bool, bool],
     order: int,
     options: SimulationOptions,
+    *,
+    losses: bool,
+    friction: bool,
 ) -> RobotSimulation:
     """Return the motion of a robot with elastic joints under torques of its motors; see `simulate_elastic`."""
-    arrays = robot_drives(robot, drives, losses[0])
-    whole = elastic_robot(robot, drives, losses=losses[0], friction=losses[1])
+    arrays = robot_drives(robot, drives, losses)
+    whole = elastic_robot(robot, drives, losses=losses, friction=friction)
     names = whole.joint_names
     links = tuple(names.index(name) for name in arrays.names)
     motors = tuple(
