@@ -16,6 +16,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Int
 
+from jounce.base.padding import padded
 from jounce.base.shapes import is_traced
 from jounce.execution.backends import LLVM, xla_backend
 from jounce.execution.chunks import in_chunks
@@ -187,9 +188,9 @@ class OnXla:
             before = np.unique(source[here < 0])  # those that are not solved here
             source = np.where(here < 0, total + np.searchsorted(before, source), here)
             room = STARTS * _power(-(-len(before) // STARTS))
-            starts = [_filled(x[..., before], room) for x in linked]
-            given = [_filled(x[..., order], total) for x in own]
-            order_of_rounds = _filled(source, total), np.asarray(len(targets))
+            starts = [padded(x[..., before], room) for x in linked]
+            given = [padded(x[..., order], total) for x in own]
+            order_of_rounds = padded(source, total), np.asarray(len(targets))
             how = positions, recorded, self.width, self.form, self.how
             result = self.mapped.in_rounds(self.shared, starts, (given, held), order_of_rounds, how)
             for whole, part in zip(wholes, result, strict=True):
@@ -202,13 +203,6 @@ class OnXla:
 def _power(count: int) -> int:
     """Return the first power of four that is no less: sizes for which programs are compiled are few."""
     return 4 ** math.ceil(math.log(max(1, count), 4))
-
-
-def _filled(array: np.ndarray, total: int) -> np.ndarray:
-    """Return an array with zeros behind its instants, up to so many."""
-    result = np.zeros((*array.shape[:-1], total), array.dtype)
-    result[..., : array.shape[-1]] = array
-    return result
 
 
 def _taken(array: np.ndarray, indices: Int[np.ndarray, " lane"], axis: int) -> np.ndarray:

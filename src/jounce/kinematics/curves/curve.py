@@ -115,9 +115,8 @@ class Curve(Displayed):
 
     def sampled(self, order: int, count: int) -> "Curve":
         """Return the curve with outputs to another order at another number of points."""
-        return Curve(
-            self.mechanism, self._free, self._tracker, self._paths, CurveSettings(order, count, self._settings.length)
-        )
+        settings = self._settings._replace(order=order, count=count)
+        return Curve(self.mechanism, self._free, self._tracker, self._paths, settings)
 
     @property
     def size(self) -> float:
