@@ -37,14 +37,16 @@ from jounce.integrate.steps.revolution_counts import AnglesOfForces, followed, m
 from jounce.kinematics.continuation.instant_program import of_design
 from jounce.mechanism.transmissions.axis_angles import measures_angle
 
-SMALLEST_STEP = FINEST / 8.0  # of the span, or of the time itself
-REFUSED = 0.45  # of a step that was refused is tried next: no power of two, or it would end where others have ended
-SHORT = 1.0 / 4.0  # of the longest step so far: shorter ones leave out as much less
-STUCK = 64  # steps that hardly move on, one after the other: a force that switches without end
-AT_LEAST, AT_MOST = 64, 512  # steps tried between two looks at progress and events,
-NUMBERS = 2**15  # of their polynomials: to make room for more takes longer than another call
-FEW_RUNS, MANY_RUNS = 8, 64  # that XLA marches side by side: more fall out of the cache
-STUBBORN = 3  # steps refused one after the other: no series that is only too short for its step needs so many
+# part of the time so far, or of the time left: a shorter step that is refused ends the run
+SMALLEST_STEP = FINEST / 8.0
+# factor on a step that is tried again: no power of two, so that it does not end where other steps have ended
+REFUSED = 0.45
+SHORT = 1.0 / 4.0  # part of the longest step so far: shorter steps are allowed smaller errors, see `furthest`
+STUCK = 64  # steps in a row that hardly advance and end a run: a force switches without end
+AT_LEAST, AT_MOST = 64, 512  # least and most steps tried in a call; progress and events are looked at between calls
+NUMBERS = 2**15  # of polynomials in a call: to make room for more takes longer than another call
+FEW_RUNS, MANY_RUNS = 8, 64  # runs that XLA marches side by side; more do not fit into the cache
+STUBBORN = 3  # refusals in a row, more than a smooth motion needs: the step may begin at a kink
 
 
 class Outcome(enum.IntEnum):

@@ -27,15 +27,14 @@ from jounce.robot.algorithms.wrench_laws import WrenchLaws
 from jounce.robot.model.joint_laws import AbstractJointLaws
 from jounce.robot.recursions.tree_equations import TreeEquations, TreeState, Unknowns, free_base
 
-SMOOTH_POINTS = 3  # on a step where nothing jumps: the series departs from the equations most at the end
-STUCK = 64  # steps that hardly move on, one after the other: a force that switches without end
-STUCK_STEP = 10 * SHORTEST  # of the run: joints that stick switch after steps that are little longer than the shortest
-AGAIN = 10  # such steps over a jump that end where there is no number: others are tried
-SHORT = 1e-5  # of the step that the series alone would allow
-STEEP = 1e-3  # of that step: a force that cuts it shorter may jump
-# rad or sizes of the robot: what is overlooked on a step may move a joint by this; beside a jump by less
-UNSEEN = 1e-12
-NOISE = 32.0  # times what the equations miss where the series begins is rounding on the way too
+SMOOTH_POINTS = 3  # of a step where nothing jumps: there the series departs from the equations most at the end
+STUCK = 64  # steps in a row that hardly advance and end a run: a force switches without end
+STUCK_STEP = 10 * SHORTEST  # part of the run: joints that stick switch after steps little longer than the shortest
+AGAIN = 10  # steps over a jump in a row that may end where there is no finite value, before the run is given up
+SHORT = 1e-5  # part of the step that the series allows: a shorter step leads over a jump
+STEEP = 1e-3  # part of the usual step: a force that makes a step shorter may jump
+UNSEEN = 1e-12  # displacement of a joint by what a step overlooks, rad or sizes of the robot; less beside a jump
+NOISE = 32.0  # multiple of what the equations miss at the start of a series that counts as rounding along the step
 
 
 class RobotProblem(Module):

@@ -42,10 +42,10 @@ from jounce.mechanism.outputs.base import lost_orders
 from jounce.mechanism.system import Group
 from jounce.mechanism.transmissions.axis_angles import AttitudeHistory, measures_angle, with_turns
 
-# than the step over a jump or a kink are one of those before and the next; a steep force takes several
+# ratio of the steps before and after a jump or kink to the step over it; a steep force takes several short ones
 MUCH_LONGER = 1e3
-FEW_INSTANTS = 8  # evaluated together, where there are no more: the end of a long run, say
-APPROACH = 4  # steps to such a place, each much shorter than the one before
+FEW_INSTANTS = 8  # width of a program for a few instants, such as those at the end of a long run
+APPROACH = 4  # steps up to a jump or kink, each of which may be much shorter than the one before it
 
 
 class Simulation(Motion):

@@ -22,10 +22,10 @@ from jounce.jet import Jet, dot
 from jounce.mechanism.system import Group
 from jounce.rigid.pose import Pose
 
-# of the largest kinetic energy and the largest change of the other: so much changes by rounding at most
+# part of the largest kinetic energy and of the largest change of the potential: rounding of the sum
 ENERGY_TOLERANCE = 1e-8
-OFFSET = 1e-12  # of all energies, however little of them is exchanged
-EXCHANGED = 1e-13  # of the power of a force: what differs by more from the rate of what is stored is taken or given
+OFFSET = 1e-12  # part of all energies that counts as rounding, however little energy is exchanged
+EXCHANGED = 1e-13  # part of the power of a force by which it may differ from the rate of the energy that it stores
 
 
 class Energies(NamedTuple):

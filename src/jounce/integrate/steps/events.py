@@ -22,21 +22,21 @@ from jounce.mechanism import AbstractOutput
 from jounce.mechanism.system import Group
 
 _ANGLES = np.pi * (np.arange(20)[::-1] + 0.5) / 20
-NODES = 0.5 + 0.5 * np.cos(_ANGLES)  # of Chebyshev, in a step or a piece of one
+NODES = 0.5 + 0.5 * np.cos(_ANGLES)  # Chebyshev nodes in a step, or in a piece of one
 INTERPOLATION = np.cos(np.arange(20)[:, None] * _ANGLES) * np.where(np.arange(20) == 0, 0.05, 0.1)[:, None]
-ENDS = np.array([0.0, 1.0])  # where polynomials are compared with what they stand for
-AT_ENDS = np.stack([(-1.0) ** np.arange(20), np.ones(20)])  # of the polynomials of Chebyshev
-LAST = 4  # coefficients of a polynomial, which tell how exact it is, too,
-RESOLVED = 1e-12  # as parts of the largest value in a piece,
-LEAST = 1e-3  # or this part of that in the step: below it, what is resolved is rounding;
-BLURRED = 1e-8  # below it they are rounding if they are no smaller on half a piece
-SPLITS = 40  # of a step in halves: to where a distance has a kink, or an angle half a turn at once
-MOST_PIECES = 256  # of a step on average
-WIDTHS = (64,)  # instants evaluated together: one program for few and for many
-REAL = 1e-4  # of a step: an imaginary part below may be that of a real root of several, blurred by rounding
-FAINT = 1e-14  # of a polynomial's coefficients: values below are rounding
-NEIGHBORHOOD = 1e-3  # of a step: where the sign is looked at beside a root
-EDGE = 1e-9  # of a step: a root at its very end may be found just beyond it, and then again in the next step
+ENDS = np.array([0.0, 1.0])  # where polynomials are compared with the outputs that they stand for
+AT_ENDS = np.stack([(-1.0) ** np.arange(20), np.ones(20)])  # values of the Chebyshev polynomials there
+LAST = 4  # coefficients of a polynomial whose size tells how accurate it is
+RESOLVED = 1e-12  # a piece is resolved where they are less than this part of its largest value
+LEAST = 1e-3  # part of the largest value in a step that the one in a piece counts as at least: below it is rounding
+BLURRED = 1e-8  # last coefficients below this that are no smaller on half a piece are rounding errors
+SPLITS = 40  # halvings of a step: they find a kink of a distance, or half a turn of an angle at once
+MOST_PIECES = 256  # pieces of a step on average
+WIDTHS = (64,)  # instants evaluated together: one program serves few and many
+REAL = 1e-4  # part of a step: a smaller imaginary part may be that of a multiple real root, blurred by rounding
+FAINT = 1e-14  # part of the coefficients of a polynomial: smaller values are rounding errors
+NEIGHBORHOOD = 1e-3  # part of a step: distance from a root at which the sign is looked at
+EDGE = 1e-9  # part of a step: a root at its very end may be found just beyond it, and again in the next step
 
 
 @dataclasses.dataclass(frozen=True)

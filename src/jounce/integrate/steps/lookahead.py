@@ -29,22 +29,22 @@ from jounce.mechanism.laws.driver_outputs import is_turning
 from jounce.mechanism.system import Group, law_left_out
 from jounce.mechanism.transmissions.axis_angles import with_turns
 
-POINTS = 32  # at which each step is looked at,
-ROUNDS_OF_JOINTS = 4  # times as many where joints are looked at
-RUN_POINTS = 8192  # in the whole run, at least, where steps are few
-HARMLESS = 1e-15  # rad or sizes of the mechanism: what is overlooked may move a body by this
-SHAKE = 2.0**-51  # relative change of state and time by which the rounding of a force is measured
-SPARSE = 7  # of so many nodes, one is used for that, both ways: a jump beside it shows one way only
+POINTS = 32  # of a step at which it is looked at
+ROUNDS_OF_JOINTS = 4  # factor on their number where joints are looked at
+RUN_POINTS = 8192  # points in the whole run at least, where there are few steps
+HARMLESS = 1e-15  # displacement of a body by something overlooked that does no harm, rad or sizes of the mechanism
+SHAKE = 2.0**-51  # relative change of state and time by which the rounding error of a force is measured
+SPARSE = 7  # one node in so many serves that, changed both ways: a jump beside it shows in one direction only
 _SHAKEN = (np.tile(NODES[::SPARSE], 2), np.repeat([SHAKE, -SHAKE], len(NODES[::SPARSE])))
-NOISE = 16.0  # times what it changes by is rounding still
-FAINT = 1e-13  # of a force: rounding of the polynomial through it
-SHORTEST = 1e-12  # of the run: a step over a jump of a force is not longer,
-FINEST = 2.0**-60  # and so short if it can: no more than rounding of places and times,
-COARSER = 4.0  # times as long each time that it has not led over the jump: where that is depends on rounding
-AWAY = 1e-9  # of the run: who has taken so long a step is away from the jump before
-JUMP = 1e-6  # rad or sizes of the mechanism: no motion law and no joint jumps by more in such a step
-GAP = 1e-12  # rad or sizes of the mechanism: joints are not farther from being fulfilled on the way, unless allowed
-NEAR = 1.0 / 16.0  # of the way to where forces and laws are no longer known: a step ends that close
+NOISE = 16.0  # multiple of the measured change up to which a difference counts as rounding
+FAINT = 1e-13  # part of a force: rounding error of the polynomial through its values
+SHORTEST = 1e-12  # part of the run: the longest step over a jump of a force
+FINEST = 2.0**-60  # part of the run: the first length tried for such a step, about the rounding of positions and times
+COARSER = 4.0  # factor on that length each time that it has not led over the jump, whose place depends on rounding
+AWAY = 1e-9  # part of the run: after a step so long the last jump is left behind
+JUMP = 1e-6  # largest jump of a motion law or a joint in so short a step, rad or sizes of the mechanism
+GAP = 1e-12  # largest residual of joints on the way unless the tolerance allows more, rad or sizes of the mechanism
+NEAR = 1.0 / 16.0  # part of the way to where forces and laws are no longer known: a step ends that close to it
 
 
 BodyMobility = Float[Numbers, "body batch"]

@@ -20,14 +20,16 @@ Sizes = Float[Numbers, "order batch"]
 
 MAX_ORDER = 40
 LOWEST_ORDER = 4
-# coefficients that must be finite: beside a jump of a force higher ones are rounding, or none
+# coefficients that must be finite; beside a jump of a force higher ones are rounding errors, or not finite
 NEEDED = LOWEST_ORDER + 2
-FAINT = 1e-10  # what grows in the upper coefficients from an amplitude below is rounding, near a singular position
-BRACED = 20.0  # in multiples of the largest mass, by a gap of one: 30 and more where coefficients drown, else below 26
-NEAR = 1e-6  # rad or sizes of the mechanism: what a body moves within the radius of a series near a pole
-ROUGH = 1e-11  # tolerance of a step there, rad or sizes of the mechanism
-MARGIN = 10.0  # an estimate of the error that is so many times the tolerance is still accepted: estimates are rough
-ROUNDING = 1e-14  # relative error of an acceleration that is no sign of a step too long
+# near a singular position: upper coefficients that grow geometrically from less than this are rounding errors
+FAINT = 1e-10
+# response to a gap of one, in largest masses: 30 and more where rounding hides coefficients, else below 26
+BRACED = 20.0
+NEAR = 1e-6  # near a pole: how far a body moves within the radius of a series, rad or sizes of the mechanism
+ROUGH = 1e-11  # tolerance of a step where rounding hides coefficients, rad or sizes of the mechanism
+MARGIN = 10.0  # an error estimate up to this many times the tolerance is accepted, since estimates are rough
+ROUNDING = 1e-14  # relative error of an acceleration that does not show that a step is too long
 
 
 class AbstractMethod(Module):

@@ -9,10 +9,9 @@ from jounce.dynamics.forward.accelerations import Attitudes, Equations, Instants
 from jounce.jet import Jet
 
 MOST_ITERATIONS = 10
-# rad or sizes of the mechanism, that redundant constraints may leave: then they contradict each other
-LARGEST_GAP = 1e-9
-CLOSE = 4e-15  # so near to where the matrix was inverted, in the same unit, the inverse is the same but for rounding
-ROUNDING = 1e-15  # a correction this small, in rad or sizes of the mechanism, leaves nothing to correct
+LARGEST_GAP = 1e-9  # of redundant constraints, rad or sizes of the mechanism: by more they contradict each other
+CLOSE = 4e-15  # distance, in the same unit, over which the inverse of the matrix changes by rounding only
+ROUNDING = 1e-15  # size of a correction, in the same unit, that leaves nothing to correct
 
 
 @jax.jit  # traced once for the steps of a run and for the motion within them

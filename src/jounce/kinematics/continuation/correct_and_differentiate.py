@@ -34,12 +34,13 @@ Truths = Bool[Numbers, " batch"]
 SolvedState = tuple[Mapping[str, Numbers], tuple[Numbers, ...], Numbers]
 """What a solved instant hands on: jets of coordinates, by name, and of outputs, and the sign of the determinant."""
 
-CONVERGED = 1e-9  # a last correction above this is no convergence, however small the tolerance
-SAFE_FRACTION = 0.4  # of the time in which some Taylor term would move a body by a radian, or by the mechanism's size
-SINGULAR_PIVOT = 1e-12  # of the largest; corrections tell before that they no longer converge
-LARGEST_GAP = 1e-9  # of redundant rows that agree, rad or sizes of the mechanism, or this many tolerances:
+CONVERGED = 1e-9  # a last correction up to this has converged, however small the tolerance
+# part of the time in which a Taylor term would move a body by a radian, or by the size of the mechanism
+SAFE_FRACTION = 0.4
+SINGULAR_PIVOT = 1e-12  # part of the largest pivot; corrections stop converging before
+LARGEST_GAP = 1e-9  # of redundant rows that agree, rad or sizes of the mechanism, or so many tolerances:
 GAP_TOLERANCES = 1e3
-LARGEST_CONTRADICTION = 1e-6  # of derivatives in redundant rows, as a part of what the motion's own could be
+LARGEST_CONTRADICTION = 1e-6  # of derivatives in redundant rows, as a part of what those of the motion could be
 
 
 class Settings(NamedTuple):

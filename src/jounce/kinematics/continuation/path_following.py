@@ -27,14 +27,13 @@ from jounce.mechanism.transmissions.axis_angles import AttitudeHistory
 
 OK = int(Status.OK)  # NumPy takes long to compare with a member of an enumeration
 PASSABLE = (OK, Status.UNDEFINED)
-SMALLEST_STEP = 1e-10  # of the span
-PASSAGE_ORDER = 4  # of the series that leads through: rounding spoils higher derivatives near a singular position
-PASSAGE_DEVIATION = 1e-8  # from that series, as a part of the way: two branches a gap of g apart deviate by (g / way)^2
-NEARLY_SINGULAR = 1e-6  # of the span: a motion that ends so short before a singular position ends at it
-LEAST_PASSAGE = 0.2  # of the way to a change point: how far the motion must go on beyond it
-NEARBY = 0.1  # radii: a singular position nearer than this spoils high derivatives, if the motion is smooth there
-# in each step at which attitudes are looked at for turns: nowhere between them a body turns by half a turn
-SAMPLES_A_STEP = 8
+SMALLEST_STEP = 1e-10  # part of the span
+PASSAGE_ORDER = 4  # order of the series that leads through; rounding spoils higher derivatives near a singular position
+PASSAGE_DEVIATION = 1e-8  # part of the way: two branches separated by a gap g deviate from that series by (g / way)^2
+NEARLY_SINGULAR = 1e-6  # part of the span: a motion that ends this close before a singular position ends at it
+LEAST_PASSAGE = 0.2  # part of the way to a change point by which the motion must go on beyond it
+NEARBY = 0.1  # radii: a singular position nearer than this spoils high derivatives where the motion is smooth
+SAMPLES_A_STEP = 8  # attitudes looked at in a step to count turns: no body turns by half a turn between two of them
 
 
 class Anchor(NamedTuple):

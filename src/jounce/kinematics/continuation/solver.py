@@ -26,16 +26,17 @@ from jounce.kinematics.continuation.step_control import ExpansionPoint, StepLimi
 from jounce.kinematics.status import Status
 from jounce.mechanism import Model
 
-SMALL_BATCH = 16  # lanes; a batch width compiles once, so a short grid uses one, and so do anchors
+SMALL_BATCH = 16  # lanes of a short grid and of anchors: each width of a batch compiles once
 LONGEST_RUN = 32  # batches
-RUN_ENTRIES = 2**20  # of what a run keeps: a large mechanism has shorter ones
-BLOCK_ENTRIES = 2**19  # of the coordinates of what a thread solves at once: the cache holds them
+RUN_ENTRIES = 2**20  # numbers that a run stores at most: those of a large mechanism are shorter
+BLOCK_ENTRIES = 2**19  # numbers of the coordinates that a thread solves at once: they fit into the cache
 XLA_BLOCK_ENTRIES = 2**21  # the same by XLA, whose rounds have more instants, and whose calls take longer
 FEWEST_FROM_ANCHORS = 64  # instants of a long grid that machine code starts from anchors
 MOST_SIDE_BY_SIDE, CALL_ENTRIES = 1024, 2**21  # instants in a call of machine code, and numbers of their coordinates
-FEW_COLUMNS = 18  # of a Jacobian: of more, machine code of single values alone is longer and no faster
-LARGE = 64  # numbers of an array that stays in memory there
-LARGE_BESIDE_TABLES = 128  # the same in small mechanisms, of which laws through many samples are no single values
+# of a Jacobian up to which machine code keeps all in single values; of more it is longer and no faster
+FEW_COLUMNS = 18
+LARGE = 64  # numbers of an array that stays in memory in machine code
+LARGE_BESIDE_TABLES = 128  # the same in small mechanisms whose laws pass through many samples
 NO_GRID = np.empty(0)
 
 

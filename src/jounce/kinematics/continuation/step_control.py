@@ -19,12 +19,14 @@ from jounce.execution.mapped import mapped
 from jounce.kinematics.continuation.correct_and_differentiate import SAFE_FRACTION
 from jounce.kinematics.status import Status
 
-LARGEST_DET_RATE = 1.0  # of the Jacobian over a step, seen from its end; from its start, SAFE_FRACTION
-PASSAGE = 3e-3  # of the radius of the series: so near a singular position it is seen whether the motion is smooth there
-CRAWLING = 1e-6  # of what is left of the motion: steps this short, and for so many anchors,
-LONGEST_CRAWL = 300  # are no sharp turn, which takes a few dozen, but a law that grows beyond all bounds
-SLIVER = 0.1  # of a step: the last one takes with it what is no longer than this
-GROWTH = 4.0  # of a step over the last one
+LARGEST_DET_RATE = 1.0  # times a step, as seen from its end, at most; as seen from its start, SAFE_FRACTION
+# part of the radius of the series: so near a singular position it shows whether the motion is smooth there
+PASSAGE = 3e-3
+CRAWLING = 1e-6  # part of what is left of the motion: length of a step that is too short,
+# and how many of them in a row end the steps: a sharp turn takes a few dozen, a law without bounds more
+LONGEST_CRAWL = 300
+SLIVER = 0.1  # part of a step: a remainder no longer than this is added to the last step
+GROWTH = 4.0  # factor by which a step may be longer than the last one
 
 Lanes = Float[Numbers, "*batch"]
 Truths = Bool[Numbers, "*batch"]
