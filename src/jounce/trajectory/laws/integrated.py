@@ -18,7 +18,7 @@ from jounce.trajectory.beyond import SLACK
 from jounce.trajectory.checks import whole_number
 from jounce.trajectory.laws.composed import Law, MadeOfOthers, with_values
 from jounce.trajectory.laws.piecewise import PiecewiseMotion
-from jounce.trajectory.laws.segment_pieces import Value, number_of_value, parsed_value
+from jounce.trajectory.laws.segment_pieces import Value, number_or_expression, parsed_value
 from jounce.trajectory.laws.user_laws import read_laws
 from jounce.trajectory.motion import AbstractMotion, SplineMotion
 from jounce.units.expression import Expression
@@ -84,8 +84,8 @@ class IntegratedMotion(MadeOfOthers):
             message = f"must be a list of at most {order} values: the law and its derivatives below that one"
             raise TrajectoryError(message, name="initial", value=initial)
         values = [*initial, *(0.0,) * (order - len(initial))]
-        given = [_known(f"initial[{k}]", x) for k, x in enumerate(values)]
-        begin = _known("start", start)
+        given = [number_or_expression(f"initial[{k}]", x) for k, x in enumerate(values)]
+        begin = number_or_expression("start", start)
         inner = law if order == 1 else IntegratedMotion(law, order - 1, given[1:], begin)
         self._take([inner], law, tuple(given), begin)
         waiting = any(isinstance(x, Expression) for x in (*given, begin)) or not self.parts
@@ -159,11 +159,6 @@ def _at(begins: Any, halves: Any, table: Any, instants: Any) -> Any:
         ahead, behind = c + 2.0 * u * ahead - behind, ahead
     inside = jnp.abs(u) <= 1.0 + 1e-6
     return jnp.where(inside, powers[0] + u * ahead - behind, jnp.nan)
-
-
-def _known(name: str, value: Value) -> Any:
-    value = parsed_value(value)
-    return value if isinstance(value, Expression) and value.names else number_of_value(name, value)
 
 
 @jit_over_arrays

@@ -15,7 +15,7 @@ from jounce.jet import Jet
 from jounce.trajectory.beyond import CLOSED, check_within, continued
 from jounce.trajectory.knots import SMOOTH, derivative_sizes
 from jounce.trajectory.laws.composed import Law, MadeOfOthers
-from jounce.trajectory.laws.segment_pieces import Value, number_of_value, parsed_value
+from jounce.trajectory.laws.segment_pieces import Value, number_or_expression, parsed_value
 from jounce.units.expression import Expression
 
 BEYOND = ("refuse", "hold", "repeat", "advance")
@@ -67,7 +67,7 @@ class PiecewiseMotion(MadeOfOthers):
         check_choice("beyond", beyond, BEYOND, TrajectoryError)
         if isinstance(laws, str) or not isinstance(laws, Sequence) or not laws:
             raise TrajectoryError("must be a list of laws", name="laws", value=laws)
-        ends = [_instant(f"until[{k}]", x) for k, x in enumerate(until)]
+        ends = [number_or_expression(f"until[{k}]", x) for k, x in enumerate(until)]
         if len(ends) not in (len(laws) - 1, len(laws)):
             message = f"{len(laws)} laws need {len(laws) - 1} instants, at which all but the last end, or one more"
             raise TrajectoryError(message, name="until", value=len(ends))
@@ -75,7 +75,7 @@ class PiecewiseMotion(MadeOfOthers):
         if not bounded and (start is not None or beyond != BEYOND[0]):
             name, value = ("beyond", beyond) if beyond != BEYOND[0] else ("start", start)
             raise TrajectoryError("the last law has no end; say until when it goes", name=name, value=value)
-        begin = _instant("start", 0.0 if start is None else start) if bounded else None
+        begin = number_or_expression("start", 0.0 if start is None else start) if bounded else None
         borders = [begin, *ends] if bounded else ends
         self.beyond = beyond if bounded else "continue"
         self._take(laws, tuple(ends), start, beyond)
@@ -219,12 +219,6 @@ class PiecewiseMotion(MadeOfOthers):
                 instant = begin if begin == known[-1] else end
                 sizes.append(derivative_sizes(part, instant, instant, order))
         return sizes
-
-
-def _instant(name: str, value: Value) -> Any:
-    """Return a checked instant; an expression of parameters, and what JAX traces, is taken as it is."""
-    value = parsed_value(value)
-    return value if isinstance(value, Expression) and value.names else number_of_value(name, value)
 
 
 def _derivatives(law: Any, instant: Any, order: int) -> Float[np.ndarray, " levels"]:

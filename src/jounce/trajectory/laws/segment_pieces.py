@@ -223,3 +223,9 @@ def number_of_value(name: str, value: Value, check: Callable[[str, Any], float] 
     value = parsed_value(value)
     value = value.evaluate() if isinstance(value, Expression) else value
     return value if isinstance(value, Tracer) else check(name, value)
+
+
+def number_or_expression(name: str, value: Value) -> Value:
+    """Return a checked number; an expression of parameters, and what JAX traces, is taken as it is."""
+    value = parsed_value(value)
+    return value if isinstance(value, Expression) and value.names else number_of_value(name, value)
