@@ -318,7 +318,7 @@ def euler_angles(sequence: str, attitude: JetLike) -> Any:
     return finish(_marked(angles, regular))
 
 
-def check_rotation(matrix: Numbers, name: str = "attitude", tolerance: float = ORTHONORMAL) -> None:
+def check_rotation(matrix: Numbers, name: str = "attitude") -> None:
     """Raise a JounceError unless matrices of shape (3, 3, ...) are rotations; those that JAX traces are not seen."""
     if tuple(np.shape(matrix)[:2]) != (3, 3):
         message = "a rotation matrix needs 3 rows and 3 columns on the first axes; batch axes come last"
@@ -328,14 +328,14 @@ def check_rotation(matrix: Numbers, name: str = "attitude", tolerance: float = O
     matrices = np.moveaxis(np.asarray(matrix).reshape(3, 3, -1), -1, 0)
     with np.errstate(invalid="ignore"):  # what is not finite shows in the result
         off = np.abs(np.swapaxes(matrices, 1, 2) @ matrices - np.eye(3)).max(axis=(1, 2))
-        bad = ~(off <= tolerance) | ~(np.linalg.det(matrices) > 0)
+        bad = ~(off <= ORTHONORMAL) | ~(np.linalg.det(matrices) > 0)
     if bad.any():
         first = int(np.flatnonzero(bad)[0])
         which = f" (number {first} of the batch)" if len(matrices) > 1 else ""
         if not np.isfinite(off[first]):
             what = "has entries that are not finite"
-        elif off[first] > tolerance:
-            what = f"is not orthonormal: an entry of R^T R is {off[first]:.3g} off, more than {tolerance:g}"
+        elif off[first] > ORTHONORMAL:
+            what = f"is not orthonormal: an entry of R^T R is {off[first]:.3g} off, more than {ORTHONORMAL:g}"
         else:
             what = "is a reflection: its determinant is negative"
         raise JounceError(f"the matrix{which} {what}", name=name, value=matrices[first].tolist())

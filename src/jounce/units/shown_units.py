@@ -211,7 +211,7 @@ def _dimension(unit: str) -> Dimension:
     return dimension_of() if unit in ("", "1") else parse_unit(unit)[1]
 
 
-def units_given(texts: Iterable[str], option: str = "--units") -> dict[str, str]:
+def units_given(texts: Iterable[str]) -> dict[str, str]:
     """Return units by name from texts such as ``angle=deg,length=mm``.
 
     Raises
@@ -228,8 +228,8 @@ def units_given(texts: Iterable[str], option: str = "--units") -> dict[str, str]
     for text in (part for given in texts for part in given.split(",")):
         name, _, unit = (part.strip() for part in text.partition("="))
         if not name or not unit:
-            raise UnitError("units are given by NAME=UNIT, such as angle=deg,length=mm", name=option, value=text)
+            raise UnitError("units are given by NAME=UNIT, such as angle=deg,length=mm", name="--units", value=text)
         if name in units:
-            raise UnitError(f"is given more than once, as {units[name]} and as {unit}", name=f"{option} {name}")
+            raise UnitError(f"is given more than once, as {units[name]} and as {unit}", name=f"--units {name}")
         units[name] = unit
     return units

@@ -98,7 +98,7 @@ class Values:
 Variation = Interval | Uniform | Normal | Values
 
 
-def read_variations(given: Any, read: Reader, option: str = "vary") -> dict[str, Variation]:
+def read_variations(given: Any, read: Reader) -> dict[str, Variation]:
     """Return how parameters vary.
 
     Parameters
@@ -108,8 +108,6 @@ def read_variations(given: Any, read: Reader, option: str = "vary") -> dict[str,
         array of values; numbers SI.
     read : callable
         Reads one value of a parameter from a text, and refuses unknown names.
-    option : str
-        Name of the option or argument that gives them, for messages.
 
     Raises
     ------
@@ -117,8 +115,8 @@ def read_variations(given: Any, read: Reader, option: str = "vary") -> dict[str,
         There is none, a form or a value cannot be read, or bounds are reversed.
     """
     if not isinstance(given, Mapping) or not given:
-        raise MechanismError(f"say what varies, as {FORMS} for each parameter", name=option, value=given)
-    return {name: _variation(str(name), form, read, option) for name, form in given.items()}
+        raise MechanismError(f"say what varies, as {FORMS} for each parameter", name="vary", value=given)
+    return {name: _variation(str(name), form, read) for name, form in given.items()}
 
 
 def named_forms(texts: Iterable[str]) -> dict[str, str]:
@@ -162,8 +160,8 @@ def reader_of(mechanism: Mechanism) -> Reader:
     return read
 
 
-def _variation(name: str, form: Any, read: Reader, option: str) -> Variation:
-    location = f"{option} {name}"
+def _variation(name: str, form: Any, read: Reader) -> Variation:
+    location = f"vary {name}"
     if isinstance(form, Interval | Uniform | Normal | Values):
         return form
     try:

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Float
 
-from jounce.errors import JounceError, MechanismFileError, UnitError, did_you_mean, no_such
+from jounce.errors import JounceError, MechanismFileError, TrajectoryError, UnitError, did_you_mean, no_such
 from jounce.io.files.column_units import name_and_unit, unit_unread
 from jounce.io.files.long_tables import Numbers, numbers_of
 from jounce.io.files.reading import LARGEST_NUMBER, fault_of_number, known_name, read_rows
@@ -137,17 +137,15 @@ def read_columns(
     )
 
 
-def read_table(
-    path: str | Path, error_type: type[JounceError] = MechanismFileError
-) -> dict[str, Float[np.ndarray, " row"]]:
+def read_table(path: str | Path) -> dict[str, Float[np.ndarray, " row"]]:
     """Read the named columns of a CSV file that knows of no time: angles and lengths, in SI units or the one named.
 
     Raises
     ------
-    JounceError
-        Of the type given: the file cannot be read, names are missing or repeat, or an entry is not a finite number.
+    TrajectoryError
+        The file cannot be read, names are missing or repeat, or an entry is not a finite number.
     """
-    table = Table(str(path), error_type)
+    table = Table(str(path), TrajectoryError)
     check_named(table)
     return {
         name: np.array(table.column(k, rates(("angle", "length"), 0)))
@@ -156,9 +154,9 @@ def read_table(
     }
 
 
-def has_column(path: str | Path, names: Iterable[str], error_type: type[JounceError] = MechanismFileError) -> bool:
+def has_column(path: str | Path, names: Iterable[str]) -> bool:
     """Tell whether a CSV file has a column of one of some names, or does not name its columns at all."""
-    table = Table(str(path), error_type)
+    table = Table(str(path), TrajectoryError)
     return table.header_line is None or any(name in table.header for name in names)
 
 
@@ -185,7 +183,7 @@ def rates(bases: Iterable[str], order: int) -> tuple[Dimension, ...]:
 
 
 def read_points(
-    path: str | Path, error_type: type[JounceError] = MechanismFileError
+    path: str | Path,
 ) -> tuple[Float[np.ndarray, " point"] | None, Float[np.ndarray, "point component"]]:
     """Read points from a CSV file, and their times where it has a column ``time``.
 
@@ -195,10 +193,10 @@ def read_points(
 
     Raises
     ------
-    JounceError
-        Of the type given: the file cannot be read, columns are missing, or an entry is not a finite number.
+    MechanismFileError
+        The file cannot be read, columns are missing, or an entry is not a finite number.
     """
-    table = Table(str(path), error_type)
+    table = Table(str(path), MechanismFileError)
     if table.header_line is None:
         if len(table.header) not in (2, 3):
             message = "points have two or three columns; name them in the first row where there are others"

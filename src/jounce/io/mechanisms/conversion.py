@@ -201,7 +201,6 @@ def robot_mechanism(
     *,
     hold: bool = False,
     drives: bool = True,
-    time: TimeGrid | None = None,
 ) -> Mechanism:
     """Return a robot as a mechanism for a file: coordinates as outputs, and what its drivers must exert.
 
@@ -217,8 +216,6 @@ def robot_mechanism(
         Whether the other coordinates are held where they start, as far as loops leave them free.
     drives : bool
         Whether the damping and the armature of the joints are taken over.
-    time : TimeGrid, optional
-        From 0 to 1 s by 0.01 s unless given.
 
     Raises
     ------
@@ -231,7 +228,7 @@ def robot_mechanism(
             message = "the coordinates of a robot with loops depend on one another; name the driven ones by --drive"
             raise RobotError(message, name="--hold", value=list(robot.closures))
         laws |= {name: float(start.get(name, 0.0)) for name in robot.joint_names if name not in laws}
-    made = robot.mechanism(dict(start), drivers=laws, drives=drives, time=time or TimeGrid(0.0, 1.0, 0.01))
+    made = robot.mechanism(dict(start), drivers=laws, drives=drives, time=TimeGrid(0.0, 1.0, 0.01))
     if any(body.mass for body in made.bodies.values()):
         loads: dict[str, Any] = {}
         for name in laws:

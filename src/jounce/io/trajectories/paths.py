@@ -58,8 +58,8 @@ def load_path(
     """
     name = str(fspath(path))
     suffix = FilePath(name).suffix.lower()
-    if suffix == ".csv" and not has_column(name, TIMES, TrajectoryError):
-        columns = read_table(name, TrajectoryError)
+    if suffix == ".csv" and not has_column(name, TIMES):
+        columns = read_table(name)
         return _path_in_file(name, {joint: values.tolist() for joint, values in columns.items()})
     if suffix in DATA_FILES:
         source = read_source(name, allow, kind="trajectory", error_type=TrajectoryError, many=True)

@@ -25,7 +25,6 @@ def fit_to_samples(
     rate: float,
     *,
     degree: int = 5,
-    drives: bool = True,
     lasting: bool = False,
 ) -> tuple[RetimedTrajectory, LimitReport]:
     """Return a trajectory slowed until it lasts whole periods, and splines through its samples keep the limits too.
@@ -44,8 +43,6 @@ def fit_to_samples(
         Samples a second.
     degree : int, default 5
         Of the splines that a reader puts through the samples.
-    drives : bool, default True
-        Whether torques contain armature inertia, damping and friction of the drives.
     lasting : bool, default False
         Whether its duration is to stay as it is.
 
@@ -80,9 +77,9 @@ def fit_to_samples(
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", SampleWarning)
             read = JointTrajectory.from_samples(times, positions, slower.names, degree)
-            report = worst = check_motion(robot, read, limits, drives=drives, hand_over=hand_over, loads=slower.loads)
+            report = worst = check_motion(robot, read, limits, hand_over=hand_over, loads=slower.loads)
         if report.kept:
-            worst = check_motion(robot, slower, limits, drives=drives, hand_over=True, loads=slower.loads)
+            worst = check_motion(robot, slower, limits, hand_over=True, loads=slower.loads)
             if worst.kept:
                 slower.report = dataclasses.replace(worst, ends=trajectory.report.ends, hand_over=hand_over)
                 return slower, report

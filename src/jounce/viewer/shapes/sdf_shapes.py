@@ -21,7 +21,7 @@ from jounce.viewer.shapes.shapes import Shapes, colored, upright_capsule, words_
 __all__ = ["sdf_shapes"]
 
 
-def sdf_shapes(root: Element, files: MeshFiles, model: str | None = None) -> Shapes:
+def sdf_shapes(root: Element, files: MeshFiles) -> Shapes:
     """Return the shapes of an SDF file by link, in its frame; planes, height maps and what cannot be read are left out.
 
     Parameters
@@ -30,11 +30,9 @@ def sdf_shapes(root: Element, files: MeshFiles, model: str | None = None) -> Sha
         The element ``<sdf>`` of a file that describes a robot.
     files : MeshFiles
         Where it lies.
-    model : str, optional
-        The model of the file that is shown, needed where several of them move.
     """
     try:
-        chosen = chosen_model(root, Faults(root.path), model, files.allow).model
+        chosen = chosen_model(root, Faults(root.path), None, files.allow).model
     except RobotFileError:  # several models move, and nobody says here which one is meant
         return {}
     frames = Frames(chosen, named(chosen))
