@@ -328,6 +328,6 @@ def test_offsets_that_follow_from_the_guess_follow_it_in_a_batch():
     gears = jn.Mechanism(space="planar", bodies=bodies, joints=joints, parameters={"turn": 0.1, "other": 1.0})
     family = ParametricMechanism(gears, build(gears), ("turn",))
     rows = np.array([[0.1], [0.5], [-0.3]])
-    equations, _ = family.of(rows)
+    equations, _ = family.of(rows).at(slice(None))
     offsets = [g.element.offset for g in equations.system.groups if hasattr(g.element, "offset")]
     np.testing.assert_allclose(np.ravel(offsets), 2.0 * rows[:, 0], atol=1e-15)

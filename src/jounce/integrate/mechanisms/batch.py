@@ -24,7 +24,13 @@ from jounce.integrate.marching.marching import (
     unexpanded,
 )
 from jounce.integrate.marching.user_methods import integrator
-from jounce.integrate.mechanisms.batch_equations import BatchStart, ParametricMechanism, Turns, outputs_of_runs
+from jounce.integrate.mechanisms.batch_equations import (
+    BatchStart,
+    ParametricMechanism,
+    Turns,
+    mapped_runs,
+    outputs_of_runs,
+)
 from jounce.integrate.results.batch import Batch
 from jounce.integrate.results.simulation import derivatives_of_motion
 from jounce.integrate.robot_batch import batch_of_robot, of_traced_robot_batches, simulate_robots
@@ -173,6 +179,7 @@ class _Runs:
         self.width = min(LANES, power_of_two(len(rows)))
         self.steps, self.backends = np.zeros(len(rows), int), set[str]()
         self._made = parametric.of(rows)
+        _, self._outputs = self._made.at(slice(1))  # of any run
         self._reached = np.zeros((len(rows), len(instants)), bool)
         self._direction = 1.0 if instants[-1] >= instants[0] else -1.0
         self._expansion = max(derivatives_of_motion(parametric.mechanism, order), 2)  # two, by which turns are counted
@@ -234,9 +241,9 @@ class _Runs:
     def advance(self, runs: np.ndarray) -> None:
         """March runs by some steps, and note what they pass."""
         current = jax.tree.map(lambda x: x[..., runs], self._current)
-        method = integrator(self.method, self.parametric.picked(self._made, runs)[0], current)
+        method = integrator(self.method, self._made.at(runs)[0], current)
         shared, how = (RunLimits(*map(np.asarray, self.limits)),), {"method": method, "steps": STEPS}
-        marched, backend = self.parametric.mapped(march_runs, self._made, runs, shared, (current,), **how)
+        marched, backend = mapped_runs(march_runs, self._made, runs, shared, (current,), **how)
         self.backends.add(backend)
         current, (steps, taken) = marched
         self._put(runs, current)
@@ -263,7 +270,7 @@ class _Runs:
 
     def _picked(self, runs: np.ndarray, angles: Turns) -> tuple[Equations, Any]:
         """Return equations of motion and outputs of some runs, whose angles about axes have the turns of these."""
-        equations, outputs = self.parametric.picked(self._made, runs)
+        equations, outputs = self._made.at(runs)
         return equations.near(angles.forces), with_turns(outputs, angles.outputs)
 
     def _begun_with(self, runs: np.ndarray) -> tuple[np.ndarray, ...]:
@@ -312,7 +319,7 @@ class _Runs:
         number[step, lane] = np.arange(len(lane))
         last = np.append(lane[1:] != lane[:-1], True)  # of the steps of a run
         counted_angles = {}
-        measuring = [which for which, group in enumerate(self._made[1]) if measures_angle(group)]
+        measuring = [which for which, group in enumerate(self._outputs) if measures_angle(group)]
         for which, turns in zip(measuring, self._turns_reached, strict=True):
 
             def measured(which_step: np.ndarray, share: np.ndarray, which: int = which) -> np.ndarray:
@@ -347,9 +354,9 @@ class _Runs:
             motion = turned_by, polynomial.map(lambda part, lanes=lanes: part[..., lanes]), since, time
             given = self._begun_with(runs[lanes]), motion
             how: Any = {"order": self._expansion}
-            noted, backend = self.parametric.mapped(outputs_of_runs, self._made, runs[lanes], (), given, **how)
+            noted, backend = mapped_runs(outputs_of_runs, self._made, runs[lanes], (), given, **how)
             self.backends.add(backend)
-            for which, (group, series) in enumerate(zip(self._made[1], map(np.array, noted), strict=True)):
+            for which, (group, series) in enumerate(zip(self._outputs, map(np.array, noted), strict=True)):
                 if which in before and measures_angle(group):
                     series[0, 0] = brought_near(series[0, 0], before[which][:, lanes])
                 elif which in before:

@@ -7,7 +7,6 @@ from typing import Any, NamedTuple
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jax.core import Tracer
 
 from jounce.constraints.base import value_fields
 from jounce.dynamics.forward.accelerations import Equations, State
@@ -25,7 +24,7 @@ from jounce.integrate.steps.projection import projected
 from jounce.jet import Jet
 from jounce.jet.turns import brought_near
 from jounce.kinematics.continuation.instant_program import of_design
-from jounce.kinematics.families.design_values import differing_leaves
+from jounce.kinematics.families.varied_tree import VariedTree
 from jounce.kinematics.status import Status
 from jounce.mechanism import Mechanism, Model, build
 from jounce.mechanism.building.starting_guess import starting_guess
@@ -66,29 +65,29 @@ class ParametricMechanism:
         self.mechanism, self.model, self.names = mechanism, model, names
         self.scale = masses_of(mechanism).scale(model.length)
         self.saddle = SaddleFronts.of(model.system.pattern)
-        self._moved: list[bool] = []
-        self._leaves, self._structure = jax.tree.flatten(self._made(mechanism, model))
+        self._nominal = self._made(mechanism, model)
 
     def _made(self, mechanism: Mechanism, model: Model) -> tuple[Equations, Any]:
         system = dataclasses.replace(model.system, outputs=())
         masses, gravity = masses_of(mechanism), gravity_of(mechanism)
         return Equations(system, masses, gravity, self.scale, model.pose_type, self.saddle), model.system.outputs
 
-    def of(self, rows: np.ndarray) -> tuple[Equations, Any]:
-        """Return equations of motion and outputs for values of the parameters, (runs, parameters)."""
+    def of(self, rows: np.ndarray) -> VariedTree:
+        """Return equations of motion and outputs for values of the parameters, (runs, parameters), a lane for each."""
         if self._has_values_of_guess() and self.guesses_differ(rows):
-            return self._one_by_one(rows)
+            return VariedTree.joined([self._of_one_run(row) for row in rows.tolist()], self._nominal)
 
-        def one(row: Any) -> list[Any]:
+        def made(row: Any) -> tuple[Equations, Any]:
             varied = self.varied(row)
-            leaves = jax.tree.leaves(self._made(varied, build(varied, like=self.model)))
-            self._moved = [isinstance(leaf, Tracer) for leaf in leaves]
-            return [leaf for leaf in leaves if isinstance(leaf, Tracer)]
+            return self._made(varied, build(varied, like=self.model))
 
-        varied = iter(jax.vmap(one, out_axes=-1)(rows))
-        pairs = zip(self._leaves, self._moved, strict=True)
-        leaves = [np.asarray(next(varied))[..., 0, :] if moved else leaf for leaf, moved in pairs]
-        return jax.tree.unflatten(self._structure, leaves)
+        return VariedTree.traced(made, rows, self._nominal)
+
+    def _of_one_run(self, row: Sequence[float]) -> tuple[Equations, Any]:
+        """Return those of one run, with values that follow from its own starting guess."""
+        varied = self.varied(row)
+        system = dataclasses.replace(self.model.system, groups=build(varied).system.groups)
+        return self._made(varied, build(varied, like=dataclasses.replace(self.model, system=system)))
 
     def varied(self, row: Any) -> Mechanism:
         """Return the mechanism with values of the parameters in which the runs differ."""
@@ -107,43 +106,18 @@ class ParametricMechanism:
         offset = any("offset" in value_fields(type(j)) and getattr(j, "offset", 0.0) is None for j in joints)
         return offset or any(hasattr(j, "sense") for j in joints)
 
-    def _one_by_one(self, rows: np.ndarray) -> tuple[Equations, Any]:
-        """Do what `of` does, where values follow from guesses that differ: they are found for each run alone."""
-        whole = []
-        for varied in map(self.varied, rows.tolist()):
-            system = dataclasses.replace(self.model.system, groups=build(varied).system.groups)
-            like = dataclasses.replace(self.model, system=system)
-            whole.append(jax.tree.leaves(self._made(varied, build(varied, like=like))))
-        differing = differing_leaves(whole)
-        self._moved = [joined is not None for joined in differing]
-        pairs = zip(self._leaves, differing, strict=True)
-        return jax.tree.unflatten(self._structure, [leaf if joined is None else joined for leaf, joined in pairs])
 
-    def picked(self, made: tuple[Equations, Any], runs: np.ndarray) -> tuple[Equations, Any]:
-        """Return what `of` returned for all runs, for some of them."""
-        pairs = zip(jax.tree.leaves(made), self._moved, strict=True)
-        return jax.tree.unflatten(self._structure, [leaf[..., runs] if moved else leaf for leaf, moved in pairs])
+def mapped_runs(
+    function: Mapped, made: VariedTree, runs: np.ndarray, shared: tuple[Any, ...], lanes: tuple[Any, ...], **static: Any
+) -> tuple[Any, str]:
+    """Return what a function gives for some runs, and the name of what computes it.
 
-    def mapped(
-        self,
-        function: Mapped,
-        made: tuple[Equations, Any],
-        runs: np.ndarray,
-        shared: tuple[Any, ...],
-        lanes: tuple[Any, ...],
-        **static: Any,
-    ) -> tuple[Any, str]:
-        """Return what a function gives for some runs, and the name of what computes it.
-
-        What `of` returned for all runs is the first thing that they share, and what each has of its own the first of
-        its lane, as `of_design` takes it.
-        """
-        leaves, own = jax.tree.leaves(made), {}
-        for k in np.flatnonzero(self._moved).tolist():
-            own[k], leaves[k] = leaves[k][..., runs], leaves[k][..., :1]
-        shared, lanes = (jax.tree.unflatten(self._structure, leaves), *shared), (own, *lanes)
-        program = function.program(shared, lanes, large=LARGE, hasty=is_in_haste(), **static)
-        return program(lanes), program.backend
+    What `ParametricMechanism.of` returned for all runs is the first thing that they share, and what each has of its
+    own the first of its lane, as `of_design` takes it.
+    """
+    shared, lanes = (made.at(runs[:1]), *shared), (made.own(runs), *lanes)
+    program = function.program(shared, lanes, large=LARGE, hasty=is_in_haste(), **static)
+    return program(lanes), program.backend
 
 
 class BatchStart:
@@ -186,14 +160,14 @@ class BatchStart:
             self._turns = jax.tree.map(lambda *xs: np.concatenate(xs, axis=-1), *turns_of_starts)
             return
         self._made, last = parametric.of(rows), begun.of(rows)
-        count = max(STAGES, int(np.ceil(self._turned(last, len(rows)) / LARGEST_STAGE)))
+        count = max(STAGES, int(np.ceil(self._turned(last.at(slice(None))[0], len(rows)) / LARGEST_STAGE)))
         change = (rows - rows[0]) / count
         self._stages = [begun.of(rows[0] + stage * change) for stage in range(1, count)] + [last]
 
-    def _turned(self, made: tuple[Equations, Any], count: int) -> float:
+    def _turned(self, equations: Equations, count: int) -> float:
         """Return by how much drivers of angles about axes turn from the first run to another at most, rad."""
         clock, largest = Jet([np.full((1, 1), self._instant)]), 0.0
-        for group in filter(measures_angle, made[0].system.groups):
+        for group in filter(measures_angle, equations.system.groups):
             law = np.asarray(group.element.motion(clock).coefficients[0])
             law = np.broadcast_to(law, (group.instances, count))
             largest = max(largest, float(np.max(np.abs(law - law[:, :1]))))
@@ -203,13 +177,13 @@ class BatchStart:
         """Return the states of some runs, and the angles about axes there."""
         if self._own is not None:
             return jax.tree.map(lambda x: x[..., runs], (self._own, self._turns))
-        equations, outputs = self._parametric.picked(self._made, runs)
+        equations, outputs = self._made.at(runs)
         measuring = [group for group in (*equations.system.forces, *outputs) if measures_angle(group)]
         angles = [np.asarray(group.element.datum.near) for group in measuring]
         state = self._state.map(lambda part: np.repeat(np.asarray(part), len(runs), axis=-1))
         together = np.ones(len(runs), bool)
         for made in self._stages:
-            (state, reached), _ = self._begun.mapped(followed, made, runs, (np.asarray(self._instant),), (state,))
+            (state, reached), _ = mapped_runs(followed, made, runs, (np.asarray(self._instant),), (state,))
             together &= reached
             if measuring:
                 coordinates = pose_coordinates(state.map(lambda part: np.asarray(part)[None]))

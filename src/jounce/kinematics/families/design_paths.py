@@ -129,8 +129,8 @@ class DesignPaths:
         solver, (first, last) = self.solver, self._ends
         steps: list[tuple[Indices, Lanes, SolvedState]] = []  # designs and instants of the anchors, and what is known
         limits = StepLimits(np.asarray(last), np.asarray(SMALLEST_STEP * (last - first)))
-        known, own = solver.still({name: x[..., lanes] for name, x in coordinates.items()}), self.designs.own(lanes)
-        known = solver.needed(known)
+        known = solver.needed(solver.still({name: x[..., lanes] for name, x in coordinates.items()}))
+        own = self.designs.systems.own(lanes)
         start = np.full(len(lanes), first)
         control = initial_control(
             ExpansionPoint(start, *[np.full(len(lanes), x) for x in (np.inf, np.inf, 0.0)]), start
@@ -232,7 +232,7 @@ class DesignPaths:
         near = to_one_before <= np.abs(to_anchor)
         source, step = np.where(near, -1, nearest), np.where(near, to_one_before, to_anchor)
         rounds = _rounds(count, times, length, buffer.width)
-        buffer.load(instants.ravel(), (source.ravel(), step.ravel()), rounds, self.designs.own(block.designs))
+        buffer.load(instants.ravel(), (source.ravel(), step.ravel()), rounds, self.designs.systems.own(block.designs))
         return count * times
 
     def _count_turns(self, outputs: list[list[np.ndarray]], anchors: Anchors) -> None:
@@ -240,7 +240,7 @@ class DesignPaths:
         if not any(map(measures_angle, self.solver.model.system.outputs)):
             return
         designs, owner, at = anchors.designs, anchors.owner, anchors.instant
-        system = self.designs.system(designs[owner])
+        system = self.designs.systems.at(designs[owner])
         measuring = [(g, output) for g, output in zip(system.outputs, outputs, strict=True) if measures_angle(g)]
         series = np.nan_to_num(anchors.known[0]["quaternion"][..., anchors.order], nan=0.0, posinf=0.0, neginf=0.0)
         here = np.arange(len(owner))

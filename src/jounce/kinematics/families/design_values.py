@@ -2,18 +2,17 @@
 
 import dataclasses
 from collections.abc import Sequence
-from functools import cached_property
 from typing import Any
 
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jax.core import Tracer
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Bool, Float
 
 from jounce.base.modules import with_fields
 from jounce.constraints.facts import facts_of, field_kinds, has_other_sign
 from jounce.kinematics.families.design_assembly import AssemblyAttempts, assemble_from_guess
+from jounce.kinematics.families.varied_tree import VariedTree
 from jounce.mechanism import Mechanism, Model
 from jounce.mechanism.building.starting_guess import starting_guess
 from jounce.mechanism.building.traced import traced_model
@@ -36,6 +35,8 @@ class Designs:
 
     Attributes
     ----------
+    systems : VariedTree
+        The systems of all, a lane for each.
     guess : dict of str to array
         Starting guess of the coordinates of all bodies, (..., bodies, designs).
     """
@@ -44,19 +45,17 @@ class Designs:
         self, mechanism: Mechanism, model: Model, names: tuple[str, ...], rows: Float[np.ndarray, "design parameter"]
     ):
         self.mechanism, self.model, self.names, self.rows = mechanism, without_forces(model), names, rows
-        fixed: list[Any] = []
 
-        def one(row: Any) -> tuple[list[Any], Any]:
+        def made(row: Any) -> System:
+            return self._with_values_of(traced_model(self.design(row), model.length))
+
+        def guess(row: Any) -> Any:
             varied = self.design(row)
-            system = traced_model(varied, model.length).system
-            leaves = jax.tree.leaves((system.groups, system.outputs))
-            fixed[:] = [None if isinstance(leaf, Tracer) else leaf for leaf in leaves]
             guess = starting_guess(varied, varied.parameter_values, POSITION_COMPONENTS[varied.space])
-            return [leaf for leaf in leaves if isinstance(leaf, Tracer)], jax.tree.map(jnp.asarray, guess)
+            return jax.tree.map(jnp.asarray, guess)
 
-        values, guess = jax.vmap(one, out_axes=-1)(rows)
-        self.guess = {name: np.asarray(x)[..., 0, :] for name, x in guess.items()}
-        self._set(fixed, [np.asarray(value)[..., 0, :] for value in values])
+        self.systems = VariedTree.traced(made, rows)
+        self.guess = {name: np.asarray(x)[..., 0, :] for name, x in jax.vmap(guess, out_axes=-1)(rows).items()}
 
     @classmethod
     def of_models(
@@ -65,53 +64,30 @@ class Designs:
         """Return designs that were assembled one by one, with the angles about axes that each counts."""
         self = object.__new__(cls)
         self.mechanism, self.model, self.names, self.rows = mechanism, without_forces(models[0]), names, rows
-        whole = [jax.tree.leaves((model.system.groups, model.system.outputs)) for model in models]
-        differing = differing_leaves(whole)
-        fixed = [leaf if joined is None else None for leaf, joined in zip(whole[0], differing, strict=True)]
-        self._set(fixed, [joined for joined in differing if joined is not None])
+        self.systems = VariedTree.joined([self._with_values_of(model) for model in models])
         return self
 
-    def _set(self, fixed: list[Any], values: list[np.ndarray]) -> None:
-        self._fixed, self._values = fixed, values
-        system = self.model.system
-        self._structure = jax.tree.structure((system.groups, system.outputs))
+    def _with_values_of(self, model: Model) -> System:
+        """Return the common system with the values of the joints, drivers and outputs of a design."""
+        return with_fields(self.model.system, groups=model.system.groups, outputs=model.system.outputs)
 
     def design(self, row: Any) -> Mechanism:
         """Return the mechanism with the values of a design."""
         return self.mechanism.with_parameters(**dict(zip(self.names, row, strict=True)))
 
-    def system(self, lanes: Int[np.ndarray, " lane"]) -> System:
-        """Return the system of some designs, a lane for each."""
-        values = iter(self._values)
-        leaves = [next(values)[..., lanes] if leaf is None else leaf for leaf in self._fixed]
-        groups, outputs = jax.tree.unflatten(self._structure, leaves)
-        return with_fields(self.model.system, groups=groups, outputs=outputs)
-
-    def own(self, lanes: slice | Int[np.ndarray, " lane"]) -> dict[int, np.ndarray]:
-        """Return the values in which some designs differ, by the index of their leaf of the system, a lane for each."""
-        return {k: value[..., lanes] for k, value in zip(self._varied, self._values, strict=True)}
-
-    @cached_property
-    def _varied(self) -> tuple[int, ...]:
-        """Which leaves of their system have an entry for each lane."""
-        groups, outputs = jax.tree.unflatten(self._structure, [leaf is None for leaf in self._fixed])
-        constant = jax.tree.map(lambda _: False, self.model.system)
-        return tuple(np.flatnonzero(jax.tree.leaves(with_fields(constant, groups=groups, outputs=outputs))).tolist())
-
     def assembled(self, instant: float, tolerance: float) -> AssemblyAttempts:
         """Assemble all designs at an instant, s, to a tolerance, rad or sizes of the mechanism."""
         count, model = len(self.rows), self.model
         driven = np.array([[name.startswith("drivers.")] for name in model.rows])
-        designs = self.guess, np.full(count, instant), self.own(slice(None))
+        designs = self.guess, np.full(count, instant), self.systems.own(slice(None))
         shared = model.system, np.asarray(tolerance), driven
         one = jax.tree.map(lambda x: x[..., :1], designs)
         return assemble_from_guess.program(shared, one, pose_type=model.pose_type)(designs)
 
     def unfit(self) -> Bool[np.ndarray, " design"]:
         """Tell which designs have a value that no mechanism may have: they are refused in words when solved alone."""
-        lanes = np.arange(len(self.rows))
-        bad = np.zeros(len(lanes), bool)
-        for group in (*self.system(lanes).groups, *self.system(lanes).outputs):
+        bad, system = np.zeros(len(self.rows), bool), self.systems.at(slice(None))
+        for group in (*system.groups, *system.outputs):
             signs = facts_of(type(group.element)).signs
             for name, kind in field_kinds(type(group.element)).items():
                 value = getattr(group.element, name)
@@ -119,16 +95,9 @@ class Designs:
                     continue
                 entries = np.asarray(value)
                 entries = entries if kind == "vector" else entries.reshape(-1, *entries.shape[-2:])
-                entries = np.broadcast_to(entries, (*np.shape(entries)[:-1], len(lanes)))
+                entries = np.broadcast_to(entries, (*np.shape(entries)[:-1], len(bad)))
                 bad |= _unfit(signs[name], entries)
         return bad
-
-
-def differing_leaves(trees: Sequence[Sequence[Any]]) -> list[np.ndarray | None]:
-    """Return the leaves of some trees, lane after lane; None for those that are the same in all of them."""
-    columns = [[np.asarray(leaf, float) for leaf in column] for column in zip(*trees, strict=True)]
-    same = [all(np.array_equal(leaf, column[0]) for leaf in column) for column in columns]
-    return [None if fixes else np.concatenate(c, axis=-1) for c, fixes in zip(columns, same, strict=True)]
 
 
 def without_forces(model: Model) -> Model:

@@ -310,9 +310,8 @@ class _Family:
         threads: int,
     ) -> Int[np.ndarray, " design"]:
         """Follow designs side by side and store their results; return those left to be solved individually."""
-        solver = Solver(
-            designs.model, levels, self.tolerance, refine=True, finite_order=self.order, own=designs.own(slice(1))
-        )
+        own = designs.systems.own(slice(1))
+        solver = Solver(designs.model, levels, self.tolerance, finite_order=self.order, own=own)
         paths = DesignPaths(solver, designs, self.all_instants[chosen], float(self.instants[-1]))
         paths.follow(coordinates, plain, threads)
         outputs, status = paths.solved(threads)
