@@ -1,5 +1,6 @@
 """Batches of robots in joint coordinates: each run is what it is alone, energy is kept, faults are named."""
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
@@ -83,3 +84,11 @@ def test_a_run_that_fails_leaves_the_others():
 def test_what_cannot_be_is_refused(given, options, says):
     with pytest.raises((RobotError, JounceError), match=says):
         jn.simulate_batch(arm(), given, TIME, order=2, **options)
+
+
+def test_a_state_that_is_traced_names_joints():
+    def coordinate(angle):
+        return jn.simulate_batch(arm(), {"k": [0.1]}, TIME, order=2, state={"elbow": angle}).outputs["k"][0, -1, 0]
+
+    with pytest.raises(RobotError, match="no moving joint has this name, got 'elbow'"):
+        jax.grad(coordinate)(0.3)
