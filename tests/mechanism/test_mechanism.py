@@ -198,6 +198,19 @@ class TestParameters:
         with pytest.raises(jn.errors.MechanismError, match=r"parameters\.a"):
             jn.solve(crank("a*t", parameters={"a": value}), [0.0])
 
+    def test_units_are_those_of_files(self):
+        given = mechanism(parameters={"a": "80 mm", "b": "2*a", "n": "60 rpm"})
+        assert given.parameters["a"] == 0.08
+        assert given.parameter_values["b"] == 0.16
+        assert given.parameter_values["n"] == pytest.approx(2 * np.pi, rel=1e-15)
+        with pytest.raises(jn.errors.UnitError, match=r"parameters\.a: unknown unit 'mmm'"):
+            mechanism(parameters={"a": "80 mmm"})
+
+    def test_units_elsewhere_are_refused_with_what_to_do(self):
+        tip = {"tip": jn.outputs.PointOutput("crank", point=["80 mm", 0])}
+        with pytest.raises(jn.errors.UnitError, match=r"outputs\.tip\.point: units .*'80 mm'; .* or a parameter"):
+            jn.solve(crank("t", outputs=tip), [0.0])
+
     def test_with_other_values(self):
         first = four_bar()
         second = first.with_parameters(AB=0.05)

@@ -109,7 +109,7 @@ class Mechanism(Displayed):
     bodies : dict of str to Body
         The moving bodies; the body ``"ground"`` always exists besides.
     joints, drivers : dict of str to AbstractConstraint
-        By name; their values may be numbers (SI), or expressions of the parameters.
+        By name; their values may be numbers (SI), or expressions of the parameters, which alone state units.
     forces : dict of str to AbstractForce, optional
         Applied forces and torques, by name; they do not bear on motion that is prescribed.
     initial : dict of str to AbstractConstraint, optional
@@ -117,8 +117,9 @@ class Mechanism(Displayed):
         first derivative of their law, and are then released.
     outputs : dict of str to AbstractQuantity, optional
         Quantities requested, by name.
-    parameters : dict of str to number or expression, optional
-        Named values, SI.
+    parameters : dict of str to number or str, optional
+        Named values: numbers (SI), or text as in a file: a number with a unit, or an expression of the others. Whether
+        a unit suits where a parameter is used is checked in files only.
     gravity : sequence, optional
         Acceleration of free fall in the global frame, (2,) or (3,), m/s^2; zero unless given.
     time : array_like, optional
@@ -185,6 +186,9 @@ class Mechanism(Displayed):
         if not self.bodies:
             raise MechanismError("a mechanism needs at least one moving body", name="bodies", value=dict(self.bodies))
         self._check_names()
+        texts = {name: self._read(name, value) for name, value in self.parameters.items() if isinstance(value, str)}
+        if texts:
+            object.__setattr__(self, "parameters", {**self.parameters, **texts})
         object.__setattr__(self, "outputs", bound(self.outputs, self))
         check_redundant_reactions(self.redundant_reactions, (*self.joints, *self.drivers))
         self._check_assembly()
@@ -284,9 +288,8 @@ class Mechanism(Displayed):
         MechanismError
             If a value is not one finite number, or expressions form a circle.
         """
-        expressions = {k: Expression(v) if isinstance(v, str) else v for k, v in self.parameters.items()}
-        values = {k: parameter_value(k, v) for k, v in expressions.items() if not isinstance(v, Expression)}
-        waiting = {k: v for k, v in expressions.items() if isinstance(v, Expression)}
+        values = {k: parameter_value(k, v) for k, v in self.parameters.items() if not isinstance(v, Expression)}
+        waiting = {k: v for k, v in self.parameters.items() if isinstance(v, Expression)}
         while waiting:
             ready = [k for k, v in waiting.items() if v.names <= values.keys()]
             for name in ready:
@@ -338,8 +341,7 @@ class Mechanism(Displayed):
         """
         for name in values:
             check_name("parameter", name, self.parameters, MechanismError, name="parameters")
-        read = {name: self._read(name, value) if isinstance(value, str) else value for name, value in values.items()}
-        return dataclasses.replace(self, parameters={**self.parameters, **read})
+        return dataclasses.replace(self, parameters={**self.parameters, **values})
 
     def _read(self, name: str, text: str) -> Any:
         """Return the value of a parameter given as text, checked against the dimensions that it may have."""

@@ -22,6 +22,7 @@ from jounce.jet import Jet
 from jounce.trajectory import AbstractMotion, Expression, ExpressionMotion, SplineMotion
 from jounce.trajectory.curves import resolve_curve
 from jounce.trajectory.laws.user_laws import read_laws, tried, tried_law
+from jounce.units.values import expression_in_si
 
 _ROWS, _REAL = frozenset((list, tuple)), frozenset((int, float))  # read first: to ask for what is abstract takes long
 _NUMBERS = frozenset((float, np.float64, np.ndarray))
@@ -37,7 +38,7 @@ def resolve(value: Any, parameters: Mapping[str, Any]) -> Any:
     if kind in _ROWS and _REAL.issuperset(map(type, value)):
         return np.array(value, float)
     if isinstance(value, str):
-        value = Expression(value)
+        value = expression_in_si(value)
     if isinstance(value, Expression):
         return value.evaluate(parameters)
     if isinstance(value, Sequence):
@@ -71,7 +72,7 @@ def resolve_motion(motion: Any, parameters: Mapping[str, Any]) -> AbstractMotion
     if isinstance(motion, numbers.Real):
         motion = Expression(repr(_number(motion)))
     if isinstance(motion, str):
-        motion = Expression(motion)
+        motion = expression_in_si(motion)
     if isinstance(motion, Expression):
         _check_names(motion, {"t"}, parameters)
         known = {name: parameters[name] for name in sorted(motion.names - {"t"})}
@@ -139,7 +140,7 @@ def _scalar_law(law: Any, force: AbstractForce, parameters: Mapping[str, Any]) -
             raise MechanismError("must be finite", value=size)
         return ExpressionLaw("size", {"size": size}, *names)  # a leaf: laws that differ in it are stacked
     if isinstance(law, str):
-        law = Expression(law)
+        law = expression_in_si(law)
     if isinstance(law, Expression):
         own = {"t", *names[0], *names[1]}
         _check_names(law, own, parameters)

@@ -207,8 +207,38 @@ def _parse_text(
     return Value(expression, dimension)
 
 
+def expression_in_si(text: str) -> Expression:
+    """Return the expression that a text stands for where only files, and parameters, state units.
+
+    Raises
+    ------
+    UnitError
+        There is a number with a unit in it.
+    ExpressionError
+        It is no expression.
+    """
+    try:
+        return Expression(text)
+    except ExpressionError as error:
+        if _unit_within(text, ()) is None:
+            raise
+        message = "units are read in files, and in parameters; give a number in SI units, or a parameter"
+        raise UnitError(message, value=text) from error
+
+
 def _with_units_named(error: ExpressionError, text: str, known: Collection[str]) -> JounceError:
     """Return an error that says so where a number with a unit is part of an expression, else the error as it is."""
+    if (quantity := _unit_within(text, known)) is None:
+        return error
+    message = (
+        f"a number with a unit must stand alone: '{quantity}' cannot be a part of an expression; define a "
+        "parameter with this value, and write its name here"
+    )
+    return UnitError(message)
+
+
+def _unit_within(text: str, known: Collection[str]) -> str | None:
+    """Return the first number with a unit in a text, which is no expression therefore."""
     for number, unit in _UNIT_WITHIN.findall(text)[:MOST_LOOKED_AT]:
         if unit in known or unit in CONSTANTS:
             continue
@@ -216,12 +246,8 @@ def _with_units_named(error: ExpressionError, text: str, known: Collection[str])
             parse_unit(unit)
         except UnitError:
             continue
-        message = (
-            f"a number with a unit must stand alone: '{number} {unit}' cannot be a part of an expression; define a "
-            "parameter with this value, and write its name here"
-        )
-        return UnitError(message)
-    return error
+        return f"{number} {unit}"
+    return None
 
 
 def _divided_by_a_name(unit: str, known: Collection[str]) -> bool:
