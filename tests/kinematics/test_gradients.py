@@ -216,6 +216,22 @@ def test_what_is_not_traced_is_reported():
     with pytest.raises(jn.errors.UnsupportedError, match="instants depend on values") as caught:
         jax.grad(lambda tau: jn.solve(FOUR_BAR.with_parameters(tau=tau), grid).outputs["psi"][-1, 1])(2.0)
     assert caught.value.name == "time"
+    with pytest.raises(jn.errors.UnsupportedError, match=r"jn\.equations cannot yet be used with values that") as caught:
+        jax.grad(lambda length: len(jn.equations(FOUR_BAR.with_parameters(BC=length))) * length)(BC)
+    assert caught.value.name == "model.parameters.BC"
+    with pytest.raises(jn.errors.UnsupportedError, match=r"jn\.retime cannot yet be used"):
+        jax.grad(lambda length: jn.retime(FOUR_BAR.with_parameters(BC=length), limits={}).stop)(BC)
+
+
+@pytest.mark.slow
+def test_equations_along_a_traced_motion_are_refused():
+    def right_side(length):
+        motion = jn.solve(FOUR_BAR.with_parameters(BC=length), TIME, order=4)
+        return jnp.sum(jn.constraint_equations(motion)["right_side"].data)
+
+    with pytest.raises(jn.errors.UnsupportedError, match=r"jn\.constraint_equations cannot yet be used") as caught:
+        jax.grad(right_side)(BC)
+    assert caught.value.name == "motion.mechanism.parameters.BC"
 
 
 @pytest.mark.slow

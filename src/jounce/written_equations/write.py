@@ -9,6 +9,7 @@ import numpy as np
 from jounce.errors import JounceError, MechanismError, RobotError, check_choice, flag, whole_number
 from jounce.kinematics import Motion
 from jounce.mechanism import Mechanism
+from jounce.mechanism.building.preconditions import concrete
 from jounce.robot import Robot
 from jounce.written_equations.joint_forms.latex import latex_document
 from jounce.written_equations.languages.c_code import c_file
@@ -53,6 +54,7 @@ def ending_of(format: str) -> str:  # noqa: A002 - the name of the option
     return LANGUAGES[format].ending if format in LANGUAGES else LATEX_ENDING
 
 
+@concrete
 def equations(
     model: Mechanism | Motion | Robot,
     joint: str | None = None,

@@ -34,6 +34,7 @@ class TracedMotion(Motion):
     """
 
     traced = True
+    may_be_traced = ("mechanism",)  # looked through for values that JAX traces
 
     def __init__(self, mechanism: Mechanism, models: tuple[Model, Model], time: np.ndarray, order: int, solved: Solved):
         driven, model = models

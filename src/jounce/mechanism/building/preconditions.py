@@ -136,9 +136,11 @@ def _entries(value: Any) -> list[tuple[str | int, Any]]:
 
 @lru_cache(maxsize=1000)
 def _fields(kind: type[Any]) -> tuple[str, ...] | None:
-    """Return the names of the fields of a class; none for one without; None for a mapping."""
+    """Return the names of the fields of a class, or those that it says; none for one without; None for a mapping."""
     if issubclass(kind, Tracer):
         return ()
     if issubclass(kind, Mapping):
         return None
-    return tuple(field.name for field in dataclasses.fields(kind)) if dataclasses.is_dataclass(kind) else ()
+    if dataclasses.is_dataclass(kind):
+        return tuple(field.name for field in dataclasses.fields(kind))
+    return getattr(kind, "may_be_traced", ())

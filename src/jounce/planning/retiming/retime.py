@@ -11,6 +11,7 @@ from jounce.base.shapes import ArrayLike
 from jounce.dynamics.limits.trajectories import FollowedTrajectory, warn_of_degrees
 from jounce.errors import SolveError, TrajectoryError, flag, whole_number
 from jounce.mechanism import Mechanism
+from jounce.mechanism.building.preconditions import concrete
 from jounce.planning.paths.path import Path
 from jounce.planning.paths.paths import Between, GivenPath, cells_needed, checked, path_of
 from jounce.planning.paths.sampled_paths import path_of_samples
@@ -41,6 +42,7 @@ NEAR_LEAST = 1.01  # times the least time: a duration below it is compared with 
 SPEEDS = 1e-9  # of the largest: what is slower at an end of a trajectory is at rest
 
 
+@concrete
 def retime(
     robot: Robot | Mechanism,
     path: GivenPath | None = None,
