@@ -30,8 +30,9 @@ from tests.shares_of_tests import pytest_addoption, pytest_collection_modifyitem
 # Most of the time of the tests goes into compiling. It is halved without XLA's last optimizations, without its passes
 # over loops and reshapes, which go round some thirty times, and in one thread, of which the other worker has the next.
 # Its newer emitters, which the solver's programs leave out too, take twice as long for an operation alone; JAX 0.11 has
-# no others. The same is asked of the results; the examples, the study of branches and the benchmarks run as users do,
-# and so do tests with JOUNCE_TESTS_AS_USERS=1: all optimizations, all threads, programs kept as for users.
+# no others. jounce's own machine code leaves out optimizations, too, where XLA does. The same is asked of the results;
+# the examples, the study of branches and the benchmarks run as users do, and so do tests with JOUNCE_TESTS_AS_USERS=1:
+# all optimizations, all threads, programs kept as for users.
 _QUICK_TO_COMPILE = (
     "--xla_backend_optimization_level=0",
     *(["--xla_cpu_use_fusion_emitters=false"] if jax.__version_info__ < (0, 11) else []),

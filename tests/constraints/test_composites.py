@@ -10,6 +10,8 @@ from jounce.jet import Jet
 from jounce.testing.samples import BODIES, group_of, pose_of, random_motion
 from tests.problems.bank import cases
 
+pytestmark = pytest.mark.long
+
 ORDER = 4
 RANKS = {
     "planar": {

@@ -26,6 +26,8 @@ from jounce.execution.backends import VARIABLE
 from jounce.execution.store import programs
 from tests.problems.own_types import taken_back
 
+pytestmark = pytest.mark.long
+
 GROUND = ("ground", "rod")
 ROD = jn.Inertia(1.0, center_of_mass=[0.5, 0, 0], tensor=[0, 1 / 12, 1 / 12])
 ARM = jn.Robot("arm", [jn.Link("base"), jn.Link("rod", ROD)], [jn.Joint("pin", "base", "rod", axis=[0, -1, 0])])

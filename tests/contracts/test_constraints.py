@@ -5,6 +5,8 @@ import pytest
 from jounce.testing import check_joint
 from tests.problems.bank import Case, cases
 
+pytestmark = pytest.mark.long
+
 CASES = cases()
 ABSOLUTE = ("x", "y")  # words of joints by a coordinate in the global frame
 

@@ -18,6 +18,8 @@ from tests.constraints.test_wheels import sleigh
 from tests.contracts.test_frames import MECHANISMS, TURNED
 from tests.problems.bank import OWN
 
+pytestmark = pytest.mark.long
+
 RATES = 4
 RATES_OF_ONE = {"planar": RATES, "spatial": 2}  # of a joint alone: in space, angles about axes compile long
 ORDER = RATES + 2  # of motions: forces use up two

@@ -13,6 +13,8 @@ from jounce import forces
 from tests.forces.motions import INSTANT, ORDER, applied, moving_bodies, pose_of, quickly, system_of
 from tests.oracles.mp_wrenches import cross, dot, minus, rates, times, wrench
 
+pytestmark = pytest.mark.long
+
 P, Q, U = [0.3, -0.2, 0.4], [-0.5, 0.1, 0.2], [1.0, 0.5, -0.7]
 K, C, L = 3.0, 0.4, 0.25
 

@@ -18,6 +18,8 @@ from jounce.sweeps.store import find
 from jounce.sweeps.sweeping import opened, prepare
 from tests.problems.waves import ROOT, VARY, Waves, contents, swept
 
+pytestmark = pytest.mark.long
+
 
 @pytest.fixture(scope="module")
 def whole(tmp_path_factory):

@@ -21,6 +21,8 @@ from tests.dynamics.inverse.test_gear_friction import (
 from tests.oracles import friction_circles
 from tests.oracles.friction_circles import CIRCLES, COUPLER, CRANK, GROUND, ROCKER
 
+pytestmark = pytest.mark.long
+
 
 def held(mechanism, name, time=0.0):
     """Return least, frictionless and greatest force of a driver at an instant."""

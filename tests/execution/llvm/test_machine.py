@@ -21,6 +21,12 @@ def function(given, _):
 GIVEN = (np.linspace(-1, 2, 21),)
 
 
+@pytest.fixture(autouse=True)
+def _optimized(monkeypatch):
+    """Let LLVM optimize, as it does for users; the tests ask XLA for little of that."""
+    monkeypatch.setenv("XLA_FLAGS", "")
+
+
 def run(**how):
     binary, results = modules.object_file(function, GIVEN, (), {}, large=4, single=True, **how)
     return binary, programs.Single(binary, GIVEN, results)(GIVEN)[0]
@@ -47,6 +53,13 @@ def test_what_is_called_once_is_compiled_without_optimizing():
     (binary, found), (usual, expected) = run(brief=True), run()
     assert binary != usual
     np.testing.assert_allclose(found, expected, rtol=1e-14)
+
+
+@pytest.mark.parametrize("level", [0, 1, 2])
+def test_machine_code_is_optimized_as_little_as_that_of_xla(level, monkeypatch):
+    without, usual, flag = run(brief=True)[0], run()[0], "--xla_backend_optimization_level"
+    monkeypatch.setenv("XLA_FLAGS", f"{flag}=2 --xla_cpu_multi_thread_eigen=false {flag}={level}")
+    assert run()[0] == (usual if level else without)
 
 
 @pytest.mark.parametrize("trouble", ["no process", "it fails", "an application"])

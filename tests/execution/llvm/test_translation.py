@@ -24,6 +24,8 @@ from tests.execution.llvm.lanes import (
     whole,
 )
 
+pytestmark = pytest.mark.long
+
 COUNTS = (1, 3, 8, COUNT)
 WIDTHS = (2, 4, 8)
 

@@ -23,6 +23,8 @@ from jounce.mechanism.redundant_reactions import resolved_reactions
 from jounce.mechanism.resolve import resolve, resolve_element
 from jounce.rigid.solids import SOLIDS
 
+pytestmark = pytest.mark.long
+
 COMPONENTS = {"planar": 2, "spatial": 3}
 VECTORS = {
     "axis": [0.1, 0.2, 1.0],

@@ -4,6 +4,8 @@ import pytest
 
 import jounce as jn
 
+pytestmark = pytest.mark.long
+
 TEXT = """
 space: planar
 gravity: [0, -9.81]

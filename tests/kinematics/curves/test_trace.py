@@ -13,6 +13,8 @@ from tests.problems.linkages import FourBar
 from tests.problems.six_bars import SixBar
 from tests.problems.small import crank, slider_crank
 
+pytestmark = pytest.mark.long
+
 FOUR_BAR = FourBar()
 
 

@@ -10,6 +10,8 @@ from jounce.kinematics.position_analysis import grid, grid_storage, solve_buffer
 from jounce.kinematics.position_analysis.grid_blocks import blocks_of, rounds
 from tests.problems.small import four_bar, slider_crank
 
+pytestmark = pytest.mark.long
+
 needs_machine_code = pytest.mark.skipif(
     not is_usable(), reason="there is no compiler, or a system where it was not tried"
 )

@@ -13,6 +13,8 @@ from jounce.jet import Jet
 from jounce.rigid import SpatialPose
 from jounce.rigid.rotations import SEQUENCES
 
+pytestmark = pytest.mark.long
+
 ORDER = 4
 SOLVED = 2  # of motions
 

@@ -11,6 +11,8 @@ from jounce.planning.paths.paths import Between, cells_needed, checked, path_of
 from jounce.planning.paths.sampled_paths import path_of_samples
 from jounce.planning.paths.straight_lines import taken_together
 
+pytestmark = pytest.mark.long
+
 
 def rise(t):
     """Return a rise from 0 to 1 between 1 and 3, at rest before and after: its jerk jumps there."""

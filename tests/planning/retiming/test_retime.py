@@ -10,6 +10,8 @@ from jounce.errors import JounceError, RobotError, SolveError, TrajectoryError
 from jounce.planning.retiming.quantities.limits import limits_of
 from jounce.planning.retiming.quantities.motion_limits_check import check_motion
 
+pytestmark = pytest.mark.long
+
 LENGTH, SPEED, ACCELERATION, JERK, JOUNCE = 2.0, 1.0, 2.0, 10.0, 200.0
 
 

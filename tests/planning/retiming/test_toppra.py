@@ -12,6 +12,8 @@ import jounce as jn
 from jounce.errors import TrajectoryError
 from jounce.planning.paths.paths import Between, path_of
 
+pytestmark = pytest.mark.long
+
 SPEED, ACCELERATION, TORQUE = 1.2, 4.0, 9.0
 GRID = 2001
 

@@ -10,6 +10,8 @@ import jounce as jn
 from jounce.errors import TrajectoryError
 from jounce.planning.smoothing import bases
 
+pytestmark = pytest.mark.long
+
 
 def minimum_jerk(times, start, duration, size):
     u = np.clip((times - start) / duration, 0, 1)

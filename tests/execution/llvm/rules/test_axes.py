@@ -7,6 +7,8 @@ from jax import lax
 
 from tests.execution.llvm.lanes import COUNT, SPECIAL, WHOLE, assert_agree, ordinary, whole
 
+pytestmark = pytest.mark.long
+
 ARRAYS = {
     "doubles": lambda: ordinary(2, 3, 4),
     "whole numbers": lambda: whole(2, 3, 4),

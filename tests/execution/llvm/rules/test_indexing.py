@@ -9,6 +9,8 @@ from jax.lax import GatherScatterMode
 from jounce.execution.llvm.text.values import UnsupportedOperationError
 from tests.execution.llvm.lanes import COUNT, assert_agree, compiled, ordinary, whole
 
+pytestmark = pytest.mark.long
+
 MODES = {"clip": GatherScatterMode.CLIP, "fill": GatherScatterMode.FILL_OR_DROP}
 BEYOND = np.array([0, 1, 2, 3, 4, -1, -2, -5, -100, 100, 2, 1, 0, 3, 5, -4, 2])
 INDICES = {"64 bits": BEYOND, "32 bits": BEYOND.astype(np.int32)}

@@ -11,6 +11,8 @@ from jax.lax import GatherDimensionNumbers, GatherScatterMode, ScatterDimensionN
 from tests.execution.llvm import lanes
 from tests.execution.llvm.lanes import FEW, ordinary, whole
 
+pytestmark = pytest.mark.long
+
 assert_agree = partial(lanes.assert_agree, larges=(FEW,))
 KINDS = [np.float64, np.int64, np.int32, bool]
 

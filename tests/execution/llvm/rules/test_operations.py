@@ -10,6 +10,8 @@ from jax import lax
 
 from tests.execution.llvm.lanes import COUNT, LONG, SPECIAL, TRUTH, WHOLE, assert_agree, ordinary, whole
 
+pytestmark = pytest.mark.long
+
 WIDTHS = (2, 4, 8)
 COUNTS = (1, 3, 8, COUNT)
 UNARY = {
