@@ -1,17 +1,23 @@
 """Integration methods of users: what they compute is read off when a run begins."""
 
+from collections.abc import Callable
 from typing import Any
 
 import jax
 import jax.numpy as jnp
 
 from jounce.base.modules import changes_parts, field, is_ours
-from jounce.dynamics.forward.accelerations import Equations, Expansion, Flags, Lanes, State
+from jounce.dynamics.forward.accelerations import Equations
 from jounce.integrate.marching.marching import IntegratorState
-from jounce.integrate.steps.methods import AbstractMethod, Number, Sizes
+from jounce.integrate.steps.methods import AbstractMethod
 from jounce.jet.programs.captured import Same, read_off, value_key
 
 METHODS = ("prepared", "longest_step", "arrive", "polynomial", "error", "expansion_order")
+
+
+def _of_method(name: str) -> Callable[..., Any]:
+    """Return a method that calls the one of this name of the user's."""
+    return lambda self, *arguments: getattr(self.method, name)(*arguments)
 
 
 class ReadIntegrator(AbstractMethod):
@@ -33,31 +39,7 @@ class ReadIntegrator(AbstractMethod):
         """See `AbstractMethod`."""
         return self.method.controlled
 
-    def expansion_order(self, tolerance: float) -> int:
-        """See `AbstractMethod`."""
-        return self.method.expansion_order(tolerance)
-
-    def longest_step(self, sizes: Sizes, tolerance: Number) -> Lanes:
-        """See `AbstractMethod`."""
-        return self.method.longest_step(sizes, tolerance)
-
-    def prepared(
-        self, expansion: Expansion, length: Number, tolerance: Number, singular: Flags, usual: Lanes
-    ) -> tuple[Expansion, Lanes, Lanes]:
-        """See `AbstractMethod`."""
-        return self.method.prepared(expansion, length, tolerance, singular, usual)
-
-    def arrive(self, equations: Equations, expansion: Expansion, time: Lanes, step: Lanes) -> State:
-        """See `AbstractMethod`."""
-        return self.method.arrive(equations, expansion, time, step)
-
-    def polynomial(self, start: Expansion, end: Expansion, step: Lanes) -> State:
-        """See `AbstractMethod`."""
-        return self.method.polynomial(start, end, step)
-
-    def error(self, start: Expansion, end: Expansion, step: Lanes, length: Number) -> Lanes:
-        """See `AbstractMethod`."""
-        return self.method.error(start, end, step, length)
+    prepared, longest_step, arrive, polynomial, error, expansion_order = map(_of_method, METHODS)  # in their order
 
 
 def integrator(method: AbstractMethod, equations: Equations, current: IntegratorState) -> AbstractMethod:
