@@ -17,8 +17,24 @@ from jounce.execution.llvm.text.code import Code
 from jounce.execution.llvm.text.values import Region, Value
 
 
+class Shaped:
+    """What has a shape as an array of NumPy has."""
+
+    shape: Any
+
+    @property
+    def ndim(self) -> int:
+        """Number of axes."""
+        return len(self.shape)
+
+    @property
+    def size(self) -> int:
+        """Number of numbers."""
+        return math.prod(self.shape)
+
+
 @dataclass(frozen=True, eq=False)
-class Stored:
+class Stored(Shaped):
     """An array in memory.
 
     Attributes
@@ -35,16 +51,6 @@ class Stored:
     shape: tuple[int, ...]
     strides: tuple[int, ...]
     first: int | Value = 0
-
-    @property
-    def ndim(self) -> int:
-        """Number of axes."""
-        return len(self.shape)
-
-    @property
-    def size(self) -> int:
-        """Number of numbers."""
-        return math.prod(self.shape)
 
     @property
     def kind(self) -> str:
@@ -66,7 +72,7 @@ class Stored:
 
 
 @dataclass(frozen=True, eq=False)
-class Deferred:
+class Deferred(Shaped):
     """An array whose numbers are computed where they are used, which is once.
 
     Attributes
@@ -90,16 +96,6 @@ class Deferred:
     def shape(self) -> tuple[int, ...]:
         """Lengths of the axes."""
         return self.given[0].shape
-
-    @property
-    def ndim(self) -> int:
-        """Number of axes."""
-        return len(self.shape)
-
-    @property
-    def size(self) -> int:
-        """Number of numbers."""
-        return math.prod(self.shape)
 
     @property
     def lanes(self) -> bool:
