@@ -53,6 +53,22 @@ def test_a_force_bent_by_a_billionth_shows(monkeypatch):
     assert (share[1:, :2] > 1e-12).all()  # hundred times rounding; the rates above are zero
 
 
+@pytest.mark.slow
+def test_drivers_that_hold_the_same_number_give_no_power():
+    """Their law has one instance for all of them."""
+    names = {"a": 0.0, "b": 1.0}
+    held = jn.Mechanism(
+        space="planar",
+        bodies={name: jn.Body([x, 0], mass=1.0, inertia=0.1) for name, x in names.items()},
+        joints={f"pin_{name}": planar.Revolute(("ground", name), [x, 0], [0, 0]) for name, x in names.items()},
+        drivers={f"at_{name}": drivers.CoordinateDriver(("ground", name), "angle", "0.5") for name in names},
+        forces={"load": jn.forces.Torque(("ground", "b"), "3*t")},
+    )
+    balance = jn.energy.power_balance(jn.solve(held, TIME, order=2))
+    assert (balance["drivers"] == 0).all()
+    assert (balance["residual"] == 0).all()
+
+
 def arm(**applied):
     return jn.Mechanism(
         space="planar",

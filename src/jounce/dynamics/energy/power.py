@@ -107,8 +107,9 @@ def _friction_powers(forces: MotionForces) -> Iterator[tuple[np.ndarray, np.ndar
 def _driver_power(forces: MotionForces, name: str) -> tuple[np.ndarray, np.ndarray]:
     """Return the power of a driver and the size of its products, as Taylor coefficients, (levels, time)."""
     index = forces.indices[name]
-    element = forces.model.system.groups[index.group].element
-    law = forces.in_chunks(lambda lanes: _law(element, forces.motion.time[lanes], forces.levels))[:, index.instance]
+    group = forces.model.system.groups[index.group]
+    laws = forces.in_chunks(lambda lanes: _law(group.element, forces.motion.time[lanes], forces.levels))
+    law = np.broadcast_to(laws, (len(laws), group.instances, laws.shape[-1]))[:, index.instance]  # one for equal numbers
     rate, force = Jet(tuple(law)).differentiate(), Jet(tuple(forces.driver_force(name)[:, 0]))
     power, size = force * rate, force.map(np.abs) * rate.map(np.abs)
     return np.stack(power.dense().coefficients), np.stack(size.dense().coefficients)
