@@ -14,7 +14,7 @@ from jounce.reporting.terminal import say, say_json, show_columns
 
 PACKAGES = ("jax", "jaxlib", "numpy", "scipy", "xarray", "llvmlite", "pydantic", "pint", "matplotlib")
 FOR_DEVELOPERS = ("test", "bench", "docs", "all")
-VARIABLES = ("JOUNCE_CACHE_DIR", "JOUNCE_THREADS", "JOUNCE_NATIVE", "JOUNCE_DEBUG", "JAX_PLATFORMS")
+VARIABLES = ("JOUNCE_CACHE_DIR", "JOUNCE_THREADS", "JOUNCE_NATIVE", "JOUNCE_DEBUG", "JAX_PLATFORMS", "XLA_FLAGS")
 LARGEST_ERROR = 1e-12  # of the peak of each derivative
 
 
