@@ -109,7 +109,7 @@ def _driver_power(forces: MotionForces, name: str) -> tuple[np.ndarray, np.ndarr
     index = forces.indices[name]
     group = forces.model.system.groups[index.group]
     laws = forces.in_chunks(lambda lanes: _law(group.element, forces.motion.time[lanes], forces.levels))
-    law = np.broadcast_to(laws, (len(laws), group.instances, laws.shape[-1]))[:, index.instance]  # one for equal numbers
+    law = np.broadcast_to(laws, (len(laws), group.instances, laws.shape[-1]))[:, index.instance]  # equal ones are one
     rate, force = Jet(tuple(law)).differentiate(), Jet(tuple(forces.driver_force(name)[:, 0]))
     power, size = force * rate, force.map(np.abs) * rate.map(np.abs)
     return np.stack(power.dense().coefficients), np.stack(size.dense().coefficients)
