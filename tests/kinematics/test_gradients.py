@@ -216,7 +216,9 @@ def test_what_is_not_traced_is_reported():
     with pytest.raises(jn.errors.UnsupportedError, match="instants depend on values") as caught:
         jax.grad(lambda tau: jn.solve(FOUR_BAR.with_parameters(tau=tau), grid).outputs["psi"][-1, 1])(2.0)
     assert caught.value.name == "time"
-    with pytest.raises(jn.errors.UnsupportedError, match=r"jn\.equations cannot yet be used with values that") as caught:
+    with pytest.raises(
+        jn.errors.UnsupportedError, match=r"jn\.equations cannot yet be used with values that"
+    ) as caught:
         jax.grad(lambda length: len(jn.equations(FOUR_BAR.with_parameters(BC=length))) * length)(BC)
     assert caught.value.name == "model.parameters.BC"
     with pytest.raises(jn.errors.UnsupportedError, match=r"jn\.retime cannot yet be used"):
