@@ -11,8 +11,6 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
-__all__ = ["Activity", "Count", "compiling", "now"]
-
 _lock = threading.Lock()
 _compiled: dict[object, str] = {}  # programs that are compiled, the latest last
 _count: Count | None = None

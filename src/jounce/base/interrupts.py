@@ -19,8 +19,6 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 
-__all__ = ["end_on_signals", "is_command", "left_behind", "mark_forks", "raising", "shielding", "undoing"]
-
 SIGNALS = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name))
 PATIENCE = 0.2  # s that the main thread has to come out of native code before another one ends the process
 STATUS = 128  # of a process ended by a signal, plus its number

@@ -24,8 +24,6 @@ from jounce.plot.instants import solved_instants
 from jounce.plot.machine_sketch import SketchFigure, check_names, paths_of
 from jounce.plot.style import GRAY, style
 
-__all__ = ["ANIMATION_SUFFIXES", "animate", "check_animation", "frame_instants"]
-
 ANIMATION_SUFFIXES = (".gif", ".mp4")
 FRAMES_PER_SECOND = 25  # a GIF counts in hundredths of a second
 LONGEST, SHORTEST = 20.0, 2.0  # s, of an animation whose speed is not given

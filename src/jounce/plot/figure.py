@@ -21,8 +21,6 @@ from jounce.plot.style import COLORS, PALE_GRAY, RESOLUTION, blank_figure, set_t
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["check_figure", "draw", "draw_columns", "finish", "save", "stacked"]
-
 Column = tuple[AbstractQuantity, Float[np.ndarray, "time derivative *component"]]
 """An output with its values."""
 

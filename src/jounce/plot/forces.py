@@ -21,8 +21,6 @@ from jounce.plot.style import BLUE, GREEN, ORANGE, PURPLE, VERMILION, blank_figu
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["draw_energy", "draw_power", "draw_reactions"]
-
 NOTHING = 1e-9  # of the largest force times the size: moments below it are rounding
 LINES = {
     "kinetic": BLUE,

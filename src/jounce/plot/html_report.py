@@ -37,8 +37,6 @@ from jounce.reporting.text.summaries import motion_summary
 from jounce.units.shown_units import ShownUnits, derivative_unit
 from jounce.written_equations.report_section import equations_section
 
-__all__ = ["check_report", "report"]
-
 MOST_INSTANTS = 2001  # of the plots
 MOST_FRAMES = 240  # of the sketch, which goes on evenly between them
 STEPS = 20000  # of places across the sketch

@@ -8,8 +8,6 @@ from jaxtyping import Int
 from jounce.errors import MechanismError
 from jounce.kinematics import Motion
 
-__all__ = ["evenly_chosen", "solved_instants", "unsolved_runs"]
-
 Indices = Int[np.ndarray, " chosen"]
 
 

@@ -12,8 +12,6 @@ from jounce.mechanism.outputs.base import AbstractQuantity
 from jounce.reporting.peaks import rate_name
 from jounce.units.shown_units import derivative_unit
 
-__all__ = ["axis_range", "bar_length", "quantity_word", "rounded_down", "scale_of", "symbol", "unit_label"]
-
 GREEK = (
     "alpha beta gamma delta epsilon zeta eta theta iota kappa lambda mu nu xi pi rho sigma tau upsilon phi chi psi "
     "omega Gamma Delta Theta Lambda Xi Pi Sigma Upsilon Phi Psi Omega"

@@ -24,8 +24,6 @@ from jounce.reporting.peaks import rate_name
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["Paths", "SketchFigure", "check_names", "draw_scale", "length_text", "limits_with", "paths_of", "sketch"]
-
 NAMES = ("all", "bodies", "joints", "outputs", "none")
 WIDEST, TALLEST, LEAST = 6.4, 5.2, 2.6  # inches
 LETTER = 0.07  # inches of a title at least, which is then written smaller

@@ -11,25 +11,6 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = [
-    "BLUE",
-    "BODY_COLORS",
-    "COLORS",
-    "GRAY",
-    "GREEN",
-    "LINE_COLORS",
-    "ORANGE",
-    "PURPLE",
-    "RESOLUTION",
-    "SKY",
-    "VERMILION",
-    "blank_figure",
-    "printable",
-    "set_ticks",
-    "shown_name",
-    "style",
-]
-
 BLUE, VERMILION, GREEN, ORANGE, PURPLE, SKY = "#0072B2", "#D55E00", "#009E73", "#E69F00", "#CC79A7", "#56B4E9"
 COLORS = (BLUE, VERMILION, GREEN)  # of components
 LINE_COLORS = (BLUE, ORANGE, GREEN, PURPLE, SKY, VERMILION, "#000000")

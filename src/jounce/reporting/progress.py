@@ -13,8 +13,6 @@ from typing import Any
 from jounce.base.activity import Activity, now
 from jounce.base.interrupts import undoing
 
-__all__ = ["Display", "in_notebook", "pause"]
-
 PATIENCE = 2.0  # s, before anything is shown
 PACE = 0.2  # s between two looks
 SHOW_CURSOR = b"\r\x1b[2K\x1b[?25h"  # on a cleared line; a line of progress hides it

@@ -12,16 +12,6 @@ from jaxtyping import Float
 from jounce.errors import MechanismError, show_value, unknown
 from jounce.rigid.rotations import check_sequence
 
-__all__ = [
-    "FORMS",
-    "euler_parameters",
-    "form_of",
-    "from_axis_angle",
-    "from_euler",
-    "from_quaternion",
-    "from_rotation_matrices",
-]
-
 FORMS: dict[str, tuple[str, ...]] = {
     "quaternion": ("quaternion",),
     "euler": ("euler", "angles"),

@@ -14,8 +14,6 @@ from jounce.mechanism import Mechanism
 from jounce.robot import Robot
 from jounce.viewer.page.local_server import AccessControl, check_installed, check_port, quiet_server, quiet_stop
 
-__all__ = ["View", "view"]
-
 MECHANISM_FILES = (".yaml", ".yml", ".toml", ".json")
 
 

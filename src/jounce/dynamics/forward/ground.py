@@ -9,8 +9,6 @@ from jaxtyping import Float
 
 from jounce.base.shapes import Numbers
 
-__all__ = ["turns_with_ground", "with_ground"]
-
 
 def with_ground(
     moving: Float[Numbers, "*components body batch"], of_ground: float | np.ndarray = 0.0

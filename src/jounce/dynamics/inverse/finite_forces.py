@@ -9,8 +9,6 @@ from jounce.errors import MechanismError
 from jounce.kinematics import Status
 from jounce.mechanism.building.element_indices import force_names
 
-__all__ = ["check_finite_forces", "check_finite_values"]
-
 
 def check_finite_values(forces: Any, values: Numbers, name: str | None = None) -> None:
     """Raise MechanismError for the first solved instant at which Taylor coefficients are not finite.

@@ -12,8 +12,6 @@ from jounce.dynamics.friction.coupling import loses_torque, rubs
 from jounce.dynamics.inverse import force_programs as programs
 from jounce.mechanism.system import holding
 
-__all__ = ["JointFriction"]
-
 
 class JointFriction:
     """The friction in the joints of a motion.

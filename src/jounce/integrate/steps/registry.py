@@ -9,8 +9,6 @@ from jounce.errors import MechanismError, check_name
 from jounce.integrate.steps.methods import AbstractMethod, Taylor
 from jounce.integrate.steps.obreshkov import Obreshkov
 
-__all__ = ["method_named", "register_method"]
-
 _methods: dict[str, Callable[[float | None], AbstractMethod]] = {
     "taylor": lambda step: Taylor(step=step),
     **{f"obreshkov-{order}": partial(Obreshkov, order) for order in (4, 6, 8)},

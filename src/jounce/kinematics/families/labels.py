@@ -11,8 +11,6 @@ from jaxtyping import Float, Int
 from jounce.kinematics.status import Status
 from jounce.units.shown_units import derivatives_of, time_axes
 
-__all__ = ["labeled_family"]
-
 
 def labeled_family(
     lane: str,

@@ -17,8 +17,6 @@ if TYPE_CHECKING:
     import pandas
     import xarray
 
-__all__ = ["Tabulated"]
-
 FORMS = ("stacked", "split")
 
 

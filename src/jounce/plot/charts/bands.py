@@ -16,8 +16,6 @@ if TYPE_CHECKING:
     import xarray
     from matplotlib.figure import Figure
 
-__all__ = ["draw_bands"]
-
 WIDTH, ROW = 9.5, 1.9  # inches
 BAND = 0.3  # of a color
 TWO_SIDED = 1.959964  # standard deviations that hold 95 percent of a normal distribution

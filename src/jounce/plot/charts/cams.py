@@ -18,8 +18,6 @@ from jounce.units.shown_units import ShownUnits
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["draw_cam"]
-
 WIDTH, HEIGHT = 8.4, 4.6  # inches
 MOST_RADII = 12  # base radii, to which the axis of radii of curvature goes
 

@@ -16,8 +16,6 @@ from jounce.plot.style import GRAY, LINE_COLORS, blank_figure, set_ticks, shown_
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["draw_curves"]
-
 SIDE = 3.6  # inches
 MARKS = {"maximum": "^", "minimum": "v", "stationary": "s"}
 PROJECTIONS = ((0, 1), (0, 2), (1, 2))

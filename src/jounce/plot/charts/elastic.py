@@ -14,8 +14,6 @@ from jounce.plot.style import BLUE, GRAY, LINE_COLORS, PALE_GRAY, VERMILION, bla
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["draw_feedforward"]
-
 WIDTH, PANEL = 7.0, 2.1  # inches
 DRAWN = 4000  # instants at most
 LEAST = 1e-17  # what is exact is drawn there

@@ -16,8 +16,6 @@ from jounce.plot.style import GRAY, LINE_COLORS, PALE_GRAY, blank_figure, set_ti
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["draw_limits"]
-
 DASHES = ("-", (0, (4, 1.5)), (0, (1, 1.2)), (0, (5, 1.2, 1, 1.2)), (0, (8, 2)), (0, (2, 2)))
 BROKEN, FORBIDDEN = "#B22222", "#EDEDED"
 WIDTH, ROW = 7.0, 1.75  # inches

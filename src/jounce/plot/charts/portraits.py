@@ -19,8 +19,6 @@ from jounce.trajectory.sampled.hermite import hermite_pieces
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["hodograph", "phase_portrait"]
-
 ARROWS = 12  # vectors drawn from the origin of a hodograph
 PROJECTIONS = ((0, 1), (0, 2), (1, 2))
 SIDE = 3.4  # inches

@@ -15,8 +15,6 @@ if TYPE_CHECKING:
 
     from jounce.planning import RetimedTrajectory
 
-__all__ = ["draw_retiming"]
-
 WIDTH, BAR, RATE = 7.0, 0.24, 1.7  # inches
 MOST = 24  # bars: those of the highest price
 

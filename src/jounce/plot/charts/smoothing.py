@@ -14,8 +14,6 @@ from jounce.trajectory import JointTrajectory
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["draw_smoothing"]
-
 WIDTH, PANEL = 7.0, 2.0  # inches
 DRAWN = 4000  # samples at most
 NAMED = 14  # joints with a name in the legend

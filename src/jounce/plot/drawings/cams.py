@@ -12,8 +12,6 @@ from jounce.mechanism import Mechanism
 from jounce.mechanism.mechanism import GROUND
 from jounce.mechanism.resolve import resolve
 
-__all__ = ["cam_disc", "pitch_curve"]
-
 Point = Float[np.ndarray, " component"]
 
 

@@ -13,8 +13,6 @@ from jounce.mechanism.system import POSITION_COMPONENTS
 from jounce.trajectory.curve_checks import derivatives_at
 from jounce.trajectory.curves import HALF_WINDOW, CurveLaw
 
-__all__ = ["CurveLines", "curve_lines", "shown"]
-
 SAMPLES, ACROSS = 401, 9  # of a curve; lines of a surface in each direction, with as many places
 AROUND = 0.4  # of the way of a point: how far around it an endless curve is shown
 PERIODIC = 1e-6  # of its size: how nearly an endless curve comes back

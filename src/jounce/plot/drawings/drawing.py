@@ -15,8 +15,6 @@ from jounce.plot.drawings.frames import Frame, frame_along, points_at, within
 from jounce.plot.drawings.geometry import Point, Skeleton, Symbol
 from jounce.plot.style import BODY_COLORS
 
-__all__ = ["Drawing", "Flat", "Label", "Shape", "View", "screen_of", "tinted"]
-
 Flat = Float[np.ndarray, "time 2"]
 """A place or a vector in the plane of the drawing, as it moves."""
 Curve = Float[np.ndarray, "time points 2"]

@@ -10,8 +10,6 @@ from jounce.plot.drawings.drawing import INK, MARKS, SYMBOLS, Drawing, Flat
 from jounce.plot.drawings.geometry import Symbol
 from jounce.plot.drawings.symbol_parts import PAPER, actuator, ball, normal_of, pin, spring, stand, turn, unit_vector
 
-__all__ = ["DRIVERS_AND_FORCES"]
-
 HINGES = ("revolute", "cylindrical", "universal", "screw", "spherical", "slot", "prismatic")  # that have one place
 
 

@@ -26,8 +26,6 @@ from jounce.mechanism.system import POSITION_COMPONENTS
 from jounce.mechanism.time import first_instant
 from jounce.rigid import PlanarPose, SpatialPose
 
-__all__ = ["Frame", "assembled", "frame_along", "frames", "guessed", "points_at", "within"]
-
 ASSEMBLY_TOLERANCE = 1e-10  # rad, or sizes of the mechanism
 
 Frame = Float[np.ndarray, "time components columns"]

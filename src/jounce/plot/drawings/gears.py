@@ -13,8 +13,6 @@ from jounce.mechanism.mechanism import GROUND
 from jounce.mechanism.resolve import resolve
 from jounce.plot.drawings.frames import guessed, points_at, within
 
-__all__ = ["pitch_radii", "shaft_wheels"]
-
 THINNEST = 0.12  # of the distance of shafts: the radius of a worm, as it is drawn
 
 Center = Float[np.ndarray, " component"]

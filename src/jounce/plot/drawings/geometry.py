@@ -28,8 +28,6 @@ from jounce.plot.drawings.curve_lines import NONE, CurveLines, curve_lines
 from jounce.plot.drawings.frames import guessed, points_at
 from jounce.plot.drawings.gears import pitch_radii, shaft_wheels
 
-__all__ = ["DrawnLink", "Point", "Points", "Skeleton", "Symbol", "Wheel", "skeleton"]
-
 Point = Float[np.ndarray, " components"]
 Points = Float[np.ndarray, "points components"]
 Element = AbstractConstraint | AbstractForce

@@ -21,8 +21,6 @@ from jounce.plot.drawings.frames import frame_along
 from jounce.plot.drawings.geometry import Symbol, Wheel
 from jounce.plot.style import GRAY
 
-__all__ = ["draw_symbols"]
-
 
 def draw_symbols(drawing: Drawing, mechanism: Mechanism) -> None:
     """Draw all joints, drivers and forces of a mechanism, with the names of joints."""

@@ -12,8 +12,6 @@ from jaxtyping import Bool, Float, Int
 from jounce.plot.drawings.drawing import SYMBOLS, WHEELS, Label
 from jounce.plot.drawings.scene import Scene, outline
 
-__all__ = ["NamePlace", "place_names"]
-
 DIRECTIONS = 16
 DISTANCES = (1.7, 2.6, 3.8, 5.5, 8.0)  # of the nearest edge of a name, in units of the drawing
 LEADER = 3.0  # units, from which on a thin line leads from a name to its place

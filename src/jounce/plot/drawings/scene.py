@@ -19,8 +19,6 @@ from jounce.plot.drawings.frames import assembled, frames
 from jounce.plot.drawings.geometry import DrawnLink, skeleton
 from jounce.plot.drawings.joint_symbols import draw_symbols
 
-__all__ = ["Scene", "drawing_of", "outline", "scene_of"]
-
 Instants = Int[np.ndarray, " time"]
 
 

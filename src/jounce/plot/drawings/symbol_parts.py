@@ -11,21 +11,6 @@ from jounce.mechanism.mechanism import GROUND
 from jounce.plot.drawings.drawing import GUIDES, INK, MARKS, SYMBOLS, Drawing, Flat
 from jounce.plot.drawings.geometry import Point, Symbol
 
-__all__ = [
-    "CORNERS",
-    "actuator",
-    "ball",
-    "box",
-    "cylinder",
-    "normal_of",
-    "pin",
-    "rail",
-    "spring",
-    "stand",
-    "turn",
-    "unit_vector",
-]
-
 Axes = Float[np.ndarray, "time 3 3"]
 DOWN = np.array([0.0, -1.0])
 PAPER = "#FFFFFF"

@@ -16,8 +16,6 @@ from jounce.viewer.page.overlay import Overlay
 from jounce.viewer.page.scene import ViserScene
 from jounce.viewer.shapes.recording import Recording
 
-__all__ = ["animation", "file_name", "picture", "table"]
-
 SMOOTH = 1 / 30  # s between two pictures of an animation
 
 

@@ -15,8 +15,6 @@ from jounce.viewer.shapes.appearance import Color
 from jounce.viewer.shapes.arrows import LOAD_COLORS, LOAD_WORDS, derivative_color, path_colors, scale_words
 from jounce.viewer.shapes.recording import Recording
 
-__all__ = ["error_box", "legend", "status_line"]
-
 CELL = "padding:1px 6px 1px 0;white-space:nowrap"
 
 

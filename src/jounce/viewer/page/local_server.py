@@ -22,8 +22,6 @@ from urllib.parse import parse_qs, urlsplit
 
 from jounce.errors import JounceError
 
-__all__ = ["AccessControl", "check_installed", "check_port", "quiet_server", "quiet_stop"]
-
 HOSTS = ("127.0.0.1", "localhost", "[::1]")  # of any port, as a tunnel may have another one at its other end
 LONGEST_PATH = 1000  # characters; those of the page are far shorter
 REFUSED = "Open this page with the complete address that jounce view prints, including its token.\n"

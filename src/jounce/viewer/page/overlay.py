@@ -11,8 +11,6 @@ from jaxtyping import Float, UInt8
 from jounce.viewer.shapes.arrows import Arrows, TracedPoint, arrows_along, colored_paths, length_scale, load_scale
 from jounce.viewer.shapes.recording import Load, Recording
 
-__all__ = ["DisplayOptions", "Overlay"]
-
 
 @dataclasses.dataclass(frozen=True)
 class DisplayOptions:

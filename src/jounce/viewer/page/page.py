@@ -16,8 +16,6 @@ from jounce.viewer.page.session import Session, Subject
 from jounce.viewer.shapes.arrows import TracedPoint
 from jounce.viewer.shapes.recording import Recording
 
-__all__ = ["Observer", "Page"]
-
 SLOWLY = 6  # legend and plots follow every so many pictures
 
 

@@ -13,8 +13,6 @@ from jounce.viewer.page.legend import error_box, status_line
 from jounce.viewer.page.page import Observer, Page
 from jounce.viewer.shapes.recording import Parameter, Recording
 
-__all__ = ["Panel"]
-
 SPEEDS = ("0.05", "0.1", "0.25", "0.5", "1", "2", "4")
 
 

@@ -8,8 +8,6 @@ from collections.abc import Callable
 
 from jounce.settings import under_own_settings
 
-__all__ = ["Player"]
-
 RATE = 30.0  # pictures a second
 
 

@@ -15,8 +15,6 @@ from jounce.viewer.page.legend import legend
 from jounce.viewer.page.page import Observer, Page
 from jounce.viewer.shapes.recording import Recording
 
-__all__ = ["Chart", "Plots", "cursor_data", "default_charts"]
-
 Times = Float[np.ndarray, " time"]
 CURSOR = "#555555"
 TICKS = {"size": 4}

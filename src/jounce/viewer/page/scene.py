@@ -16,8 +16,6 @@ from jounce.viewer.shapes.arrows import LOAD_COLORS, derivative_color, in_front,
 from jounce.viewer.shapes.meshes import arc_arrow, coil, cylinder
 from jounce.viewer.shapes.recording import Recording, Vectors
 
-__all__ = ["ViserScene"]
-
 FIELD_OF_VIEW, FLAT_FIELD_OF_VIEW = 0.6, 0.12  # rad; the second is nearly without perspective
 MARGIN, NARROW = 1.2, 0.85  # width by height of the space between the panels
 ARROW = {"shaft_radius": 0.0045, "head_radius": 0.0125, "head_length": 0.034}  # in sizes

@@ -11,8 +11,6 @@ from jounce.errors import JounceError
 from jounce.settings import under_own_settings
 from jounce.viewer.shapes.recording import Parameter, Recording
 
-__all__ = ["Session", "Subject"]
-
 
 @runtime_checkable
 class Subject(Protocol):

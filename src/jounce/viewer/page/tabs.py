@@ -12,8 +12,6 @@ from jounce.viewer.shapes.appearance import BodyPoint
 from jounce.viewer.shapes.arrows import LOAD_WORDS, TracedPoint
 from jounce.viewer.shapes.recording import Recording
 
-__all__ = ["ArrowsTab", "ForcesTab"]
-
 OWN = "a point of my own"
 SHOWN = 4  # derivatives with a check box; higher ones are plotted
 SCALE_HINT = "Factor by which arrows are longer than the automatic length"

@@ -9,19 +9,6 @@ import numpy as np
 from jaxtyping import Float
 from trimesh import Trimesh
 
-__all__ = [
-    "BODY_COLORS",
-    "DARK",
-    "GRAY",
-    "Appearance",
-    "BodyPoint",
-    "Color",
-    "ColoredMesh",
-    "Connector",
-    "Position",
-    "upward",
-]
-
 Color = tuple[int, int, int]
 """Red, green and blue, from 0 to 255."""
 

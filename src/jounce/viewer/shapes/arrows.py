@@ -13,22 +13,6 @@ from jounce.units.shown_units import derivative_unit
 from jounce.viewer.shapes.appearance import BodyPoint, Color
 from jounce.viewer.shapes.recording import Load, Recording, Vectors
 
-__all__ = [
-    "COLORS",
-    "LOAD_COLORS",
-    "LOAD_WORDS",
-    "Arrows",
-    "TracedPoint",
-    "arrows_along",
-    "colored_paths",
-    "derivative_color",
-    "in_front",
-    "load_scale",
-    "long_enough",
-    "path_colors",
-    "scale_words",
-]
-
 LONGEST, LONGEST_FORCE = 0.3, 0.28  # of the longest arrow, in sizes of what moves
 COLORS = {1: (0, 114, 178), 2: (213, 94, 0), 3: (0, 158, 115), 4: (170, 51, 119)}  # velocity to jounce
 HIGHER = ((102, 102, 0), (80, 40, 160), (120, 60, 0), (0, 90, 90))

@@ -27,8 +27,6 @@ from jounce.viewer.shapes.appearance import (
 from jounce.viewer.shapes.mechanism_meshes import THICKNESS, planar_meshes, spatial_meshes
 from jounce.viewer.shapes.recording import spatial_vectors
 
-__all__ = ["mechanism_appearance"]
-
 ROD, SPRING, ACTUATOR = ("rod", 0.012, GRAY), ("spring", 0.022, (90, 120, 90)), ("actuator", 0.016, (136, 34, 85))
 ROPE, BROWN = 0.005, (138, 90, 43)
 CONNECTORS = {  # by symbol: kind, radius in sizes of the mechanism, and color

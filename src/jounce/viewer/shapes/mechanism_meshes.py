@@ -30,8 +30,6 @@ from jounce.viewer.shapes.meshes import (
     wheel,
 )
 
-__all__ = ["THICKNESS", "planar_meshes", "spatial_meshes"]
-
 Pieces = Iterator[tuple[str, Trimesh, Color]]  # of which body, in its frame
 
 STAND = (104, 110, 120)

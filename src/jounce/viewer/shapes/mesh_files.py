@@ -17,8 +17,6 @@ from trimesh.resolvers import Resolver
 from jounce.errors import RobotFileError
 from jounce.io.files.reading import MAX_SAMPLES, named_file, read_file
 
-__all__ = ["MeshFiles"]
-
 Rgba = tuple[float, ...]
 """Red, green, blue and opacity, from 0 to 1."""
 LARGEST = 400_000  # triangles of one mesh that a page can move smoothly

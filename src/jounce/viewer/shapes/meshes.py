@@ -18,23 +18,6 @@ from trimesh import Trimesh, creation
 from jounce.plot.drawings.frames import frame_along
 from jounce.viewer.shapes.appearance import Position
 
-__all__ = [
-    "arc_arrow",
-    "box",
-    "capsule",
-    "coil",
-    "cylinder",
-    "extruded",
-    "merged",
-    "plate",
-    "rotation_to",
-    "sleeve",
-    "sphere",
-    "transformed",
-    "tube",
-    "wheel",
-]
-
 AROUND = 24  # corners of a circle
 Z, ORIGIN = (0.0, 0.0, 1.0), (0.0, 0.0, 0.0)
 Vector = Float[np.ndarray, "3"]

@@ -16,8 +16,6 @@ from jounce.mechanism.time import nearest_instants
 from jounce.units.shown_units import raised
 from jounce.viewer.shapes.appearance import Appearance, BodyPoint, Position
 
-__all__ = ["Load", "Parameter", "Quantity", "Recording", "Vectors", "poses", "rotated", "spatial_vectors"]
-
 Vectors = Float[np.ndarray, "time 3"]
 Positions = Float[np.ndarray, "time body 3"]
 Quaternions = Float[np.ndarray, "time body 4"]

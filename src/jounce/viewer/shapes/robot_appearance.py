@@ -17,8 +17,6 @@ from jounce.viewer.shapes.meshes import box, capsule, cylinder, merged, rotation
 from jounce.viewer.shapes.robot_shapes import file_shapes
 from jounce.viewer.shapes.shapes import Shapes
 
-__all__ = ["robot_appearance"]
-
 Vector = Float[np.ndarray, "3"]
 Rotation = Float[np.ndarray, "3 3"]
 

@@ -24,8 +24,6 @@ from jounce.viewer.shapes.meshes import box, cylinder, sphere, transformed
 from jounce.viewer.shapes.sdf_shapes import sdf_shapes
 from jounce.viewer.shapes.shapes import Shapes, colored, upright_capsule, words_as_numbers
 
-__all__ = ["file_shapes"]
-
 Rotation = Float[np.ndarray, "3 3"]
 
 

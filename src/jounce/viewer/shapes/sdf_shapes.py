@@ -18,8 +18,6 @@ from jounce.viewer.shapes.mesh_files import MeshFiles, Rgba
 from jounce.viewer.shapes.meshes import box, cylinder, extruded, sphere, transformed
 from jounce.viewer.shapes.shapes import Shapes, colored, upright_capsule, words_as_numbers
 
-__all__ = ["sdf_shapes"]
-
 
 def sdf_shapes(root: Element, files: MeshFiles) -> Shapes:
     """Return the shapes of an SDF file by link, in its frame; planes, height maps and what cannot be read are left out.

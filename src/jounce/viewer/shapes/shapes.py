@@ -9,8 +9,6 @@ from jounce.viewer.shapes.appearance import ColoredMesh
 from jounce.viewer.shapes.mesh_files import Rgba
 from jounce.viewer.shapes.meshes import capsule
 
-__all__ = ["Shapes", "colored", "upright_capsule", "words_as_numbers"]
-
 PLAIN = (190, 195, 202)
 Shapes = dict[str, list[ColoredMesh]]
 """By link, in its frame."""

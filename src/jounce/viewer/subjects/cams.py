@@ -22,8 +22,6 @@ from jounce.viewer.shapes.meshes import extruded, plate, wheel
 from jounce.viewer.shapes.recording import Recording
 from jounce.viewer.subjects.mechanisms import MechanismSubject, instants_shown, recorded
 
-__all__ = ["CamSubject", "cam_mechanism"]
-
 INSTANTS = 361
 STEM = 0.05  # half the width of what holds an edge or a roller, in base radii
 

@@ -16,8 +16,6 @@ from jounce.viewer.shapes.recording import Recording
 from jounce.viewer.subjects.mechanisms import recorded
 from jounce.viewer.subjects.robots import RobotSubject
 
-__all__ = ["ClosedRobotSubject", "independent"]
-
 MOST_TRIED = 60  # choices of driven joints, which take a few seconds
 
 

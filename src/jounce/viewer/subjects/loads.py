@@ -15,8 +15,6 @@ from jounce.plot.drawings.frames import Frame, frames, points_at
 from jounce.plot.drawings.geometry import Symbol, skeleton
 from jounce.viewer.shapes.recording import Load, Vectors, spatial_vectors
 
-__all__ = ["has_loads", "mechanism_loads"]
-
 
 def has_loads(mechanism: Mechanism) -> bool:
     """Tell whether there are masses or applied forces, so that joints carry something."""

@@ -23,8 +23,6 @@ from jounce.viewer.shapes.mechanism_appearance import mechanism_appearance
 from jounce.viewer.shapes.recording import Load, Parameter, Quantity, Recording, poses, spatial_vectors
 from jounce.viewer.subjects.loads import has_loads, mechanism_loads
 
-__all__ = ["MechanismSubject", "instants_shown", "mechanism_parameters", "parameter_range", "recorded"]
-
 FEWEST, MOST = 100, 2001  # instants that are shown
 
 

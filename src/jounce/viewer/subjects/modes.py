@@ -14,8 +14,6 @@ from jounce.viewer.shapes.appearance import Appearance
 from jounce.viewer.shapes.recording import Parameter, Recording
 from jounce.viewer.subjects.mechanisms import mechanism_parameters, recorded
 
-__all__ = ["ModesSubject"]
-
 SWING = 2.0  # s, that one takes on the page, however fast it is
 MODE, AMPLITUDE = "mode", "amplitude"
 GROUP = "Mode"

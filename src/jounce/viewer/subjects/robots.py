@@ -23,8 +23,6 @@ from jounce.units.shown_units import time_axes
 from jounce.viewer.shapes.appearance import Appearance, Position
 from jounce.viewer.shapes.recording import Load, Parameter, Quantity, Recording, rotated
 
-__all__ = ["RobotRecording", "RobotSubject", "swing_of", "swing_parameters"]
-
 FRAMES = 181
 SWING = 4.0  # s, of one swing, unless a limit of velocity is slower
 REACH = {True: np.pi / 4, False: 0.1}  # of joints without limits, rad and m: half a swing

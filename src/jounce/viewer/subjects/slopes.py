@@ -20,8 +20,6 @@ from jounce.viewer.page.page import Observer, Page
 from jounce.viewer.shapes.recording import Recording
 from jounce.viewer.subjects.mechanisms import MechanismSubject
 
-__all__ = ["PeakSlopes", "SlopesFolder", "can_be_differentiated", "peak_slopes"]
-
 STEPS = {LENGTH: (1e-3, "1 mm"), ANGLE: (np.pi / 180, "1 deg")}
 NONE = "none"
 

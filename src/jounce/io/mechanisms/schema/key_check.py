@@ -13,8 +13,6 @@ from jounce.errors import JounceError, did_you_mean, show_value
 from jounce.io.files.located_data import Location, Source
 from jounce.io.files.source import read_source
 
-__all__ = ["ROLES", "check_keys", "unknown_key", "unknown_type"]
-
 ROLES = {"joints": "joint", "drivers": "driver", "forces": "force", "initial": "driver"}
 """The sections of a file whose entries are distinguished by ``type``, and the role of each."""
 
