@@ -53,8 +53,8 @@ class Multipliers:
         free = np.setdiff1d(np.arange(len(extremes)), known.bounded)
         self.fixed = self.fixed + by_extreme[:, free] @ here.row_slopes[chosen[free]]
 
-    def solved(self) -> tuple[float, Vector, Vector, float]:
-        """Return the residual, and the multipliers of conditions, of bounds and of the smallest singular value."""
+    def solved(self) -> tuple[float, Vector, Vector]:
+        """Return the residual, and the multipliers of conditions and of bounds."""
         from scipy.optimize import nnls  # here, to start quickly
 
         count, extra = len(self.here.point), len(self.known.bounded)
@@ -71,7 +71,7 @@ class Multipliers:
                 multipliers[kind][abs(signed_index) - 1] += sign * weight
         size = max(float(np.linalg.norm(target)), self.known.scale)
         residual = float(np.linalg.norm(columns @ weights - target)) / size
-        return residual, multipliers["condition"], multipliers["bound"], float(multipliers["singular"][0])
+        return residual, multipliers["condition"], multipliers["bound"]
 
     def _conditions(self) -> list[tuple[Vector, str, int]]:
         """Return the slopes of active conditions, both signs of those that are equalities."""

@@ -47,7 +47,6 @@ class SearchResult:
         Slope of the objective by each condition.
     bound_multipliers : array of shape (parameters,)
         Slope of the objective by a lower bound (positive) or an upper one (negative), by the point.
-    singular_multiplier : float
     """
 
     point: Vector
@@ -58,7 +57,6 @@ class SearchResult:
     residual: float
     multipliers: Vector
     bound_multipliers: Vector
-    singular_multiplier: float
 
     @property
     def feasible(self) -> bool:
@@ -176,8 +174,7 @@ class Search:
         broken = self.broken(numbers[1:], self._sizes_at(here))
         near = self.near_singular(here)
         kkt = Multipliers(self._known(float(numbers[0])), here, numbers, slopes, extremes, chosen)
-        residual, conditions, bounds, singular = kkt.solved()
-        return SearchResult(point, here, float(numbers[0]), broken, near, residual, conditions, bounds, singular)
+        return SearchResult(point, here, float(numbers[0]), broken, near, *kkt.solved())
 
     def _known(self, objective: float) -> Known:
         goals, size = self.problem.goals, abs(objective)

@@ -22,8 +22,6 @@ class BeltCourse(NamedTuple):
         Angle of the line of centers, from the first to the second.
     leaving : array of shape (...)
         Angle from there to where the strand on its left leaves the first pulley; that on its right, as much below.
-    strand : array of shape (...)
-        Length of each strand.
     wraps : tuple of array of shape (...)
         Angles over which the belt lies on each pulley.
     length : array of shape (...)
@@ -32,7 +30,6 @@ class BeltCourse(NamedTuple):
 
     line: Any
     leaving: Any
-    strand: Any
     wraps: tuple[Any, Any]
     length: Any
 
@@ -64,9 +61,8 @@ def belt_course(first: Points, second: Points, radii: Sequence[float], crossed: 
         leaving = np.arccos(radial / distance)
     on_first = 2 * (np.pi - leaving)
     on_second = on_first if crossed else 2 * leaving
-    return BeltCourse(
-        np.arctan2(y, x), leaving, strand, (on_first, on_second), 2 * strand + one * on_first + two * on_second
-    )
+    length = 2 * strand + one * on_first + two * on_second
+    return BeltCourse(np.arctan2(y, x), leaving, (on_first, on_second), length)
 
 
 def belt_outline(course: BeltCourse, centers: Sequence[Points], radii: Sequence[float], crossed: bool) -> Any:

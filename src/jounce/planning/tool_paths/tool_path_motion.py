@@ -111,7 +111,6 @@ class ToolPathMotion(Displayed):
         path.judge(min(self.order, path.highest))
         lost, self.ending = (Status.OK, "") if nodes.failed is None else self._why()
         until = nodes.time[-1] if nodes.failed is not None else np.inf
-        self._until = until
         reached = self.time <= until
         inside = np.where(reached, self.time, nodes.time[-1])
         series = target(inside, self.order)
