@@ -37,6 +37,7 @@ def check(trajectory, names=JOINTS, order=2, tolerance=1e-3, start=0.0):
 
 Q, V, A = (motion(TIMES, k).T for k in range(3))
 EPOCH = [f"1732686000.{round(t * 1e9):09d}" if t < 1 else "1732686001.000000000" for t in TIMES]
+RPM = 30 / np.pi  # of 1 rad/s
 NANO = [x.replace(".", "") for x in EPOCH]
 
 
@@ -74,6 +75,11 @@ NANO = [x.replace(".", "") for x in EPOCH]
             JOINTS,
         ),
         ("t,shoulder_pos_deg,elbow_pos_deg,elbow_vel_deg_per_s", [TIMES, *np.rad2deg(Q), np.rad2deg(V[1])], JOINTS),
+        (
+            "t,shoulder_deg,elbow_rad,shoulder_dps,elbow_rpm",
+            [TIMES, np.rad2deg(Q[0]), Q[1], np.rad2deg(V[0]), V[1] * RPM],
+            JOINTS,
+        ),
     ],
 )
 def test_tables_of_other_tools(tmp_path, header, columns, names):

@@ -18,7 +18,8 @@ _WITH_INDEX = re.compile(r".*\S\[[0-9]+\]\s*")
 _WITH_UNIT = re.compile(r"(.*\S)\s*\[([^\[\]]*)\]\s*")
 _IN_PARENTHESES = re.compile(r"(.*\S)\s*\(([^()]*)\)\s*")
 _LAST_WORD = re.compile(
-    r"(?P<name>.*?[^\W_])_(?:(?P<unit>deg|degrees?|rad|mm)(?P<rate>(?:_|_per_|p)s(?P<power>2?))?|(?P<time>s|sec|ms|us|ns))",
+    r"(?P<name>.*?[^\W_])_(?:(?P<unit>deg|degrees?|rad|mm)(?P<rate>(?:_|_per_|p|/)s(?P<power>2?))?"
+    r"|(?P<whole>dps|rpm|s|sec|ms|us|ns))",
     re.IGNORECASE,
 )
 _SAID = {  # what measures something else than SI, where a name says it
@@ -119,8 +120,8 @@ def name_and_last_word(text: str) -> tuple[str, str | None]:
         return (match[1], match[2]) if _moves(match[2]) else (text, None)
     if (match := _LAST_WORD.fullmatch(text)) is None:
         return text, None
-    if match["time"]:
-        return match["name"], match["time"].lower()
+    if match["whole"]:
+        return match["name"], {"dps": "deg/s"}.get(match["whole"].lower(), match["whole"].lower())
     power = f"^{match['power']}" if match["power"] else ""
     return match["name"], match["unit"].lower() + (f"/s{power}" if match["rate"] else "")
 
