@@ -35,8 +35,9 @@ def test_all_that_the_stub_lists_is_there_and_comes_from_where_it_says():
             )
     assert [*names, "__version__"] == jounce.__all__
     assert {*names, "__version__"} <= {*dir(jounce)}
-    with pytest.raises(AttributeError, match="module 'jounce' has no attribute 'sovle'"):
+    with pytest.raises(AttributeError, match="module 'jounce' has no attribute 'sovle'") as caught:
         jounce.sovle  # noqa: B018 - what is looked for is the error
+    assert (caught.value.name, caught.value.obj) == ("sovle", jounce)  # from which Python words "Did you mean"
 
 
 def test_names_of_release_0_4_work_with_a_warning_that_gives_the_new_one():

@@ -45,7 +45,8 @@ def __getattr__(name: str) -> Any:
         warnings.warn(f"jounce.{name} is jounce.{moved} from release 0.5 on", DeprecationWarning, stacklevel=2)
         return functools.reduce(getattr, moved.split("."), sys.modules[__name__])
     if room is None and (name.startswith("_") or importlib.util.find_spec(f"{__name__}.{name}") is None):
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+        message = f"module {__name__!r} has no attribute {name!r}"
+        raise AttributeError(message, name=name, obj=sys.modules[__name__])  # by which Python finds what is meant
     with _importing.lock, _importing.uncollected():
         if room in (None, __name__):
             value = importlib.import_module(f"{__name__}.{name}")

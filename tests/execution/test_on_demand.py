@@ -30,7 +30,7 @@ def test_nothing_is_computed_before_it_is_asked_for_nor_twice():
     assert (values["b"], values["a"], values["b"], asked) == (2.0, 1.0, 2.0, ["b"])
     assert dict(values) == {"a": 1.0, "b": 2.0, "c": 3.0}
     assert (repr(values), asked) == ("{'a': 1.0, 'b': 2.0, 'c': 3.0}", ["b", "c"])
-    with pytest.raises(KeyError, match="d"):
+    with pytest.raises(KeyError, match="'d'; valid: a, b, c"):
         values["d"]
 
 

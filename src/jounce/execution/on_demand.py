@@ -5,6 +5,7 @@ from typing import Any
 
 import jax
 
+from jounce.errors import did_you_mean, show_value
 from jounce.settings import under_own_settings
 
 
@@ -39,7 +40,7 @@ class OnDemand(Mapping[str, Any]):
         """Return the value of a name."""
         if name not in self._known:
             if name not in self._names:
-                raise KeyError(name)
+                raise KeyError(f"{show_value(name)}; {did_you_mean(name, self._names)}")
             self._known.update(self._compute(name))
         return self._known[name]
 

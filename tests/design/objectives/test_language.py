@@ -78,7 +78,7 @@ def test_what_cannot_be_read_is_reported_before_anything_is_solved(minimize, sub
         ({"BC": 0.2}, "a lower and an upper bound"),
         ({"BC": (-0.1, 0.2)}, "no mechanism can have this bound: joints.BC.length"),
         ({"BC": "16cm:12cm"}, "the lower one first"),
-        ({"BC": ("1 s", "2 s")}, "no mechanism can have this bound"),
+        ({"BC": ("1 s", "2 s")}, r"no mechanism can have this bound: parameters\.BC: [^']*, got '1 s'$"),
         ({"BC": (0.1, float("nan"))}, "finite"),
     ],
 )

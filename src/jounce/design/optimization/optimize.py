@@ -15,7 +15,7 @@ from jounce.base.shapes import ArrayLike, real_numbers, seconds
 from jounce.design.objectives.measures import PrescribedPath
 from jounce.design.optimization.result import OptimizedDesign
 from jounce.design.optimization.study import DesignRequest, Study
-from jounce.errors import DesignError, JounceError, MechanismError, check_name, whole_number
+from jounce.errors import UNSET, DesignError, JounceError, MechanismError, check_name, whole_number
 from jounce.kinematics import assemblies as all_assemblies
 from jounce.mechanism import Mechanism, build, check_mechanism, time_grid, with_output_drivers
 from jounce.mechanism.building.preconditions import concrete
@@ -176,7 +176,7 @@ def _bound(mechanism: Mechanism, name: str, given: Any) -> float:
         build(with_output_drivers(changed))
     except JounceError as error:
         message = f"no mechanism can have this bound: {error}"
-        raise type(error)(message, name=f"vary.{name}", value=given) from None
+        raise type(error)(message, name=f"vary.{name}", value=UNSET if error.value == given else given) from None
     return value
 
 

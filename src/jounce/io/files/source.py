@@ -24,7 +24,7 @@ def _decode(path: str, content: bytes) -> str:
         text = content.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         line = content.count(b"\n", 0, error.start) + 1
-        raise MechanismFileError("is not text in UTF-8", path=path, line=line) from None
+        raise MechanismFileError("is not text in UTF-8; save it in that encoding", path=path, line=line) from None
     line = 0
     for line, row in enumerate(text.split("\n"), start=1):
         if len(row) > MAX_LINE_LENGTH:
