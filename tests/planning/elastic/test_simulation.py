@@ -30,6 +30,7 @@ def test_torques_of_motors_are_numbers_expressions_and_functions_of_time(arm):
     arrays = robot_drives(arm, DRIVES, losses=True)
     given = {"shoulder": lambda t: jnp.sin(3 * t), "elbow": np.array(0.4)}
     constant, ((index, law),), feedback = torques_of(arrays, given)
+    assert torques_of(arrays, jn.JointTrajectory({"elbow": "t"}, 0.0, 1.0))[1][0][0] == arrays.names.index("elbow")
     assert (arrays.names[index], feedback) == ("shoulder", None)
     assert dict(zip(arrays.names, constant, strict=True)) == {"shoulder": 0.0, "elbow": 0.4}
     found = [float(x) for x in law(jn.Jet.variable(0.3, order=3)).derivatives()]
@@ -55,6 +56,10 @@ def test_what_does_not_fit_is_refused(arm):
         jn.planning.simulate_elastic(arm, DRIVES, [0.0, 1.0], {"elbow": lambda t: math.sin(t)})
     with pytest.raises(jn.errors.RobotError, match=r"torque.elbow: unknown name 'shoulder'"):
         jn.planning.simulate_elastic(arm, DRIVES, [0.0, 1.0], {"elbow": "2*shoulder"})
+    with pytest.raises(jn.errors.RobotError, match=r"torque: the function must return an array of 2 forces.* not \(\)"):
+        jn.planning.simulate_elastic(arm, DRIVES, [0.0, 1.0], lambda t, *_: 2 * t)
+    with pytest.raises(jn.errors.RobotError, match=r"torque: must be a function of time, q, q', theta and theta'"):
+        jn.planning.simulate_elastic(arm, DRIVES, [0.0, 1.0], lambda t: 2 * t)
     hinge = jn.load("examples/hooke_joint.yaml")
     (name,) = hinge.drivers
     spring = {name: jn.planning.Drive(stiffness=1.0, rotor_inertia=1.0)}

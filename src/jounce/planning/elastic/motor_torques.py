@@ -7,7 +7,7 @@ import numpy as np
 
 from jounce.errors import RobotError, check_name
 from jounce.planning.elastic.drives import DriveArrays
-from jounce.trajectory import AbstractMotion
+from jounce.trajectory import AbstractMotion, JointTrajectory
 from jounce.trajectory.laws.user_laws import law_or_number, read_laws
 
 MOTOR = "_motor"  # what the joint or body of a rotor is called after what it moves
@@ -24,6 +24,8 @@ def torques_of(
         If a name is none of the drives, or a law is none.
     """
     constant = np.zeros(len(arrays.names))
+    if isinstance(torque, JointTrajectory):
+        torque = torque.laws
     if torque is None or callable(torque):
         return constant, (), torque
     if not isinstance(torque, Mapping):

@@ -23,7 +23,7 @@ from jounce.planning.elastic.driven_systems import robot_drives
 from jounce.planning.elastic.drives import Drive, DriveArrays
 from jounce.planning.elastic.motor_torques import MOTOR, torques_of
 from jounce.robot import Joint, Link, Robot
-from jounce.robot.model.joint_laws import AbstractJointLaws
+from jounce.robot.model.joint_laws import AbstractJointLaws, read_forces
 from jounce.trajectory import AbstractMotion
 
 
@@ -142,8 +142,10 @@ def simulate_elastic_robot(
         for name, elastic in zip(arrays.names, arrays.elastic, strict=True)
     )
     constant, laws, function = torques_of(arrays, torque)
-    sample = jnp.zeros(()), *[jnp.zeros(len(arrays.names))] * 4
-    feedback = None if function is None else OfSample.of(function, *sample)
+    count, feedback = len(arrays.names), None
+    if function is not None:
+        sample = jnp.zeros(()), *[jnp.zeros(count)] * 4
+        feedback = read_forces(function, "torque", (count,), sample, "time, q, q', theta and theta'")
     stiffness = np.where(arrays.elastic, arrays.stiffness, 0.0)
     indices, functions = tuple(k for k, _ in laws), tuple(law for _, law in laws)
     damping = stiffness * arrays.time_constant

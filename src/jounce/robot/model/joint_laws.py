@@ -165,14 +165,42 @@ def _single(law: Any, names: tuple[str, ...], where: str) -> Any:
 
 
 def _read(function: Callable[..., Any], count: int, shape: tuple[int, ...], where: str) -> OfSample:
-    """Return what a function of a user computes now, checked."""
-    state = jnp.zeros(()), jnp.zeros(count), jnp.zeros(count)
+    return read_forces(function, where, shape, (jnp.zeros(()), jnp.zeros(count), jnp.zeros(count)))
+
+
+def read_forces(
+    function: Callable[..., Any],
+    where: str,
+    shape: tuple[int, ...],
+    state: Sequence[Any],
+    arguments: str = "time, q and rates",
+) -> OfSample:
+    """Return what a function of a user computes now, checked.
+
+    Parameters
+    ----------
+    function : callable
+        Of arrays of one sample.
+    where : str
+        What gave it, for messages.
+    shape : tuple of int
+        Of what it has to return.
+    state : sequence of array
+        Arguments, of which shapes and types count.
+    arguments : str
+        What they are, for messages.
+
+    Raises
+    ------
+    RobotError
+        If it cannot be used, or returns another shape.
+    """
     try:
         sampled = OfSample.of(function, *state)
     except TypeError as error:
-        message = f"must be a function of time, q and rates, by operations of JAX: {str(error).splitlines()[0]}"
+        message = f"must be a function of {arguments}, by operations of JAX: {str(error).splitlines()[0]}"
         raise RobotError(message, name=where) from error
     if sampled.shape != shape:
-        noun = f"an array of {count} forces" if shape else "one number"
+        noun = f"an array of {shape[0]} forces" if shape else "one number"
         raise RobotError(f"the function must return {noun}, the shape {shape}, not {sampled.shape}", name=where)
     return sampled
