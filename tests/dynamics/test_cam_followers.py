@@ -112,3 +112,19 @@ def test_followers_that_lift_off_are_named_with_the_instant(mechanism):
         comment = found.dataset[name].attrs["comment"]
         assert f"changes its sign before t = {change:.4g} s" in comment
         assert "lifts off there" in comment
+
+
+@pytest.mark.slow
+def test_the_jump_speed_is_that_of_the_handbook():
+    """Where spring and weight just hold the mass to a modified sine, whose formulas are those of Norton 2002."""
+    camshaft, u = jn.load("examples/camshaft.yaml"), np.linspace(1 / 8, 7 / 8, 200001)
+    phase, rise, turn = 4 * np.pi * u / 3 + np.pi / 3, 0.015, np.pi / 2
+    lift = rise / (4 + np.pi) * (2 + np.pi * u - 9 / 4 * np.sin(phase))
+    bend = rise / (4 + np.pi) * 4 * np.pi**2 * np.sin(phase) / turn**2  # second derivative by the angle
+    falling = bend < 0
+    speed = np.sqrt(((9.81 + 5000.0 * (0.046 + lift - 0.030)) / -np.where(falling, bend, -1e-9))[falling].min())
+    for share, held in ((0.999, True), (1.001, False)):
+        time = np.linspace(0.0, 2 * np.pi / (share * speed), 361)
+        spring = jn.dynamics.contact_spring(camshaft.with_parameters(speed=share * speed), "cam", "spring", time)
+        assert (spring.margin > 0) == held
+        assert abs(spring.margin) < 0.5  # N, of a preload of 80
