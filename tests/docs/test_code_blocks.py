@@ -12,7 +12,7 @@ from jounce.cli import main
 ROOT = pathlib.Path(__file__).parents[2]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
 SLOW = ("closed_loop_robots", "coming_from", "integrators", "own_joint", "reactions", "robots", "simulation", "spatial")
-SLOW += ("gradients", "robot_forward_dynamics", "torque_rates")  # to compile
+SLOW += ("cams", "gradients", "robot_forward_dynamics", "torque_rates")  # to compile
 BLOCK = re.compile(r"^```(\w+)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 
 
