@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, TextIO
 import numpy as np
 
 from jounce.errors import OutputError
-from jounce.io.files.column_units import heading, is_si, name_and_unit
+from jounce.io.files.column_units import heading, is_si, says_a_unit
 from jounce.io.files.netcdf_parts import NetcdfParts
 from jounce.io.files.reading import written_name
 from jounce.io.files.writing import check_target, replacing
@@ -75,8 +75,8 @@ def write(
     overwrite
         Whether that may be a file which this process has read as an input, such as the samples of a motion law.
     header_units
-        Whether the heading of a CSV file says the units, as ``psi_d1 [deg/s]``; unless given, where some are not of SI:
-        what reads such a file as samples takes them for what they are.
+        Whether the heading of a CSV file says the units, as ``psi_d1 [deg/s]``; unless given, where some are not of
+        SI, or a name reads as one with a unit: what reads such a file as samples takes them for what they are.
 
     Raises
     ------
@@ -206,8 +206,8 @@ def _write_rows(dataset: xarray.Dataset, stream: TextIO, header_units: bool | No
     if headed:
         units = column_units(dataset, table)
         chosen_units = header_units
-        if chosen_units is None:  # a name that ends in brackets reads as one with a unit, unless its own unit follows
-            chosen_units = not all(map(is_si, units)) or any(name_and_unit(name)[1] is not None for name in table)
+        if chosen_units is None:
+            chosen_units = not all(map(is_si, units)) or any(map(says_a_unit, table))
         names = [
             heading(name, unit) if chosen_units and unit else name for name, unit in zip(table, units, strict=True)
         ]

@@ -19,16 +19,16 @@ from jounce.cli.options import (
     spare_inputs,
     written,
 )
+from jounce.cli.robot_commands.joint_tables import joint_table
 from jounce.cli.robot_commands.servo import frequency_of
 from jounce.errors import JounceError, SampleWarning
 from jounce.io.files import DATA_FILES
 from jounce.reporting.terminal import say, show_table
 
 if TYPE_CHECKING:
+    from jounce.mechanism import Mechanism
     from jounce.planning import RetimedTrajectory
     from jounce.robot import Robot
-
-ROWS = 3  # derivatives that are written
 
 
 def retime(
@@ -197,6 +197,7 @@ def _state(model: Any, names: Any, running: tuple[Path, float], reading: RobotRe
 
 @dataclasses.dataclass(frozen=True)
 class _Result:
+    system: Robot | Mechanism
     retimed: RetimedTrajectory
     free: float  # duration before it was fitted to rows, s
     before: float | None
@@ -217,7 +218,7 @@ def _of_mechanism(file: Path, limits: Path | None, rate: float, settings: Any, r
     from jounce.mechanism import TimeGrid, time_grid
 
     retimed.times = time_grid(TimeGrid(0.0, retimed.stop, 1 / rate), {})
-    return _Result(retimed, retimed.stop, retimed.path.stop - retimed.path.start)
+    return _Result(mechanism, retimed, retimed.stop, retimed.path.stop - retimed.path.start)
 
 
 def _of_robot(
@@ -262,7 +263,8 @@ def _of_robot(
         free, read = retimed.stop, None
         if output.out is not None:
             retimed, read = _at_rate(model, retimed, bounds, rate, reading.degree, "duration" in settings)
-    return _Result(retimed, free, given.stop - given.start if isinstance(given, JointTrajectory) else None, read)
+    before = given.stop - given.start if isinstance(given, JointTrajectory) else None
+    return _Result(model, retimed, free, before, read)
 
 
 def _write_result(result: _Result, files: tuple[Path, Path | None], figure: Path | None, output: TableOutput) -> None:
@@ -276,7 +278,7 @@ def _write_result(result: _Result, files: tuple[Path, Path | None], figure: Path
         names = [file.name for file in files if file is not None]
         say(retimed_words(retimed, result.before, result.free, names, result.read))
         show_table(binding_table(retimed))
-    output.write(lambda: sampled(retimed))
+    output.write(lambda: joint_table(result.system, retimed, retimed.times, retimed.report.robot))
     if figure is not None:
         from jounce.plot import save
         from jounce.plot.charts.retiming import draw_retiming
@@ -297,15 +299,3 @@ def _at_rate(
         return fit_to_samples(model, retimed, bounds, rate, degree=degree, lasting=lasting)
     except JounceError as error:
         raise error.located(name="--rate") from None
-
-
-def sampled(retimed: RetimedTrajectory) -> Any:
-    """Return the positions of the joints, and their derivatives to jerk, at the instants of a trajectory."""
-    import xarray
-
-    from jounce.units.shown_units import time_axes
-
-    values = retimed.derivatives(retimed.times, ROWS)
-    variables = {name: (("time", "derivative"), values[:, :, k]) for k, name in enumerate(retimed.names)}
-    axes = time_axes(retimed.times, ROWS + 1)
-    return xarray.Dataset(variables, coords=axes, attrs={"title": retimed.report.robot, "source": "jounce"})

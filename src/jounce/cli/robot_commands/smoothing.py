@@ -5,13 +5,18 @@ from __future__ import annotations
 import warnings
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from jounce.cli.options import NO_TABLE, PLAIN_ROBOT, RobotReading, TableOutput, errors_about, spare_inputs, written
-from jounce.cli.robot_commands.retiming import ROWS, deviation_of
+from jounce.cli.robot_commands.joint_tables import joint_table
+from jounce.cli.robot_commands.retiming import deviation_of
 from jounce.cli.robot_commands.servo import frequency_of
 from jounce.errors import SampleWarning
 from jounce.reporting.terminal import say, show_table
+
+if TYPE_CHECKING:
+    from jounce.robot import Robot
+    from jounce.trajectory import JointTrajectory
 
 BLOCK = 50_000  # rows at once
 
@@ -80,7 +85,7 @@ def smooth(
         if words := smoothing_words(motion):
             say(words)
     if output.out is not None:
-        output.write_parts(_parts(motion, times), len(times))
+        output.write_parts(_parts(model, motion, times), len(times))
     if figure is not None:
         from jounce.plot import save
         from jounce.plot.charts.smoothing import draw_smoothing
@@ -92,14 +97,7 @@ def smooth(
     return 0
 
 
-def _parts(motion: Any, times: Any) -> Iterator[Any]:
+def _parts(model: Robot, motion: JointTrajectory, times: Any) -> Iterator[Any]:
     """Yield positions of the joints, and their derivatives to jerk, some instants at a time."""
-    import xarray
-
-    from jounce.units.shown_units import time_axes
-
     for first in range(0, len(times), BLOCK):
-        some = times[first : first + BLOCK]
-        values = motion.derivatives(some, ROWS)
-        variables = {name: (("time", "derivative"), values[:, :, k]) for k, name in enumerate(motion.names)}
-        yield xarray.Dataset(variables, coords=time_axes(some, ROWS + 1), attrs={"source": "jounce"})
+        yield joint_table(model, motion, times[first : first + BLOCK])

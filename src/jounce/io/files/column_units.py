@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from jounce.errors import UnitError
 from jounce.settings import under_own_settings
-from jounce.units.dimensions import TIME, Dimension
+from jounce.units.dimensions import ANGLE, LENGTH, TIME, Dimension
 from jounce.units.shown_units import ShownUnits, unit_size
 
 if TYPE_CHECKING:
@@ -154,3 +154,15 @@ def unit_unread(name: str, dimensions: Iterable[Dimension]) -> str | None:
     matches = (match for base, pattern in _SAID.items() if base in measured and (match := pattern.search(name)))
     match = next(matches, None)
     return None if match is None else "deg" if match[0][0] in "dD" else match[0].lower()
+
+
+def says_a_unit(name: str) -> bool:
+    """Tell whether a name, as the heading of a column, says a unit; a unit in brackets after it counts instead.
+
+    Examples
+    --------
+    >>> says_a_unit("elbow_deg"), says_a_unit("elbow_deg_d1"), says_a_unit("q [1]"), says_a_unit("elbow")
+    (True, True, True, False)
+    """
+    read = name_and_unit(name)[1] or name_and_last_word(name)[1] or unit_unread(name, (ANGLE, LENGTH, TIME))
+    return read is not None
