@@ -6,9 +6,10 @@ import pytest
 import jounce as jn
 from jounce.execution.llvm import programs, self_test
 
-pytestmark = pytest.mark.skipif(
-    not self_test.is_usable(), reason="there is no compiler, or a system where it was not tried"
-)
+pytestmark = [
+    pytest.mark.long,
+    pytest.mark.skipif(not self_test.is_usable(), reason="there is no compiler, or a system where it was not tried"),
+]
 
 
 @pytest.fixture(autouse=True)

@@ -14,9 +14,10 @@ from jounce.mechanism.building.builder import build
 from tests.linear_algebra.test_frontal import chain
 from tests.problems.small import four_bar, slider_crank
 
-pytestmark = pytest.mark.skipif(
-    not self_test.is_usable(), reason="there is no compiler, or a system where it was not tried"
-)
+pytestmark = [
+    pytest.mark.long,
+    pytest.mark.skipif(not self_test.is_usable(), reason="there is no compiler, or a system where it was not tried"),
+]
 SPATIAL = ["rsur", "rssr", "hooke_joint", "bennett", "sarrus", "stewart_platform", "delta_robot"]
 PLANAR = ["six_bar_watt", "jansen_leg", "quick_return", "gear_pair", "wolfrom_train", "peaucellier", "servo_press"]
 

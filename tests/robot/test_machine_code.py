@@ -11,7 +11,10 @@ from jounce.robot.algorithms.inverse_dynamics import generalized_forces
 from jounce.robot.recursions.batches import LEAST_THREADED
 from tests.problems.robots import random_robot, robot_named
 
-pytestmark = pytest.mark.skipif(not is_usable(), reason="there is no compiler, or a system where it was not tried")
+pytestmark = [
+    pytest.mark.long,
+    pytest.mark.skipif(not is_usable(), reason="there is no compiler, or a system where it was not tried"),
+]
 COUNTS = (0, 1, 7, 129, 5000)
 CONTINUOUS = jn.Robot(
     "wheel",

@@ -8,6 +8,8 @@ from jounce import planar
 from jounce.jet import Jet, cross
 from jounce.testing import ContractError, JointReport, check_joint
 
+pytestmark = pytest.mark.long
+
 
 class Frozen(jn.joints.AbstractConstraint, space="planar"):
     """A place that depends on time, whose rates it leaves out."""

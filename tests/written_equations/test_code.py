@@ -16,6 +16,8 @@ from tests.problems.mechanisms import example
 from tests.problems.own_types import taken_back
 from tests.problems.written import at, between_free_bodies, coordinates, differences, from_one, random_states, run
 
+pytestmark = pytest.mark.long
+
 QUICK = "planar-joint-parallel2"
 CASES = [
     pytest.param(case, id=str(case), marks=[] if str(case) == QUICK else pytest.mark.slow)

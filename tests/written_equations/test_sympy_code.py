@@ -13,6 +13,8 @@ from tests.problems.mechanisms import example
 from tests.problems.written import at, between_free_bodies, coordinates, from_one, random_states, run
 from tests.written_equations.test_code import worm
 
+pytestmark = pytest.mark.long
+
 sympy = pytest.importorskip("sympy")
 
 QUICK = "planar-joint-double_revolute"

@@ -13,6 +13,8 @@ from jax import lax
 from jounce.execution.llvm import translation
 from tests.execution.llvm.lanes import COUNT, FEW, assert_agree
 
+pytestmark = pytest.mark.long
+
 MODULUS = 1009
 SIZE = 9  # numbers of an array: more than are single values, and than a vector has
 

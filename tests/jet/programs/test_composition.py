@@ -12,6 +12,8 @@ from jounce.jet.programs import composition
 from jounce.jet.programs.operations import COMPOSED, REARRANGING
 from tests.oracles.mp_taylor import DIGITS, composed, worst
 
+pytestmark = pytest.mark.long
+
 AT = 0.7
 X, Y = jnp.array([0.0, 1.0, 3.0]), jnp.array([0.0, 2.0, -1.0])
 M = jnp.array([[1.0, 2.0], [3.0, 4.0]])

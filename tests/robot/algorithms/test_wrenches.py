@@ -11,6 +11,8 @@ import jounce as jn
 from jounce.robot.algorithms.wrenches import check_wrenches
 from tests.problems.robots import random_robot, robot_named
 
+pytestmark = pytest.mark.long
+
 ROBOT = random_robot(2, 7)
 LINK, POINT = ROBOT.moving_links[4], (0.1, -0.2, 0.3)
 ORDER = 3
