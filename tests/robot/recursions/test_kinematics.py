@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import jounce as jn
+from jounce.robot.model.arguments import floats
 from tests.problems.robots import coordinates, poses, robot_named
 
 NAMES = ("planar_arm", "mimic", "serial")
@@ -151,6 +152,11 @@ NOTHING = jn.Robot("frame", [jn.Link("base")], [])
             "pin.computeFrameJacobian(model, data, q, frame, LOCAL_WORLD_ALIGNED)",
         ),
         (lambda: jn.inverse_dynamics(PIN, "q.csv"), "q: must be an array of real numbers, got 'str'"),
+        (
+            lambda: floats("q", jn.JointTrajectory({"pin": "t"}, 0.0, 1.0)),
+            "q: must be an array of real numbers; of a trajectory, give derivatives(times, order), q and its rates at "
+            "instants, got 'JointTrajectory'",
+        ),
         (
             lambda: jn.inverse_dynamics(PIN, np.zeros((3, 1), complex)),
             "q: must be an array of real numbers, got 'ndarray'",

@@ -11,7 +11,7 @@ from jounce import errors
 from jounce.base.shapes import Numbers, is_real, real_numbers
 from jounce.errors import RobotError
 from jounce.robot.model.abstract_robot import AbstractRobot
-from jounce.trajectory.joint_trajectory import MAX_ORDER
+from jounce.trajectory.joint_trajectory import MAX_ORDER, JointTrajectory
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -55,6 +55,8 @@ def floats(name: str, values: Any, read: Callable[..., np.ndarray] = real_number
 
 
 def _no_array(message: str, name: str, value: object) -> RobotError:
+    if isinstance(value, JointTrajectory):
+        message = f"{message}; of a trajectory, give derivatives(times, order), q and its rates at instants"
     return RobotError(message, name=name, value=type(value).__name__)
 
 
