@@ -154,8 +154,8 @@ NOTHING = jn.Robot("frame", [jn.Link("base")], [])
         (lambda: jn.inverse_dynamics(PIN, "q.csv"), "q: must be an array of real numbers, got 'str'"),
         (
             lambda: floats("q", jn.JointTrajectory({"pin": "t"}, 0.0, 1.0)),
-            "q: must be an array of real numbers; of a trajectory, give derivatives(times, order), q and its rates at "
-            "instants, got 'JointTrajectory'",
+            "q: must be an array of real numbers, got 'JointTrajectory'; of a trajectory, give "
+            "derivatives(times, order), q and its rates at instants",
         ),
         (
             lambda: jn.inverse_dynamics(PIN, np.zeros((3, 1), complex)),
