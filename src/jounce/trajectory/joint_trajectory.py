@@ -358,10 +358,11 @@ class JointTrajectory(Displayed):
         for name in names:
             law = self.laws[name]
             if isinstance(law, SplineMotion) and (doubt := unsupported_derivative(law.errors, order)):
-                phrases.append((doubt[0], -doubt[1], name, law.degree))
+                phrases.append((doubt[0], -doubt[1], name))
         if phrases:
-            worst, error, name, degree = min(phrases)
-            warnings.warn(SampleWarning(unsupported_words(name, worst, -error, degree)), stacklevel=3)
+            worst, error, name = min(phrases)
+            words = unsupported_words(name, worst, -error, self.laws[name])
+            warnings.warn(SampleWarning(words), stacklevel=3)
 
     def _chosen(self, names: Iterable[str] | None) -> tuple[str, ...]:
         chosen = self.names if names is None else names_of_joints(names)

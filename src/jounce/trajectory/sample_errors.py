@@ -1,6 +1,7 @@
 """What derivatives samples of a motion support: the errors of those of a spline through them."""
 
 import math
+from typing import Any
 
 import numpy as np
 from jaxtyping import Float
@@ -93,13 +94,16 @@ def unsupported_derivative(errors: Float[np.ndarray, " derivative"], order: int)
     return worst, float(known[worst])
 
 
-def unsupported_words(name: str, order: int, error: float, degree: int) -> str:
-    """Word why samples do not support a derivative, and what to do."""
+def unsupported_words(name: str, order: int, error: float, law: Any) -> str:
+    """Word why the samples of a `SplineMotion` do not support a derivative, and what to do."""
     size = "cannot be known from them" if error >= 1 else f"is about {100 * error:.0f} %"
-    if order >= degree:
-        cause = f"splines of degree {degree} have continuous derivatives to order {degree - 1}; choose a higher degree"
+    with_rates = law.joined < law.degree - 1
+    if order >= law.degree:
+        remedy = "leave out the rates beside them" if with_rates else "choose a higher degree"
+        cause = f"splines of degree {law.degree} have continuous derivatives to order {law.joined}; {remedy}"
     else:
-        cause = "sample more often or more exactly, or smooth the samples"
+        remedy = ", smooth them, or leave out the rates beside them" if with_rates else ", or smooth the samples"
+        cause = f"sample more often or more exactly{remedy}"
     return f"samples of '{name}' do not support its derivative of order {order}: its error {size}; {cause}"
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import jounce as jn
-from jounce.errors import TrajectoryError
+from jounce.errors import SampleWarning, TrajectoryError
 from jounce.trajectory import HermiteMotion, HermiteSplineMotion
 
 EVEN = np.linspace(0.0, 2.0, 41)
@@ -73,3 +73,26 @@ def test_points_that_know_fewer_derivatives_than_others():
     with pytest.raises(TrajectoryError, match="finite"):
         HermiteMotion([0, 1], [[0, np.inf], [1, 0]], incomplete=True)
     assert isinstance(jn.laws.HermiteMotion([0.0, 1.0], [[0.0], [1.0]]), HermiteMotion)
+
+
+def test_rounded_rates_are_worse_than_none_which_the_warning_says():
+    times = np.linspace(0.0, 2.0, 201)
+    rounded = np.round(table(times, 2), 8)
+    inside = times[5:-5]
+
+    def error(law):
+        jounce = jn.JointTrajectory({"elbow": law}, 0.0, 2.0).derivatives(inside, 4)[:, 4, 0]
+        return np.abs(jounce - 81 * np.sin(3 * inside)).max()
+
+    with pytest.warns(SampleWarning, match="order 4: .*sample more .*leave out the rates beside them"):
+        with_rates = error(HermiteSplineMotion(times, rounded))
+    with pytest.warns(SampleWarning, match="or smooth the samples$"):
+        alone = error(jn.laws.SplineMotion(times, rounded[:, 0]))
+    assert alone < with_rates / 3
+
+
+def test_above_its_degree_the_rates_are_what_is_too_much():
+    times = np.linspace(0.0, 2.0, 81)
+    law = HermiteSplineMotion(times, table(times, 2))
+    with pytest.warns(SampleWarning, match="degree 5 .*to order 3; leave out the rates beside them"):
+        jn.JointTrajectory({"elbow": law}, 0.0, 2.0).derivatives(times, 6)

@@ -88,5 +88,4 @@ def _motions(element: AbstractConstraint | AbstractForce) -> Iterator[tuple[str,
 def _warn(location: str, law: SplineMotion, order: int) -> None:
     """Warn of the lowest derivative that the samples of a law do not support."""
     if (doubt := unsupported_derivative(law.errors, order)) is not None:
-        words = unsupported_words(location, *doubt, law.degree)
-        warn_caller(SampleWarning(words))
+        warn_caller(SampleWarning(unsupported_words(location, *doubt, law)))
