@@ -4,7 +4,17 @@ import enum
 
 
 class Status(enum.IntEnum):
-    """Outcome at one instant."""
+    """Outcome at one instant of a motion; at all but OK, its results are NaN.
+
+    Examples
+    --------
+    >>> import jounce as jn
+    >>> motion = jn.solve(jn.load("examples/four_bar.yaml"), [0.0, 0.1], order=1)
+    >>> [jn.Status(code).name for code in motion.status]
+    ['OK', 'OK']
+    >>> jn.Status.NOT_ASSEMBLED.advice
+    "the bodies cannot be assembled; check lengths and the driver's range"
+    """
 
     OK = 0
     NOT_ASSEMBLED = 1

@@ -80,6 +80,12 @@ class Motion(Tabulated):
 
     It is assembled from the Taylor coefficients of the coordinates of all bodies, or what computes them, and the
     derivatives of the outputs, (order + 1, components, instances, time) for each group.
+
+    Examples
+    --------
+    >>> import jounce as jn
+    >>> jn.solve(jn.load("examples/four_bar.yaml"), [0.0, 0.1], order=1).outputs["C"].shape
+    (2, 2, 2)
     """
 
     traced = False  # by JAX

@@ -32,6 +32,11 @@ class Limits:
     deceleration : float or None
         Largest absolute value of the acceleration while it slows the joint down, where it has the sign opposite to the
         velocity; `acceleration` holds there too unless this is given.
+
+    Examples
+    --------
+    >>> import jounce as jn
+    >>> limits = jn.Limits(velocity=3.0, effort_rate=500.0)  # rad/s, N m/s
     """
 
     lower: float | None = None
@@ -128,6 +133,11 @@ class Link:
     ------
     RobotError
         If the inertia is none, or the share is not finite.
+
+    Examples
+    --------
+    >>> import jounce as jn
+    >>> rod = jn.Link("rod", jn.Inertia(1.2, center_of_mass=[0.25, 0, 0], tensor=[0, 0.03, 0.03]))
     """
 
     name: str
@@ -179,6 +189,15 @@ class Joint:
     RobotError
         If the type is not known, a value is not finite or has another shape, the axis has no length, the rotation is
         none, or armature, damping, friction or stiffness is negative.
+
+    Examples
+    --------
+    >>> import jounce as jn
+    >>> pin = jn.Joint("pin", "base", "rod", axis=[0, -1, 0], damping=0.3)  # turns up from x toward z
+    >>> rod = jn.Link("rod", jn.Inertia(2.0, center_of_mass=[0.5, 0, 0], tensor=[0, 0.1, 0.1]))
+    >>> pendulum = jn.Robot("pendulum", [jn.Link("base"), rod], [pin])
+    >>> jn.inverse_dynamics(pendulum, [[0.0], [1.0], [0.0]]).round(6).tolist()  # 2 * 9.81 * 0.5 + 0.3 N m
+    [[10.11]]
     """
 
     name: str
