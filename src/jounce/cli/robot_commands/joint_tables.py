@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
-import numpy as np
-from jaxtyping import Float
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     import xarray
@@ -18,7 +15,7 @@ ROWS = 3  # derivatives that are written
 
 
 def joint_table(
-    system: Robot | Mechanism, trajectory: JointTrajectory, times: Float[np.ndarray, " time"], title: str | None = None
+    system: Robot | Mechanism, trajectory: JointTrajectory, times: Any, title: str | None = None
 ) -> xarray.Dataset:
     """Return the positions of joints of a robot, or of drivers, to their jerk at instants."""
     import xarray

@@ -297,6 +297,7 @@ class _Description(Pass):
     def of(self, closed: ClosedJaxpr, arguments: Sequence[Any] = ()) -> list[Any]:
         del arguments
         given = [self._argument(k, v.aval) for k, v in enumerate(closed.jaxpr.invars)]
+        self._lines.append(f"of {given}")  # also of arguments that it does not read
         self._lines.append(f"return {super().of(closed, given)}")
         return self.values
 
