@@ -169,13 +169,8 @@ class _Runs:
         limits: RunLimits,
         method: AbstractMethod,
     ):
-        self.parametric, self.instants, self.order, self.limits, self.method = (
-            parametric,
-            instants,
-            order,
-            limits,
-            method,
-        )
+        self.parametric, self.instants, self.order = parametric, instants, order
+        self.limits, self.method = limits, method
         self.width = min(LANES, power_of_two(len(rows)))
         self.steps, self.backends = np.zeros(len(rows), int), set[str]()
         self._made = parametric.of(rows)
