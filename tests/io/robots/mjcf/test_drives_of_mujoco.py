@@ -100,3 +100,17 @@ def test_what_of_a_tendon_is_not_linear_is_reported(tmp_path):
     path.write_text(ARM.replace('springlength="0.2"', 'springlength="0.1 0.3"'))
     with pytest.warns(jn.errors.RobotWarning, match=r"of tendons: line \(line 9\)"):
         jn.load_robot(path)
+
+
+def test_the_armature_of_a_tendon_couples_branches(tmp_path):
+    """Two carts of 1 kg, a length of x - 2 y: the kinetic energy is that of the carts and 3 (x' - 2 y')^2 / 2."""
+    cart = (
+        '<body><joint name="{}" type="slide" axis="1 0 0"/><inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/></body>'
+    )
+    line = '<fixed armature="3"><joint joint="x" coef="1"/><joint joint="y" coef="-2"/></fixed>'
+    path = tmp_path / "robot.xml"
+    path.write_text(
+        f"<mujoco><worldbody>{cart.format('x')}{cart.format('y')}</worldbody><tendon>{line}</tendon></mujoco>"
+    )
+    matrix = jn.mass_matrix(jn.load_robot(path, strict=True), [0.0, 0.0])
+    np.testing.assert_allclose(matrix, [[4, -6], [-6, 13]], rtol=0, atol=1e-14)

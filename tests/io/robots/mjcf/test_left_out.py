@@ -182,3 +182,66 @@ def test_a_weld_of_bodies_that_are_fixed_already_is_left_out(tmp_path):
         assert not jn.load_robot(path).closures
     with pytest.raises(jn.errors.RobotFileError, match="a and b are fixed to one another, and need no closure"):
         jn.load_robot(path, strict=True)
+
+
+def stepped(tmp_path, joint="", after=""):
+    """Return how far a weightless knee is bent ten seconds after it was let go at half a radian."""
+    path = written(tmp_path, 'gravity="0 0 0"', "", f'damping="0.5" {joint}', after)
+    model = mujoco.MjModel.from_xml_path(str(path))
+    data = mujoco.MjData(model)
+    data.qpos[1] = 0.5
+    for _ in range(5000):
+        mujoco.mj_step(model, data)
+    return data.qpos[1]
+
+
+@pytest.mark.parametrize(
+    "joint, after, part",
+    [
+        ('stiffness="9" springyield="10"', "", 'springyield="10"'),
+        ("", TENDON.format('stiffness="9" springyield="0.2"'), 'springyield="0.2"'),
+    ],
+)
+def test_springs_that_yield_are_reported(tmp_path, joint, after, part):
+    """MuJoCo brings the knee back to where the spring has yielded to, and to zero without yielding."""
+    assert stepped(tmp_path, joint, after) > 0.2
+    assert abs(stepped(tmp_path, joint.replace(part, ""), after.replace(part, ""))) < 0.01
+    path = written(tmp_path, "", "", joint, after)
+    with pytest.warns(jn.errors.RobotWarning, match=r"yielding of springs: (knee \(line 5\)|cord \(line 7\)); make"):
+        load_robot(path)
+
+
+@pytest.mark.parametrize("flag, acts", [("", True), (FLAG.format("actuation"), False)])
+def test_actuators_without_an_input_are_reported(tmp_path, flag, acts):
+    """A motor whose terminals are shorted brakes; it has no control that could be left out."""
+    after = '<actuator><dcmotor name="brake" joint="knee" input="none" motorconst="0.3" resistance="2"/></actuator>'
+    path = written(tmp_path, flag, "", "", after)
+    model = mujoco.MjModel.from_xml_path(str(path))
+    data = mujoco.MjData(model)
+    data.qvel[1] = 2.0
+    mujoco.mj_forward(model, data)
+    assert data.qfrc_actuator[1] == pytest.approx(-2.0 * 0.3**2 / 2 if acts else 0.0)
+    if acts:
+        with pytest.warns(jn.errors.RobotWarning, match=r"actuators without an input: brake \(line 7\); make"):
+            load_robot(path)
+    else:
+        load_robot(path, strict=True)
+
+
+@pytest.mark.parametrize(
+    "joint, after, says",
+    [
+        ('type="ball" range="0 40"', "", r"ranges of balls: knee \(line 5\); make"),
+        ("", TENDON.format('range="-0.1 0.2"'), r"ranges of tendons: cord \(line 7\); make"),
+        ('type="ball" range="0 40" limited="false"', "", None),
+        ("", TENDON.format('range="-0.1 0.2" limited="false"'), None),
+    ],
+)
+@pytest.mark.parametrize("flag", ["", FLAG.format("limit")])
+def test_ranges_that_are_not_limits_of_a_joint_are_reported(tmp_path, joint, after, says, flag):
+    path = written(tmp_path, flag, "", joint, after)
+    if says is None or flag:
+        load_robot(path, strict=True)
+    else:
+        with pytest.warns(jn.errors.RobotWarning, match=says):
+            load_robot(path)

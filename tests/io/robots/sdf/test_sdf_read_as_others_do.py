@@ -64,6 +64,16 @@ def test_names_of_models_stand_for_their_frames(tmp_path):
     assert (robot.joints["j"].parent, robot.joints["j"].child) == ("a", "n::c")
 
 
+def test_a_nested_model_may_place_the_model_that_holds_it(tmp_path):
+    """Its frame, turned by a quarter at (1, 0, 0), is put at (0, 0, 5): what was at the origin is at (0, 1, 5)."""
+    nested = f'<model name="n"><pose>1 0 0 0 0 {np.pi / 2}</pose>{link("c")}</model>'
+    parts = ["<pose>0 0 5 0 0 0</pose>", link("a"), nested, joint("held", "world", "a", "fixed"), joint("j", "a", "n")]
+    robot = read(tmp_path, model(*parts, attributes='placement_frame="n"'), strict=True)
+    for name, place in (("a", [0, 1, 5]), ("n::c", [0, 0, 5])):
+        position = jn.forward_kinematics(robot, np.zeros((1, 1)), name).position[0]
+        np.testing.assert_allclose(position, place, rtol=0, atol=1e-15)
+
+
 def test_old_files_name_links_and_joints_alike(tmp_path):
     parts = [link("a"), link("b"), joint("b", "a", "b")]
     robot = read_with_warning(tmp_path, model(*parts, version="1.6"), "have the name of a link.*: b")

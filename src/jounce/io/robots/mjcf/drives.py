@@ -9,7 +9,7 @@ import numpy as np
 
 from jounce.robot.model.couplings import BallDrive, Tendon
 
-OF_CONSTRAINTS = ("FRICTIONLOSS", "EQUALITY")  # which the flag of all constraints switches off, too
+OF_CONSTRAINTS = ("FRICTIONLOSS", "EQUALITY", "LIMIT")  # which the flag of all constraints switches off, too
 OF_BALL = {"armature": "armature", "damping": "damping", "friction": "frictionloss"}
 
 

@@ -13,8 +13,13 @@ from jounce.io.robots.mjcf.files import line_of
 
 COMPENSATION = "gravity compensation of bodies"
 FLUID = "forces of the fluid around"
+YIELD = "yielding of springs"
+UNCONTROLLED = "forces of actuators without an input"
+RANGE_OF_BALLS = "ranges of balls"
+RANGE_OF_TENDONS = "ranges of tendons"
 OF_TENDONS = {
     "stiffness": "springs of tendons",
+    "springyield": YIELD,
     "damping": "damping of tendons",
     "frictionloss": "friction of tendons",
     "armature": "armature of tendons",
@@ -51,6 +56,16 @@ def left_out_of_spec(spec: Any, mujoco: Any) -> list[LeftOut]:
                 value = np.ravel(getattr(part, key))
                 if value.any() and on(key) and (key not in read or value[1:].any()):
                     left.append(LeftOut(heading, name, line_of(part.info), f"{kind}s.{name}.{key}", _plain(value)))
+    for k, actuator in enumerate(spec.actuators if on("actuation") else ()):
+        if actuator.ctrlspec == int(mujoco.mjtCtrlInput.mjINPUT_NONE):  # friction and cogging of a motor, its brake
+            name = actuator.name or f"actuator_{k}"
+            left.append(LeftOut(UNCONTROLLED, name, line_of(actuator.info), f"actuators.{name}.input", "none"))
+    for k, tendon in enumerate(spec.tendons if on("range") else ()):
+        automatic = spec.compiler.autolimits and tendon.limited == int(mujoco.mjtLimited.mjLIMITED_AUTO)
+        if tendon.limited == int(mujoco.mjtLimited.mjLIMITED_TRUE) or (automatic and tendon.range[0] < tendon.range[1]):
+            name = tendon.name or f"tendon_{k}"
+            where = f"tendons.{name}.range"
+            left.append(LeftOut(RANGE_OF_TENDONS, name, line_of(tendon.info), where, tendon.range.tolist()))
     return left
 
 
@@ -84,6 +99,10 @@ def left_out_of_model(
         stiffness = np.array([model.jnt_stiffness[j], *model.jnt_stiffnesspoly[j]])
         if stiffness.any() and on("stiffness") and free[j] and not single_spring(model, j):
             yield LeftOut(JOINT_SPRINGS, name, None, f"joints.{name}.stiffness", _plain(stiffness))
+        elif stiffness.any() and on("stiffness") and free[j] and model.jnt_springyield[j]:
+            yield LeftOut(YIELD, name, None, f"joints.{name}.springyield", float(model.jnt_springyield[j]))
+        if model.jnt_limited[j] and model.jnt_type[j] == int(mujoco.mjtJoint.mjJNT_BALL) and on("range"):
+            yield LeftOut(RANGE_OF_BALLS, name, None, f"joints.{name}.range", float(model.jnt_range[j, 1]))
     passive = on("stiffness") or on("damping")  # MuJoCo leaves out all such forces where it leaves out both
     falls = model.opt.gravity.any() and on("gravity")
     matters = passive and falls and model.jnt_actgravcomp.any()  # else bodies feel less of gravity
@@ -108,6 +127,7 @@ def _moved_by(model: Any, body: int) -> Iterable[int]:
 def _working(flags: int, mujoco: Any) -> Callable[[str], bool]:
     """Return whether MuJoCo computes what belongs to an attribute, or the file switches it off."""
     parts = {"stiffness": "SPRING", "damping": "DAMPER", "frictionloss": "FRICTIONLOSS", "gravity": "GRAVITY"}
+    parts |= {"springyield": "SPRING", "actuation": "ACTUATION", "range": "LIMIT"}
     return lambda key: key not in parts or works(flags, parts[key], mujoco)
 
 

@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 
-from jounce.errors import no_such
 from jounce.io.robots.elements.xml_elements import Element
 from jounce.io.robots.sdf.poses import MODEL, WORLD, FramePose, Frames, pose_of
 
@@ -47,10 +46,7 @@ def placed(model: Element) -> FramePose:
     frame, pose = model.attributes.get("placement_frame", "").strip(), pose_of(model)
     if not frame:
         return pose
-    elements = named(model)
-    if frame != MODEL and frame not in elements:
-        raise model.error(no_such("link, joint or frame", frame, elements), "placement_frame", value=frame)
-    here = Frames(model, elements).pose(frame)
+    here = Frames(model, named(model)).of(frame, model, "placement_frame")
     return pose.then(FramePose(np.zeros(3), np.eye(3)).seen_from(here))
 
 
