@@ -48,7 +48,7 @@ from jounce.kinematics.sensitivity.traced_motion import TracedMotion
 from jounce.kinematics.status import Status
 from jounce.mechanism import Mechanism, Model
 from jounce.mechanism.building.preconditions import check_holonomic
-from jounce.mechanism.building.traced import Angles, angles_of, template, traced_model, traced_values
+from jounce.mechanism.building.traced import Angles, angles_of, template, traced_model
 from jounce.mechanism.outputs.base import lost_orders
 from jounce.mechanism.transmissions.axis_angles import measures_angle
 
@@ -105,17 +105,17 @@ def _recorded(
     simulate: Callable[..., Simulation], mechanism: Mechanism, options: Mapping[str, Any]
 ) -> tuple[Simulation, Mechanism] | None:
     """Return the simulation at the values that JAX traces, and the mechanism that has them; None if it knows none."""
-    made = template(mechanism)
+    values, made = template(mechanism)
 
     def simulated(values: tuple[Any, ...]) -> tuple[Simulation, Mechanism]:
         known = made(values)
         return simulate(known, **options), known
 
-    return recorded(simulated, _values(mechanism))
+    return recorded(simulated, _as_floats(values))
 
 
-def _values(mechanism: Mechanism) -> tuple[Any, ...]:
-    return tuple(jnp.asarray(value, float) for value in traced_values(mechanism))
+def _as_floats(values: list[Any]) -> tuple[Any, ...]:
+    return tuple(jnp.asarray(value, float) for value in values)
 
 
 def _called(simulate: Callable[..., Any], mechanism: Mechanism, options: Mapping[str, Any]) -> TracedMotion:
@@ -126,7 +126,7 @@ def _called(simulate: Callable[..., Any], mechanism: Mechanism, options: Mapping
         instants = instants_of(time, mechanism.parameter_values)
     except ConcretizationTypeError:
         raise UnsupportedError("the instants depend on values that JAX traces; give them", name="time") from None
-    made, levels = template(mechanism), order + max(lost_orders(mechanism.outputs.values()), 1) + 1
+    (values, made), levels = template(mechanism), order + max(lost_orders(mechanism.outputs.values()), 1) + 1
     shapes = solved_shapes(mechanism, len(instants), levels)
     options = {**options, "time": instants, "strict": False}
 
@@ -138,7 +138,7 @@ def _called(simulate: Callable[..., Any], mechanism: Mechanism, options: Mapping
             return failed(shapes, status)
         return motion.solved if motion.traced else _solved(motion, dict(motion.poses[1]))
 
-    solved = called(solved_at, shapes, _values(mechanism))
+    solved = called(solved_at, shapes, _as_floats(values))
     model = traced_model(mechanism, solved.length, solved.angles, first_of(solved.coordinates))
     check_not_redundant(model)
     return TracedMotion(mechanism, (model, model), instants, order, solved)

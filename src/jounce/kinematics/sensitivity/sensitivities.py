@@ -31,7 +31,8 @@ from jounce.kinematics.sensitivity.jacobian_series import jacobian_series, solve
 from jounce.kinematics.status import Status
 from jounce.mechanism import Mechanism, Model, with_output_drivers
 from jounce.mechanism.building.builder import grouped_elements
-from jounce.mechanism.building.traced import Angles, Part, angles_of, template, traced_model, traced_values
+from jounce.mechanism.building.preconditions import holds_tracer
+from jounce.mechanism.building.traced import Angles, Part, angles_of, template, traced_model
 from jounce.mechanism.laws.output_drivers import output_laws, without_output_laws
 from jounce.mechanism.system import System, movable
 from jounce.mechanism.transmissions.axis_angles import measures_angle
@@ -43,7 +44,7 @@ from jounce.trajectory import Expression
 
 Solve = Callable[[Mechanism, bool], Motion]
 Values = tuple[Any, ...]
-"""What JAX traces in a mechanism, in the order of `traced_values`."""
+"""What JAX traces in a mechanism, in the order of `template`."""
 
 
 class Solved(NamedTuple):
@@ -93,9 +94,9 @@ def differentiable_motion(
         Solves a mechanism of plain numbers at the instants, strictly or not. What it raises where JAX knows the numbers
         is raised; elsewhere a motion that cannot be begun is NaN.
     """
-    made, driven = template(mechanism), _builder(mechanism, with_output_drivers)
+    (given, made), driven = template(mechanism), _builder(mechanism, with_output_drivers)
     shown = _builder(mechanism, without_output_laws) if output_laws(mechanism) else driven
-    values = tuple(x if x.dtype == np.float64 else x.astype(float) for x in traced_values(mechanism))
+    values = tuple(x if x.dtype == np.float64 else x.astype(float) for x in given)
     shapes = solved_shapes(mechanism, len(instants), levels)
 
     def on_the_host(strict: bool, values: Values) -> Solved:
@@ -126,12 +127,11 @@ def differentiable_motion(
         return solved, still._replace(coordinates=driven.change(values, changes, solved, instants))
 
     solved = solution(values)
-    first = first_of(solved.coordinates)
-    model = driven(values, solved.length, solved.angles, first)
+    model = driven(values, solved.length, solved.angles, solved.coordinates)
     if shown is driven:
         return solved, (model, model)
     angles = solved.angles._replace(angle=(solved.driven, *solved.angles.angle[1:]))
-    return solved, (model, shown(values, solved.length, angles, first))
+    return solved, (model, shown(values, solved.length, angles, solved.coordinates))
 
 
 def solved_shapes(mechanism: Mechanism, count: int, levels: int) -> Solved:
@@ -221,20 +221,24 @@ class _Builder:
     """
 
     def __init__(self, mechanism: Mechanism, made_of: Callable[[Mechanism], Mechanism], *, again: bool):
-        self._made, self._made_of, self._models = template(mechanism), made_of, {}
+        (_, self._made), self._made_of, self._models = template(mechanism), made_of, {}
         self._make, self.change = self._numbers, self._change
         if again:
             self._make = jax.jit(self._numbers, static_argnames="counted")
             self.change = Compiled(self._change, ())
 
-    def __call__(self, values: Values, length: Any, angles: Angles | None, first: Any) -> Model:
-        """Return the model; see `traced_model`."""
-        numbers, which = self.numbers(values, length, angles, first)
+    def __call__(self, values: Values, length: Any, angles: Angles | None, coordinates: Any) -> Model:
+        """Return the model; see `traced_model`, and `numbers`."""
+        numbers, which = self.numbers(values, length, angles, coordinates)
         return self.model(numbers, which, angles is not None)
 
-    def numbers(self, values: Values, length: Any, angles: Angles | None, first: Any) -> tuple[list[Any], Any]:
-        """Return those numbers of a system that depend on what is traced, and which of its leaves they are."""
-        numbers = self._make(values, length, angles, first, counted=angles is not None)
+    def numbers(self, values: Values, length: Any, angles: Angles | None, coordinates: Any) -> tuple[list[Any], Any]:
+        """Return those numbers of a system that depend on what is traced, and which of its leaves they are.
+
+        The coordinates are Taylor coefficients of a motion; its first position is used. JAX takes longer for a part of
+        an array than for a program that is given the whole.
+        """
+        numbers = self._make(values, length, angles, coordinates, counted=angles is not None)
         return numbers, self._models[angles is not None][2]
 
     def model(self, numbers: Sequence[Any], which: tuple[int, ...], counted: bool) -> Model:
@@ -245,8 +249,8 @@ class _Builder:
             whole[k] = number
         return dataclasses.replace(model, system=jax.tree.unflatten(structure, whole))
 
-    def _numbers(self, values: Values, length: Any, angles: Any, first: Any, *, counted: bool) -> list[Any]:
-        model = traced_model(self._made_of(self._made(values)), length, angles, first)
+    def _numbers(self, values: Values, length: Any, angles: Any, coordinates: Any, *, counted: bool) -> list[Any]:
+        model = traced_model(self._made_of(self._made(values)), length, angles, first_of(coordinates))
         check_not_redundant(model)
         leaves, structure = jax.tree.flatten(model.system)
         which = tuple(k for k, leaf in enumerate(leaves) if isinstance(leaf, Tracer))
@@ -261,13 +265,12 @@ class _Builder:
         regular = solved.status == int(Status.OK)
         coordinates = {name: _where(regular, c, c[..., :1]) for name, c in solved.coordinates.items()}
         instants = jnp.where(regular, instants, instants[0])
-        first = first_of(coordinates)
-        moved = {name: jnp.zeros_like(x) for name, x in first.items()}
+        first = {name: x[:1, ..., :1] for name, x in coordinates.items() if name != "angular_velocity"}
+        moved = jax.tree.map(jnp.zeros_like, first)
         if any(solved.angles.angle):  # they are counted from the first position, which moves too
             system, slope, which = _linear(self, (solved.length, None), values, changes, first, moved)
-            start = {name: x[None] for name, x in first.items()}
-            moved = _moved(system, slope, which, start, instants[:1])
-            moved = {name: moved[name][0] for name in first}
+            changed = _moved(system, slope, which, first, instants[:1])
+            moved = {name: changed[name] for name in first}
         system, slope, which = _linear(self, (solved.length, solved.angles), values, changes, first, moved)
         change = _moved(system, slope, which, coordinates, instants)
         return {name: _where(regular, c, jnp.zeros_like(c)) for name, c in change.items()}
@@ -285,10 +288,10 @@ def _builder(mechanism: Mechanism, made_of: Callable[[Mechanism], Mechanism]) ->
     numbers = {name: value for name, value in mechanism.parameters.items() if not isinstance(value, Tracer)}
     plain = tuple((n, x if isinstance(x, str | Expression) else float(x)) for n, x in numbers.items())
     fields = [field.name for field in dataclasses.fields(mechanism) if field.name != "parameters"]
-    fields_of_mechanism = [getattr(mechanism, name) for name in fields]
-    if traced_values(fields_of_mechanism) or (own := _users_code(mechanism)) is None:
+    given = {name: getattr(mechanism, name) for name in fields}
+    if holds_tracer(given) or (own := _users_code(mechanism)) is None:
         return _Builder(mechanism, made_of, again=False)
-    key = (made_of, tuple(map(id, fields_of_mechanism)), tuple(mechanism.parameters), plain, own)
+    key = (made_of, tuple(map(id, given.values())), tuple(mechanism.parameters), plain, own)
     if key not in _builders:
         while len(_builders) >= MOST_BUILDERS:
             _builders.pop(next(iter(_builders)))

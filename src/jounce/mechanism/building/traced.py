@@ -50,36 +50,24 @@ class Angles(NamedTuple):
     near: tuple[Part, Part]
 
 
-def traced_values(tree: Any) -> list[Any]:
-    """Return the values that JAX traces in a mechanism, or in any nesting of dataclasses, mappings and sequences."""
+def template(tree: Any) -> tuple[list[Any], Callable[[Sequence[Any]], Any]]:
+    """Return the values that JAX traces in a mechanism, and what makes it again from others in their places.
+
+    The second holds none of them. Numbers become plain ones on the way, as a mechanism is checked for.
+    """
     values: list[Any] = []
 
-    def seen(value: Any) -> Any:
+    def taken(value: Any) -> Any:
         values.append(value)
-        return value
+        return _PLACEHOLDER
 
-    _mapped(tree, seen)
-    return values
-
-
-def with_values(tree: Any, values: Sequence[Any]) -> Any:
-    """Return a mechanism with other values in the places of those that JAX traces, in the order of `traced_values`."""
-    left = iter(values)
-    return _mapped(tree, lambda _: next(left))
-
-
-def template(tree: Any) -> Callable[[Sequence[Any]], Any]:
-    """Return what makes a mechanism again from values in the places of those that JAX traces, and holds none of them.
-
-    Numbers become plain ones on the way, as a mechanism is checked for.
-    """
-    holder = _mapped(tree, lambda _: _PLACEHOLDER)
+    holder = _mapped(tree, taken)
 
     def made(values: Sequence[Any]) -> Any:
         left = iter(values)
         return _mapped(holder, lambda _: next(left))
 
-    return made
+    return values, made
 
 
 class _Placeholder:
