@@ -184,6 +184,21 @@ def test_a_weld_of_bodies_that_are_fixed_already_is_left_out(tmp_path):
         jn.load_robot(path, strict=True)
 
 
+@pytest.mark.parametrize("ends", ['body1="hand"', 'body1="hand" body2="other"'])
+def test_a_weld_of_bodies_that_only_a_user_moves_is_left_out(tmp_path, ends):
+    path = tmp_path / "robot.xml"
+    geom = '<geom size="0.1"/>'
+    mocap = "".join(f'<body name="{name}" mocap="true">{geom}</body>' for name in ("hand", "other"))
+    path.write_text(
+        f"<mujoco><worldbody>{mocap}<body><joint/>{geom}</body></worldbody>"
+        f'<equality><weld name="w" {ends}/></equality></mujoco>'
+    )
+    with pytest.warns(jn.errors.RobotWarning, match="closures of links that are fixed to one another: w"):
+        robot = jn.load_robot(path)
+    assert not robot.closures
+    assert robot.joint_names == ("joint_0",)
+
+
 def stepped(tmp_path, joint="", after=""):
     """Return how far a weightless knee is bent ten seconds after it was let go at half a radian."""
     path = written(tmp_path, 'gravity="0 0 0"', "", f'damping="0.5" {joint}', after)

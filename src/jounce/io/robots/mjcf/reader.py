@@ -242,6 +242,9 @@ class _Reader:
             if kind in (int(kinds.mjEQ_CONNECT), int(kinds.mjEQ_WELD)):
                 closure = self._closure(k, names[k])
                 rigid = [int(model.body_weldid[self.bodies.index(link)]) for link in closure.links]
+                rigid = [
+                    0 if model.body_mocapid[body] >= 0 else body for body in rigid
+                ]  # which stay where they are here
                 if rigid[0] == rigid[1]:
                     message = f"{closure.links[0]} and {closure.links[1]} are fixed to one another, and need no closure"
                     self.faults.leave_out(FIXED_ALREADY, names[k], RobotFileError(message, **location))
