@@ -237,3 +237,17 @@ def test_a_change_point_is_reported_as_singular_and_not_linearized():
     assert np.allclose([pose["angle"] for pose in found.poses.values()], 0.0, atol=1e-9)
     with pytest.raises(MobilityError, match="the position is singular"):
         jn.linearize(found)
+
+
+def test_an_equilibrium_of_a_spring_alone_is_listed_once_where_nothing_loads_it():
+    """A slider on the y axis and a spring of length 1.2 to (1, 0): 0 is unstable, sqrt(0.44) free of all load."""
+    slider = jn.Mechanism(
+        space="planar",
+        bodies={"slider": jn.Body([0, 0.3], mass=2.0, inertia=0.1)},
+        joints={"guide": planar.Prismatic(("ground", "slider"), [0, 0], [0, 0], [0, 1], [0, 1])},
+        forces={"spring": forces.Spring(("ground", "slider"), [1, 0], [0, 0], stiffness=1000.0, length=1.2)},
+    )
+    found = jn.dynamics.equilibria(slider, starts=5, seed=1)
+    assert [one.stability for one in found] == ["stable", "unstable"]
+    heights = [one.poses["slider"]["position"][1] for one in found]
+    np.testing.assert_allclose(heights, [np.sqrt(0.44), 0.0], atol=1e-12)

@@ -94,8 +94,8 @@ def search(start: OperatingPoint, *, settle: bool) -> SearchResult:
         left = free.T @ point.loads.sum(axis=0)
         if not free.shape[1]:
             return SearchResult(point, left, True)
-        stiffness = free.T @ point.varied(np.stack([free, *[np.zeros_like(free)] * 2]))[0].sum(axis=0)
-        scale = max(_scale(point), float(np.abs(stiffness).max()), 1e-300)
+        stiffness = _stiffness(point)
+        scale = _scale(point, stiffness)
         step = free @ _step(left, stiffness, scale, settle=settle)
         size = float(np.max(np.abs(step), initial=0.0))
         if size <= CLOSED:
@@ -120,7 +120,21 @@ def _ended(point: OperatingPoint, scale: float) -> SearchResult:
     return SearchResult(point, left, bool(np.abs(left).max(initial=0.0) <= BALANCED * scale))
 
 
-def _scale(point: OperatingPoint) -> float:
+def load_scale(point: OperatingPoint) -> float:
+    """Return the size of the largest load, or of those that a unit of displacement would make, N m."""
+    return _scale(point, _stiffness(point) if point.free.shape[1] else np.zeros((0, 0)))
+
+
+def _scale(point: OperatingPoint, stiffness: np.ndarray) -> float:
+    return max(_largest_load(point), float(np.abs(stiffness).max(initial=0.0)), 1e-300)
+
+
+def _stiffness(point: OperatingPoint) -> Float[np.ndarray, "direction direction"]:
+    free = point.free
+    return free.T @ point.varied(np.stack([free, *[np.zeros_like(free)] * 2]))[0].sum(axis=0)
+
+
+def _largest_load(point: OperatingPoint) -> float:
     """Return the size of the largest load: of weight, of any applied force, or of what the constraints bear, N m."""
     borne = point.jacobian.T @ point.multipliers
     largest = [np.abs([*point.loads, borne]).max(initial=0.0)]

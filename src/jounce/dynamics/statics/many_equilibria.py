@@ -6,7 +6,7 @@ import numpy as np
 
 from jounce.base.shapes import Real, Refused
 from jounce.dynamics.forward.initial_state import TOLERANCE
-from jounce.dynamics.statics.equilibrium_search import displaced, rest_point, search
+from jounce.dynamics.statics.equilibrium_search import displaced, load_scale, rest_point, search
 from jounce.dynamics.statics.independent_coordinates import OperatingPoint
 from jounce.dynamics.statics.static_equilibrium import Equilibrium, as_mechanism, at_rest_from, equilibrium_of
 from jounce.errors import MechanismError, whole_number
@@ -138,10 +138,10 @@ def _closed(start: OperatingPoint, coordinates: Coordinates) -> OperatingPoint |
 def _same(one: OperatingPoint, other: OperatingPoint) -> bool:
     """Tell whether two positions are equal up to rounding; whole turns matter only if a force depends on them."""
     a, b = one.coordinates, other.coordinates
-    if np.abs(one.loads - other.loads).max() > SAME * np.abs(one.loads).max():
-        return False
     if np.abs(a["position"][0] - b["position"][0]).max() > SAME * one.model.length:
         return False
     if "angle" in a:
-        return bool(np.abs(np.sin((a["angle"][0] - b["angle"][0]) / 2)).max() <= SAME)
-    return bool((1 - np.abs((a["quaternion"][0] * b["quaternion"][0]).sum(axis=0))).max() <= SAME**2)
+        turned = np.abs(np.sin((a["angle"][0] - b["angle"][0]) / 2)).max() > SAME
+    else:
+        turned = (1 - np.abs((a["quaternion"][0] * b["quaternion"][0]).sum(axis=0))).max() > SAME**2
+    return not turned and bool(np.abs(one.loads - other.loads).max() <= SAME * load_scale(one))
