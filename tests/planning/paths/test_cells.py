@@ -5,7 +5,7 @@ import pytest
 
 import jounce as jn
 from jounce.errors import TrajectoryError
-from jounce.planning.paths.paths import cells_needed, path_of
+from jounce.planning.paths.paths import Between, cells_needed, path_of
 
 SLIDER = jn.Robot(
     "slider",
@@ -48,3 +48,12 @@ def test_a_jerk_is_kept_between_samples_on_a_path_with_a_hundred_waves():
     jerk = np.abs(found.derivatives(np.linspace(0.0, found.stop, 100001), 3)[:, 3, 0]).max()
     assert 0.99 < jerk / 60.0 < 1 + 1e-6
     assert found.report.kept
+
+
+@pytest.mark.parametrize("deviation", [1e-4, 1e-5, 1e-6, 1e-8])
+def test_corners_rounded_more_narrowly_than_looks_are_refused_not_crept_around(deviation):
+    """A time law over 160 cells took days for such a path, whose corners cost milliseconds."""
+    corners = np.array([[0.0, -1.2, 1.5], [0.4, -1.0, 1.2], [1.0, -1.1, 1.0], [1.2, -1.4, 1.3]])
+    path = path_of(corners, ["a", "b", "c"], 2, Between(deviation))
+    with pytest.raises(TrajectoryError, match=r"too finely at s = .*allow a larger deviation"):
+        cells_needed(path, 2)

@@ -1,6 +1,7 @@
 """Paths of joints: positions as functions of a parameter that says nothing of time."""
 
 import dataclasses
+import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -231,20 +232,36 @@ def cells_needed(path: Path, order: int) -> int:
     curves, scale = values[:, order], np.abs(values[:, 1]).max() / length ** (order - 1)
     size = np.ptp(curves[inside], axis=0).max() + SLIGHT * scale
     at, joint, step = 0, 0, 1
+    _check_seen(path, order, s[inside], curves[inside], size)
     for cells in CELLS:
         step = FINEST // (cells * POINTS_IN_CELL)
-        ends = curves[::step]
-        off = np.abs(curves[step // 2 :: step] - (ends[1:] + ends[:-1]) / 2) / size
+        ends, part = curves[::step, None], np.arange(step)[:, None] / step
+        lines = ends[:-1] + (ends[1:] - ends[:-1]) * part
+        off = np.abs(curves[:-1].reshape(lines.shape) - lines).max(axis=1) / size  # a blend may lie between two looks
         off[: int(ENDS * len(off))] = off[int((1 - ENDS) * len(off)) :] = 0.0  # cells are narrow at the ends
         at, joint = divmod(int(np.argmax(off)), off.shape[1])
         if off[at, joint] <= RESOLVED:
             return cells
-    location = path.location(float(s[step // 2 + at * step]))
+    raise _too_fine(path, float(s[step // 2 + at * step]), path.names[joint])
+
+
+def _check_seen(path: Path, order: int, s: np.ndarray, curves: np.ndarray, size: float) -> None:
+    """Raise TrajectoryError where a spline bends so narrowly that it does so between the finest places."""
+    for name, law, curve in zip(path.names, path.laws.values(), curves.T, strict=True):
+        if isinstance(law, SplineMotion) and len(law.coefficients) > order:
+            begins = np.asarray(law.breakpoints, float)
+            own = math.factorial(order) * np.asarray(law.coefficients, float)[order]
+            off = np.where((begins > s[0]) & (begins < s[-1]), np.abs(own - np.interp(begins, s, curve)), 0.0)
+            if off.max() > RESOLVED * max(size, np.ptp(own)):
+                raise _too_fine(path, float(begins[off.argmax()]), name)
+
+
+def _too_fine(path: Path, at: float, name: str) -> TrajectoryError:
     message = (
-        f"the path oscillates or bends too finely at {location} for a time law that keeps limits: "
+        f"the path oscillates or bends too finely at {path.location(at)} for a time law that keeps limits: "
         f"{CELLS[-1]} cells do not resolve it; allow a larger deviation, smooth it, or retime shorter parts of it"
     )
-    raise TrajectoryError(message, name=path.names[joint])
+    return TrajectoryError(message, name=name)
 
 
 def _jumps(law: AbstractMotion, order: int) -> Any:
