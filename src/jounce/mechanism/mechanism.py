@@ -15,12 +15,13 @@ from jounce.mechanism.outputs.base import AbstractQuantity
 from jounce.mechanism.outputs.derivative_outputs import bound
 from jounce.mechanism.redundant_reactions import RedundantReactions, check_redundant_reactions
 from jounce.mechanism.resolve import parameter_value
+from jounce.mechanism.stated_units import check_stated_units
 from jounce.rigid.inertia import Inertia
 from jounce.trajectory import Expression
 from jounce.units.dimensions import Dimension, check_one_of
 from jounce.units.expression import check_parameter_name
 from jounce.units.shown_units import ShownUnits
-from jounce.units.values import parse_value
+from jounce.units.values import parse_value, stated_dimensions
 
 GROUND = "ground"
 CLASSES = {"outputs": AbstractQuantity, "forces": AbstractForce}  # constraints otherwise
@@ -118,8 +119,8 @@ class Mechanism(Displayed):
     outputs : dict of str to AbstractQuantity, optional
         Quantities requested, by name.
     parameters : dict of str to number or str, optional
-        Named values: numbers (SI), or text as in a file: a number with a unit, or an expression of the others. Whether
-        a unit suits where a parameter is used is checked in files only.
+        Named values: numbers (SI), or text as in a file: a number with a unit, or an expression of the others. A unit
+        must suit where the parameter is used.
     gravity : sequence, optional
         Acceleration of free fall in the global frame, (2,) or (3,), m/s^2; zero unless given.
     time : array_like, optional
@@ -186,9 +187,12 @@ class Mechanism(Displayed):
         if not self.bodies:
             raise MechanismError("a mechanism needs at least one moving body", name="bodies", value=dict(self.bodies))
         self._check_names()
-        texts = {name: self._read(name, value) for name, value in self.parameters.items() if isinstance(value, str)}
+        texts = {name: value for name, value in self.parameters.items() if isinstance(value, str)}
+        before = {name: allowed[0] for name, allowed in self.dimensions.items() if len(allowed) == 1}
+        known = stated_dimensions(texts, before) if texts else before
         if texts:
-            object.__setattr__(self, "parameters", {**self.parameters, **texts})
+            values = {name: self._read(name, text, known) for name, text in texts.items()}
+            object.__setattr__(self, "parameters", {**self.parameters, **values})
         object.__setattr__(self, "outputs", bound(self.outputs, self))
         check_redundant_reactions(self.redundant_reactions, (*self.joints, *self.drivers))
         self._check_assembly()
@@ -196,6 +200,9 @@ class Mechanism(Displayed):
             for name, element in elements.items():
                 self._check_element(kind, name, element)
         self._check_columns()
+        if stated := {name: (x,) for name, x in known.items() if name not in self.dimensions}:
+            check_stated_units(self, known)
+            object.__setattr__(self, "dimensions", {**self.dimensions, **stated})
         _ = self.shown_units
 
     def __repr__(self) -> str:
@@ -343,10 +350,9 @@ class Mechanism(Displayed):
             check_name("parameter", name, self.parameters, MechanismError, name="parameters")
         return dataclasses.replace(self, parameters={**self.parameters, **values})
 
-    def _read(self, name: str, text: str) -> Any:
+    def _read(self, name: str, text: str, known: Mapping[str, Dimension]) -> Any:
         """Return the value of a parameter given as text, checked against the dimensions that it may have."""
         others = [other for other in self.parameters if other != name]
-        known = {other: allowed[0] for other, allowed in self.dimensions.items() if len(allowed) == 1}
         allowed = self.dimensions.get(name, ())
         try:
             given = parse_value(text, "any", others, known)

@@ -171,6 +171,39 @@ def parse_value(
     return Value(number)
 
 
+def stated_dimensions(
+    parameters: Mapping[str, object], known: Mapping[str, Dimension] | None = None
+) -> dict[str, Dimension]:
+    """Return the dimensions of those parameters that have a unit, or follow from others that have one.
+
+    Parameters
+    ----------
+    parameters : mapping of str to object
+        Their values, as a file holds them.
+    known : mapping of str to Dimension, optional
+        Those that are known already; they are returned, too.
+
+    Examples
+    --------
+    >>> stated_dimensions({"a": "5 cm", "area": "2*a*a", "n": 3})
+    {'a': (('length', 1),)}
+    >>> stated_dimensions({"half": "a/2", "a": "5 cm"})["half"]
+    (('length', 1),)
+    """
+    dimensions, waiting, count = dict(known or {}), dict(parameters), -1
+    while len(dimensions) > count:
+        count = len(dimensions)
+        for name, raw in list(waiting.items()):
+            try:
+                dimension = parse_value(raw, "any", parameters, dimensions).dimension
+            except JounceError:  # reported with its location
+                continue
+            if dimension is not None:
+                dimensions.setdefault(name, dimension)
+                del waiting[name]
+    return dimensions
+
+
 def _parse_text(
     text: str,
     kind: str,

@@ -29,7 +29,7 @@ from jounce.mechanism.transmissions.gear_frames import check_distances
 from jounce.rigid.euler_parameters import euler_parameters
 from jounce.settings import under_own_settings
 from jounce.trajectory import Expression
-from jounce.units.values import parse_value
+from jounce.units.values import stated_dimensions
 
 _Locations = dict[str, tuple[Location, tuple[FileKey, ...]]]
 """Where in the file the elements of a mechanism stand, by dotted name, and the keys of each."""
@@ -115,7 +115,7 @@ def _validate(source: Source, space: str) -> dict[str, Any]:
     context = {
         "names": names,
         "bodies": dict.fromkeys(("ground", *(bodies if isinstance(bodies, dict) else ()))),
-        "dimensions": _dimensions(parameters) if names else {},
+        "dimensions": stated_dimensions(parameters) if isinstance(parameters, dict) else {},
         "uses": dict.fromkeys(names, ()),
         "drivers": _driven_quantities(source.data.get("drivers"), space),
         "outputs": outputs if isinstance(outputs := source.data.get("outputs"), dict) else {},
@@ -140,23 +140,6 @@ def _driven_quantities(drivers: object, space: str) -> dict[str, str]:
         quantity = next((key.quantity for key in file_keys(kind) if key.kind == "motion"), "any") if kind else "any"
         quantities[name] = at_coordinate(quantity, given.get("coordinate"))
     return quantities
-
-
-def _dimensions(parameters: dict[str, Any]) -> dict[str, Any]:
-    """Return the dimensions of those parameters that have a unit, or follow from others that have one."""
-    dimensions: dict[str, Any] = {}
-    waiting, count = dict(parameters), -1
-    while len(dimensions) > count:
-        count = len(dimensions)
-        for name, raw in list(waiting.items()):
-            try:
-                dimension = parse_value(raw, "any", parameters, dimensions).dimension
-            except JounceError:  # reported with its location
-                continue
-            if dimension is not None:
-                dimensions[name] = dimension
-                del waiting[name]
-    return dimensions
 
 
 def _plain(model: Any) -> dict[str, Any]:
