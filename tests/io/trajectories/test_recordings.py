@@ -204,6 +204,25 @@ def test_the_index_of_pandas_counts_rows_or_is_the_time(tmp_path):
         jn.load_trajectory(table(tmp_path, ",time,shoulder", [Q[1], TIMES, Q[0]]))
 
 
+@pytest.mark.parametrize("gap, told", [(0.15, False), (1.6, True)])
+def test_gaps_between_samples_are_reported(tmp_path, gap, told):
+    """Within one and a quarter periods without samples, the spline is off by more than the amplitude."""
+    times = np.arange(200) * 0.01
+    times = np.concatenate([times, times + 2 + gap])
+    path = table(tmp_path, "time,axis,still", [times, np.sin(5 * times + 0.3), 0 * times + 1])
+    if not told:
+        read = jn.load_trajectory(path)
+    else:
+        words = (
+            r"no samples between t = 1\.99 and 3\.6 s \(line 202\), of axis, still: the motion there is what a spline"
+        )
+        with pytest.warns(jn.errors.RecordingWarning, match=words):
+            read = jn.load_trajectory(path)
+    middle = 1.995 + gap / 2 + np.linspace(-0.3, 0.3, 7) * gap
+    error = np.abs(read.derivatives(middle, 0)[:, 0, 0] - np.sin(5 * middle + 0.3)).max()
+    assert error > 1 if told else error < 1e-3
+
+
 def test_two_positions_at_one_stamp(tmp_path):
     times = np.insert(TIMES, 25, TIMES[25])
     path = table(tmp_path, "time,shoulder,elbow", [times, *np.insert(Q, 25, Q[:, 25] + 1e-4, axis=1)])

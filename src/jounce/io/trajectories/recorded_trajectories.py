@@ -11,6 +11,7 @@ from jaxtyping import Bool, Float
 from jounce.errors import JounceError, RecordingWarning, TrajectoryError
 from jounce.io.trajectories.agreement import check_agreement, check_turns
 from jounce.io.trajectories.recordings import Recording
+from jounce.io.trajectories.stamps import gaps
 from jounce.trajectory import (
     AbstractMotion,
     HermiteMotion,
@@ -48,7 +49,7 @@ def trajectory_of(
     Warns
     -----
     RecordingWarning
-        What of the file was not taken as it is.
+        What of the file was not taken as it is, and gaps between samples.
     """
     if len(recording.times) < 2:
         raise recording.error("at least two samples are needed", value=len(recording.times))
@@ -60,6 +61,7 @@ def trajectory_of(
     if not recording.points:
         check_turns(recording)
         notes += check_agreement(recording)
+        notes += [] if as_controller else gaps(recording)
     if notes:
         warnings.warn(RecordingWarning(f"{recording.path}: {'; '.join(notes)}"), stacklevel=4)
     pointed = as_controller or recording.points

@@ -20,6 +20,7 @@ SCALES = ((1e17, 9, "ns"), (1e14, 6, "us"), (1e11, 3, "ms"), (EPOCH, 0, "s"))
 MOST_REPEATED = 0.5  # of the rows
 BACK = 40  # steps by which a row may be late
 ROUGHER = 1.5  # by which rows in the order of their stamps may go further than in that of the file
+GAP = 20  # times the median step: a spline through samples beside it says little of what was between them
 SAME = 1.5  # times the largest step beside: positions at one stamp differ by no more
 
 
@@ -121,6 +122,25 @@ def in_sequence(recording: Recording) -> Recording:
     if (steps < 0).any():
         recording = _sorted(recording, steps)
     return _merged(recording)
+
+
+def gaps(recording: Recording) -> list[str]:
+    """Return words about the longest gap between the samples of each joint, none for those that have no gap."""
+    notes: dict[str, list[str]] = {}
+    for joint, name in enumerate(recording.names):
+        rows = np.flatnonzero(~np.isnan(recording.values[:, 0, joint]))
+        times = recording.times[rows]
+        steps = np.diff(times)
+        wide = np.flatnonzero(steps > GAP * np.median(steps)) if len(steps) else []
+        if not len(wide):
+            continue
+        k = int(wide[np.argmax(steps[wide])])
+        line = f" (line {recording.lines[rows[k + 1]]})" if len(recording.lines) else ""
+        more = f", the longest of {len(wide)} gaps" if len(wide) > 1 else ""
+        words = f"no samples between t = {times[k]:.6g} and {times[k + 1]:.6g} s{line}{more}"
+        notes.setdefault(words, []).append(name)
+    advice = "the motion there is what a spline makes of those beside"
+    return [f"{words}, of {', '.join(names)}: {advice}" for words, names in notes.items()]
 
 
 def _sorted(recording: Recording, steps: np.ndarray) -> Recording:
