@@ -18,6 +18,7 @@ from jounce.base.modules import Module
 from jounce.base.shapes import Numbers
 from jounce.constraints.planar import length_of
 from jounce.errors import MechanismError
+from jounce.execution.traced_once import traced_once
 from jounce.jet import Jet, components, cross, dot, stack, wrap
 from jounce.jet.algebra import total
 from jounce.jet.turns import brought_near, principal
@@ -99,6 +100,7 @@ def relative_angle(
 # the axis only: jets of the arctangent would subtract products that are larger by 2^k at order k.
 
 
+@traced_once()
 def _turn(body_i: SpatialPose, body_j: SpatialPose, axis: Vectors, datum: Datum | None) -> Jet:
     quaternion, w = body_j.quaternion, body_j.angular_velocity  # the latter in the frame of body j
     if body_i.angular_velocity is not None:
@@ -119,6 +121,7 @@ def _turn(body_i: SpatialPose, body_j: SpatialPose, axis: Vectors, datum: Datum 
     return rate.integrate(value)
 
 
+@traced_once()
 def _between(body_i: SpatialPose, body_j: SpatialPose, axis: Vectors, vector_i: Vectors, vector_j: Vectors) -> Jet:
     u, a, b = body_i.direction(axis), body_i.direction(vector_i), body_j.direction(vector_j)
     along = u.dot(b)

@@ -24,6 +24,7 @@ from jounce.execution.llvm.programs import Program, Single
 from jounce.execution.llvm.text.values import UnsupportedOperationError
 from jounce.execution.store.programs import current_store, loaded_or_made
 from jounce.execution.structure import UndescribedError, cache_key, settings
+from jounce.execution.traced_once import one_program
 
 Group = tuple[Sequence[np.ndarray | jax.ShapeDtypeStruct], Any]  # leaves of a tree, or their forms, and its structure
 LITTLE = 20_000  # numbers that a program is given: of more, even one call takes long
@@ -145,9 +146,10 @@ class Translated:
     def _traced(self, given: Any, lanes: Any, **static: Any) -> Any:
         _thread.tracing = True
         try:
-            if self._single:
-                return self.function(*given[0], **given[1], **static)
-            return self.function(given, lanes, **static)
+            with one_program():
+                if self._single:
+                    return self.function(*given[0], **given[1], **static)
+                return self.function(given, lanes, **static)
         finally:
             _thread.tracing = False
 

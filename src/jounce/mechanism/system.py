@@ -13,6 +13,7 @@ from jounce.base.modules import Module, field, unchecked, with_fields
 from jounce.base.shapes import Numbers
 from jounce.constraints.friction import check_no_own_code
 from jounce.errors import JounceError
+from jounce.execution.traced_once import traced_once
 from jounce.jet import Jet, concatenate
 from jounce.jet.algebra import stacked
 from jounce.linear_algebra.elimination_order import Order, elimination_order
@@ -108,27 +109,7 @@ class Group(Module):
         They are the linear map from the coefficients of order one of a body to those of the residual. Each block has
         the shape (coordinates, rows, instances, batch).
         """
-        poses = self._poses(pose)
-        batch = poses[0].position.shape[-2:]
-        still = [p.extended(None, None) for p in poses]
-        directions = jnp.diag(scale)[:, :, None, None]
-        blocks = []
-        for slot in self.moving_slots:
-
-            def slope(shift: Any, turn: Any, slot: int = slot) -> Any:
-                changed = list(still)
-                changed[slot] = poses[slot].extended(shift, turn)
-                value, rate = with_rows(self.element.residual(*changed, time)).coefficients
-                return jnp.zeros_like(value) if rate is None else rate
-
-            def wide(direction: Any) -> Any:
-                return jnp.broadcast_to(direction, (*direction.shape[:2], *batch))
-
-            split = pose.shifts
-            by_shift = jax.vmap(lambda d: slope(d, None))(wide(directions[:split, :split]))
-            by_turn = jax.vmap(lambda d: slope(None, d))(wide(directions[split:, split:]))
-            blocks.append(jnp.concatenate([by_shift, by_turn]))
-        return blocks
+        return _derivative_blocks(self.element, self._poses(pose), time, scale, self.moving_slots)
 
     @property
     def moving_slots(self) -> tuple[int, ...]:
@@ -137,6 +118,31 @@ class Group(Module):
 
     def _poses(self, pose: Pose) -> list[Any]:
         return [pose.take(indices) for indices in self.bodies]
+
+
+@traced_once(static=(4,))
+def _derivative_blocks(
+    element: Any, poses: Sequence[Pose], time: Jet, scale: Float[Numbers, " coordinate"], slots: tuple[int, ...]
+) -> list[Any]:
+    batch, shifts = poses[0].position.shape[-2:], poses[0].shifts
+    still = [p.extended(None, None) for p in poses]
+    directions = jnp.diag(scale)[:, :, None, None]
+    blocks = []
+    for slot in slots:
+
+        def slope(shift: Any, turn: Any, slot: int = slot) -> Any:
+            changed = list(still)
+            changed[slot] = poses[slot].extended(shift, turn)
+            value, rate = with_rows(element.residual(*changed, time)).coefficients
+            return jnp.zeros_like(value) if rate is None else rate
+
+        def wide(direction: Any) -> Any:
+            return jnp.broadcast_to(direction, (*direction.shape[:2], *batch))
+
+        by_shift = jax.vmap(lambda d: slope(d, None))(wide(directions[:shifts, :shifts]))
+        by_turn = jax.vmap(lambda d: slope(None, d))(wide(directions[shifts:, shifts:]))
+        blocks.append(jnp.concatenate([by_shift, by_turn]))
+    return blocks
 
 
 def holding(group: Group, name: str, value: Any) -> Group:
