@@ -12,6 +12,7 @@ from jounce.base.shapes import Numbers
 from jounce.errors import MechanismError
 from jounce.execution.chunks import in_chunks
 from jounce.execution.device import on_processor
+from jounce.execution.mapped import Mapped
 from jounce.jet import Jet
 from jounce.jet.derivatives import plain_derivatives
 from jounce.kinematics import Motion, Status
@@ -23,6 +24,9 @@ if TYPE_CHECKING:
 
 Coordinates = Mapping[str, Float[Numbers, "_ ... _"]]
 """Taylor coefficients of the coordinates of poses, by name: as `Motion.poses` has them."""
+
+LanesOf = Callable[[Int[np.ndarray, " instant"]], Any]
+"""Returns the arguments of a `Mapped` at some instants, by their indices."""
 
 Values = TypeVar("Values")
 
@@ -37,6 +41,17 @@ def along_motion(motion: Motion, function: Callable[[Int[np.ndarray, " chunk"]],
     """Return what a function of indices of instants gives for all of a motion, at once where JAX traces it."""
     count = len(motion.time)
     return function(np.arange(count)) if motion.traced else in_chunks(function, count)
+
+
+def at_instants(
+    motion: Motion,
+    program: Mapped,
+    shared: Any,
+    lanes_of: LanesOf,
+    **static: Any,
+) -> Any:
+    """Return the results of a function of one instant for all of a motion, as `Mapped.at_instants` gives them."""
+    return program.at_instants(shared, lanes_of, len(motion.time), **static)[0]
 
 
 def in_small_chunks(function: Callable[..., Values], size: int, *arrays: Any) -> Values:

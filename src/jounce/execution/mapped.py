@@ -286,7 +286,15 @@ class Mapped:
                 return OnLlvm(code, arrays)
         return OnXla(self, shared, form, tuple(static.items()), 1 if width is None else width())
 
-    def at_instants(self, shared: Any, lanes_of: Callable[[np.ndarray], Any], count: int, **static: Any) -> Any:
+    def at_instants(
+        self,
+        shared: Any,
+        lanes_of: Callable[[np.ndarray], Any],
+        count: int,
+        *,
+        large: int = LARGE,
+        **static: Any,
+    ) -> Any:
         """Return the results for so many instants, and the name of what computes them.
 
         Parameters
@@ -297,16 +305,24 @@ class Mapped:
             Returns the arguments of some instants, by their indices; of few, they are made once.
         count : int
             How many instants there are, at least one.
+        large : int, optional
+            Arrays of more numbers are in memory in machine code, as `object_file` has it.
         **static
             Further arguments of the function.
         """
         few = count <= FEWEST_TOGETHER
         lanes = lanes_of(np.arange(count if few else 1))
-        program = self.program(shared, lanes, large=LARGE, hasty=is_in_haste(), **static)
+        if is_traced(jax.tree.leaves((shared, lanes))):
+            return self.on_xla(shared, lanes_of(np.arange(count)), tuple(static.items())), xla_backend()
+        program = self.program(shared, lanes, large=large, hasty=is_in_haste(), **static)
         if few:
             return program(lanes), program.backend
         widths = program.together(sum(np.size(x) for x in jax.tree.leaves(lanes)))
         return in_chunks(lambda some: program(lanes_of(some)), count, widths, filled=False), program.backend
+
+    def prepare(self, shared: Any, lanes_of: Callable[[np.ndarray], Any], *, large: int = LARGE, **static: Any) -> None:
+        """Make the machine code that `at_instants` calls; XLA's programs depend on how many instants there are."""
+        self.program(shared, lanes_of(np.zeros(1, int)), large=large, hasty=is_in_haste(), **static)
 
     def _block(self, shared: Any, lanes: Any, how: tuple[tuple[str, Any], ...]) -> Any:
         return self._many(shared, lanes, **dict(how))

@@ -12,13 +12,13 @@ from jounce.dynamics.forward.accelerations import Lanes
 from jounce.dynamics.inverse.finite_forces import check_finite_values
 from jounce.dynamics.inverse.motion_forces import MotionForces
 from jounce.dynamics.masses import Gravity, Masses
-from jounce.dynamics.motion_values import Coordinates, check_motion, labeled, pose_of
-from jounce.execution.compilation import compiled
+from jounce.dynamics.motion_values import Coordinates, at_instants, check_motion, labeled, pose_of
+from jounce.execution.mapped import Mapped
 from jounce.jet import Jet, dot
 from jounce.jet.algebra import stacked, total
 from jounce.kinematics import Motion
 from jounce.mechanism.system import Group
-from jounce.mechanism.transmissions.axis_angles import at_lanes
+from jounce.mechanism.transmissions.axis_angles import at_lanes, with_turns
 from jounce.rigid import PlanarPose
 from jounce.rigid.pose import Pose
 
@@ -75,8 +75,9 @@ def power_balance(motion: Motion) -> "xarray.Dataset":
     forces = MotionForces.of(motion)
     nothing = np.zeros((forces.levels, len(motion.time)))
     driven = [(nothing, nothing), *(_driver_power(forces, name) for name in motion.mechanism.drivers)]
-    rest = forces.in_chunks(lambda lanes: _powers(*_of_chunk(forces, lanes), forces.pose_type, forces.levels))
-    applied, kinetic, potential, sizes = (np.asarray(part) for part in rest)
+    free = at_lanes(forces.motion.forces, np.zeros(1, int))
+    shared = free, forces.masses, forces.gravity, forces.model.length
+    applied, kinetic, potential, sizes = forces.along(_powers, shared, forces.acting_at, levels=forces.levels)
     check_finite_values(forces, applied)
     power, size = np.sum(driven, axis=0)
     taken, rubbed = np.sum([(nothing, nothing), *_friction_powers(forces)], axis=0)
@@ -98,7 +99,7 @@ def _friction_powers(forces: MotionForces) -> Iterator[tuple[np.ndarray, np.ndar
     """Give the power of each joint with friction and the size of its products, (levels, time)."""
     for name in forces.friction.names:
         place = forces.indices[name]
-        of_group = forces.in_chunks(lambda lanes, group=place.group: forces.friction.resisted(group, lanes))
+        of_group = forces.friction.resisted(place.group)
         factor, normal = Jet(tuple(of_group[:, place.instance])), Jet(tuple(forces.friction.normal_force(name)[:, 0]))
         size = factor.map(np.abs) * normal.map(np.abs)
         yield np.stack((factor * normal).dense().coefficients) * -1.0, np.stack(size.dense().coefficients)
@@ -108,37 +109,31 @@ def _driver_power(forces: MotionForces, name: str) -> tuple[np.ndarray, np.ndarr
     """Return the power of a driver and the size of its products, as Taylor coefficients, (levels, time)."""
     index = forces.indices[name]
     group = forces.model.system.groups[index.group]
-    laws = forces.in_chunks(lambda lanes: _law(group.element, forces.motion.time[lanes], forces.levels))
+    motion = forces.motion
+    laws = at_instants(motion, _law, group.element, lambda lanes: motion.time[lanes], levels=forces.levels)
     law = np.broadcast_to(laws, (len(laws), group.instances, laws.shape[-1]))[:, index.instance]  # equal ones are one
     rate, force = Jet(tuple(law)).differentiate(), Jet(tuple(forces.driver_force(name)[:, 0]))
     power, size = force * rate, force.map(np.abs) * rate.map(np.abs)
     return np.stack(power.dense().coefficients), np.stack(size.dense().coefficients)
 
 
-@compiled("levels", brief=True)
-def _law(driver: Any, instants: Lanes, levels: int) -> Float[Numbers, "_ instance batch"]:
+@Mapped
+def _law(driver: Any, instants: Lanes, *, levels: int) -> Float[Numbers, "_ instance batch"]:
     law = stacked(driver.motion(Jet.variable(instants[None], levels)))
     return law.reshape(levels + 1, -1, len(instants))
 
 
-def _of_chunk(forces: MotionForces, lanes: np.ndarray) -> tuple[Any, ...]:
-    bodies = forces.coordinates_at(None, lanes, forces.levels + 2)
-    applied, instants = at_lanes(forces.motion.forces, lanes), forces.motion.time[lanes]
-    return applied, bodies, instants, forces.masses, forces.gravity, forces.model.length
-
-
-@compiled("pose_type", "levels", brief=True)
+@Mapped
 def _powers(
-    groups: tuple[Group, ...],
-    bodies: Coordinates,
-    instants: Lanes,
-    masses: Masses,
-    gravity: Gravity,
-    length: float | Float[Numbers, ""],
+    shared: tuple[tuple[Group, ...], Masses, Gravity, float | Float[Numbers, ""]],
+    lanes: tuple[Coordinates, Sequence[Any], Lanes],
+    *,
     pose_type: type[Pose],
     levels: int,
 ) -> tuple[Float[Numbers, "{levels} _ batch"], ...]:
     """Return the power of each force, the rates of both energies of each body, and the sizes of all their products."""
+    (groups, masses, gravity, length), (bodies, angles, instants) = shared, lanes
+    groups = with_turns(groups, angles)
     order = levels + 1  # energies have one less, and their rates one less again
     pose, time = pose_of(bodies, pose_type, order), Jet.variable(instants[None], order)
     mass, center, moments = masses

@@ -42,12 +42,12 @@ def check_finite_values(forces: Any, values: Numbers, name: str | None = None) -
     raise MechanismError(f"has {at}; {advice}", name=name)
 
 
-def check_finite_forces(forces: Any, finite: Any, lanes: np.ndarray) -> None:
+def check_finite_forces(forces: Any, finite: Any) -> None:
     """Raise MechanismError for the first instant that was solved and at which an applied force is not finite."""
     if forces.motion.traced:
         return
-    bad = np.argwhere((~np.asarray(finite) & (forces.motion.status[lanes] == Status.OK)).T)
+    bad = np.argwhere((~np.asarray(finite) & (forces.motion.status == Status.OK)).T)
     if len(bad):
         lane, force = bad[0]
-        name, instant = force_names(forces.model)[force], forces.motion.time[lanes[lane]]
+        name, instant = force_names(forces.model)[force], forces.motion.time[lane]
         raise MechanismError(f"has no finite value at t = {instant:g} s; check its law", name=f"forces.{name}")

@@ -1,8 +1,4 @@
-"""Compiled programs of inverse dynamics.
-
-Residuals are compiled for each type of joint, on the poses of the bodies that it connects, so that all mechanisms share
-these programs.
-"""
+"""Programs of inverse dynamics: functions of one instant."""
 
 import dataclasses
 from collections.abc import Sequence
@@ -18,17 +14,14 @@ from jounce.base.shapes import Numbers
 from jounce.constraints.friction import pressing_force, slip_velocity
 from jounce.dynamics.forward.accelerations import Lanes
 from jounce.dynamics.forward.loads import loads, mass_matrices
-from jounce.dynamics.friction import coupling
-from jounce.dynamics.friction.coupling import friction_slope, loses_torque, rubs
+from jounce.dynamics.friction.coupling import friction_slope, loses_torque, resisting, rubs
 from jounce.dynamics.inverse import constraint_forces, redundant_forces
 from jounce.dynamics.inverse.constraint_forces import Multipliers, Slope, Slopes
 from jounce.dynamics.inverse.friction_of_motion import Rubbed, rubbing_of, with_friction
 from jounce.dynamics.inverse.tooth_flanks import with_flanks
-from jounce.dynamics.masses import Gravity, Masses
-from jounce.dynamics.motion_values import Coordinates, in_small_chunks, part_of, pose_of
+from jounce.dynamics.motion_values import Coordinates, cut, in_small_chunks, part_of, pose_of
 from jounce.execution.compilation import compiled
-from jounce.execution.mapped import Mapped, OnLlvm
-from jounce.execution.store.programs import is_in_haste
+from jounce.execution.mapped import Mapped
 from jounce.jet import Jet, cross
 from jounce.jet.algebra import stacked, total
 from jounce.kinematics.sensitivity.jacobian_series import along_displacements, slopes
@@ -39,9 +32,9 @@ from jounce.rigid.pose import Pose
 
 LARGE = 16  # largest size of an array that is kept in memory by the machine code of an instant
 SMALL_CHUNK = 16  # number of instants whose dense matrices are factored together
+Acting = tuple[Sequence[Coordinates], Sequence[Any]]  # the poses of bodies, and the angles about axes between them
 
 
-@compiled("pose_type", "slot", "levels", brief=True)
 def element_slopes(
     element: Any, poses: Sequence[Coordinates], instants: Lanes, pose_type: type[Pose], slot: int, levels: int
 ) -> Any:
@@ -50,8 +43,10 @@ def element_slopes(
     return slopes(element, [pose_of(pose, pose_type, levels - 1) for pose in poses], time, slot)
 
 
-@compiled("pose_type", "slot", "levels", brief=True)
-def friction_slopes(element: Any, poses: Sequence[Coordinates], pose_type: type[Pose], slot: int, levels: int) -> Any:
+@Mapped
+def friction_slopes(
+    element: Any, poses: Sequence[Coordinates], *, pose_type: type[Pose], slot: int, levels: int
+) -> Slope:
     """Return the wrench of friction on the body in a slot for a unit normal force, as `friction_slope` does."""
     return friction_slope(element, [pose_of(pose, pose_type, levels) for pose in poses], slot)
 
@@ -65,22 +60,22 @@ def slip_directions(element: Any, poses: Sequence[Coordinates], pose_type: type[
     return jax.eval_shape(slip, poses).shape[0]
 
 
-@compiled("pose_type", "levels", brief=True)
-def resisting(element: Any, poses: Sequence[Coordinates], pose_type: type[Pose], levels: int) -> Any:
-    """Return the fraction of the normal force that resists slip, (levels, directions, joints, time)."""
-    return stacked(coupling.resisting(element, [pose_of(pose, pose_type, levels) for pose in poses]))
-
-
-@compiled("pose_type", "levels", brief=True)
-def resisted(element: Any, poses: Sequence[Coordinates], pose_type: type[Pose], levels: int) -> Any:
+@Mapped
+def resisted(element: Any, poses: Sequence[Coordinates], *, pose_type: type[Pose], levels: int) -> Any:
     """Return the friction power for a unit normal force, as Taylor coefficients, (levels, joints, time)."""
     slip = slip_velocity(element, [pose_of(pose, pose_type, levels) for pose in poses])
     return stacked(element.friction.resisting(slip).dot(slip))
 
 
-@compiled(brief=True)
-def responses(system: System, blocks: Slopes, loads: Float[Numbers, "load coordinate body batch"]) -> Any:
-    """Return the multipliers that balance each of several loads, (loads, rows, time), in a fully driven system."""
+@Mapped
+def responses(system: System, lanes: tuple[Coordinates, Any, Lanes, Any], *, pose_type: type[Pose]) -> Any:
+    """Return the multipliers that balance each of several loads, (loads, rows, time), in a fully driven system.
+
+    For the instant are given the coordinates of all bodies, the loaded tooth flanks, the time, and the loads, of shape
+    (loads, coordinates, bodies, batch).
+    """
+    bodies, flanks, instants, loads = lanes
+    blocks = _blocks(system, flanks, bodies, instants, pose_type, 1)
 
     def of_chunk(blocks: Slopes, loads: Numbers) -> Any:
         return jax.vmap(constraint_forces.load_solver(system, blocks, None))(loads)
@@ -90,71 +85,53 @@ def responses(system: System, blocks: Slopes, loads: Float[Numbers, "load coordi
     )
 
 
-@compiled("pose_type", brief=True)
+@Mapped
 def pressing(
     element: Any,
-    poses: Sequence[Coordinates],
-    slope: Slope,
-    forces: Float[Numbers, "row instance batch"],
+    lanes: tuple[Sequence[Coordinates], Lanes, Any, Float[Numbers, "row instance batch"]],
+    *,
     pose_type: type[Pose],
+    slot: int,
 ) -> Any:
     """Return the normal forces of joints with friction, (components, instances, time), at order zero.
 
-    For gears, return the torque that they transmit.
+    For gears, return the torque that they transmit. For the instant are given the poses of the bodies, the time, the
+    loaded tooth flanks or None, and the multipliers of their rows.
     """
+    poses, instants, flank, forces = lanes
     if loses_torque(element):
         return element.passed_on(Jet([forces[0]])).coefficients[0][None]
-    bodies = tuple(pose_of(pose, pose_type, 0) for pose in poses)
-    held = constraint_forces.wrench(slope[:1], forces[None])[0][: bodies[0].shifts]
-    return pressing_force(element, bodies, Jet([held])).coefficients[0]
-
-
-@compiled("pose_type", brief=True)
-def body_loads(
-    system: System, bodies: Coordinates, instants: Lanes, masses: Masses, gravity: Gravity, pose_type: type[Pose]
-) -> tuple[Any, Any]:
-    """Return the loads that the constraints balance, and at which instants each applied force is finite."""
-    order = len(bodies["position"]) - 1
-    pose = pose_of(bodies, pose_type, order)
-    time = Jet.variable(instants[None], order)
-    return loads(system, pose, time, masses, gravity), system.finite_forces(pose, time)
-
-
-@compiled("pose_type", brief=True)
-def multipliers(
-    system: System,
-    blocks: Slopes,
-    load: Float[Numbers, "levels coordinate body batch"],
-    at_rest: Coordinates | None,
-    masses: Masses,
-    pose_type: type[Pose],
-    rubbed: Sequence[Rubbed] = (),
-) -> Any:
-    """Return the multipliers that balance a load, and normal forces, Taylor coefficients, (levels, rows, time)."""
-    mass = None if at_rest is None else mass_matrices(pose_of(at_rest, pose_type, 0), masses)[:, :, 1:]
-
-    def of_chunk(blocks: Slopes, load: Numbers, mass: Any, rubbed: Sequence[Rubbed]) -> Any:
-        if not rubbed:
-            return constraint_forces.multipliers(system, blocks, load, mass)
-        return with_friction(system, blocks, load, mass, rubbing_of(system, blocks, rubbed, pose_type))
-
-    dense = mass is not None or system.fronts is None
-    return (
-        in_small_chunks(of_chunk, SMALL_CHUNK, blocks, load, mass, rubbed)
-        if dense
-        else of_chunk(blocks, load, mass, rubbed)
+    placed = [cut(pose, 0) for pose in poses]
+    wrench = joint_wrench.function(
+        element, (placed, instants, flank, forces[None], None), pose_type=pose_type, slot=slot, levels=1
     )
+    bodies = tuple(pose_of(pose, pose_type, 0) for pose in placed)
+    return pressing_force(element, bodies, Jet([wrench[0, : bodies[0].shifts]])).coefficients[0]
+
+
+def _blocks(
+    system: System, flanks: Any, bodies: Coordinates, instants: Lanes, pose_type: type[Pose], levels: int
+) -> list[list[Slope]]:
+    """Return the derivatives of the residuals of all groups with respect to the bodies in their moving slots."""
+    blocks = []
+    for group in with_flanks(system.groups, flanks):
+        poses = [part_of(bodies, its, levels) for its in group.bodies]
+        of_slots = [element_slopes(group.element, poses, instants, pose_type, k, levels) for k in group.moving_slots]
+        blocks.append(of_slots)
+    return blocks
 
 
 @Mapped
-def _balanced(shared: Any, lanes: Any, *, pose_type: type[Pose]) -> tuple[Any, Any]:
-    """Return the multipliers of one instant for several cases, and which applied forces are finite there.
+def balanced(shared: Any, lanes: Any, *, pose_type: type[Pose]) -> tuple[Any, Any]:
+    """Return the multipliers of an instant for several cases, and normal forces, and which applied forces are finite.
+
+    The multipliers are Taylor coefficients, (cases, levels, rows, time).
 
     Parameters
     ----------
     shared : tuple
         The system, the system of its forces alone, masses and gravity. If rows are redundant, also the arguments of
-        `least_multipliers` other than the load; otherwise None, and the single case is that of `multipliers`.
+        `_least_multipliers` other than the load; otherwise None, and there is one case.
     lanes : tuple
         For the instant: the coordinates of all bodies, the angles about axes that forces measure, the loaded tooth
         flanks, and the time.
@@ -162,28 +139,33 @@ def _balanced(shared: Any, lanes: Any, *, pose_type: type[Pose]) -> tuple[Any, A
         Type of the poses.
     """
     (system, loaded, masses, gravity, choice), (bodies, angles, flanks, instants) = shared, lanes
-    system = with_fields(system, groups=with_flanks(system.groups, flanks))
     levels = len(bodies["position"]) - 2  # accelerations use up two
     loaded = dataclasses.replace(loaded, forces=with_turns(loaded.forces, angles))
-    load, finite = body_loads.function(loaded, bodies, instants, masses, gravity, pose_type)
-
-    def slope(group: Group, slot: int) -> Any:
-        poses = [part_of(bodies, its, levels) for its in group.bodies]
-        return element_slopes.function(group.element, poses, instants, pose_type, slot, levels)
-
-    blocks = [[slope(group, slot) for slot in group.moving_slots] for group in system.groups]
+    pose, time = pose_of(bodies, pose_type, levels + 1), Jet.variable(instants[None], levels + 1)
+    load, finite = loads(loaded, pose, time, masses, gravity), loaded.finite_forces(pose, time)
+    blocks = _blocks(system, flanks, bodies, instants, pose_type, levels)
     if choice is not None:
-        return least_multipliers.function(system, blocks, load, *choice), finite
-    still = None if system.shape[0] == system.shape[1] else part_of(bodies, None, 1)
+        return _least_multipliers(system, blocks, load, *choice), finite
+    square = system.shape[0] == system.shape[1]
+    mass = None if square else mass_matrices(pose_of(part_of(bodies, None, 1), pose_type, 0), masses)[:, :, 1:]
 
     def rubbed(group: Group) -> Rubbed:
         moving, placed = ([part_of(bodies, its, n) for its in group.bodies] for n in (levels + 1, levels))
-        slopes = [friction_slopes.function(group.element, moving, pose_type, s, levels) for s in group.moving_slots]
-        part = resisting.function(group.element, moving, pose_type, levels) if loses_torque(group.element) else None
-        return slopes, placed, part
+        how: Any = {"pose_type": pose_type, "levels": levels}
+        slopes = [friction_slopes.function(group.element, moving, slot=slot, **how) for slot in group.moving_slots]
+        if not loses_torque(group.element):
+            return slopes, placed, None
+        return slopes, placed, stacked(resisting(group.element, [pose_of(p, pose_type, levels) for p in moving]))
 
-    rubbing = [rubbed(group) for group in system.groups if rubs(group)]
-    return multipliers.function(system, blocks, load, still, masses, pose_type, rubbing)[None], finite
+    def of_chunk(blocks: Slopes, load: Numbers, mass: Any, rubbed: Sequence[Rubbed]) -> Any:
+        if not rubbed:
+            return constraint_forces.multipliers(system, blocks, load, mass)
+        return with_friction(system, blocks, load, mass, rubbing_of(system, blocks, rubbed, pose_type))
+
+    given = blocks, load, mass, [rubbed(group) for group in system.groups if rubs(group)]
+    is_dense = mass is not None or system.fronts is None
+    found = in_small_chunks(of_chunk, SMALL_CHUNK, *given) if is_dense else of_chunk(*given)
+    return found[None], finite
 
 
 def without_constraints(system: System, forces: tuple[Group, ...]) -> System:
@@ -193,14 +175,7 @@ def without_constraints(system: System, forces: tuple[Group, ...]) -> System:
     return with_fields(system, **values, forces=forces)
 
 
-def balance_of_instant(shared: Any, lanes: Any, pose_type: type[Pose]) -> OnLlvm | None:
-    """Return machine code for `_balanced`, or None if there is none; any instant serves as an example."""
-    program = _balanced.program(shared, lanes, large=LARGE, hasty=is_in_haste(), pose_type=pose_type)
-    return program if isinstance(program, OnLlvm) else None  # XLA's programs are those of each kind of joint
-
-
-@compiled(brief=True)
-def least_multipliers(
+def _least_multipliers(
     system: System,
     blocks: Slopes,
     load: Float[Numbers, "levels coordinate body batch"],
@@ -219,61 +194,95 @@ def least_multipliers(
     return in_small_chunks(of_chunk, SMALL_CHUNK, blocks, load)
 
 
-@compiled(brief=True)
-def scaled_jacobian(system: System, blocks: Slopes) -> Any:
+@compiled("pose_type", brief=True, single=True)
+def scaled_jacobian(system: System, bodies: Coordinates, instants: Lanes, pose_type: type[Pose]) -> Any:
     """Return the Jacobian with scaled rows and columns."""
-    return constraint_forces.jacobian_of(system, blocks)
+    return system.jacobian(pose_of(bodies, pose_type, 0), Jet([instants[None]]))
 
 
-@compiled("pose_type", brief=True)
-def exerted(
-    driver: Any, poses: Sequence[Coordinates], instants: Lanes, forces: Multipliers, pose_type: type[Pose]
-) -> Any:
+@Mapped
+def exerted(driver: Any, lanes: tuple[Sequence[Coordinates], Lanes, Multipliers], *, pose_type: type[Pose]) -> Any:
     """Return the forces of drivers along their prescribed coordinates, as Taylor coefficients."""
+    poses, instants, forces = lanes
     order = len(forces) - 1
     built = [pose_of(pose, pose_type, order) for pose in poses]
     return constraint_forces.exerted(driver, built, Jet.variable(instants[None], order), forces)
 
 
-@compiled("pose_type", "levels", brief=True)
-def applied(force: Any, poses: Sequence[Coordinates], instants: Lanes, pose_type: type[Pose], levels: int) -> Any:
+@Mapped
+def applied(force: Group, lanes: tuple[Acting, Lanes], *, pose_type: type[Pose], levels: int) -> Any:
     """Return the applied forces, as Taylor coefficients."""
-    built = [pose_of(pose, pose_type, levels) for pose in poses]
-    time = Jet.variable(instants[None], levels)
-    exerted = force.force(force.displacement(*built, time), force.velocity(*built, time), time).truncate(levels - 1)
-    return stacked(with_rows(exerted))
+    element, poses, time = acting_at(force, lanes, pose_type, levels)
+    exerted = element.force(element.displacement(*poses, time), element.velocity(*poses, time), time)
+    return stacked(with_rows(exerted.truncate(levels - 1)))
 
 
-@compiled("pose_type", "slot", "levels", brief=True)
-def force_slopes(
-    force: Any, poses: Sequence[Coordinates], instants: Lanes, pose_type: type[Pose], slot: int, levels: int
+def acting_at(force: Group, lanes: tuple[Acting, Lanes], pose_type: type[Pose], order: int) -> tuple[Any, Any, Jet]:
+    """Return forces with the turns of the angles that they measure, the poses of their bodies, and the time."""
+    (poses, angles), instants = lanes
+    (group,) = with_turns((force,), angles)
+    return group.element, [pose_of(pose, pose_type, order) for pose in poses], Jet.variable(instants[None], order)
+
+
+@Mapped
+def joint_wrench(
+    element: Any,
+    lanes: tuple[Sequence[Coordinates], Lanes, Any, Multipliers, tuple[Sequence[Coordinates], Multipliers] | None],
+    *,
+    pose_type: type[Pose],
+    slot: int,
+    levels: int,
 ) -> Any:
-    """Return the derivative of the displacements of applied forces by the body in a slot, as `slopes` does."""
-    time = Jet.variable(instants[None], levels - 1)
-    built = tuple(movable(pose_of(pose, pose_type, levels - 1)) for pose in poses)
+    """Return the wrenches of joints on the body in a slot: global force, and moment about its origin in its axes.
+
+    Parameters
+    ----------
+    element : AbstractConstraint
+        The joints.
+    lanes : tuple
+        For the instant: the poses of their bodies, the time, the loaded tooth flanks or None, the multipliers of their
+        rows, and of joints with friction the poses to one order more and the normal forces, else None.
+    pose_type, slot, levels
+        Type of the poses, the slot of the body, and the number of Taylor coefficients.
+    """
+    poses, instants, flank, forces, rubbed = lanes
+    if flank is not None:
+        element = with_fields(element, flank=flank)
+    slope = element_slopes(element, poses, instants, pose_type, slot, levels)
+    wrench = constraint_forces.wrench(slope, forces)
+    if rubbed is None:
+        return wrench
+    moving, pressing = rubbed
+    slope = friction_slopes.function(element, moving, pose_type=pose_type, slot=slot, levels=levels)
+    return wrench + constraint_forces.wrench(slope, pressing)
+
+
+@Mapped
+def force_wrench(
+    force: Group, lanes: tuple[Acting, Lanes, Multipliers], *, pose_type: type[Pose], slot: int, levels: int
+) -> Any:
+    """Return the wrenches of applied forces on the body in a slot, as `joint_wrench` does."""
+    acting, instants, sizes = lanes
+    element, poses, time = acting_at(force, (acting, instants), pose_type, levels - 1)
+    built = tuple(map(movable, poses))
     unchanged = [jax.tree.map(jnp.zeros_like, pose) for pose in built]
 
-    def acting(change: Any) -> Any:
+    def displaced(change: Any) -> Any:
         changes = (*unchanged[:slot], change, *unchanged[slot + 1 :])
-        return stacked(with_rows(force.variation(built, changes, time)))
+        return stacked(with_rows(element.variation(built, changes, time)))
 
-    return along_displacements(built[slot], acting)
-
-
-@compiled(brief=True)
-def wrenches(slope: Slope, forces: Multipliers) -> Any:
-    """Return the wrenches of joints on the body in a slot: global force, and moment about its origin in its axes."""
-    return constraint_forces.wrench(slope, forces)
+    return constraint_forces.wrench(along_displacements(built[slot], displaced), -sizes)  # a residual is held against
 
 
-@compiled("pose_type", brief=True)
+@Mapped
 def passed_on(
-    works: Sequence[Float[Numbers, "levels coordinate batch"]],
-    bodies: Sequence[Coordinates],
     point: Float[Numbers, "component 1 1"],
+    lanes: tuple[Sequence[Float[Numbers, "levels coordinate batch"]], Sequence[Coordinates]],
+    *,
     pose_type: type[Pose],
 ) -> Any:
     """Return the opposite of the wrenches on several bodies: force, and moment about a point, both global."""
+    works, bodies = lanes
     order, wrenches = len(works[0]) - 1, []
     for work, body in zip(works, bodies, strict=True):
         pose = pose_of(body, pose_type, order)
@@ -284,14 +293,15 @@ def passed_on(
     return -total(wrenches)
 
 
-@compiled("pose_type", brief=True)
+@Mapped
 def expressed(
-    work: Float[Numbers, "levels coordinate batch"],
-    bodies: Sequence[Coordinates],
     point: Float[Numbers, "component 1 1"],
+    lanes: tuple[Float[Numbers, "levels coordinate batch"], Sequence[Coordinates]],
+    *,
     pose_type: type[Pose],
 ) -> tuple[Any, Any]:
     """Return force and moment about a point of a body, along its axes or those of another body."""
+    work, bodies = lanes
     order = len(work) - 1
     pose, *frame = (pose_of(body, pose_type, order) for body in bodies)
     force, moment = (Jet(tuple(part[:, :, None])) for part in (work[:, : pose.shifts], work[:, pose.shifts :]))

@@ -10,6 +10,7 @@ from jounce.base.shapes import Numbers
 from jounce.constraints.friction import UnitFriction
 from jounce.dynamics.friction.coupling import loses_torque, rubs
 from jounce.dynamics.inverse import force_programs as programs
+from jounce.dynamics.motion_values import cut
 from jounce.mechanism.system import holding
 
 
@@ -32,29 +33,19 @@ class JointFriction:
         counts = [self.forces._joined.groups[k].instances for k in rubbing]
         return {k: len(self.forces.model.rows) + sum(counts[:n]) for n, k in enumerate(rubbing)}
 
-    def slopes(self, index: int, lanes: np.ndarray) -> programs.Rubbed:
-        """Return the coefficients of the friction equations of a group at some instants."""
-        group = self.forces._joined.groups[index]
-        moving = [self.forces.coordinates_at(slot, lanes, self.forces.levels + 1) for slot in group.bodies]
-        slots = group.moving_slots
-        slopes = [
-            programs.friction_slopes(group.element, moving, self.forces.pose_type, s, self.forces.levels) for s in slots
-        ]
-        part = None
-        if loses_torque(group.element):
-            part = programs.resisting(group.element, moving, self.forces.pose_type, self.forces.levels)
-        return slopes, self.forces._poses(index, lanes), part
-
     @property
     def names(self) -> list[str]:
         """Names of the joints with friction."""
         return [name for name, place in self.forces.indices.items() if place.group in self.first_rows]
 
-    def resisted(self, index: int, lanes: np.ndarray) -> Float[Numbers, "order instance time"]:
-        """Return the friction power of a group for a unit normal force, at some instants."""
-        group = self.forces._joined.groups[index]
-        moving = [self.forces.coordinates_at(slot, lanes, self.forces.levels + 1) for slot in group.bodies]
-        return programs.resisted(group.element, moving, self.forces.pose_type, self.forces.levels)
+    def resisted(self, index: int) -> Float[Numbers, "order instance time"]:
+        """Return the friction power of a group for a unit normal force, as Taylor coefficients."""
+        forces, group = self.forces, self.forces._joined.groups[index]
+
+        def lanes_of(lanes: np.ndarray) -> Any:
+            return [forces.coordinates_at(slot, lanes, forces.levels + 1) for slot in group.bodies]
+
+        return forces.along(programs.resisted, group.element, lanes_of, levels=forces.levels)
 
     def pressing_force(
         self, name: str, multipliers: Numbers, lanes: np.ndarray
@@ -67,8 +58,13 @@ class JointFriction:
         own = multipliers[:, place.rows].reshape(len(multipliers), -1, group.instances, len(lanes))
         if loses_torque(group.element):
             return np.asarray(own)[:, :, place.instance]
-        works = programs.wrenches(self.forces._slopes(place.group, group.moving_slots[-1], lanes), own)
-        return np.asarray(works)[:, : self.forces.pose_type.shifts, place.instance]
+
+        def lanes_of(some: np.ndarray) -> Any:
+            return *self.forces.joint_at(place.group, lanes[some]), own[..., some], None
+
+        how = {"pose_type": self.forces.pose_type, "slot": group.moving_slots[-1], "levels": self.forces.levels}
+        works, _ = programs.joint_wrench.at_instants(group.element, lanes_of, len(lanes), **how)
+        return works[:, : self.forces.pose_type.shifts, place.instance]
 
     @property
     def coefficients(self) -> Float[np.ndarray, " joint"]:
@@ -106,11 +102,12 @@ class JointFriction:
         """Return the multipliers that balance a unit friction force in each direction of slip, at rest."""
         forces = self.forces
 
-        def chunk(lanes: np.ndarray) -> Any:
+        def lanes_of(lanes: np.ndarray) -> Any:
             loads = np.concatenate([self._unit_loads(index, lanes) for index in self.first_rows])
-            return programs.responses(forces._joined, forces._blocks(lanes), loads)
+            bodies, _, flanks, instants = forces._lanes(lanes)
+            return cut(bodies, 0), flanks, instants, loads
 
-        return np.asarray(forces.in_chunks(chunk))
+        return forces.along(programs.responses, forces._joined, lanes_of)
 
     def _unit_loads(self, index: int, lanes: np.ndarray) -> Float[np.ndarray, "direction coordinate body time"]:
         """Return the wrenches on bodies for a unit friction force in each direction of slip of a group."""
@@ -123,7 +120,8 @@ class JointFriction:
             radius = None if loses_torque(group.element) else group.element.friction.radius
             unit = holding(group, "friction", UnitFriction(radius, direction)).element
             for slot in group.moving_slots:
-                slope = np.asarray(programs.friction_slopes(unit, moving, forces.pose_type, slot, 1))[0, :, 0]
+                how = {"pose_type": forces.pose_type, "slot": slot, "levels": 1}
+                slope = programs.friction_slopes.program(unit, moving, **how)(moving)[0, :, 0]
                 for instance, body in enumerate(group.bodies[slot]):
                     loads[instance, direction, :, body] += slope[:, instance]
         return loads[:, :, :, 1:].reshape(-1, components, bodies, len(lanes))
@@ -135,18 +133,17 @@ class JointFriction:
         """
         forces = self.forces
 
-        def chunk(lanes: np.ndarray) -> Any:
-            components = []
-            for index in self.first_rows:
-                group = forces._joined.groups[index]
-                own = multipliers[self._rows(index)][:, lanes].reshape(-1, group.instances, len(lanes))
-                slope = forces._slopes(index, group.moving_slots[-1], lanes)
-                poses = [forces.coordinates_at(slot, lanes, 1) for slot in group.bodies]
-                part = np.asarray(programs.pressing(group.element, poses, slope, own, forces.pose_type))
-                components.append(np.pad(part, [(0, forces.pose_type.shifts - len(part)), (0, 0), (0, 0)]))
-            return np.concatenate(components, axis=1).swapaxes(0, 1)
+        components = []
+        for index in self.first_rows:
+            group = forces._joined.groups[index]
+            own = multipliers[self._rows(index)].reshape(-1, group.instances, multipliers.shape[-1])
 
-        return forces.in_chunks(chunk)
+            def lanes_of(lanes: np.ndarray, index: int = index, own: Any = own) -> Any:
+                return *forces.joint_at(index, lanes), own[..., lanes]
+
+            part = forces.along(programs.pressing, group.element, lanes_of, slot=group.moving_slots[-1])
+            components.append(np.pad(part, [(0, forces.pose_type.shifts - len(part)), (0, 0), (0, 0)]))
+        return np.concatenate(components, axis=1).swapaxes(0, 1)
 
     def _rows(self, index: int) -> slice:
         """Return the rows of a group."""

@@ -18,14 +18,15 @@ from jounce.dynamics.inverse.locked_friction import check_not_locked, friction_l
 from jounce.dynamics.inverse.meshing import check_meshing
 from jounce.dynamics.inverse.redundant_forces import OPEN, OpenMultipliers
 from jounce.dynamics.masses import check_loads, gravity_of, masses_of
-from jounce.dynamics.motion_values import along_motion, part_of
+from jounce.dynamics.motion_values import LanesOf, at_instants, part_of
 from jounce.errors import MechanismError
+from jounce.execution.mapped import Mapped
 from jounce.jet.algebra import total
 from jounce.kinematics import Motion, Status
 from jounce.kinematics.continuation.change_points import spoiled
 from jounce.mechanism.building.element_indices import ElementIndex, element_indices
 from jounce.mechanism.redundant_reactions import resolved_reactions
-from jounce.mechanism.system import Group, holding, law_left_out
+from jounce.mechanism.system import Group, law_left_out
 from jounce.mechanism.transmissions.axis_angles import at_lanes, measures_angle
 
 NOTHING = 1e-9  # of the largest multiplier: what is less is rounding
@@ -108,48 +109,37 @@ class MotionForces:
         return multipliers
 
     def prepare(self) -> None:
-        """Compile the machine code that balances loads, for any motion of this form."""
+        """Compile the program that balances loads, for any motion of this form."""
         cases, rows = 1 + self._looks_for_open, len(self.model.rows)
         choice = np.zeros(rows), np.zeros(cases), np.zeros((cases, rows))
-        self._balancing_code(None if self.model.system.rank is None else choice)
+        shared = self._balance(None if self.model.system.rank is None else choice)
+        programs.balanced.prepare(shared, self._lanes, large=programs.LARGE, pose_type=self.pose_type)
 
     def _balanced(self, flanks: teeth.Flanks) -> Float[Numbers, "case level row time"]:
         """Return the multipliers that balance the loads, and self-balanced ones, given the loaded tooth flanks."""
         self.flanks = flanks
-        choice = None if self.model.system.rank is None else self._choice
-        code = self._balancing_code(choice)
-
-        def chunk(lanes: np.ndarray) -> Any:
-            if code is not None:
-                multipliers, finite = code(self._lanes(lanes))
-                check_finite_forces(self, finite, lanes)
-                return multipliers
-            blocks, (bodies, *_, instants) = self._blocks(lanes), self._lanes(lanes)
-            forces = programs.without_constraints(self._joined, at_lanes(self.forces, lanes))
-            load, finite = programs.body_loads(forces, bodies, instants, self.masses, self.gravity, self.pose_type)
-            check_finite_forces(self, finite, lanes)
-            if choice is not None:
-                return programs.least_multipliers(self._joined, blocks, load, *choice)
-            still = None if self._joined.shape[0] == self._joined.shape[1] else self.coordinates_at(None, lanes, 1)
-            rubbed = [self.friction.slopes(k, lanes) for k in self.friction.first_rows]
-            return programs.multipliers(self._joined, blocks, load, still, self.masses, self.pose_type, rubbed)[None]
-
-        multipliers = self.in_chunks(chunk)
+        shared = self._balance(None if self.model.system.rank is None else self._choice)
+        multipliers, finite = self.along(programs.balanced, shared, self._lanes, large=programs.LARGE)
+        check_finite_forces(self, finite)
         check_not_locked(self.motion, self._joined, multipliers[0])
         check_finite_values(self, multipliers[0])
         return without_open_rates(self, multipliers)
 
-    def _balancing_code(self, choice: tuple[Numbers, Numbers, Numbers] | None) -> Any:
-        """Return the code of `balance_of_instant` for a choice among the multipliers of redundant rows."""
-        one = self._lanes(first := np.zeros(1, int))
-        free = programs.without_constraints(self._joined, at_lanes(self.forces, first))
-        return programs.balance_of_instant((self._joined, free, self.masses, self.gravity, choice), one, self.pose_type)
+    def _balance(self, choice: tuple[Numbers, Numbers, Numbers] | None) -> Any:
+        """Return what a balance has at all instants, for a choice among the multipliers of redundant rows."""
+        free = programs.without_constraints(self._joined, at_lanes(self.forces, np.zeros(1, int)))
+        return self._joined, free, self.masses, self.gravity, choice
 
     def _lanes(self, lanes: np.ndarray) -> Any:
         """Return the arguments of a balance for some instants."""
-        angles = tuple(group.element.datum.near[..., lanes] for group in self.forces if measures_angle(group))
+        bodies, angles, instants = self.acting_at(lanes)
         pressed = tuple(flank[..., lanes] for flank in self.flanks.values())
-        return self.coordinates_at(None, lanes, self.levels + 2), angles, pressed, self.motion.time[lanes]
+        return bodies, angles if self.forces else (), pressed, instants
+
+    def acting_at(self, lanes: np.ndarray) -> tuple[Any, tuple[Any, ...], Any]:
+        """Return the coordinates of all bodies at some instants, the angles that forces measure, and the time."""
+        angles = tuple(group.element.datum.near[..., lanes] for group in self.motion.forces if measures_angle(group))
+        return self.coordinates_at(None, lanes, self.levels + 2), angles, self.motion.time[lanes]
 
     @property
     def _choice(self) -> tuple[Numbers, Numbers, Numbers]:
@@ -211,12 +201,12 @@ class MotionForces:
     @cached_property
     def open(self) -> OpenMultipliers:
         """Forces that redundant constraints do not determine, at the first solved instant."""
-        model = self.model
         lanes = np.array([np.argmax(self.motion.status == Status.OK)])  # 0 where none is
-        scaled = programs.scaled_jacobian(dataclasses.replace(model.system, outputs=(), forces=()), self._blocks(lanes))
+        system, bodies = dataclasses.replace(self._joined, forces=()), self.coordinates_at(None, lanes, 1)
+        scaled = programs.scaled_jacobian(system, bodies, self.motion.time[lanes], self.pose_type)
         mechanism = self.motion.mechanism
         selection = resolved_reactions(mechanism.redundant_reactions, mechanism.parameter_values)
-        return OpenMultipliers(model, np.asarray(scaled)[..., 0], selection)
+        return OpenMultipliers(self.model, np.asarray(scaled)[..., 0], selection)
 
     @property
     def friction(self) -> JointFriction:
@@ -228,11 +218,6 @@ class MotionForces:
         """Rates at which the motion changes, 1/s."""
         return teeth.rate_of(self.motion)
 
-    def _blocks(self, lanes: np.ndarray) -> list[list[Any]]:
-        """Return the derivatives of the residuals of all groups with respect to the bodies in their moving slots."""
-        groups = enumerate(self.model.system.groups)
-        return [[self._slopes(index, slot, lanes) for slot in group.moving_slots] for index, group in groups]
-
     def is_loaded(self, name: str) -> bool:
         """Return whether a joint or driver exerts a force anywhere in the motion."""
         sizes = np.abs(np.nan_to_num(np.asarray(self.multipliers[0])))
@@ -243,11 +228,11 @@ class MotionForces:
         index = self.indices[name]
         driver = law_left_out(self.model.system.groups[index.group], only_if_evaluated=True).element
 
-        def chunk(lanes: np.ndarray) -> Any:
-            poses, exerting = self._poses(index.group, lanes), self._of_group(index)[..., lanes]
-            return programs.exerted(driver, poses, self.motion.time[lanes], exerting, self.pose_type)
+        def lanes_of(lanes: np.ndarray) -> Any:
+            return self._poses(index.group, lanes), self.motion.time[lanes], self._of_group(index)[..., lanes]
 
-        return self._once(chunk, "driver", index.group)[:, index.instance : index.instance + 1]
+        forces = self._once(programs.exerted, driver, lanes_of, index.group)
+        return forces[:, index.instance : index.instance + 1]
 
     def reaction(self, name: str, body: int, frame: int | None, point: Numbers) -> tuple[Any, Any]:
         """Return the force of a joint, driver or applied force on a body, and its moment about a point of the body.
@@ -281,11 +266,12 @@ class MotionForces:
         moving = {slot: its for slot, its in joined if its and slot not in getattr(element, "unfelt", ())}
         works = [self._wrench(name, slot) for slot in moving]
 
-        def chunk(lanes: np.ndarray) -> Any:
+        def lanes_of(lanes: np.ndarray) -> Any:
             poses = [self.coordinates_at((its,), lanes, self.levels) for its in moving.values()]
-            return programs.passed_on([w[..., lanes] for w in works], poses, point[:, None, None], self.pose_type)
+            return [work[..., lanes] for work in works], poses
 
-        return self._expressed(self.in_chunks(chunk), 0, frame, np.zeros(np.shape(point)))
+        work = self.along(programs.passed_on, point[:, None, None], lanes_of)
+        return self._expressed(work, 0, frame, np.zeros(np.shape(point)))
 
     def point_of(self, name: str, body: int) -> Float[Numbers, " component"]:
         """Return the point of a joint, driver or force on a body; the origin of the body if it has none there."""
@@ -312,23 +298,23 @@ class MotionForces:
             first, group = self.friction.first_rows.get(place.group), self._joined.groups[place.group]
 
             def of_constraint(lanes: np.ndarray) -> Any:
-                held = programs.wrenches(self._slopes(place.group, slot, lanes), self._of_group(place)[..., lanes])
-                if first is None:
-                    return held
-                slopes, *_ = self.friction.slopes(place.group, lanes)
-                pressing = self._balancing[0][:, None, first : first + group.instances, lanes]
-                return held + programs.wrenches(slopes[group.moving_slots.index(slot)], pressing)
+                rubbed = None
+                if first is not None:
+                    moving = [self.coordinates_at(its, lanes, self.levels + 1) for its in group.bodies]
+                    rubbed = moving, self._balancing[0][:, None, first : first + group.instances, lanes]
+                return *self.joint_at(place.group, lanes), self._of_group(place)[..., lanes], rubbed
 
-            wrench = self._once(of_constraint, "joint", place.group, slot)[:, :, place.instance]
+            how = {"slot": slot, "levels": self.levels}
+            wrench = self._once(programs.joint_wrench, group.element, of_constraint, place.group, **how)
+            wrench = wrench[:, :, place.instance]
             return teeth.without_open_rates(wrench, self._reversals.get(place.group), place.instance)
         index, instance = self._force_index(name)
 
         def of_force(lanes: np.ndarray) -> Any:
-            element, poses, instants = self._acting(index, lanes, self.levels)
-            slope = programs.force_slopes(element, poses, instants, self.pose_type, slot, self.levels)
-            return programs.wrenches(slope, -self._sizes(index)[..., lanes])  # a residual is held against
+            return *self._acting(index, lanes, self.levels), self._sizes(index)[..., lanes]
 
-        return self._once(of_force, "force", index, slot)[:, :, instance]
+        how = {"slot": slot, "levels": self.levels}
+        return self._once(programs.force_wrench, self._free(index), of_force, index, **how)[:, :, instance]
 
     def applied_force(self, name: str) -> Numbers:
         """Return an applied force, as Taylor coefficients, (levels, components, time)."""
@@ -348,50 +334,53 @@ class MotionForces:
     def _sizes(self, index: int) -> Float[Numbers, "order component instance time"]:
         """Return the applied forces of a group, as Taylor coefficients."""
 
-        def chunk(lanes: np.ndarray) -> Any:
-            return programs.applied(*self._acting(index, lanes, self.levels + 1), self.pose_type, self.levels)
+        def lanes_of(lanes: np.ndarray) -> Any:
+            return self._acting(index, lanes, self.levels + 1)
 
-        return self._once(chunk, "size", index)
+        return self._once(programs.applied, self._free(index), lanes_of, index, levels=self.levels)
 
-    def _acting(self, index: int, lanes: np.ndarray, levels: int) -> tuple[Any, tuple[dict[str, Any], ...], Any]:
-        """Return the forces of a group, the poses of their bodies to a number of coefficients, and the instants."""
-        (group,) = at_lanes((self.motion.forces[index],), lanes)
-        poses = tuple(self.coordinates_at(slot, lanes, levels) for slot in group.bodies)
-        return group.element, poses, self.motion.time[lanes]
+    def _free(self, index: int) -> Group:
+        """Return the forces of a group, whose angles about axes are those of one instant."""
+        return at_lanes((self.motion.forces[index],), np.zeros(1, int))[0]
 
-    def _once(self, chunk: Callable[[np.ndarray], Any], *key: Any) -> Numbers:
-        """Return the values of a function of indices of instants for all of them, cached by a key."""
+    def _acting(self, index: int, lanes: np.ndarray, levels: int) -> tuple[programs.Acting, Any]:
+        """Return the poses of the bodies of forces, the angles about axes between them, and the instants."""
+        group = self.motion.forces[index]
+        angles = [group.element.datum.near[..., lanes]] if measures_angle(group) else []
+        poses = [self.coordinates_at(slot, lanes, levels) for slot in group.bodies]
+        return (poses, angles), self.motion.time[lanes]
+
+    def _once(self, program: Mapped, shared: Any, lanes_of: LanesOf, *key: Any, **static: Any) -> Any:
+        """Return the results of a program for all instants, cached by the program, a key and static arguments."""
+        key = (program, *key, *static.items())
         if key not in self._numbers:
-            self._numbers[key] = self.in_chunks(chunk)
+            self._numbers[key] = self.along(program, shared, lanes_of, **static)
         return self._numbers[key]
+
+    def along(self, program: Mapped, shared: Any, lanes_of: LanesOf, **static: Any) -> Any:
+        """Return the results of a program for all instants."""
+        return at_instants(self.motion, program, shared, lanes_of, pose_type=self.pose_type, **static)
 
     def _expressed(self, work: Numbers, body: int, frame: int | None, point: Numbers) -> tuple[Any, Any]:
         """Return force and moment about a point of a body, as `reaction` does, from a wrench as `_wrench` has it."""
+        bodies = (body,) if frame is None else (body, frame)
 
-        def chunk(lanes: np.ndarray) -> Any:
-            bodies = (body,) if frame is None else (body, frame)
-            taken = [self.coordinates_at((b,), lanes, self.levels) for b in bodies]
-            return programs.expressed(work[:, :, lanes], taken, point[:, None, None], self.pose_type)
+        def lanes_of(lanes: np.ndarray) -> Any:
+            return work[:, :, lanes], [self.coordinates_at((b,), lanes, self.levels) for b in bodies]
 
-        return self.in_chunks(chunk)
-
-    def in_chunks(self, function: Callable[[np.ndarray], Any]) -> Any:
-        """Return the values of a function of indices of instants for all of them, as arrays with the time last."""
-        return along_motion(self.motion, function)
+        return self.along(programs.expressed, point[:, None, None], lanes_of)
 
     def coordinates_at(self, bodies: tuple[int, ...] | None, lanes: np.ndarray, levels: int) -> dict[str, Any]:
         """Return coordinates at some instants, for the bodies and the number of coefficients of `part_of`."""
         return {name: values[..., lanes] for name, values in part_of(self.coordinates, bodies, levels).items()}
 
+    def joint_at(self, index: int, lanes: np.ndarray) -> tuple[Any, Any, Any]:
+        """Return the poses of the bodies of a group at some instants, the time, and the loaded tooth flanks or None."""
+        flank = self.flanks[index][..., lanes] if index in self.flanks else None
+        return self._poses(index, lanes), self.motion.time[lanes], flank
+
     def _poses(self, index: int, lanes: np.ndarray) -> tuple[dict[str, Any], ...]:
         return tuple(self.coordinates_at(slot, lanes, self.levels) for slot in self.model.system.groups[index].bodies)
-
-    def _slopes(self, index: int, slot: int, lanes: np.ndarray) -> Any:
-        group = self._joined.groups[index]
-        if index in self.flanks:
-            group = holding(group, "flank", self.flanks[index][..., lanes])
-        element, poses, instants = group.element, self._poses(index, lanes), self.motion.time[lanes]
-        return programs.element_slopes(element, poses, instants, self.pose_type, slot, self.levels)
 
     def _of_group(self, index: ElementIndex) -> Float[Numbers, "order row instance time"]:
         """Return the multipliers of a group."""
