@@ -164,8 +164,8 @@ def balanced(shared: Any, lanes: Any, *, pose_type: type[Pose]) -> tuple[Any, An
 
     given = blocks, load, mass, [rubbed(group) for group in system.groups if rubs(group)]
     is_dense = mass is not None or system.fronts is None
-    found = in_small_chunks(of_chunk, SMALL_CHUNK, *given) if is_dense else of_chunk(*given)
-    return found[None], finite
+    multipliers = in_small_chunks(of_chunk, SMALL_CHUNK, *given) if is_dense else of_chunk(*given)
+    return multipliers[None], finite
 
 
 def without_constraints(system: System, forces: tuple[Group, ...]) -> System:

@@ -24,8 +24,10 @@ from jounce.mechanism import Body, Mechanism, TimeGrid, time_grid
 from jounce.mechanism.building.preconditions import concrete
 from jounce.mechanism.laws.cam_laws import leader_name
 from jounce.mechanism.outputs.derivative_outputs import form_of
+from jounce.settings import under_own_settings
 
 
+@under_own_settings
 @concrete
 def write_mechanism(mechanism: Mechanism, path: str | PathLike[str], *, overwrite: bool = False) -> None:
     """Write a mechanism to a YAML, TOML or JSON file that `load` reads.
