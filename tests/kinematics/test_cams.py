@@ -1,6 +1,7 @@
 """Plate cams from laws: against eccentric discs, whose laws are known, and by following the profile back."""
 
 import math
+import warnings
 
 import numpy as np
 import pytest
@@ -176,3 +177,23 @@ def test_followers_refuse_what_does_not_go_together():
         jn.cams.TranslatingFollower("roller")
     with pytest.raises(jn.errors.MechanismError, match="unknown shape"):
         jn.cams.TranslatingFollower("mushroom")
+
+
+def test_samples_too_noisy_for_the_curvature_of_a_cam_are_named():
+    angle = np.linspace(0.0, 2 * math.pi, 181)
+    lift = 0.006 * (1 - np.cos(angle))  # its second derivative is 6 mm/rad^2 at most
+    noise = 1e-6 * np.random.default_rng(0).standard_normal(181)
+    noise[-1] = noise[0]
+    follower = jn.cams.TranslatingFollower("roller", radius=ROLLER)
+
+    def cam(values):
+        return jn.cams.plate_cam(jn.laws.SplineMotion(angle, values, beyond="repeat"), follower, 0.03)
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        smooth = cam(lift)
+    with pytest.warns(jn.errors.SampleWarning, match=r"'law' do not support its derivative of order [12]"):
+        rough = cam(lift + noise)
+    second = [np.abs(c.law(jn.jet.Jet.variable(angle, 2)).coefficients[2] * 2).max() for c in (smooth, rough)]
+    assert abs(second[0] - 0.006) < 1e-6
+    assert second[1] > 1.1 * second[0]  # what is read off such a law is noise

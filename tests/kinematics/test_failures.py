@@ -240,6 +240,12 @@ def test_constraints_that_contradict_each_other_are_reported_in_one_sentence():
     assert words.endswith("; correct lengths, or take out a joint")
     assert len(words) < 200
     assert "2 equations more than coordinates" in caught.value.details
+    second = jn.drivers.CoordinateDriver(("ground", "left"), "angle", motion="2 + t")
+    twice = dataclasses.replace(wiper(), drivers={"turn": TURN, "second": second})
+    with pytest.raises(jn.errors.AssemblyError) as caught:
+        jn.solve(twice, [0.0])
+    words = str(caught.value)
+    assert words.endswith("; correct lengths, or take out a joint or a driver")
 
 
 @pytest.mark.slow

@@ -31,16 +31,16 @@ def reproduce(
     out
         Folder for figures and tables; created if it does not exist.
     samples
-        Your own accelerations (.csv: time, then a column for each motion: angular, rad/s^2, or tangential with
-        its unit, as fast [m/s^2]) instead of stand-ins; negrean-2025 only.
+        Your own accelerations (.csv) for negrean-2025: the time, then
+        a column for each motion, angular (rad/s^2) or with its unit: fast [m/s^2].
     masses
-        Your own link (.yaml, .toml, .json: mass, center_x, center_z, inertia_y; radius for tangential
-        samples); negrean-2025 only.
+        Your own link (.yaml, .toml, .json) for negrean-2025: mass,
+        center_x, center_z, inertia_y, and radius for tangential samples.
     remove_gravity
-        Subtract gravity from tangential samples, for an accelerometer on an arm with a level axis.
+        Subtract gravity from tangential samples (arm with a level axis).
     stop
-        Quantity that the assembly tolerances of sommer-2024's figures 4, 6, 10 and 12 bound: correction (the next
-        Newton-Raphson correction, the default) or residual (the largest one, with lengths in cm, as in the paper).
+        Measure of the assembly error of sommer-2024: correction (of
+        Newton-Raphson, the default) or residual (lengths in cm, as in the paper).
 
     Examples
     --------

@@ -185,7 +185,7 @@ class RobotRun(AbstractRun):
         if int(self.current.stuck) >= STUCK // 2:
             words = (
                 f"a force of a joint switches without end at t = {time:g} s, as friction of a joint that sticks does: "
-                "smooth it, as by tanh(v/v0)"
+                "smooth it, as by tanh(v/v0), or leave out the drives"
             )
             return Status.COLLAPSED, words
         if int(self.current.outcome) == Outcome.LOST:

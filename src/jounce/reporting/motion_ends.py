@@ -10,7 +10,7 @@ import numpy as np
 from jounce.dynamics.limits.motion_ends import TrajectoryEnd
 from jounce.planning.paths.sampled_paths import lines_of
 from jounce.planning.paths.straight_lines import polynomials_at
-from jounce.planning.smoothing.smooth import sampled
+from jounce.planning.smoothing.smooth import SmoothedTrajectory, sampled
 from jounce.trajectory import HermiteMotion, HermiteSplineMotion, JointTrajectory, SplineMotion
 
 WITH_VELOCITIES = 5  # degree of splines through positions and velocities
@@ -113,6 +113,10 @@ def _farthest(trajectory: JointTrajectory) -> tuple[float, str | None, float | N
 
 def between_words(trajectory: JointTrajectory) -> list[str]:
     """Word what was taken to happen between the points of a trajectory; nothing where its laws say it."""
+    if isinstance(trajectory, SmoothedTrajectory):
+        away = max(joint.away for joint in trajectory.joints.values())
+        bound = f"within {trajectory.deviation:.3g} rad or m of each of {len(trajectory.times)} samples"
+        return [f"smoothed {bound}, at most {away:.2g} from them"]
     facts = between_facts(trajectory)
     if facts is None:
         return []

@@ -126,10 +126,11 @@ def _periodic(times: _Samples, values: _Samples, degree: int, beyond: str) -> tu
     difference, duration = float(values[-1] - values[0]), float(np.ptp(values)) or 1.0
     advance = float(whole_periods(difference)) if beyond == "repeat" else difference
     if abs(difference - advance) > CLOSED * duration:
-        message = "samples that repeat must end at the value they begin with, or whole turns (in rad) from it"
-        raise MechanismError(
-            f"{message}; choose beyond: advance, or close them: the last one differs by", value=difference
+        message = (
+            "samples that repeat must end at the value they begin with, or whole turns of 2 pi from it; the last one "
+            f"is {difference:g} (SI) from the first: close them, or choose beyond: advance"
         )
+        raise MechanismError(message)
     slope = advance / (times[-1] - times[0])
     level = values - slope * (times - times[0])
     level[-1] = level[0]

@@ -129,6 +129,10 @@ def test_a_duration_is_written_in_whole_periods(run, cart, tmp_path):
     assert len(rows["time"]) == 4001
     assert abs(float(rows["slide"].values[-1, 0]) - 2) < 1e-9
     assert figure.read_bytes()[:4] == b"\x89PNG"
+    status, printed, _ = run("retime", *cart, "--duration", "4s")
+    assert status == 0
+    assert "no limit binds" in printed
+    assert "limit that binds" not in printed
     status, _, error = run("retime", *cart, "--duration", "2.4s")
     assert status == 2
     assert "the least time of this path within these limits is 2.50" in error

@@ -27,6 +27,7 @@ def test_a_log_is_smoothed_written_and_read(tmp_path, capsys):
     assert abs(np.abs(jerk).max() / 8 - 1) < 0.2
     assert np.abs(again.derivatives(times, 0)[:, 0, 0] - values).max() <= 6e-5
     assert main(["torques", robot, str(log), "--deviation", "6e-5", "--rates", "1"]) == 0
+    assert "smoothed within 6e-05 rad or m of each of 401 samples, at most " in capsys.readouterr().out
     assert main(["smooth", robot, str(log), "--deviation", "-1", "--out", str(tmp_path / "none.csv")]) == 2
     assert not (tmp_path / "none.csv").exists()
     for command in (["smooth", "--rate", "200Hz"], ["torques"], ["check"]):

@@ -132,7 +132,8 @@ def simulate(
       jounce simulate examples/flyball_governor.yaml \
         --method obreshkov-6 --tolerance 1e-9
       jounce simulate examples/robots/scara.urdf --until "2 s" \
-        --start "elbow=30 deg" --torque "shoulder=5*sin(t)"
+        --start "elbow=30 deg" --torque "shoulder=5*sin(t)" \
+        --driven quill=0 --no-drives
     """
     output.check()
     if file.suffix.lower() in ROBOT_FILES:

@@ -277,7 +277,11 @@ def _write_result(result: _Result, files: tuple[Path, Path | None], figure: Path
     if not output.json:
         names = [file.name for file in files if file is not None]
         say(retimed_words(retimed, result.before, result.free, names, result.read))
-        show_table(binding_table(retimed))
+        table = binding_table(retimed)
+        if table.rows:
+            show_table(table)
+        else:
+            say("\nno limit binds")
     output.write(lambda: joint_table(result.system, retimed, retimed.times, retimed.report.robot))
     if figure is not None:
         from jounce.plot import save

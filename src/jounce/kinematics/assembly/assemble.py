@@ -254,9 +254,10 @@ def check_assembled(model: Model, attempt: AssemblyAttempt, instant: float, *, f
         )
         shown, others = open_rows[:2], " and others" if len(open_rows) > 2 else ""
         verb, gaps_of_shown = "stays" if len(open_rows) == 1 else "stay", ", ".join(wide[name] for name in shown)
+        driver = " or a driver" if any(name.startswith("drivers.") for name in open_rows) else ""
         message = (
             f"over-constrained at t = {instant:g} s: {', '.join(shown)}{others} {verb} open, by {gaps_of_shown}, and "
-            "contradict each other; correct lengths, or take out a joint"
+            f"contradict each other; correct lengths, or take out a joint{driver}"
         )
         raise AssemblyError(message, status=Status.NOT_ASSEMBLED, details=details)
     missing = attempt.jacobian.shape[1] - len(model.rows)

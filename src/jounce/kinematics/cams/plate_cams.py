@@ -14,7 +14,7 @@ import numpy as np
 
 from jounce.base.display import Displayed
 from jounce.base.shapes import ArrayLike, real_numbers
-from jounce.errors import MechanismError, TrajectoryError, check_choice, whole_number
+from jounce.errors import MechanismError, SampleWarning, TrajectoryError, check_choice, warn_caller, whole_number
 from jounce.jet import Jet, atan2, sqrt
 from jounce.jet.turns import WHOLE_TURN
 from jounce.kinematics.cams.followers import AbstractFollower, Follower, across, rotated, unit
@@ -30,6 +30,7 @@ from jounce.trajectory import (
     continuity,
 )
 from jounce.trajectory.checks import positive
+from jounce.trajectory.sample_errors import unsupported_derivative, unsupported_words
 from jounce.units.shown_units import ShownUnits
 
 if TYPE_CHECKING:
@@ -37,6 +38,7 @@ if TYPE_CHECKING:
 
 SIGNS = {"counterclockwise": 1.0, "clockwise": -1.0}
 CLOSED = 1e-9  # of the rise: so near to where it began a law ends
+CURVED = 2  # the derivative of a law on which radii of curvature depend
 ORDER = 3  # of the jets: positions, tangents, and how they turn
 BENT = 1e-9  # of how far a normal turns: less is straight
 NOTICED = 1e-6  # of the size of the cam: less is lost to the spacing of the points where it is undercut elsewhere
@@ -251,6 +253,8 @@ def plate_cam(
     if isinstance(law, SegmentedMotion) and law.beyond != "repeat" and law.lasts(WHOLE_TURN):
         cam = dataclasses.replace(cam, law=law.repeated())
     _check(cam)
+    if isinstance(law, SplineMotion) and (doubt := unsupported_derivative(law.errors, CURVED)):
+        warn_caller(SampleWarning(unsupported_words("law", *doubt, law)))
     return cam
 
 

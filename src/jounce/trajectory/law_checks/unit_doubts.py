@@ -241,4 +241,4 @@ def trajectory_doubt(laws: dict[str, Any], first: float, last: float, limits: di
         return ""
     name, why = next(iter(doubts.items()))
     others = f" (and {count - 1} joint{'s' if count > 2 else ''} like it)" if (count := len(doubts)) > 1 else ""
-    return f"{name} {why}{others} A number without a unit is in SI; give the unit, or convert to rad"
+    return f"{name} {why}{others} A number without a unit is in SI; head the column '{name} [deg]', or convert to rad"

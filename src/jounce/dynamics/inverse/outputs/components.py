@@ -68,8 +68,8 @@ class AbstractForceOutput(AbstractMotionOutput):
         if forces.loose is None:
             return passing_words(forces)
         return (
-            f"not unique, as constraints are redundant: {forces.open.words}; redundant_reactions chooses by least "
-            "norm or by stiffnesses"
+            f"not unique, as constraints are redundant: {forces.open.words}; set redundant_reactions to least_norm, "
+            "or to stiffnesses, to share the loads"
         )
 
 
