@@ -7,6 +7,7 @@ import jounce as jn
 from jounce.errors import TrajectoryError
 from jounce.planning.paths.paths import path_of
 from jounce.planning.paths.trajectory_paths import Ramps
+from jounce.trajectory.law_checks.smoothness import knots
 
 THERE, BACK = jn.laws.Segment("cycloidal", 1.0, to=0.5), jn.laws.Segment("cycloidal", 1.3, to=0.0)
 
@@ -55,6 +56,13 @@ def test_a_corner_at_which_a_trajectory_stands_still_is_kept(order):
     corner = path.start + (path.stop - path.start) * np.argmin(np.abs(j - 0.5) + np.abs(k)) / 20000
     there, elsewhere = path.derivatives(np.array([corner]), order)[0], np.abs(places(path)).max(axis=(0, 2))
     assert (np.abs(there).max(axis=1) < 1e-2 * elsewhere[: order + 1])[1:].all()
+    # one joint moves until the stop and the other from it on, also where the length changes by less than its rounding
+    stop = knots(path.laws["j"], path.start, path.stop)
+    stop = stop[np.argmin(np.abs(path.derivatives(stop, 1)[:, 1]).max(axis=1))]
+    beside = np.geomspace(1e-9, 1e-3, 13)
+    before, after = (np.abs(path.derivatives(stop + side * beside, 1)[:, 1].T) for side in (-1, 1))
+    assert (before[1] <= 1e-6 * before[0]).all()
+    assert (after[0] <= 1e-6 * after[1]).all()
 
 
 def test_a_path_that_bends_is_followed_closely():
@@ -89,3 +97,25 @@ def test_a_motion_there_and_back_takes_as_long_as_its_closed_form_says():
 def test_what_does_not_move_is_reported():
     with pytest.raises(TrajectoryError, match="does not move"):
         path_of(jn.JointTrajectory({"j": 1.0}, 0.0, 1.0))
+
+
+@pytest.mark.slow
+def test_a_stop_at_a_corner_keeps_limits_of_jerk():
+    limits = jn.Limits(velocity=2.0, acceleration=8.0, jerk=200.0)
+    links = [jn.Link("base"), jn.Link("a", jn.Inertia(1.0)), jn.Link("b", jn.Inertia(1.0))]
+    j = jn.Joint("j", "base", "a", "prismatic", axis=[1, 0, 0], limits=limits)
+    k = jn.Joint("k", "a", "b", "prismatic", axis=[0, 1, 0], limits=limits)
+    first = jn.laws.SegmentedMotion([jn.laws.Segment("cycloidal", 1.0, to=0.7), jn.laws.Segment("dwell", 1.3)])
+    second = jn.laws.SegmentedMotion([jn.laws.Segment("dwell", 1.0), jn.laws.Segment("cycloidal", 1.3, to=0.3)])
+    trajectory = jn.JointTrajectory({"j": first, "k": second}, 0.0, 2.3)
+    fast = jn.retime(jn.Robot("gantry", links, [j, k]), trajectory, cells=40)
+    assert fast.report.kept
+    # of each way alone: 0.7 m reaches all limits, 0.3 m does not reach the velocity
+    peak = 4 * (np.sqrt(0.04**2 + 0.3 / 2) - 0.04)
+    least = 0.7 / 2 + 2 / 8 + 8 / 200 + 2 * 0.3 / peak
+    assert least < fast.stop < 1.03 * least
+    times, step = np.linspace(0.0, fast.stop, 2001, retstep=True)
+    differences = np.asarray(fast.derivatives(times, 0)).reshape(-1, 2)
+    for limit in (2.0, 8.0, 200.0):
+        differences = np.diff(differences, axis=0) / step
+        assert 0.9 * limit < np.abs(differences).max() < limit * (1 + 1e-4)

@@ -33,6 +33,8 @@ AWAY = 1e-7  # of the length: distance from a stop at which its directions are t
 BEND = 2e-3  # rad: a smaller change of direction at a stop is none
 BACK = 0.05  # rad: so near to half a turn it is a reversal
 WIDEST = 0.1  # of the length: how far a power reaches on each side of a stop
+CLOSE = 0.125  # of this, within which a power of its own keeps rounding small
+ROUNDING = 4 * float(np.finfo(float).eps)  # of the length
 FLAT = 4  # derivatives to which a power joins the length
 DEGREE = 5
 TURNING = 1e-2  # of the largest acceleration: more at a rest turns a trajectory smoothly
@@ -89,12 +91,19 @@ class Ramps:
         return np.where(inside, self.centers[near] + np.sign(away) * self.reach[near] * share, shifted)
 
     def motion(self, total: float) -> JoinedPieces:
-        """Return the length over the parameter, up to a total length."""
+        """Return the length over the parameter, up to a total length.
+
+        Next to a stop the length changes by less than its rounding. Before the center it is less than the stop by a
+        little more than that, so that what has a corner at this length turns at the center, where all rests.
+        """
         begins, pieces = [0.0], [np.polynomial.Polynomial([0.0, 1.0])]
         for stop, center, reach, width in zip(self.stops, self.centers, self.reach, self.widths, strict=True):
-            before, after = np.polynomial.Polynomial([1.0, -1.0 / reach]), np.polynomial.Polynomial([0.0, 1.0 / reach])
-            begins += [center - reach, center, center + reach]
-            pieces += [stop - reach * self.share(before), stop + reach * self.share(after)]
+            before, near, after = (
+                self.share(np.polynomial.Polynomial(x))
+                for x in ([1.0, -1.0 / reach], [CLOSE, -1.0 / reach], [0.0, 1.0 / reach])
+            )
+            begins += [center - reach, center - CLOSE * reach, center, center + reach]
+            pieces += [stop - reach * before, stop * (1 - ROUNDING) - reach * near, stop + reach * after]
             pieces.append(np.polynomial.Polynomial([stop + width, 1.0]))
         height = max(len(piece.coef) for piece in pieces)
         powers = np.stack([np.pad(piece.coef, (0, height - len(piece.coef))) for piece in pieces], axis=1)
