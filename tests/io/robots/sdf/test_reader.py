@@ -84,6 +84,26 @@ def turned(words, form):
     return Rotation.from_euler("xyz", [float(word) for word in words[3:]], degrees=form == "degrees").as_matrix()
 
 
+def test_a_quaternion_that_is_not_of_length_one_is_named(tmp_path):
+    def arm(scale):
+        words = " ".join(f"{scale * x:.2f}" for x in (0.48, 0.6, 0.0, 0.64))
+        posed = f'<pose rotation_format="quat_xyzw">0 0 1 {words}</pose>'
+        inside = SOME.replace("<mass>", f"{posed}<mass>")
+        return model(link("a"), f'<link name="b">{posed}{inside}</link>', joint("j", "a", "b"))
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        expected = read(tmp_path, arm(1.0))
+        read(tmp_path, arm(0.995))  # what rounding makes of one
+    note = r"do not have the length 1, and are divided by .*: links\.b\.inertial\.pose \(line 1\), b\.pose \(line 1\)"
+    with pytest.warns(RobotWarning, match=note):
+        same(read(tmp_path, arm(2.0)), expected, expected.gravity)
+    with pytest.raises(
+        RobotFileError, match=r"line 1, .*the quaternion has the length 2, not 1.*got \[0\.96, 1\.2, 0\.0, 1\.28\]"
+    ):
+        read(tmp_path, arm(2.0), strict=True)
+
+
 def test_joints_away_from_the_base_or_toward_it(tmp_path):
     expected = without_armature(random_robot(4, 5, fixed=0.0))
     text, place = sdf(expected, "1.7", 4, turned=("joint_0", "joint_2", "joint_3"))

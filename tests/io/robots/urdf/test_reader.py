@@ -297,7 +297,7 @@ def test_impossible_moments_are_used_as_they_are_with_a_warning(tmp_path):
 
 
 def test_a_quaternion_of_urdf_1_1_is_read(tmp_path):
-    quaternion = [0.5, -1.0, 2.0, 1.5]
+    quaternion = [0.2, -0.4, 0.8, 0.4]
     text = " ".join(map(str, quaternion))
     path = small(tmp_path, f'type="revolute"><origin xyz="1 2 3" quat_xyzw="{text}"/>')
     rotation = load_robot(path).joints["j"].rotation
@@ -306,6 +306,13 @@ def test_a_quaternion_of_urdf_1_1_is_read(tmp_path):
     child = inertial(moments).replace("<mass", f'<origin quat_xyzw="{text}"/><mass')
     tensor = load_robot(small(tmp_path, 'type="revolute">', child)).links["arm"].inertia.tensor
     np.testing.assert_allclose(tensor, rotation @ moments @ rotation.T, rtol=0, atol=1e-15)
+
+
+def test_a_quaternion_of_urdf_1_1_that_is_not_of_length_one_is_named(tmp_path):
+    path = small(tmp_path, 'type="revolute"><origin quat_xyzw="0 0 1.2 1.6"/>')
+    with pytest.warns(jn.errors.RobotWarning, match=r"length 1, and are divided by .*: joints\.j\.origin \(line 1\)"):
+        rotation = load_robot(path).joints["j"].rotation
+    np.testing.assert_allclose(rotation, [[0.28, -0.96, 0], [0.96, 0.28, 0], [0, 0, 1]], rtol=0, atol=1e-15)
 
 
 @pytest.mark.parametrize("origin", ['quat_xyzw="0 0 0 0"', 'quat_xyzw="0 0 1"', 'quat_xyzw="0 0 0 1" rpy="0 0 0"'])

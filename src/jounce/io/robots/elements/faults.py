@@ -13,6 +13,7 @@ FOLLOWS_NONE = "these joints follow one that the file does not have, and are tak
 BELOW_ZERO = "limits of velocity or effort are below zero, which in SDF means none, and are read as none"
 REVERSED = "lower limits exceed upper ones, and are read as no range"
 ONE_END = "these joints have one end of a range, beyond the zero that stands for the other, which is taken for none"
+NOT_UNIT = "these quaternions do not have the length 1, and are divided by their length"
 WITHOUT_INERTIAL = "these links have no inertia of their own, which SDF takes for 1 kg with moments of 1 kg m^2"
 PARTLY_INERTIAL = "these links lack their mass or moments of inertia, which SDF takes for 1 kg and 1 kg m^2"
 DEFAULT_DENSITY = "shapes give these links their mass without a density, for which SDF takes 1000 kg/m^3"

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable
 from typing import NamedTuple
 
@@ -10,6 +9,7 @@ import numpy as np
 from jaxtyping import Float
 
 from jounce.errors import no_such
+from jounce.io.robots.elements.quaternions import rotation_of
 from jounce.io.robots.elements.xml_elements import Element
 
 MODEL = "__model__"
@@ -127,10 +127,8 @@ def pose_of(element: Element, *name: str) -> FramePose:
         return HERE
     form = pose.attributes.get("rotation_format", "euler_rpy")
     if form == "quat_xyzw":
-        *position, x, y, z, w = pose.content_numbers(7, *name, "pose")
-        if math.hypot(x, y, z, w) < 1e-9:
-            raise pose.error("the quaternion must not be zero", *name, "pose", value=[x, y, z, w])
-        return FramePose(np.array(position), Rotation.from_quat([x, y, z, w]).as_matrix())
+        numbers = pose.content_numbers(7, *name, "pose")
+        return FramePose(np.array(numbers[:3]), rotation_of(numbers[3:], pose, *name, "pose"))
     if form != "euler_rpy":
         raise pose.error("rotation_format must be euler_rpy or quat_xyzw", *name, "pose", value=form)
     *position, roll, pitch, yaw = pose.content_numbers(6, *name, "pose")

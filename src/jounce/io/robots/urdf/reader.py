@@ -25,6 +25,7 @@ from jounce.io.robots.elements.faults import (
 )
 from jounce.io.robots.elements.followers import with_room
 from jounce.io.robots.elements.named_elements import NamedElements
+from jounce.io.robots.elements.quaternions import rotation_of
 from jounce.io.robots.elements.xml_elements import Element
 from jounce.io.robots.urdf.extensions import Loop, joint_springs, shares_of_gravity, urdf_closures
 from jounce.io.robots.urdf.left_out import check_version, note_left_out, rotors
@@ -211,11 +212,9 @@ def _pose(element: Element, *name: str) -> _Pose:
     quaternion = origin.numbers("quat_xyzw", 4, *name, "origin")
     if quaternion is None:
         return np.array(position), Rotation.from_euler("xyz", turns).as_matrix()
-    if math.hypot(*quaternion) < 1e-9:
-        raise origin.error("quat_xyzw must not be zero", *name, "origin", value=quaternion)
     if "rpy" in origin.attributes:
         raise origin.error("has both rpy and quat_xyzw; leave one of them out", *name, "origin")
-    return np.array(position), Rotation.from_quat(quaternion).as_matrix()
+    return np.array(position), rotation_of(quaternion, origin, *name, "origin")
 
 
 def _parent(joint: Element) -> str:
