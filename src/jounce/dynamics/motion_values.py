@@ -54,6 +54,11 @@ def at_instants(
     return program.at_instants(shared, lanes_of, len(motion.time), **static)[0]
 
 
+def along(coordinates: Coordinates) -> LanesOf:
+    """Return what gives coordinates at some instants."""
+    return lambda lanes: {name: values[..., lanes] for name, values in coordinates.items()}
+
+
 def in_small_chunks(function: Callable[..., Values], size: int, *arrays: Any) -> Values:
     """Return what a function of arrays with the instants last gives, for a few of these after another.
 

@@ -5,7 +5,6 @@ the body, away from the motion. Each changes a whole motion by a constant, and h
 it is a jet: the column of a Jacobian.
 """
 
-from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 import jax
@@ -18,10 +17,9 @@ from jounce.dynamics.energy.slopes import Columns, Form, column_of, slope_values
 from jounce.dynamics.forward.loads import inertia_forces
 from jounce.dynamics.inverse.constraint_equations import COLUMNS
 from jounce.dynamics.masses import Gravity, Masses, gravity_of, required_masses
-from jounce.dynamics.motion_values import Coordinates, cut, labeled, pose_of
+from jounce.dynamics.motion_values import Coordinates, along, at_instants, cut, labeled, pose_of
 from jounce.errors import MechanismError
-from jounce.execution.chunks import in_chunks
-from jounce.execution.compilation import compiled
+from jounce.execution.mapped import Mapped
 from jounce.jet import Jet
 from jounce.jet.algebra import stacked
 from jounce.kinematics import Motion
@@ -57,11 +55,7 @@ def in_body_coordinates(motion: Motion, form: Form, *, power: int = 0) -> "xarra
         If no body has a mass, or the motion has too few derivatives.
     """
     masses = required_masses(motion.mechanism)
-
-    def chunk(coordinates: Coordinates) -> Any:
-        return _evaluated(coordinates, masses, motion.poses[0], form)
-
-    return _of_bodies(motion, chunk, form.order, power)
+    return _of_bodies(motion, _evaluated, masses, form.order, power, form=form)
 
 
 def balanced_bodies(motion: Motion, rates: int, *, gravity: bool) -> "xarray.DataArray":
@@ -88,17 +82,13 @@ def balanced_bodies(motion: Motion, rates: int, *, gravity: bool) -> "xarray.Dat
     """
     masses, order = required_masses(motion.mechanism), rates + 2
     falling = gravity_of(motion.mechanism)
-
-    def chunk(coordinates: Coordinates) -> Any:
-        return _momentum(coordinates, masses, falling if gravity else np.zeros_like(falling), motion.poses[0], order)
-
-    return _of_bodies(motion, chunk, order)
+    return _of_bodies(motion, _momentum, (masses, falling if gravity else np.zeros_like(falling)), order, order=order)
 
 
 def _of_bodies(
-    motion: Motion, function: Callable[[Coordinates], Any], order: int, power: int = 0
+    motion: Motion, program: Mapped, shared: Any, needed: int, power: int = 0, **static: Any
 ) -> "xarray.DataArray":
-    """Return what a function of the coordinates of bodies, to an order, gives along a motion, labeled.
+    """Return what a program of the coordinates of bodies, to an order, gives along a motion, labeled.
 
     Raises
     ------
@@ -106,15 +96,11 @@ def _of_bodies(
         If the motion has too few derivatives.
     """
     mechanism, coordinates = motion.mechanism, motion.poses[1]
-    if len(coordinates["position"]) - 1 < order:
-        raise MechanismError(f"this needs a motion of order {order} or higher", name="order", value=motion.order)
-    start = cut(coordinates, order)
-
-    def chunk(lanes: np.ndarray) -> Any:
-        return function({name: values[..., lanes] for name, values in start.items()})
-
-    values = in_chunks(chunk, len(motion.time))
-    values = np.where(spoiled(motion.passages, motion.time, order), np.nan, values)
+    if len(coordinates["position"]) - 1 < needed:
+        raise MechanismError(f"this needs a motion of order {needed} or higher", name="order", value=motion.order)
+    start = along(cut(coordinates, needed))
+    values = at_instants(motion, program, shared, start, pose_type=motion.poses[0], **static)
+    values = np.where(spoiled(motion.passages, motion.time, needed), np.nan, values)
     names = COLUMNS[mechanism.space]
     efforts = ["N" if name in "xyz" else "N*m" for name in names] * len(mechanism.bodies)
     units = [derivative_unit(unit, power) if power >= 0 else f"{unit}*s^{-power}" for unit in efforts]
@@ -122,18 +108,19 @@ def _of_bodies(
     return labeled(motion, values, column=columns).assign_coords(unit=("column", units))
 
 
-@compiled("pose_type", "order")
+@Mapped
 def _momentum(
-    coordinates: Coordinates, masses: Masses, gravity: Gravity, pose_type: type[Pose], order: int
+    shared: tuple[Masses, Gravity], coordinates: Coordinates, *, pose_type: type[Pose], order: int
 ) -> Float[Numbers, "level coordinate time"]:
+    masses, gravity = shared
     pose = movable(pose_of(coordinates, pose_type, order).truncate(order))
     forces = jnp.concatenate([stacked(part) for part in inertia_forces(pose, masses, gravity)], axis=1)[:, :, 1:]
     return jnp.swapaxes(forces, 1, 2).reshape(forces.shape[0], -1, forces.shape[-1])
 
 
-@compiled("pose_type", "form")
+@Mapped
 def _evaluated(
-    coordinates: Coordinates, masses: Masses, pose_type: type[Pose], form: Form
+    masses: Masses, coordinates: Coordinates, *, pose_type: type[Pose], form: Form
 ) -> Float[Numbers, "level coordinate time"]:
     pose = movable(pose_of(coordinates, pose_type, form.order).truncate(form.order))
     moving, own = jax.tree.map(lambda x: x[..., 1:, :], (pose, masses))  # without the ground

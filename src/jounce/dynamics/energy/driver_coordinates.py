@@ -19,10 +19,9 @@ from jounce.dynamics.energy.slopes import Columns, Form, column_of, slope_values
 from jounce.dynamics.forward.accelerations import Lanes
 from jounce.dynamics.inverse.motion_forces import MotionForces
 from jounce.dynamics.masses import Masses, required_masses
-from jounce.dynamics.motion_values import Coordinates, cut, labeled, pose_of
+from jounce.dynamics.motion_values import Coordinates, along, at_instants, cut, labeled, pose_of
 from jounce.errors import MechanismError
-from jounce.execution.chunks import in_chunks
-from jounce.execution.compilation import compiled
+from jounce.execution.mapped import Mapped
 from jounce.jet import Jet
 from jounce.kinematics import Motion
 from jounce.kinematics.continuation.change_points import spoiled
@@ -81,13 +80,16 @@ def in_driver_coordinates(
     order = tuple((indices[name].group, indices[name].instance) for name in names)
     pose_type, coordinates = motion.poses
     masses = required_masses(motion.mechanism)
-    start = cut(coordinates, 0)
-
-    def chunk(lanes: np.ndarray) -> Any:
-        at_lanes = {name: values[..., lanes] for name, values in start.items()}
-        return _evaluated(model.system, at_lanes, motion.time[lanes], masses, pose_type, order, form)
-
-    values = in_chunks(chunk, len(motion.time))
+    start = along(cut(coordinates, 0))
+    values = at_instants(
+        motion,
+        _evaluated,
+        (model.system, masses),
+        lambda lanes: (start(lanes), motion.time[lanes]),
+        pose_type=pose_type,
+        order=order,
+        form=form,
+    )
     values = np.where(spoiled(motion.passages, motion.time, form.order), np.nan, values)
     return _of_drivers(motion, values, power)
 
@@ -137,16 +139,16 @@ def balanced(motion: Motion, rates: int, *, gravity: bool) -> "xarray.DataArray"
     return _of_drivers(motion, values)
 
 
-@compiled("pose_type", "order", "form")
+@Mapped
 def _evaluated(
-    system: System,
-    coordinates: Coordinates,
-    instants: Lanes,
-    masses: Masses,
+    shared: tuple[System, Masses],
+    lanes: tuple[Coordinates, Lanes],
+    *,
     pose_type: type[Pose],
     order: tuple[tuple[int, int], ...],
     form: Form,
 ) -> Any:
+    (system, masses), (coordinates, instants) = shared, lanes
     start_pose = pose_of(coordinates, pose_type)
     factor = factored(dataclasses.replace(system, fronts=None), start_pose, Jet([instants[None]]))
     time = Jet.variable(instants[None], form.order)

@@ -16,9 +16,9 @@ from jaxtyping import Float
 
 from jounce.base.shapes import ArrayLike, Numbers
 from jounce.dynamics.masses import Masses, required_masses, second_moments
-from jounce.dynamics.motion_values import Coordinates, labeled, pose_of
+from jounce.dynamics.motion_values import Coordinates, along, at_instants, labeled, pose_of
 from jounce.errors import JounceError, MechanismError, RobotError, flag, whole_number
-from jounce.execution.compilation import compiled
+from jounce.execution.mapped import Mapped
 from jounce.jet import Jet, dot
 from jounce.jet.algebra import stacked, total
 from jounce.kinematics import Motion
@@ -316,7 +316,8 @@ def energy_coefficients(motion: Motion, order: int, function: EnergyFunction = b
     """
     pose_type, coordinates = motion.poses
     _check_known(motion, order, len(coordinates["position"]) - 1)
-    return _of_bodies(coordinates, required_masses(motion.mechanism), pose_type, order, function)
+    how = {"pose_type": pose_type, "order": order, "function": function}
+    return at_instants(motion, _of_bodies, required_masses(motion.mechanism), along(coordinates), **how)
 
 
 def _check_known(motion: Motion, order: int, known: int) -> None:
@@ -325,8 +326,8 @@ def _check_known(motion: Motion, order: int, known: int) -> None:
         raise MechanismError(message, name="order", value=motion.order)
 
 
-@compiled("pose_type", "order", "function", brief=True)
+@Mapped
 def _of_bodies(
-    coordinates: Coordinates, masses: Masses, pose_type: type[Pose], order: int, function: EnergyFunction
+    masses: Masses, coordinates: Coordinates, *, pose_type: type[Pose], order: int, function: EnergyFunction
 ) -> tuple[Energies, ...]:
     return tuple(stacked(part) for part in function(pose_of(coordinates, pose_type), *masses, order))

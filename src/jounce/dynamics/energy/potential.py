@@ -4,17 +4,20 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Float
 
 from jounce.base.shapes import Numbers
 from jounce.dynamics.energy.energies import Energies
+from jounce.dynamics.forward.accelerations import Lanes
 from jounce.dynamics.masses import Gravity, gravity_of, required_masses
-from jounce.dynamics.motion_values import Coordinates, check_motion, concrete_values, cut, labeled, pose_of
-from jounce.execution.compilation import compiled
+from jounce.dynamics.motion_values import Coordinates, along, at_instants, check_motion, cut, labeled, pose_of
+from jounce.execution.mapped import Mapped
 from jounce.jet import Jet, dot
 from jounce.jet.algebra import stacked
 from jounce.kinematics import Motion
 from jounce.mechanism.system import Group
+from jounce.mechanism.transmissions.axis_angles import angles_along, at_lanes, with_turns
 from jounce.rigid.pose import Pose
 
 if TYPE_CHECKING:
@@ -60,14 +63,16 @@ def potential_energy(motion: Motion) -> "xarray.DataArray":
 def potential_coefficients(motion: Motion) -> Energies:
     """Return the potential energies of bodies as Taylor coefficients, the ground first."""
     masses, (pose_type, coordinates) = required_masses(motion.mechanism), motion.poses
-    heights = concrete_values(motion, _heights(coordinates, masses.center, gravity_of(motion.mechanism), pose_type))
+    shared = masses.center, gravity_of(motion.mechanism)
+    heights = at_instants(motion, _heights, shared, along(coordinates), pose_type=pose_type)
     return 0.0 - heights * masses.mass[None]  # no -0
 
 
-@compiled("pose_type", brief=True)
+@Mapped
 def _heights(
-    coordinates: Coordinates, center: Float[Numbers, "component body 1"], gravity: Gravity, pose_type: type[Pose]
+    shared: tuple[Float[Numbers, "component body 1"], Gravity], coordinates: Coordinates, *, pose_type: type[Pose]
 ) -> Energies:
+    center, gravity = shared
     return stacked(dot(pose_of(coordinates, pose_type).point(center), gravity))
 
 
@@ -99,13 +104,25 @@ def stored_energy(motion: Motion) -> Any:
     """
     check_motion(motion)
     pose_type, coordinates = motion.poses
-    stored = _stored(motion.forces, cut(coordinates, 1), motion.time[None], pose_type)
-    return labeled(motion, concrete_values(motion, stored)[None], "J")[:, 0].drop_vars("derivative")
+    angles, bodies = angles_along(motion.forces), along(cut(coordinates, 1))
+    stored = at_instants(
+        motion,
+        _stored,
+        at_lanes(motion.forces, np.zeros(1, int)),
+        lambda lanes: (bodies(lanes), angles(lanes), motion.time[lanes]),
+        pose_type=pose_type,
+    )
+    return labeled(motion, stored[None], "J")[:, 0].drop_vars("derivative")
 
 
-@compiled("pose_type", brief=True)
-def _stored(groups: tuple[Group, ...], coordinates: Coordinates, time: Any, pose_type: type[Pose]) -> Any:
-    return energy_of_forces(groups, pose_of(coordinates, pose_type), Jet.variable(time, 1))
+@Mapped
+def _stored(
+    groups: tuple[Group, ...], lanes: tuple[Coordinates, Sequence[Any], Lanes], *, pose_type: type[Pose]
+) -> Any:
+    coordinates, angles, instants = lanes
+    return energy_of_forces(
+        with_turns(groups, angles), pose_of(coordinates, pose_type), Jet.variable(instants[None], 1)
+    )
 
 
 def energy_of_forces(groups: Sequence[Group], pose: Pose, time: Jet) -> Float[Numbers, " batch"]:

@@ -20,10 +20,11 @@ from jounce.dynamics.forward.mechanism_state import MotionAtState, at_state
 from jounce.dynamics.forward.saddle_point import Jacobian, MassMatrix, block_diagonal, even_scale, saddle_point
 from jounce.dynamics.inverse.motion_forces import MotionForces
 from jounce.dynamics.masses import Masses, masses_of
-from jounce.dynamics.motion_values import Coordinates, cut, derivatives_along, pose_of
+from jounce.dynamics.motion_values import Coordinates, along, at_instants, cut, derivatives_along, pose_of
 from jounce.errors import MechanismError
 from jounce.execution.chunks import in_chunks
 from jounce.execution.compilation import compiled
+from jounce.execution.mapped import Mapped
 from jounce.jet import Jet
 from jounce.jet.derivatives import plain_derivatives
 from jounce.kinematics import Motion, Status
@@ -326,16 +327,12 @@ def _mass_matrix(motion: Motion) -> Float[np.ndarray, "time column column"]:
     """Return the mass matrix at all instants."""
     pose_type, coordinates = motion.poses
     masses = masses_of(motion.mechanism)
-
-    def chunk(lanes: np.ndarray) -> Any:
-        bodies = {name: values[..., lanes] for name, values in cut(coordinates, 0).items()}
-        return _body_masses(bodies, masses, pose_type)
-
-    return np.moveaxis(in_chunks(chunk, len(motion.time)), -1, 0)
+    matrices = at_instants(motion, _body_masses, masses, along(cut(coordinates, 0)), pose_type=pose_type)
+    return np.moveaxis(matrices, -1, 0)
 
 
-@compiled("pose_type")
-def _body_masses(bodies: Coordinates, masses: Masses, pose_type: type[Pose]) -> MassMatrix:
+@Mapped
+def _body_masses(masses: Masses, bodies: Coordinates, *, pose_type: type[Pose]) -> MassMatrix:
     blocks = mass_matrices(pose_of(bodies, pose_type, 0), masses)[:, :, 1:]
     return block_diagonal(blocks, np.ones(len(blocks)))
 

@@ -27,7 +27,7 @@ from jounce.kinematics.continuation.change_points import spoiled
 from jounce.mechanism.building.element_indices import ElementIndex, element_indices
 from jounce.mechanism.redundant_reactions import resolved_reactions
 from jounce.mechanism.system import Group, law_left_out
-from jounce.mechanism.transmissions.axis_angles import at_lanes, measures_angle
+from jounce.mechanism.transmissions.axis_angles import angles_along, at_lanes
 
 NOTHING = 1e-9  # of the largest multiplier: what is less is rounding
 
@@ -138,7 +138,7 @@ class MotionForces:
 
     def acting_at(self, lanes: np.ndarray) -> tuple[Any, tuple[Any, ...], Any]:
         """Return the coordinates of all bodies at some instants, the angles that forces measure, and the time."""
-        angles = tuple(group.element.datum.near[..., lanes] for group in self.motion.forces if measures_angle(group))
+        angles = angles_along(self.motion.forces)(lanes)
         return self.coordinates_at(None, lanes, self.levels + 2), angles, self.motion.time[lanes]
 
     @property
@@ -346,7 +346,7 @@ class MotionForces:
     def _acting(self, index: int, lanes: np.ndarray, levels: int) -> tuple[programs.Acting, Any]:
         """Return the poses of the bodies of forces, the angles about axes between them, and the instants."""
         group = self.motion.forces[index]
-        angles = [group.element.datum.near[..., lanes]] if measures_angle(group) else []
+        angles = angles_along((group,))(lanes)
         poses = [self.coordinates_at(slot, lanes, levels) for slot in group.bodies]
         return (poses, angles), self.motion.time[lanes]
 

@@ -13,12 +13,11 @@ from jounce.base.modules import with_fields
 from jounce.base.shapes import ArrayLike, Numbers
 from jounce.errors import MechanismError, check_name
 from jounce.execution.backends import xla_backend
-from jounce.execution.chunks import in_chunks
 from jounce.execution.on_demand import OnDemand
 from jounce.jet.derivatives import plain_derivatives
 from jounce.jet.turns import brought_near
 from jounce.kinematics.continuation.path_following import ChangePoint
-from jounce.kinematics.results.pose_outputs import check_output, output_group, output_series
+from jounce.kinematics.results.pose_outputs import check_output, output_group, series_along
 from jounce.kinematics.results.tables import Tabulated
 from jounce.kinematics.status import Status
 from jounce.mechanism import (
@@ -37,14 +36,13 @@ from jounce.mechanism.laws.driver_outputs import is_turning
 from jounce.mechanism.outputs.attitude_outputs import continued, euler_angles_of
 from jounce.mechanism.outputs.derivative_outputs import bound_alone
 from jounce.mechanism.system import Group
-from jounce.mechanism.transmissions.axis_angles import AttitudeHistory, at_lanes, attitudes_of, measures_angle
+from jounce.mechanism.transmissions.axis_angles import AttitudeHistory, attitudes_of, measures_angle
 from jounce.trajectory import HermiteMotion
 from jounce.units.shown_units import derivatives_of, time_axes
 
 if TYPE_CHECKING:
     import xarray
 
-TOGETHER = 1024  # instants at which an output that was not solved for is evaluated: one program for few and for many
 _UNDEFINED = Status.UNDEFINED.advice.partition(": ")[2]
 
 
@@ -350,7 +348,7 @@ class Motion(Tabulated):
         """The attitudes of all bodies along the motion, where they are known."""
         return self.history
 
-    def _coefficients(self, group: Group) -> Float[np.ndarray, "order component instance time"]:
+    def _coefficients(self, group: Group) -> Float[Numbers, "order component instance time"]:
         """Return the Taylor coefficients of outputs, (order + 1, components, instances, time).
 
         The program is given the ground, which never moves, and the bodies of the group alone: it serves any others.
@@ -360,11 +358,7 @@ class Motion(Tabulated):
         coordinates = {name: part[..., [0, *moving], :] for name, part in self._coordinates.items()}
         groups = tuple(with_fields(counted, bodies=indices) for counted in self._counting((group,)))
 
-        def chunk(lanes: np.ndarray) -> Any:
-            known = {name: part[..., lanes] for name, part in coordinates.items()}
-            return output_series(at_lanes(groups, lanes), known, self.model.pose_type)
-
-        (series,) = in_chunks(chunk, len(self.time), (TOGETHER,))
+        (series,) = series_along(groups, coordinates, len(self.time), self.model.pose_type)
         return series
 
     def _counting(self, groups: tuple[Group, ...]) -> tuple[Group, ...]:

@@ -1,5 +1,6 @@
 """Outputs that follow from the poses of bodies at an instant, of many instants at once."""
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -8,6 +9,7 @@ from jaxtyping import Float
 from jounce.base.shapes import Numbers
 from jounce.constraints import AbstractConstraint
 from jounce.execution.compilation import compiled
+from jounce.execution.mapped import Mapped
 from jounce.jet import Jet
 from jounce.jet.algebra import stacked
 from jounce.jet.derivatives import plain_derivatives
@@ -15,6 +17,7 @@ from jounce.mechanism import AbstractOutput, AbstractQuantity, Mechanism, Model
 from jounce.mechanism.building.builder import counted_as_in
 from jounce.mechanism.mechanism import GROUND
 from jounce.mechanism.system import POSITION_COMPONENTS, Group, group_elements
+from jounce.mechanism.transmissions.axis_angles import angles_along, at_lanes, with_turns
 
 
 def check_output(output: AbstractQuantity, mechanism: Mechanism, name: str = "output") -> None:
@@ -44,6 +47,26 @@ def output_series(
     """Return the Taylor coefficients of outputs, (order + 1, components, instances, batch) for each group."""
     pose = pose_type.from_coordinates({name: Jet(tuple(c)) for name, c in coordinates.items()})
     return tuple(stacked(group.evaluate(pose)) for group in groups)
+
+
+def series_along(
+    groups: tuple[Group, ...], coordinates: dict[str, Any], count: int, pose_type: type
+) -> tuple[Float[Numbers, "_ _ _ batch"], ...]:
+    """Return what `output_series` does for so many instants, whose turns of angles about axes the groups hold."""
+    angles = angles_along(groups)
+
+    def lanes_of(lanes: np.ndarray) -> Any:
+        return {name: part[..., lanes] for name, part in coordinates.items()}, angles(lanes)
+
+    return _of_instant.at_instants(at_lanes(groups, np.zeros(1, int)), lanes_of, count, pose_type=pose_type)[0]
+
+
+@Mapped
+def _of_instant(
+    groups: tuple[Group, ...], lanes: tuple[dict[str, Any], Sequence[Any]], *, pose_type: type
+) -> tuple[Float[Numbers, "_ _ _ batch"], ...]:
+    coordinates, angles = lanes
+    return output_series.function(with_turns(groups, angles), coordinates, pose_type)
 
 
 def output_values(
