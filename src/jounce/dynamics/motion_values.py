@@ -10,7 +10,6 @@ from jaxtyping import Float, Int
 
 from jounce.base.shapes import Numbers
 from jounce.errors import MechanismError
-from jounce.execution.chunks import in_chunks
 from jounce.execution.device import on_processor
 from jounce.execution.mapped import Mapped
 from jounce.jet import Jet
@@ -37,24 +36,12 @@ def check_motion(motion: object) -> None:
         raise MechanismError("must be a jn.Motion, as jn.solve and jn.simulate give it", name="motion", value=motion)
 
 
-def along_motion(motion: Motion, function: Callable[[Int[np.ndarray, " chunk"]], Values]) -> Values:
-    """Return what a function of indices of instants gives for all of a motion, at once where JAX traces it."""
-    count = len(motion.time)
-    return function(np.arange(count)) if motion.traced else in_chunks(function, count)
-
-
-def at_instants(
-    motion: Motion,
-    program: Mapped,
-    shared: Any,
-    lanes_of: LanesOf,
-    **static: Any,
-) -> Any:
+def at_instants(motion: Motion, program: Mapped, shared: Any, lanes_of: LanesOf, **static: Any) -> Any:
     """Return the results of a function of one instant for all of a motion, as `Mapped.at_instants` gives them."""
     return program.at_instants(shared, lanes_of, len(motion.time), **static)[0]
 
 
-def along(coordinates: Coordinates) -> LanesOf:
+def coordinates_along(coordinates: Coordinates) -> LanesOf:
     """Return what gives coordinates at some instants."""
     return lambda lanes: {name: values[..., lanes] for name, values in coordinates.items()}
 
@@ -87,11 +74,6 @@ def in_small_chunks(function: Callable[..., Values], size: int, *arrays: Any) ->
         return jnp.moveaxis(parts, 0, -2).reshape(*parts.shape[1:-1], chunk_count * size)[..., :count]
 
     return jax.tree.map(joined, jax.lax.map(lambda some: function(*some), jax.tree.map(split, arrays)))
-
-
-def concrete_values(motion: Motion, values: Any) -> Any:
-    """Return values along a motion as an array of NumPy, or as they are where JAX traces the motion."""
-    return values if motion.traced else np.asarray(values)
 
 
 def pose_of(coordinates: Coordinates, pose_type: type[Pose], order: int | None = None) -> Any:

@@ -8,7 +8,6 @@ from jounce.base.shapes import Numbers
 from jounce.constraints.base import Whole
 from jounce.dynamics.energy.energies import energy_coefficients, energy_unit
 from jounce.dynamics.energy.potential import potential_coefficients
-from jounce.dynamics.motion_values import concrete_values
 from jounce.errors import MechanismError, check_name, whole_number
 from jounce.kinematics import Motion
 from jounce.kinematics.position_analysis.solve import HIGHEST_ORDER
@@ -38,7 +37,7 @@ class AbstractEnergyOutput(AbstractMotionOutput):
 
     def coefficients(self, motion: Motion) -> Numbers:
         """Return the Taylor coefficients of the energy, (levels, 1, time)."""
-        parts = concrete_values(motion, self._of_bodies(motion))
+        parts = self._of_bodies(motion)
         if self.single_body is None:
             return parts.sum(axis=1, keepdims=True)
         index = 1 + list(motion.mechanism.bodies).index(self.single_body)  # the ground first

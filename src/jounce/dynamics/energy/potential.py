@@ -11,7 +11,15 @@ from jounce.base.shapes import Numbers
 from jounce.dynamics.energy.energies import Energies
 from jounce.dynamics.forward.accelerations import Lanes
 from jounce.dynamics.masses import Gravity, gravity_of, required_masses
-from jounce.dynamics.motion_values import Coordinates, along, at_instants, check_motion, cut, labeled, pose_of
+from jounce.dynamics.motion_values import (
+    Coordinates,
+    at_instants,
+    check_motion,
+    coordinates_along,
+    cut,
+    labeled,
+    pose_of,
+)
 from jounce.execution.mapped import Mapped
 from jounce.jet import Jet, dot
 from jounce.jet.algebra import stacked
@@ -64,7 +72,7 @@ def potential_coefficients(motion: Motion) -> Energies:
     """Return the potential energies of bodies as Taylor coefficients, the ground first."""
     masses, (pose_type, coordinates) = required_masses(motion.mechanism), motion.poses
     shared = masses.center, gravity_of(motion.mechanism)
-    heights = at_instants(motion, _heights, shared, along(coordinates), pose_type=pose_type)
+    heights = at_instants(motion, _heights, shared, coordinates_along(coordinates), pose_type=pose_type)
     return 0.0 - heights * masses.mass[None]  # no -0
 
 
@@ -104,7 +112,7 @@ def stored_energy(motion: Motion) -> Any:
     """
     check_motion(motion)
     pose_type, coordinates = motion.poses
-    angles, bodies = angles_along(motion.forces), along(cut(coordinates, 1))
+    angles, bodies = angles_along(motion.forces), coordinates_along(cut(coordinates, 1))
     stored = at_instants(
         motion,
         _stored,
