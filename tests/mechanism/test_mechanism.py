@@ -259,8 +259,7 @@ class TestTimeGrid:
             (jn.TimeGrid(0, 0, count=1), [0]),
             (jn.TimeGrid(-1, 0.99, 0.5), [-1, -0.5, 0, 0.5, 0.99]),
             (jn.TimeGrid(0, 1, 0.3), [0, 0.3, 0.6, 0.9, 1]),
-            (jn.TimeGrid(0, 1, 1.0 + 1e-9), [0, 1]),
-            (jn.TimeGrid(1, 1, 2.0), [1]),
+            (jn.TimeGrid(0, 1, 2.0), [0, 1]),
             (jn.TimeGrid(0, 1, 0.25 * (1 + 1e-9)), [0, 0.25, 0.5, 0.75, 1]),
             (jn.TimeGrid(0, 1, 0.25 * (1 - 1e-9)), [0, 0.25, 0.5, 0.75, 1]),
             (jn.TimeGrid("tau", "2*tau", "tau/2"), [2, 3, 4]),
@@ -293,7 +292,7 @@ class TestTimeGrid:
         assert 0 < instants[-1] - instants[-2] < step
         assert "last one" in last_step_words(instants)
 
-    @pytest.mark.parametrize("step", [0.1, 1e-3, 1 / 3, 0.7 / 7, 1.0])
+    @pytest.mark.parametrize("step", [0.1, 1e-3, 1 / 3, 0.7 / 7, 5.0, 1.0])
     def test_nothing_is_reported_steps_that_are_alike(self, step):
         assert last_step_words(time_grid(jn.TimeGrid(0, 1, step), {})) == ""
 
@@ -313,8 +312,6 @@ class TestTimeGrid:
             (jn.TimeGrid(0, 1, 0.1, 3), "either step or count"),
             (jn.TimeGrid(0, 1, -0.1), r"time\.step.*greater than zero"),
             (jn.TimeGrid(0, 1, 0), r"time\.step.*greater than zero"),
-            (jn.TimeGrid(0, 2, 121), r"time\.step: the step, s, which comes third, .*\(2 s\), got 121.*count="),
-            (jn.TimeGrid(0, 1, 1.001), r"time\.step.* longer than the grid"),
             (jn.TimeGrid(1, 0, 0.1), r"time\.stop.*before start"),
             (jn.TimeGrid(0, np.inf, 0.1), r"time\.stop.*finite"),
             (jn.TimeGrid(0, 1, 1e-12), "at most 10000000 instants.*got 10000000000"),

@@ -26,8 +26,8 @@ class TimeGrid:
     start, stop : number or expression
         First and last instant, s.
     step : number or expression, optional
-        Spacing, s, no longer than the grid, the last step being shorter where the others do not arrive at the stop; or
-        `count`, the number of instants with both ends.
+        Spacing, s, the last step being shorter where the others do not arrive at the stop; or `count`, the number of
+        instants with both ends.
 
     Examples
     --------
@@ -140,29 +140,12 @@ def _spaced(grid: TimeGrid, parameters: Mapping[str, Any]) -> SpacedInstants:
     else:
         steps = (stop - start) / values["step"]
         part = PART_OF_STEP + 2 * np.spacing(max(abs(start), abs(stop))) / values["step"]  # what late instants round to
-        if 0 < steps < 1 - part:
-            message = (
-                f"the step, s, which comes third, is longer than the grid ({stop - start:g} s); shorten it, or give"
-            )
-            raise MechanismError(f"{message} the number of instants as count=", name="time.step", value=values["step"])
         whole = np.floor(steps + part)
         count = whole + 1 + (steps > whole + part)  # the last step is shorter
     if count > MAX_INSTANTS:
         raise MechanismError(f"a time grid holds at most {MAX_INSTANTS} instants", name="time", value=float(count))
     step = values["step"] if "step" in values else (stop - start) / max(int(count) - 1, 1)
     return SpacedInstants(start, step, int(count), stop)
-
-
-def at_frequency(start: float, stop: float, frequency: float) -> TimeGrid:
-    """Return the grid of both ends and of the instants between at a frequency, 1/s.
-
-    Examples
-    --------
-    >>> time_grid(at_frequency(0.0, 1.0, 2.0), {}).tolist(), time_grid(at_frequency(0.0, 1.0, 0.1), {}).tolist()
-    ([0.0, 0.5, 1.0], [0.0, 1.0])
-    """
-    period = 1 / frequency
-    return TimeGrid(start, stop, min(period, stop - start) if stop > start else period)
 
 
 def last_step_words(instants: Instants) -> str:

@@ -176,6 +176,8 @@ def stated_dimensions(
 ) -> dict[str, Dimension]:
     """Return the dimensions of those parameters that have a unit, or follow from others that have one.
 
+    A product with a number has none that is certain, as the number may have any.
+
     Parameters
     ----------
     parameters : mapping of str to object
@@ -185,10 +187,8 @@ def stated_dimensions(
 
     Examples
     --------
-    >>> stated_dimensions({"a": "5 cm", "area": "2*a*a", "n": 3})
-    {'a': (('length', 1),)}
-    >>> stated_dimensions({"half": "a/2", "a": "5 cm"})["half"]
-    (('length', 1),)
+    >>> stated_dimensions({"area": "a*a", "a": "5 cm", "double": "2*a"})
+    {'a': (('length', 1),), 'area': (('length', 2),)}
     """
     dimensions, waiting, count = dict(known or {}), dict(parameters), -1
     while len(dimensions) > count:

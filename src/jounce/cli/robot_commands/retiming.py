@@ -215,10 +215,9 @@ def _of_mechanism(file: Path, limits: Path | None, rate: float, settings: Any, r
     bounds = load_drive_limits(limits, mechanism)
     with errors_about(file):
         retimed = find(mechanism, None, bounds, **settings)
-    from jounce.mechanism import time_grid
-    from jounce.mechanism.time import at_frequency
+    from jounce.mechanism import TimeGrid, time_grid
 
-    retimed.times = time_grid(at_frequency(0.0, retimed.stop, rate), {})
+    retimed.times = time_grid(TimeGrid(0.0, retimed.stop, 1 / rate), {})
     return _Result(mechanism, retimed, retimed.stop, retimed.path.stop - retimed.path.start)
 
 

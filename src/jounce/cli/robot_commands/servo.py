@@ -102,11 +102,12 @@ def frequency_of(text: str) -> float:
 def _at_rate(mechanism: Mechanism, frequency: float, order: int, count: Count) -> Motion:
     """Solve a mechanism at every period of the drive, from the first instant of its file to the last."""
     from jounce.kinematics import solve
-    from jounce.mechanism.time import at_frequency, instants_of
+    from jounce.mechanism import TimeGrid
+    from jounce.mechanism.time import instants_of
 
     known = instants_of(mechanism.time, mechanism.parameter_values)
     first, last = float(known[0]), float(known[-1])
-    grid = at_frequency(first, last, frequency)
+    grid = TimeGrid(first, last, 1 / frequency)
     return solve(mechanism, grid, order, strict=False, progress=count, keep=True)
 
 

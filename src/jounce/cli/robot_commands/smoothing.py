@@ -58,8 +58,7 @@ def smooth(
         examples/trajectories/panda_good.csv --deviation 0.001deg \
         --out smooth.csv --figure smooth.png
     """
-    from jounce.mechanism import time_grid
-    from jounce.mechanism.time import at_frequency
+    from jounce.mechanism import TimeGrid, time_grid
     from jounce.planning import smooth as find
     from jounce.reporting.smoothing_facts import smoothing_result, smoothing_table, smoothing_words
 
@@ -78,7 +77,7 @@ def smooth(
             spare_inputs(file, overwrite=output.overwrite)
         with errors_about(trajectory, robot):
             motion = find(given, allowed)
-    times = time_grid(at_frequency(motion.start, motion.stop, frequency), {})
+    times = time_grid(TimeGrid(motion.start, motion.stop, 1 / frequency), {})
     if not output.json:
         rows = "" if output.out is None else f"{len(times)} rows "
         say(f"{rows}from {motion.start:g} s to {motion.stop:g} s, within {allowed:.3g} rad or m of each sample")
