@@ -125,7 +125,7 @@ def worked(forces: MotionForces, name: str, element: Any, pose: Any) -> np.ndarr
     rates = np.stack(rate.dense().coefficients)[:, :, place.instance]
     power = -convolved(scalar, forces.multipliers[:, list(place.own_rows)], rates)
     if name in forces.friction.names:
-        taken = np.asarray(forces.friction.resisted(place.group, np.zeros(1, int)))[:, place.instance]
+        taken = forces.friction.resisted(place.group)[:, place.instance, :1]
         power = power - convolved(scalar, forces.friction.normal_force(name), taken[:, None])
     return power
 
