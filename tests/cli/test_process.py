@@ -229,3 +229,30 @@ def test_a_terminal_of_any_size_shows_every_number(columns, environment, cache):
 
 def test_help_on_a_terminal_that_does_not_tell_its_width():
     assert "Usage" in on_terminal(80, "--help", TERM="xterm", COLUMNS="0")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "names, arguments",
+    [
+        (("numpy", "jax", "scipy", "yaml", "csv", "cyclopts", "pydantic"), ("run", FOUR_BAR, "--order", "0")),
+        (
+            ("numpy", "csv", "signal", "socket", "threading", "tempfile", "pickle"),
+            ("sweep", FOUR_BAR, "--vary", "BC=13cm:15cm:3", "--order", "0", "--workers", "1", "--out", "a.zarr"),
+        ),
+    ],
+)
+def test_files_of_the_user_that_are_named_as_modules_are_not_run(names, arguments, tmp_path, cache):
+    for name in names:
+        (tmp_path / f"{name}.py").write_text(f"open('it_ran', 'a').write({name!r})\nraise RuntimeError\n")
+    script = tmp_path / "bin" / "script.py"  # as the one that is installed: it searches its own folder
+    script.parent.mkdir()
+    script.write_text("import sys\nfrom jounce.cli import main\nif __name__ == '__main__':\n    sys.exit(main())\n")
+    start = [sys.executable, str(script)]
+    for command in (COMMAND, start) if arguments[0] == "run" else (start,):
+        done = subprocess.run(
+            [*command, *arguments], cwd=tmp_path, env=ENVIRONMENT | cache, capture_output=True, text=True, timeout=300
+        )
+        assert (done.returncode, done.stderr) == (0, "")
+        assert "psi" in done.stdout
+    assert not (tmp_path / "it_ran").exists()

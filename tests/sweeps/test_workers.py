@@ -157,3 +157,14 @@ def test_a_killed_client_of_a_cluster_loses_nothing(scheduler, tmp_path):
     ]
     assert sums[0] == sums[1] != ""
     assert not any(out.glob(".scratch-*"))
+
+
+def test_the_environment_is_as_before_when_workers_have_ended(monkeypatch):
+    monkeypatch.setenv("PJRT_NPROC", "3")
+    monkeypatch.delenv("PYTHONSAFEPATH", raising=False)
+    before = dict(os.environ)
+    with cluster._environment():
+        assert os.environ["PJRT_NPROC"] == "3"
+        os.environ["PJRT_NPROC"], inside = "7", dict(os.environ)  # Dask sets it, too
+    assert inside["PYTHONSAFEPATH"] == "1"
+    assert dict(os.environ) == before

@@ -19,6 +19,10 @@ from jounce.sweeps.manifest import versions
 AHEAD = 2  # chunks that wait for each thread of the cluster
 POLL = 5.0  # s
 PATIENCE = 60.0  # s without any worker
+FOR_WORKERS = {
+    "PJRT_NPROC": "1",  # a worker has one core: threads of XLA would take it from the others
+    "PYTHONSAFEPATH": "1",  # it starts by `python -c`, which would import signal.py from its folder
+}
 GUARD = "put what it does below 'if __name__ == \"__main__\":', or sweep with workers=0, in this process"
 MISSING = "needs {}, which is not installed; install it with: pip install 'jounce[sweep]'"
 
@@ -163,6 +167,7 @@ def _client(scheduler: str | None, workers: int | None, timeout: float, scratch:
 
     with _quiet(), ExitStack() as closing:
         if scheduler is None:
+            closing.enter_context(_environment())
             cluster = closing.enter_context(_local(thread_count(workers), scratch))
             yield closing.enter_context(Client(cluster))
             return
@@ -180,6 +185,21 @@ def _client(scheduler: str | None, workers: int | None, timeout: float, scratch:
         yield client
 
 
+@contextmanager
+def _environment() -> Iterator[None]:
+    """Set what workers inherit, which Dask leaves set, for as long as they run."""
+    before = {name: os.environ.get(name) for name in FOR_WORKERS}
+    os.environ.update({name: os.environ.get(name) or value for name, value in FOR_WORKERS.items()})
+    try:
+        yield
+    finally:
+        for name, value in before.items():
+            if value is None:
+                os.environ.pop(name, None)
+            else:
+                os.environ[name] = value
+
+
 def _local(count: int, scratch: Path) -> Any:
     """Start worker processes on this machine."""
     import dask.config
@@ -194,9 +214,8 @@ def _local(count: int, scratch: Path) -> Any:
         "temporary-directory": str(scratch),
         "distributed.worker.use-file-locking": False,  # nobody else has this folder
         "distributed.worker.profile.enabled": False,  # it looks at all stacks a hundred times a second
-        # a worker has one core: threads of XLA would take it from the others. Dask's own MALLOC_TRIM_THRESHOLD_ is left
-        # out, which gives every large array new pages
-        "distributed.nanny.pre-spawn-environ": {"PJRT_NPROC": os.environ.get("PJRT_NPROC", "1")},
+        # Dask's own MALLOC_TRIM_THRESHOLD_ is left out, which gives every large array new pages
+        "distributed.nanny.pre-spawn-environ": {name: os.environ[name] for name in FOR_WORKERS},
     }
     try:
         _track_quietly()
