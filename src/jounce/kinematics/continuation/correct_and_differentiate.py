@@ -22,7 +22,7 @@ from jounce.jet.turns import brought_near
 from jounce.kinematics.continuation.corrector import newton_raphson
 from jounce.kinematics.continuation.jacobian_factors import Factor, factored
 from jounce.kinematics.continuation.predictor import hidden_by_laws, laws_predictable, near_prediction, travel_of
-from jounce.kinematics.continuation.singularity_distance import det_rate_of
+from jounce.kinematics.continuation.singularity_distance import det_rate_of, det_rates_of
 from jounce.kinematics.status import Status
 from jounce.linear_algebra.least_squares import LeastSquaresFactor
 from jounce.mechanism.system import Group, System
@@ -233,6 +233,7 @@ def advance(
     *,
     pose_type: type[Pose],
     order: int,
+    searched: int = 1,
     with_det_rate: bool = True,
 ) -> StepResult:
     """Solve a batch of instants, each from a neighbor solved before.
@@ -249,23 +250,26 @@ def advance(
     step, instant : array of shape (batch,)
         Time from the neighbor, and the time arrived at, s.
     search : bool
-        Whether to find how far the motion from the first lane can be predicted, and where it is singular next.
+        Whether to find how far the motion from the first lanes can be predicted, and where it is singular next.
     pose_type, order
         PlanarPose or SpatialPose; derivatives requested.
+    searched : int, default 1
+        How many lanes are searched: one, or all.
     with_det_rate : bool, default True
         Whether the rate of the determinant is looked for here, too; else it is left at zero.
     """
     arrival, factor, pose = solved_batch(system, settings, known, step, instant, pose_type=pose_type, order=order)
-    first = arrival.status[:1]
+    first = arrival.status[:searched]
 
-    def searched() -> Any:
-        hidden = hidden_by_laws(system, first, instant[:1], step[:1], order)
-        det_rate = det_rate_of(system, pose, factor, instant) if with_det_rate else np.zeros(1)
-        here = {name: jet.map(lambda c: c[..., :1]) for name, jet in pose.coordinates().items()}
+    def found() -> Any:
+        hidden = hidden_by_laws(system, first, instant[:searched], step[:searched], order)
+        det_rates = det_rate_of if searched == 1 else det_rates_of
+        det_rate = det_rates(system, pose, factor, instant) if with_det_rate else np.zeros(1)
+        here = {name: jet.map(lambda c: c[..., :searched]) for name, jet in pose.coordinates().items()}
         return hidden, det_rate, *safe_step_and_radius(system, here, pose_type.predictor)
 
-    first, det_rate, safe_step, radius = jax.lax.cond(search, searched, lambda: (first, *[np.zeros(1)] * 3))
-    status = jnp.concatenate([first, arrival.status[1:]])
+    first, det_rate, safe_step, radius = jax.lax.cond(search, found, lambda: (first, *[np.zeros(searched)] * 3))
+    status = jnp.concatenate([first, arrival.status[searched:]])
     return arrival._replace(status=status, det_rate=det_rate, safe_step=safe_step, radius=radius)
 
 
@@ -307,8 +311,9 @@ def solved_batch(
     consistent = jnp.all(gaps[1] <= 1.0, axis=0)
     status = _status(correction.last, predictable, pivot_ratio, admitted, defined, consistent, tolerance)
     body, deviation = jnp.argmax(departures, axis=0), departure / jnp.maximum(travel, 1e-300)
+    nothing = jnp.zeros_like(step)  # of what is searched
     arrival = StepResult(
-        coordinates, outputs, status, body, np.zeros(1), np.zeros(1), deviation, signs, np.zeros(1), pivot_ratio,
-        admissible, finite, gaps,
+        coordinates, outputs, status, body, nothing, nothing, deviation, signs, nothing, pivot_ratio, admissible,
+        finite, gaps,
     )  # fmt: skip
     return arrival, factor, pose

@@ -10,14 +10,7 @@ import jax.numpy as jnp
 from jounce.base.modules import with_fields
 from jounce.execution.device import on_processor
 from jounce.execution.mapped import GPU_WIDTH, mapped
-from jounce.kinematics.continuation.correct_and_differentiate import (
-    StepResult,
-    advance,
-    safe_step_and_radius,
-    solved_batch,
-)
-from jounce.kinematics.continuation.predictor import hidden_by_laws
-from jounce.kinematics.continuation.singularity_distance import det_rates_of
+from jounce.kinematics.continuation.correct_and_differentiate import StepResult, advance, solved_batch
 from jounce.mechanism.system import System
 from jounce.rigid.pose import Pose
 
@@ -41,20 +34,10 @@ def round_width(system: System) -> int:
 def _of_many(shared: Any, instants: Any, *, pose_type: type[Pose], order: int) -> StepResult:
     """Solve many instants as `advance_instant` does one; those of one motion are not searched."""
     (system, settings), (known, step, instant, own, search) = shared, instants
-    system = of_design(system, own)
-    arrival, factor, pose = solved_batch(system, settings, known, step, instant, pose_type=pose_type, order=order)
-    nothing = jnp.zeros_like(step)
+    given = of_design(system, own), settings, known, step, instant
     if own is None:
-        return arrival._replace(det_rate=nothing, safe_step=nothing, radius=nothing)
-
-    def searched() -> Any:
-        hidden = hidden_by_laws(system, arrival.status, instant, step, order)
-        det_rate = det_rates_of(system, pose, factor, instant)
-        return hidden, det_rate, *safe_step_and_radius(system, pose.coordinates(), pose_type.predictor)
-
-    nowhere = arrival.status, *[nothing] * 3
-    status, det_rate, safe_step, radius = jax.lax.cond(jnp.any(search), searched, lambda: nowhere)
-    return arrival._replace(status=status, det_rate=det_rate, safe_step=safe_step, radius=radius)
+        return solved_batch(*given, pose_type=pose_type, order=order)[0]
+    return advance(*given, jnp.any(search), pose_type=pose_type, order=order, searched=step.shape[-1])
 
 
 @mapped(by_xla=_of_many)

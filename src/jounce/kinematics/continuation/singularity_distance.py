@@ -66,21 +66,7 @@ def det_rates_of(
     """Return what `det_rate_of` does, for all lanes."""
     relative = system.pattern.dense(_slope(system, pose, instant)) * system.row_scale[:, :, None]
     relative = jax.vmap(partial(factor.solve, refined=False), in_axes=1, out_axes=1)(relative)
-
-    def product(a: Any, b: Any) -> Any:
-        return jnp.sum(a[:, :, None] * b[None], axis=1)
-
-    def norm(x: Any) -> Any:
-        return jnp.maximum(jnp.sqrt(jnp.sum(x * x, axis=(0, 1))), 1e-300)
-
-    power, grown = relative, jnp.zeros_like(instant)
-    for k in range(1, SQUARINGS + 1):
-        size = norm(power)
-        scaled = power / size[None, None]
-        power, grown = product(scaled, scaled), grown + jnp.log(size) / 2 ** (k - 1)
-    size = jnp.exp(grown + jnp.log(norm(power)) / 2**SQUARINGS)
-    along, trace = jnp.sum(power * jnp.swapaxes(relative, 0, 1), axis=(0, 1)), jnp.trace(power)
-    return _leading(along / jnp.where(trace == 0, 1.0, trace), size, along, size)
+    return jax.vmap(_of_matrix, in_axes=-1, out_axes=-1)(relative)[0]
 
 
 def _slope(system: System, pose: Pose, instant: Float[Numbers, " batch"]) -> Float[Numbers, "entry batch"]:
