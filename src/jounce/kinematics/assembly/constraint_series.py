@@ -17,6 +17,7 @@ from jaxtyping import Bool, Float
 
 from jounce.base.modules import with_fields
 from jounce.base.shapes import Numbers
+from jounce.execution.chunks import in_chunks
 from jounce.execution.compilation import compiled
 from jounce.jet import Jet
 from jounce.kinematics.assembly.initial_revolutions import Coordinates
@@ -92,17 +93,10 @@ class ReducedConstraints:
         coordinates : array of shape (lanes, order, columns)
             Coefficients of the scaled coordinates.
         """
-        count = len(series)
-        parts = []
-        for first in range(0, count, LANES):
-            some = series[first : first + LANES]
-            filled = np.zeros((LANES, self.order, series.shape[2]))
-            filled[: len(some), : some.shape[1]] = some
-            given = self.coordinates, (self.free, self.dependent, self.inverse, self.held.astype(float))
-            lanes = np.moveaxis(filled, 0, -1)
-            evaluated = _along(self.model.system, *given, lanes, pose_type=self.model.pose_type)
-            parts.append([np.moveaxis(np.asarray(x), -1, 0)[: len(some)] for x in evaluated])
-        equations, sizes, moved = (np.concatenate(x) for x in zip(*parts, strict=True))
+        bases, lanes = (self.free, self.dependent, self.inverse, self.held.astype(float)), np.moveaxis(series, 0, -1)
+        given, kind = (self.model.system, self.coordinates, bases), self.model.pose_type
+        parts = in_chunks(lambda k: _along(*given, lanes[..., k], pose_type=kind), len(series), (LANES,), threads=1)
+        equations, sizes, moved = (np.moveaxis(x, -1, 0) for x in parts)
         return equations, sizes, moved
 
     def gap(self, series: Float[np.ndarray, "lane order k"], order: int) -> tuple[np.ndarray, np.ndarray]:

@@ -12,6 +12,7 @@ from jaxtyping import Float
 
 from jounce.kinematics.assembly.initial_revolutions import Coordinates, Displace
 from jounce.kinematics.assembly.redundancy import Redundancy
+from jounce.linear_algebra.clusters import clusters
 from jounce.mechanism import Model
 from jounce.mechanism.transmissions.axis_angles import quaternion_product, turned
 
@@ -63,17 +64,7 @@ def _moved_together(parts: Float[np.ndarray, "direction body coordinate"]) -> li
     """Return clusters of bodies that directions of the null space move together."""
     projector = np.einsum("dbc,def->bcef", parts, parts)
     joined = np.sqrt((projector**2).sum(axis=(1, 3))) > RELATED
-    moving, clusters = set(np.flatnonzero(joined.diagonal()).tolist()), []
-    while moving:
-        group, waiting = set(), [min(moving)]
-        while waiting:
-            body = waiting.pop()
-            if body not in group:
-                group.add(body)
-                waiting += np.flatnonzero(joined[body]).tolist()
-        moving -= group
-        clusters.append(sorted(group))
-    return clusters
+    return [cluster for cluster in clusters(joined) if joined[cluster[0], cluster[0]]]
 
 
 def _spin(

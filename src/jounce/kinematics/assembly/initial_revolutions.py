@@ -14,6 +14,7 @@ from jaxtyping import Bool, Float
 
 from jounce.constraints.facts import dimension_of_field
 from jounce.jet.turns import WHOLE_TURN, principal, whole_periods
+from jounce.linear_algebra.clusters import clusters
 from jounce.linear_algebra.host_jacobian import HostJacobian
 from jounce.mechanism import Model
 from jounce.mechanism.transmissions.axis_angles import AttitudeHistory, measures_angle
@@ -203,17 +204,10 @@ def nearest_turns(
     bodies = np.arange(len(away))
     changes = np.stack([residual_at(shifted((bodies == k) * 1.0)) - still for k in bodies])
     counted = np.abs(changes) > 1e-6
-    turns = np.where(counted.any(axis=1), 0.0, np.round(away))
-    waiting = {int(k) for k in np.flatnonzero(counted.any(axis=1))}
-    while waiting:  # bodies that share a row that counts turns
-        together, before = {min(waiting)}, set()
-        while together != before:
-            before = set(together)
-            rows = counted[sorted(together)].any(axis=0)
-            together = {k for k in waiting if counted[k][rows].any()}
-        waiting -= together
-        members = np.array(sorted(together))
-        turns[members] = _together(changes[members], away[members])
+    turns = np.round(away)
+    for members in clusters(counted @ counted.T):  # bodies that share a row that counts turns
+        if counted[members].any():
+            turns[members] = _together(changes[members], away[members])
     if not turns.any() or np.max(np.abs(residual_at(shifted(turns)) - still)) > 1e-6:
         return coordinates
     return {**coordinates, "angle": shifted(turns)}

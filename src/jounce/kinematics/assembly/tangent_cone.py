@@ -13,12 +13,13 @@ import numpy as np
 from jaxtyping import Float
 
 from jounce.kinematics.assembly.constraint_series import FULFILLED, ReducedConstraints
-from jounce.linear_algebra.quadratic_forms import polarized
+from jounce.linear_algebra.quadratic_forms import common_zeros, polarized
 
 STARTS = 400  # directions from which tangents are sought
 MOST_CURVES = 16
 SAME = 1e-3  # rad, between two tangents that are one
 STEPS = 40
+VANISHING = 1e-9  # of the largest coefficient of the forms
 RETRIES = 6
 DIFFERENCE = 1e-4  # of coefficients, by which slopes are found: of polynomials, whose error is its square
 
@@ -81,21 +82,10 @@ def _quadratic_tangents(constraints: ReducedConstraints) -> Float[np.ndarray, "t
     forms = _quadratic_forms(constraints)
     scale = np.abs(forms).max(initial=0.0)
     random = np.random.default_rng(0)
-    u = random.standard_normal((STARTS, count))
-    u /= np.linalg.norm(u, axis=1, keepdims=True)
+    starts = random.standard_normal((STARTS, count))
     if not scale > FULFILLED:
-        return u
-    forms = forms / scale
-    for _ in range(STEPS):
-        along = np.einsum("sij,nj->nsi", forms, u)
-        gap = np.einsum("nsi,ni->ns", along, u)
-        slope = np.concatenate([2 * along, u[:, None]], axis=1)
-        right = np.concatenate([gap, np.zeros((len(u), 1))], axis=1)
-        u = u - np.einsum("nij,nj->ni", np.linalg.pinv(slope, rcond=1e-10), right)
-        u /= np.linalg.norm(u, axis=1, keepdims=True)
-    gap = np.abs(np.einsum("sij,ni,nj->ns", forms, u, u)).max(axis=1)
-    # where a root is double the iteration halves its error at each step, and the gap goes with its square
-    return u[gap <= 1e-9]
+        return starts / np.linalg.norm(starts, axis=1, keepdims=True)
+    return common_zeros(forms / scale, starts, VANISHING, steps=STEPS)
 
 
 def _quadratic_forms(constraints: ReducedConstraints) -> Float[np.ndarray, "s k k"]:

@@ -13,7 +13,7 @@ from jaxtyping import Float
 from jounce.errors import SolveError
 from jounce.kinematics.curves.path_tracker import CurvePoint, PathTracker, all_finite
 from jounce.kinematics.status import Status
-from jounce.linear_algebra.quadratic_forms import polarized
+from jounce.linear_algebra.quadratic_forms import common_zeros, polarized
 
 PASSAGE_ORDER = 8  # of the series that leads through: rounding spoils higher coefficients near a singular point
 NEAR = 0.02  # of the radius of the series: from so near its terms up to that order are good to rounding
@@ -25,7 +25,8 @@ VANISHING = 1e-7  # of second derivatives
 MAX_CORRECTIONS, LOCATED = 6, 1e-9  # of the way there, to which a crossing is located
 SAME_DIRECTION = 1e-6
 FIRST_STEPS, LARGEST_BEND = (2e-3, 2e-4, 2e-5), 1e-3  # into a branch
-STARTS, MAX_TURNS = 16, 60
+STARTS, STEPS, LONGEST_STEP = 16, 60, 0.3  # on the sphere, for each direction of the first order
+ROUNDING = 1e-12  # of the largest coefficient of the forms
 MOST_MULTIPLE = 4  # directions in which branches touch; more are a surface
 LEAST_ANGLE = 1e-3  # between branches, by the slopes of the forms: nearer ones count as one
 
@@ -166,17 +167,12 @@ def _tangents(
 
 
 def _common_zeros(forms: Float[np.ndarray, "form k k"]) -> tuple[list[np.ndarray], bool]:
-    """Return unit vectors, up to their sign, on which all forms vanish, and whether each is one by itself.
-
-    Gauss-Newton from many starts on the sphere; each start finds the nearest.
-    """
+    """Return unit vectors, up to their sign, on which all forms vanish, and whether each is one by itself."""
     count = forms.shape[1]
     single: list[np.ndarray] = []
     several: list[np.ndarray] = []
-    for x in np.random.default_rng(0).standard_normal((STARTS * count, count)):
-        x = _zero_near(forms, x / np.linalg.norm(x))
-        if x is None:
-            continue
+    starts = np.random.default_rng(0).standard_normal((STARTS * count, count))
+    for x in common_zeros(forms, starts, ROUNDING, steps=STEPS, longest=LONGEST_STEP):
         sizes = np.linalg.svd(np.concatenate([2 * forms @ x, x[None]]), compute_uv=False)
         is_single = len(sizes) == count and bool(sizes[-1] > LEAST_ANGLE)
         zeros, least_angle = (single, SAME_DIRECTION) if is_single else (several, LEAST_ANGLE)
@@ -185,16 +181,3 @@ def _common_zeros(forms: Float[np.ndarray, "form k k"]) -> tuple[list[np.ndarray
     if len(several) > MOST_MULTIPLE:
         return single, False  # a surface of them
     return [*single, *several], not several
-
-
-def _zero_near(forms: Float[np.ndarray, "form k k"], x: Float[np.ndarray, " k"]) -> Float[np.ndarray, " k"] | None:
-    """Return a unit vector near another on which all forms vanish, if Gauss-Newton finds one."""
-    for _ in range(MAX_TURNS):
-        values = np.einsum("fij,i,j->f", forms, x, x)
-        slopes = np.concatenate([2 * forms @ x, x[None]])
-        step = np.linalg.lstsq(slopes, np.append(-values, 0.0), rcond=1e-10)[0]
-        step *= min(1.0, 0.3 / max(np.linalg.norm(step), 1e-300))
-        x = (x + step) / np.linalg.norm(x + step)
-        if np.max(np.abs(step)) < 1e-15:
-            break
-    return x if np.max(np.abs(np.einsum("fij,i,j->f", forms, x, x))) <= 1e-12 else None

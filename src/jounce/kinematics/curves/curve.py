@@ -8,10 +8,11 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
 from jounce.base.display import Displayed
 from jounce.errors import MechanismError
+from jounce.execution.chunks import in_chunks
 from jounce.jet.derivatives import plain_derivatives
 from jounce.jet.turns import WHOLE_TURN
 from jounce.kinematics.curves.crossings import ChangePoint, departed
@@ -352,14 +353,15 @@ class Curve(Displayed):
     @cached_property
     def smallest_singular_values(self) -> Float[np.ndarray, " point"]:
         """Smallest singular value of the scaled Jacobian with the driver held, at the points: zero at dead points."""
-        columns, smallest = self._tracker.columns, []
         points = [self._at(s) for s in self.arc_lengths]
-        for first in range(0, len(points), LANES):
-            some = points[first : first + LANES]
-            lanes = [dataclasses.replace(point, rows=some[0].rows) for point in some]
-            batch = self._tracker.points(lanes, np.zeros(len(lanes)), corrected=False)
-            smallest.append(np.linalg.svd(np.moveaxis(batch.jacobian[:, :columns], -1, 0), compute_uv=False)[:, -1])
-        return np.concatenate(smallest)
+        points = [dataclasses.replace(point, rows=points[0].rows) for point in points]
+
+        def jacobians(lanes: Int[np.ndarray, " lane"]) -> np.ndarray:
+            batch = self._tracker.points([points[k] for k in lanes], np.zeros(len(lanes)), corrected=False)
+            return batch.jacobian[:, : self._tracker.columns]
+
+        matrices = in_chunks(jacobians, len(points), (LANES,), threads=1)
+        return np.linalg.svd(np.moveaxis(matrices, -1, 0), compute_uv=False)[:, -1]
 
     @cached_property
     def outputs(self) -> Mapping[str, np.ndarray]:

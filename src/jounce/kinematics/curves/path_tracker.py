@@ -12,9 +12,11 @@ from numpy.polynomial.polynomial import polyval
 
 from jounce.base.padding import padded
 from jounce.base.shapes import Numbers
+from jounce.execution.chunks import in_chunks
 from jounce.jet.turns import principal
 from jounce.kinematics.curves.series import CurvePoints, curve_points, second_order
 from jounce.mechanism import Model
+from jounce.mechanism.transmissions.axis_angles import conjugate, quaternion_product
 from jounce.rigid import PlanarPose
 
 ORDER = 20
@@ -323,14 +325,13 @@ class PathTracker:
         """Return half the second derivatives of the residual along directions."""
         coordinates = {name: c[0][..., None] for name, c in point.coordinates.items()}
         scale, value = np.asarray(self.value_scale if self.driven else 0.0), np.asarray(point.value[0])
-        columns = []
-        for first in range(0, directions.shape[1], LANES):
-            some = directions[:, first : first + LANES]
-            wide = np.zeros((self.columns + 1, LANES))
-            wide[: self.unknowns, : some.shape[1]] = some
-            arguments = (self.model.system, coordinates, value, wide, scale)
-            columns.append(np.asarray(second_order(*arguments, pose_type=self.model.pose_type))[:, : some.shape[1]])
-        return np.concatenate(columns, axis=1)
+        wide = np.pad(directions, ((0, self.columns + 1 - self.unknowns), (0, 0)))
+
+        def of_some(lanes: Int[np.ndarray, " lane"]) -> Any:
+            given = self.model.system, coordinates, value, wide[:, lanes], scale
+            return second_order(*given, pose_type=self.model.pose_type)
+
+        return in_chunks(of_some, wide.shape[1], (LANES,), threads=1)
 
 
 def _rank(sizes: Float[np.ndarray, " k"], tolerance: float) -> int:
@@ -339,15 +340,12 @@ def _rank(sizes: Float[np.ndarray, " k"], tolerance: float) -> int:
 
 def spun(quaternion: np.ndarray, turn: np.ndarray) -> np.ndarray:
     """Return how Euler parameters, (4, bodies), change with turns about the axes of the bodies, (3, bodies)."""
-    e0, e = quaternion[0], quaternion[1:]
-    return 0.5 * np.concatenate([-np.sum(e * turn, axis=0)[None], e0 * turn + np.cross(e, turn, axis=0)])
+    return 0.5 * quaternion_product(quaternion, np.concatenate([np.zeros_like(turn[:1]), turn]))
 
 
 def spin(quaternion: np.ndarray, other: np.ndarray) -> np.ndarray:
     """Return twice the vector part of the product of an attitude's conjugate with other Euler parameters."""
-    e0, e = quaternion[0], quaternion[1:]
-    f0, f = other[0], other[1:]
-    return 2.0 * (e0 * f - f0 * e - np.cross(e, f, axis=0))
+    return 2.0 * quaternion_product(conjugate(quaternion), other)[1:]
 
 
 def all_finite(points: CurvePoints) -> Bool[np.ndarray, " lane"]:

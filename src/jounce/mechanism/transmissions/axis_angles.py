@@ -220,7 +220,7 @@ def departure(before: Sequence[Group], after: Sequence[Group]) -> float:
         if measures_angle(new):
             axis, attitude = axis_of(new), new.element.datum.attitude
             angle = principal(_raw_angle(old, attitude) - new.element.datum.angle)
-            turn = quaternion_product(attitude, _inverse(old.element.datum.attitude))[1:]
+            turn = quaternion_product(attitude, conjugate(old.element.datum.attitude))[1:]
             tilt = turn - (turn * axis).sum(axis=0) * axis
             largest = max(largest, np.max(np.abs(angle)), np.max(np.abs(tilt)))
     return float(largest)
@@ -264,7 +264,7 @@ def _shaft_angles(group: Group, quaternion: Float[np.ndarray, "4 bodies sample"]
         group.bodies[:2], (element.axis_i, element.axis_j), (element.held_i, element.held_j), strict=True
     ):
         axis = np.asarray(axis) / np.linalg.norm(axis, axis=0)
-        angles.append(-since(held, quaternion_product(_inverse(quaternion[:, list(bodies)]), frame), axis))
+        angles.append(-since(held, quaternion_product(conjugate(quaternion[:, list(bodies)]), frame), axis))
     return np.concatenate(angles)
 
 
@@ -283,7 +283,7 @@ def unit(vectors: Float[np.ndarray, "component *batch"]) -> Float[np.ndarray, "c
 def relative_attitude(group: Group, coordinates: Coordinates) -> Quaternions:
     """Return the Euler parameters of the second bodies of a group relative to the first, (4, instances, 1)."""
     first, second = (np.asarray(coordinates["quaternion"])[:, list(bodies)] for bodies in group.bodies)
-    return quaternion_product(_inverse(first), second)
+    return quaternion_product(conjugate(first), second)
 
 
 def attitudes_of(
@@ -299,13 +299,13 @@ def attitudes_of(
         Of all bodies, the ground first.
     """
     *base, body = (quaternion[:, k] for k in bodies)
-    return quaternion_product(_inverse(base[0]), body) if base else body
+    return quaternion_product(conjugate(base[0]), body) if base else body
 
 
 def since(datum: Datum, attitude: Quaternions, axis: Vectors) -> Angles:
     """Return the angle of an attitude, within half a turn of that of a datum."""
     return (
-        np.asarray(datum.angle) + angle_of(quaternion_product(attitude, _inverse(np.asarray(datum.attitude))), axis)[0]
+        np.asarray(datum.angle) + angle_of(quaternion_product(attitude, conjugate(np.asarray(datum.attitude))), axis)[0]
     )
 
 
@@ -318,7 +318,7 @@ def _between(attitude: Quaternions, axis: Vectors, first: Vectors, second: Vecto
 
 def _across(second: Numbers, attitude: Quaternions, axis: Vectors) -> Numbers:
     """Return the part of vectors of bodies j across axes of bodies i."""
-    along = turned(_inverse(attitude), axis)
+    along = turned(conjugate(attitude), axis)
     return second - (second * along).sum(axis=0) * along
 
 
@@ -329,7 +329,8 @@ def _relative_sign(bodies: tuple[int, ...], axis: Float[np.ndarray, " 3"], given
     return int(np.sign(axis @ given.axis)) * (1 if bodies == given.bodies else -1)
 
 
-def _inverse(p: Quaternions) -> Quaternions:
+def conjugate(p: Quaternions) -> Quaternions:
+    """Return the Euler parameters of the turns back."""
     return np.concatenate([p[:1], -p[1:]])
 
 

@@ -1,0 +1,18 @@
+"""Clusters of what is joined pair by pair."""
+
+import numpy as np
+from jaxtyping import Bool
+
+
+def clusters(joined: Bool[np.ndarray, "member member"]) -> list[list[int]]:
+    """Return the members that are joined with each other, over others or at once, by the least of each cluster.
+
+    Examples
+    --------
+    >>> clusters(np.array([[0, 0, 1], [0, 0, 0], [1, 0, 0]], bool))
+    [[0, 2], [1]]
+    """
+    reached = joined | np.eye(len(joined), dtype=bool)
+    while ((further := reached @ reached) != reached).any():
+        reached = further
+    return [np.flatnonzero(row).tolist() for k, row in enumerate(reached) if row.argmax() == k]
