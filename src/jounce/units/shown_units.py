@@ -78,6 +78,11 @@ def time_axes(instants: Float[Numbers, " time"], levels: int) -> dict[str, Any]:
     }
 
 
+def component_axes(output: Any, count: int) -> dict[str, list[str]]:
+    """Return the axes that the components of an output have, by name, with their labels: one, or those of a matrix."""
+    return {axis: list(labels) for axis, labels in output.axes or (("component", output.labels[:count]),)}
+
+
 def derivatives_of(name: str) -> str:
     """Return the long name of an array of a quantity and its derivatives, whose unit is that of the quantity itself.
 

@@ -6,7 +6,7 @@ constraints tell which velocities continue, and where they branch (`constraint_s
 
 import dataclasses
 from collections.abc import Sequence
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 from jaxtyping import Float
@@ -214,7 +214,8 @@ def _analyzed(constraints: ReducedConstraints, displace: Displace) -> Mobility:
     if not left:
         return Mobility(columns, rows, 0, 0, None, "rigid")
     if _all_go_on(constraints):
-        return Mobility(columns, rows, left, left, order, "regular", None, (_whole(constraints),))
+        whole = Branch(left, _by_body(constraints, constraints.free.T))
+        return Mobility(columns, rows, left, left, order, "regular", None, (whole,))
     local_curves = curves(constraints)
     going = [curve for curve in local_curves if curve.order == order]
     branches = _branches(constraints, going, displace)
@@ -237,10 +238,6 @@ def _all_go_on(constraints: ReducedConstraints) -> bool:
     series[:, 0] = some / np.linalg.norm(some, axis=1, keepdims=True)
     gap, allowed = constraints.gap(series, constraints.order)
     return bool((np.abs(gap) <= allowed).all())
-
-
-def _whole(constraints: ReducedConstraints) -> Branch:
-    return Branch(constraints.free.shape[1], _by_body(constraints, constraints.free.T))
 
 
 def _branches(constraints: ReducedConstraints, going: Sequence[LocalCurve], displace: Displace) -> tuple[Branch, ...]:
@@ -300,24 +297,3 @@ def _turn(vector: Float[np.ndarray, " coordinate"]) -> float:
 
 def _freedom(number: int) -> str:
     return f"{number} degree{'' if number == 1 else 's'} of freedom"
-
-
-def facts_of(result: Mobility) -> dict[str, Any]:
-    """Return a mobility as plain data."""
-    return {
-        "count": result.count,
-        "instantaneous": result.instantaneous,
-        "finite": result.finite,
-        "order": result.order,
-        "kind": result.kind,
-        "blocked": result.blocked,
-        "branches": [
-            {
-                "freedom": branch.freedom,
-                "cusp": branch.cusp,
-                "tangents": {name: vectors.tolist() for name, vectors in branch.tangents.items()},
-            }
-            for branch in result.branches
-        ],
-        "words": str(result),
-    }

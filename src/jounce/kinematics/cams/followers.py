@@ -249,8 +249,3 @@ def rotated(vector: Jet, angle: Jet) -> Jet:
 def unit(angle: Jet) -> Jet:
     """Return unit vectors in a direction, (2, ...)."""
     return stack([cos(angle), sin(angle)])
-
-
-def across(vector: Jet) -> Jet:
-    """Return vectors of shape (2, ...) turned by a right angle."""
-    return stack([-vector[1], vector[0]])

@@ -17,9 +17,10 @@ from jounce.base.shapes import ArrayLike, real_numbers
 from jounce.errors import MechanismError, SampleWarning, TrajectoryError, check_choice, warn_caller, whole_number
 from jounce.jet import Jet, atan2, sqrt
 from jounce.jet.turns import WHOLE_TURN
-from jounce.kinematics.cams.followers import AbstractFollower, Follower, across, rotated, unit
+from jounce.kinematics.cams.followers import AbstractFollower, Follower, rotated, unit
 from jounce.kinematics.cams.results import Extreme, Geometry, Numbers1, Undercut
 from jounce.kinematics.cams.undercut import Cutter, runs
+from jounce.rigid import perpendicular
 from jounce.trajectory import (
     AbstractMotion,
     Continuity,
@@ -296,13 +297,13 @@ def _geometry(cam: PlateCam, angles: Numbers1) -> Geometry:
         direction, distance = follower.face(coordinate)
         normal = unit(direction + back)
         turning = (direction + back).differentiate()
-        pitch = profile = normal * distance + across(normal) * (distance.differentiate() / turning)
-        tangent = across(normal) * -sense
+        pitch = profile = normal * distance + perpendicular(normal) * (distance.differentiate() / turning)
+        tangent = perpendicular(normal) * -sense
     else:
         pitch = rotated(follower.center(coordinate), back)
         tangent = pitch.differentiate()
         tangent = tangent / sqrt(_dot(tangent, tangent))
-        normal = across(tangent) * sense  # away from the cam
+        normal = perpendicular(tangent) * sense  # away from the cam
         profile = pitch - normal * follower.radius
     forward, around = (_dot(tangent, curve.differentiate()) for curve in (profile, pitch))
     turned = _dot(tangent, normal.differentiate())

@@ -152,22 +152,17 @@ def _outputs(system: System, pose: Pose, angles: Sequence[Numbers], step: Lanes)
     return tuple(results)
 
 
-def _finite(jets: Sequence[Numbers], finite_order: Int[Numbers, ""]) -> Bool[Numbers, "instance batch"]:
-    """Tell where coefficients of jets are finite up to the order requested, for each instance: (instances, batch)."""
-    flags = []
-    for jet in jets:
-        above = (np.arange(jet.shape[0]) > finite_order).reshape(-1, *[1] * (jet.ndim - 1))
-        flags.append(jnp.all(jnp.isfinite(jet) | above, axis=(0, 1)))
-    return jnp.concatenate(flags)
-
-
 def _finite_results(
     coordinates: Sequence[Numbers], outputs: Sequence[Numbers], finite_order: Int[Numbers, ""]
 ) -> Bool[Numbers, "result batch"]:
     """Tell where the pose and each output are finite up to the order requested."""
-    posed = [jnp.max(part, axis=-2, keepdims=True) for part in coordinates]
-    finite = _finite([*(x.reshape(x.shape[0], -1, 1, x.shape[-1]) for x in posed), *outputs], finite_order)
-    return jnp.concatenate([jnp.all(finite[: len(posed)], axis=0, keepdims=True), finite[len(posed) :]])
+
+    def finite(jet: Numbers, axes: tuple[int, ...]) -> Any:
+        above = (np.arange(len(jet)) > finite_order).reshape(-1, *[1] * (jet.ndim - 1))
+        return jnp.all(jnp.isfinite(jet) | above, axis=axes)
+
+    posed = [finite(jnp.max(part, axis=-2), tuple(range(part.ndim - 2))) for part in coordinates]
+    return jnp.concatenate([jnp.all(jnp.stack(posed), axis=0, keepdims=True), *(finite(x, (0, 1)) for x in outputs)])
 
 
 def _signs(system: System, factor: Factor, before: Callable[[], tuple[Pose, Jet]], sign: Lanes) -> Lanes:
@@ -261,14 +256,14 @@ def advance(
     arrival, factor, pose = solved_batch(system, settings, known, step, instant, pose_type=pose_type, order=order)
     first = arrival.status[:searched]
 
-    def found() -> Any:
+    def search_result() -> Any:
         hidden = hidden_by_laws(system, first, instant[:searched], step[:searched], order)
         det_rates = det_rate_of if searched == 1 else det_rates_of
         det_rate = det_rates(system, pose, factor, instant) if with_det_rate else np.zeros(1)
         here = {name: jet.map(lambda c: c[..., :searched]) for name, jet in pose.coordinates().items()}
         return hidden, det_rate, *safe_step_and_radius(system, here, pose_type.predictor)
 
-    first, det_rate, safe_step, radius = jax.lax.cond(search, found, lambda: (first, *[np.zeros(searched)] * 3))
+    first, det_rate, safe_step, radius = jax.lax.cond(search, search_result, lambda: (first, *[np.zeros(searched)] * 3))
     status = jnp.concatenate([first, arrival.status[searched:]])
     return arrival._replace(status=status, det_rate=det_rate, safe_step=safe_step, radius=radius)
 

@@ -177,8 +177,7 @@ def history_of(anchors: Sequence[Anchor]) -> AttitudeHistory | None:
     times = np.array([anchor.instant for anchor in anchors])
     series = np.concatenate([anchor.state[0]["quaternion"] for anchor in anchors], axis=-1)
     between = partial(attitudes_between, times, np.where(np.isfinite(series), series, 0.0))
-    since = np.diff(times)[:, None] * (np.arange(SAMPLES_A_STEP) / SAMPLES_A_STEP)
-    instants = np.append((times[:-1, None] + since).ravel(), times[-1])
+    instants = within_steps(times, SAMPLES_A_STEP)
     return AttitudeHistory(between(instants), instants, between=between)
 
 
@@ -302,6 +301,12 @@ def _passed(solver: Solver, here: Anchor, stop: float) -> tuple[Anchor, ChangePo
         return None
     located = 0.5 * (middle + target - beyond.reach)  # what each side errs by cancels to the second order
     return beyond, ChangePoint(located, min(here.radius, beyond.radius))
+
+
+def within_steps(times: Float[np.ndarray, " anchor"], count: int) -> Float[np.ndarray, " time"]:
+    """Return so many instants from each anchor to the next one, evenly spaced, and the last anchor."""
+    since = np.diff(times)[:, None] * (np.arange(count) / count)
+    return np.append((times[:-1, None] + since).ravel(), times[-1])
 
 
 def attitudes_between(

@@ -9,7 +9,7 @@ import numpy as np
 from jounce.base.display import Displayed
 from jounce.base.modules import with_fields
 from jounce.base.shapes import Real
-from jounce.errors import AssemblyError, MobilityError
+from jounce.errors import AssemblyError, MechanismError, MobilityError, whole_number
 from jounce.execution.device import resident
 from jounce.kinematics.assembly.assemble import (
     check_assembled,
@@ -24,7 +24,7 @@ from jounce.kinematics.curves.curve import Curve
 from jounce.kinematics.curves.path_tracker import PathTracker
 from jounce.kinematics.curves.start import posed
 from jounce.kinematics.curves.starts import assemble_side_by_side
-from jounce.kinematics.curves.tracing import check_number, instant_of, traced
+from jounce.kinematics.curves.tracing import instant_of, traced
 from jounce.mechanism import Mechanism, build, check_mechanism
 from jounce.mechanism.building.preconditions import check_holonomic, concrete
 from jounce.mechanism.carriages import check_without_ends
@@ -187,8 +187,8 @@ def assemblies(
     check_mechanism(mechanism)
     check_without_ends(mechanism, "a search for assemblies")
     check_holonomic(mechanism, "an assembly")
-    check_number("count", count, 1, 10**7, whole=True)
-    check_number("seed", seed, 0, 2**63 - 1, whole=True)
+    count = whole_number("count", count, 1, 10**7, error=MechanismError)
+    seed = whole_number("seed", seed, 0, 2**63 - 1, error=MechanismError)
     search = _Search(mechanism, instant_of(mechanism, time))
     search.from_starts(count, np.random.default_rng(seed))
     curves: tuple[Curve, ...] = ()

@@ -1,6 +1,7 @@
 """From a mechanism to its curve of configurations."""
 
 from jounce.base.shapes import Real
+from jounce.errors import MechanismError, whole_number
 from jounce.kinematics.curves.choice import chosen
 from jounce.kinematics.curves.curve import Curve, CurveSettings
 from jounce.kinematics.curves.tracing import check_number, instant_of, traced
@@ -67,8 +68,8 @@ def trace(
     check_mechanism(mechanism)
     check_without_ends(mechanism, "a trace")
     check_holonomic(mechanism, "a trace")
-    check_number("order", order, 0, HIGHEST_ORDER, whole=True)
-    check_number("count", count, 2, 10**7, whole=True)
+    order = whole_number("order", order, 0, HIGHEST_ORDER, error=MechanismError)
+    count = whole_number("count", count, 2, 10**7, error=MechanismError)
     check_number("length", length, 1e-6, 1e6)
     instant = instant_of(mechanism, time)
-    return traced(chosen(mechanism, instant), instant, driver, CurveSettings(int(order), int(count), float(length)))
+    return traced(chosen(mechanism, instant), instant, driver, CurveSettings(order, count, float(length)))

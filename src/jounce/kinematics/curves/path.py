@@ -85,14 +85,9 @@ def track(tracker: PathTracker, start: CurvePoint, length: float) -> Path:
     return path
 
 
-def nominal_step(tracker: PathTracker, point: CurvePoint) -> float:
-    """Return the arc length over which the series of a point is good to rounding."""
-    return tracker.radius(point) * TAIL ** (1 / ORDER)
-
-
 def _next_point(tracker: PathTracker, point: CurvePoint, reach: float) -> CurvePoint | End:
     """Return the next accepted point, or the reason why there is none."""
-    step = min(nominal_step(tracker, point), SHARE_OF_DISTANCE * reach)
+    step = min(tracker.radius(point) * TAIL ** (1 / ORDER), SHARE_OF_DISTANCE * reach)
     parts = np.arange(1, LANES + 1) / LANES
     end = End.SINGULAR
     if not np.isfinite(step):

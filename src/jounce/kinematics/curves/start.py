@@ -4,7 +4,6 @@ import dataclasses
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float
 
 from jounce.base.modules import with_fields
 from jounce.constraints.facts import dimension_of_field, field_kinds
@@ -75,7 +74,8 @@ def freed(mechanism: Mechanism, instant: float, driver: str | None) -> Freed:
         driver = next(iter(elements))
     values = law_values(_driven(mechanism, elements), instant)
     laws = {name: _with_law(x, "t" if name == driver else repr(values[name])) for name, x in elements.items()}
-    return Freed(_driven(mechanism, laws), driver, values[driver], _unit(elements[driver]))
+    unit = {"angle": "rad", "length": "m"}.get(dimension_of_field(elements[driver], "motion"), "")
+    return Freed(_driven(mechanism, laws), driver, values[driver], unit)
 
 
 def _driven(mechanism: Mechanism, drivers: Any) -> Mechanism:
@@ -100,10 +100,6 @@ def _with_law(driver: Any, text: str) -> Any:
             "a driver whose value is free needs one law, its field motion", name="driver", value=fields
         )
     return dataclasses.replace(driver, motion=ExpressionMotion(text))
-
-
-def _unit(driver: Any) -> str:
-    return {"angle": "rad", "length": "m"}.get(dimension_of_field(driver, "motion"), "")
 
 
 def start_of_curve(free: Freed) -> tuple[PathTracker, CurvePoint]:
@@ -143,7 +139,9 @@ def _check_freedom(tracker: PathTracker, point: CurvePoint) -> None:
         message = "nothing can move: with the driver free, joints and drivers leave no degree of freedom"
         raise MobilityError(message if tracker.driven else "nothing can move: the joints leave no degree of freedom")
     missing = jacobian.shape[1] - jacobian.shape[0]
-    if missing > 1 or _unopposed(tracker, point, jacobian, null):
+    rows = tracker.left_null_space(jacobian)
+    # the second order leaves all directions of the first
+    if missing > 1 or np.max(np.abs(rows.T @ tracker.second_order(point, null)), initial=0.0) < VANISHING:
         count = null.shape[1]
         directions = null[: tracker.columns].T
         message = (
@@ -155,18 +153,6 @@ def _check_freedom(tracker: PathTracker, point: CurvePoint) -> None:
     raise SingularityError(
         "the start is a change point, where branches cross, so that no one curve starts there: start at another instant"
     )
-
-
-def _unopposed(
-    tracker: PathTracker,
-    point: CurvePoint,
-    jacobian: Float[np.ndarray, "row column"],
-    null: Float[np.ndarray, "column k"],
-) -> bool:
-    """Tell whether the second order leaves all directions of the first."""
-    rows = tracker.left_null_space(jacobian)
-    half = tracker.second_order(point, null)
-    return bool(np.max(np.abs(rows.T @ half), initial=0.0) < VANISHING)
 
 
 def posed(mechanism: Mechanism, coordinates: dict[str, np.ndarray]) -> Mechanism:

@@ -20,14 +20,12 @@ def traced(mechanism: Mechanism, instant: float, driver: str | None, settings: C
     return Curve(mechanism, free, tracker, track_both_directions(tracker, start, settings.length), settings)
 
 
-def check_number(name: str, value: Any, least: Any, most: Any, *, whole: bool = False) -> None:
-    """Raise MechanismError unless an option is a number between bounds."""
-    kind = numbers.Integral if whole else numbers.Real
-    fits = isinstance(value, kind) and not isinstance(value, bool) and math.isfinite(float(value))
+def check_number(name: str, value: Any, least: Any, most: Any) -> None:
+    """Raise MechanismError unless an option is a finite number between bounds."""
+    fits = isinstance(value, numbers.Real) and not isinstance(value, bool) and math.isfinite(float(value))
     if not fits or not least <= value <= most:
-        what = "a whole number" if whole else "a finite number"
         bounds = "" if not math.isfinite(most) else f" from {least:g} to {most:g}"
-        raise MechanismError(f"must be {what}{bounds}", name=name, value=value)
+        raise MechanismError(f"must be a finite number{bounds}", name=name, value=value)
 
 
 def instant_of(mechanism: Mechanism, time: Any) -> float:

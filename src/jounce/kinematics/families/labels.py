@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from jounce.kinematics.status import Status
-from jounce.units.shown_units import derivatives_of, time_axes
+from jounce.units.shown_units import component_axes, derivatives_of, time_axes
 
 
 def labeled_family(
@@ -56,10 +56,10 @@ def labeled_family(
             continue
         dims = [lane, "time", "derivative"]
         if series.ndim == 4:
-            axes = output.axes or (("component", output.labels[: series.shape[3]]),)
-            coordinates |= {axis: list(labels) for axis, labels in axes}
-            series = series.reshape(*series.shape[:3], *(len(labels) for _, labels in axes))
-            dims += [axis for axis, _ in axes]
+            axes = component_axes(output, series.shape[3])
+            series = series.reshape(*series.shape[:3], *map(len, axes.values()))
+            coordinates |= axes
+            dims += axes
         variables[name] = (dims, series, {"units": output.unit, "long_name": derivatives_of(name)})
     meanings = " ".join(each.name.lower() for each in Status)
     words = {"long_name": "outcome", "flag_values": list(map(int, Status)), "flag_meanings": meanings}

@@ -153,7 +153,7 @@ def solve_with_sides(
     *,
     tolerance: float = 1e-12,
     threads: int | None = None,
-) -> tuple["xarray.Dataset", "Sides"]:
+) -> tuple["xarray.Dataset", Sides]:
     """Return the dataset of `solve_batch`, and outputs on both sides of each jump or bend of the laws of each design.
 
     Parameters

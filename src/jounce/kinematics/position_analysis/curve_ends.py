@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping
 import numpy as np
 from jaxtyping import Float
 
-from jounce.kinematics.continuation.path_following import FollowedPath, attitudes_between
+from jounce.kinematics.continuation.path_following import FollowedPath, attitudes_between, within_steps
 from jounce.kinematics.status import Status
 from jounce.mechanism.building.builder import Model
 from jounce.mechanism.carriages import joint_of
@@ -117,8 +117,7 @@ def _leaves(path: FollowedPath, ends: CurveEnds) -> tuple[float, bool] | None:
     def positions(instants: Float[np.ndarray, " time"]) -> Float[np.ndarray, "component 1 time"]:
         return attitudes_between(times, whole, instants)
 
-    since = np.diff(times)[:, None] * (np.arange(SAMPLES) / SAMPLES)
-    instants = np.append((times[:-1, None] + since).ravel(), times[-1])
+    instants = within_steps(times, SAMPLES)
     beyond = shared.excess(positions(instants)) > 0
     if not beyond.any():
         return None

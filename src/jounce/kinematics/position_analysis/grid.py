@@ -17,7 +17,7 @@ from jaxtyping import Bool, Float, Int
 
 from jounce.execution.threads import Threads
 from jounce.jet.derivatives import plain_derivatives
-from jounce.kinematics.continuation.change_points import LARGEST_DISAGREEMENT, bridged, half_width, spoiled_width
+from jounce.kinematics.continuation.change_points import LARGEST_DISAGREEMENT, bridged, half_width, spoiled
 from jounce.kinematics.continuation.correct_and_differentiate import SolvedState, StepResult
 from jounce.kinematics.continuation.path_following import OK, PASSABLE, ChangePoint, FollowedPath, follow
 from jounce.kinematics.continuation.solver import SMALL_BATCH, Solver
@@ -88,8 +88,7 @@ class GridSolver:
             self._solve_remaining(left, threads, report)
         for point in self.path.change_points:
             self._bridge(point)
-        for point in self.path.singular_positions_outside():
-            self._refuse(np.abs(self.time - point.instant) < spoiled_width(point, self.solver.order))
+        self._refuse(self.path.singular_positions_outside())
         if explain and not self._reached.all():
             self._explain_end(int(np.argmin(self._reached)))
         if progress is not None and done < count:
@@ -186,27 +185,28 @@ class GridSolver:
 
     def _bridge(self, point: ChangePoint) -> None:
         """Replace the instants next to a change point, and the one at it, by what the motion on both sides gives."""
-        away = np.abs(self.time - point.instant)
-        lanes = np.flatnonzero((away < half_width(point, self.solver.order)) & (self.time < self.path.ended_at))
+        near = np.abs(self.time - point.instant) < half_width(point, self.solver.order)
+        lanes = np.flatnonzero(near & (self.time < self.path.ended_at))
         if not lanes.size:
             return
         state = bridged(self.solver, self.path, point, self.time[lanes])
-        if state is None:
-            self._refuse(away < spoiled_width(point, self.solver.order))
-            return
-        solved = self.status[lanes] == OK
-        names = self.solver.model.pose_type.predictor
-        deviations = [np.abs(state[0][name][0] - self._store[0][name][0][..., lanes])[..., solved] for name in names]
-        if max(np.max(x, initial=0.0) for x in deviations) > LARGEST_DISAGREEMENT:
-            self._refuse(away < spoiled_width(point, self.solver.order))
+        if state is None or self._disagreement(state[0], lanes) > LARGEST_DISAGREEMENT:
+            self._refuse([point])
             return
         self.status[lanes] = OK
         for lane in lanes.tolist():
             self.faults.pop(lane, None)
         self._store_lanes(lanes, jax.tree.leaves((*state, self._store[2][lanes])))
 
-    def _refuse(self, lanes: Bool[np.ndarray, " time"]) -> None:
-        self.status[lanes & (self.status == OK)] = Status.SINGULAR
+    def _disagreement(self, coordinates: dict[str, np.ndarray], lanes: Indices) -> float:
+        """Return by how much positions are off from those that were solved, rad or m."""
+        solved, names = self.status[lanes] == OK, self.solver.model.pose_type.predictor
+        away = [np.abs(coordinates[name][0] - self._store[0][name][0][..., lanes])[..., solved] for name in names]
+        return max(np.max(x, initial=0.0) for x in away)
+
+    def _refuse(self, points: Sequence[ChangePoint]) -> None:
+        """Mark what was solved next to singular positions, and is mostly rounding there."""
+        self.status[spoiled(points, self.time, self.solver.order) & (self.status == OK)] = Status.SINGULAR
 
     def _explain_end(self, lost: int) -> None:
         """Say at the first instant that was not reached why the motion could not be followed to it."""

@@ -38,7 +38,7 @@ from jounce.mechanism.outputs.derivative_outputs import bound_alone
 from jounce.mechanism.system import Group
 from jounce.mechanism.transmissions.axis_angles import AttitudeHistory, attitudes_of, measures_angle
 from jounce.trajectory import HermiteMotion
-from jounce.units.shown_units import derivatives_of, time_axes
+from jounce.units.shown_units import component_axes, derivatives_of, time_axes
 
 if TYPE_CHECKING:
     import xarray
@@ -384,9 +384,9 @@ class Motion(Tabulated):
 
         coordinates = time_axes(self.time, values.shape[1])
         if values.ndim == 3:
-            axes = output.axes or (("component", output.labels[: values.shape[2]]),)
-            coordinates |= {axis: list(labels) for axis, labels in axes}
-            values = values.reshape(*values.shape[:2], *(len(labels) for _, labels in axes))
+            axes = component_axes(output, values.shape[2])
+            values = values.reshape(*values.shape[:2], *map(len, axes.values()))
+            coordinates |= axes
         dims = tuple(coordinates)
         attributes = {"units": output.unit, "long_name": derivatives_of(name)}
         if isinstance(output, AbstractMotionOutput) and not self.traced and (remark := output.remark(self, values)):

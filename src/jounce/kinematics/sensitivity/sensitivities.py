@@ -26,6 +26,7 @@ from jounce.errors import AssemblyError, MechanismError, MobilityError, SolveErr
 from jounce.execution.compilation import Compiled, compiled
 from jounce.jet import Jet
 from jounce.jet.algebra import stacked
+from jounce.kinematics.continuation.instant_program import of_design
 from jounce.kinematics.results.motion import Motion
 from jounce.kinematics.sensitivity.jacobian_series import jacobian_series, solved_series
 from jounce.kinematics.status import Status
@@ -244,9 +245,8 @@ class _Builder:
     def model(self, numbers: Sequence[Any], which: tuple[int, ...], counted: bool) -> Model:
         """Return the model that has these numbers."""
         model, leaves, _, structure = self._models[counted]
-        whole = list(leaves)
-        for k, number in zip(which, numbers, strict=True):
-            whole[k] = number
+        known = dict(zip(which, numbers, strict=True))
+        whole = [known.get(k, leaf) for k, leaf in enumerate(leaves)]
         return dataclasses.replace(model, system=jax.tree.unflatten(structure, whole))
 
     def _numbers(self, values: Values, length: Any, angles: Any, coordinates: Any, *, counted: bool) -> list[Any]:
@@ -353,13 +353,10 @@ def _change_along(
     pose = pose_type.from_coordinates({name: Jet(tuple(c)) for name, c in coordinates.items()})
     pose = movable(jax.lax.optimization_barrier(pose))  # or XLA computes it again in everything that uses it
     time = Jet.variable(instants[None], order)
-    leaves, structure = jax.tree.flatten(system)
+    leaves = jax.tree.leaves(system)
 
     def residual(numbers: Sequence[Any]) -> Any:
-        own = list(leaves)
-        for k, number in zip(which, numbers, strict=True):
-            own[k] = number
-        return stacked(jax.tree.unflatten(structure, own).residual(pose, time))
+        return stacked(of_design(system, dict(zip(which, numbers, strict=True))).residual(pose, time))
 
     _, missing = jax.jvp(residual, ([leaves[k] for k in which],), (list(slope),))
     rates = solved_series(system, jacobian_series(system, pose, time), -missing)

@@ -20,7 +20,7 @@ from jounce.kinematics.assembly.assemble import (
 )
 from jounce.kinematics.assembly.gauss_newton import Displacements, assemble_from_guess
 from jounce.kinematics.assembly.idle_motions import idle_motions
-from jounce.kinematics.assembly.mobility import facts_of, independent, mobility
+from jounce.kinematics.assembly.mobility import Mobility, independent, mobility
 from jounce.linear_algebra.host_jacobian import HostJacobian
 from jounce.mechanism import Mechanism, Model, build
 from jounce.mechanism.building.builder import with_reference
@@ -107,7 +107,7 @@ class StartingState:
         joints = self.here.take(np.array([name.startswith("joints.") for name in self.model.rows], bool))
         equations, columns = joints.shape
         whole = joints.rank == equations
-        return facts_of(independent(columns, equations) if whole else mobility(self.mechanism, self.instant))
+        return _facts_of(independent(columns, equations) if whole else mobility(self.mechanism, self.instant))
 
     def _assembled(self) -> tuple[dict[str, Any] | None, dict[str, Any]]:
         facts = {"status": "assembled", "message": None, "at": self.instant, "open": None}
@@ -160,3 +160,24 @@ class StartingState:
             "words": freedom_words(freedom, mechanism.drivers),
             "message": message,
         }
+
+
+def _facts_of(result: Mobility) -> dict[str, Any]:
+    """Return a mobility as plain data."""
+    return {
+        "count": result.count,
+        "instantaneous": result.instantaneous,
+        "finite": result.finite,
+        "order": result.order,
+        "kind": result.kind,
+        "blocked": result.blocked,
+        "branches": [
+            {
+                "freedom": branch.freedom,
+                "cusp": branch.cusp,
+                "tangents": {name: vectors.tolist() for name, vectors in branch.tangents.items()},
+            }
+            for branch in result.branches
+        ],
+        "words": str(result),
+    }
