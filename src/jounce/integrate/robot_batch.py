@@ -1,9 +1,8 @@
 """Many simulations of one robot in joint coordinates that differ in where they begin and in masses of links."""
 
-import functools
 import inspect
 from collections.abc import Callable, Mapping
-from typing import Any, ParamSpec, TypeVar
+from typing import Any
 
 import jax.numpy as jnp
 import numpy as np
@@ -14,7 +13,7 @@ from jounce.execution.backends import joined
 from jounce.execution.threads import Threads, thread_count
 from jounce.integrate.marching.robot_state import start_levels
 from jounce.integrate.results.batch import Batch
-from jounce.integrate.results.robot_sensitivities import TracedRobotBatch, of_traced_robots
+from jounce.integrate.results.robot_sensitivities import TracedRobotMotion, traced_robot_motion
 from jounce.integrate.results.robot_simulation import RobotSimulation
 from jounce.integrate.simulate_robot import simulate_robot
 from jounce.integrate.steps.methods import AbstractMethod
@@ -25,38 +24,10 @@ from jounce.robot.robot import Robot
 
 RATE, MASS = ".rate", ".mass"
 
-P = ParamSpec("P")
-R = TypeVar("R")
 
-
-def of_traced_robot_batches(guarded: Callable[P, R]) -> Callable[P, R]:
-    """Return what simulates batches, also of robots of which JAX traces something; their joints are outputs."""
-    signature = inspect.signature(guarded)
-
-    @functools.wraps(guarded)
-    def door(*arguments: P.args, **keywords: P.kwargs) -> R:
-        robot: Any = arguments[0] if arguments else keywords.get("mechanism")
-        if not isinstance(robot, Robot) or robot.closures or not is_traced((robot.tree, arguments[1:], keywords)):
-            return guarded(*arguments, **keywords)
-        bound = signature.bind(*arguments, **keywords)
-        bound.apply_defaults()
-        given = dict(bound.arguments)
-        values, motions = simulate_robots(given.pop("mechanism"), **given.pop("robot"), **given)
-        q = jnp.stack([motion.q for motion in motions])
-        outputs = {name: q[..., k] for k, name in enumerate(robot.joint_names)}
-        batch: Any = TracedRobotBatch(robot, motions[0].time, motions[0].order, values, outputs)
-        return batch
-
-    return door
-
-
-def batch_of_robot(robot: Robot, values: dict[str, np.ndarray], runs: list[RobotSimulation]) -> Batch:
-    """Return the runs of a robot, its joints as outputs."""
-    q = np.stack([run.q for run in runs])
-    outputs = {name: q[..., k] for k, name in enumerate(runs[0].robot.joint_names)}
-    steps, status = np.array([len(run.steps.start) for run in runs]), np.stack([run.status for run in runs])
-    backend = joined(name for run in runs for name in run.backend.split(", "))
-    return Batch(runs[0].time, values, outputs, status, steps, robot, runs[0].order, backend)
+def traced_robot_batch(guarded: Callable[..., Any], robot: Robot, *arguments: Any, **keywords: Any) -> Batch:
+    """Return a batch of a robot of which JAX traces something, from a function that refuses that."""
+    return inspect.unwrap(guarded)(robot, *arguments, **keywords)
 
 
 def simulate_robots(
@@ -69,10 +40,10 @@ def simulate_robots(
     tolerance: float,
     longest_step: float,
     **options: Any,
-) -> tuple[dict[str, Any], list[Any]]:
-    """Return what runs differ in, by name, and each run; see `jounce.simulate_batch`.
+) -> Batch:
+    """Return the runs of a robot, its joints as outputs; see `jounce.simulate_batch`.
 
-    Runs of which JAX traces something are motions that have derivatives.
+    Outputs are arrays of JAX, which have derivatives, where it traces something.
 
     Raises
     ------
@@ -91,19 +62,15 @@ def simulate_robots(
     start = start_levels(robot, state)
 
     def begun(k: int) -> tuple[Robot, Any]:
-        state, changed = start.copy(), robot
+        levels, changed = [list(level) for level in start], robot
         for name, given in values.items():
+            value = given[k] if traced else float(given[k])
             joint, level = (name.removesuffix(RATE), 1) if name not in robot.joint_names else (name, 0)
             if joint in robot.joint_names:
-                column = robot.joint_names.index(joint)
-                if traced:
-                    state = jnp.asarray(state).at[level, column].set(given[k])
-                else:
-                    state[level, column] = given[k]
+                levels[level][robot.joint_names.index(joint)] = value
             else:
-                mass = given[k] if traced else float(given[k])
-                changed = changed.with_inertia(name.removesuffix(MASS), mass=mass)
-        return changed, state
+                changed = changed.with_inertia(name.removesuffix(MASS), mass=value)
+        return changed, levels
 
     starts = []
     for k in range(len(next(iter(values.values())))):
@@ -113,15 +80,24 @@ def simulate_robots(
             error.name = f"runs.{k}" if error.name is None else f"runs.{k}.{error.name}"
             raise
 
+    def run(start: tuple[Robot, Any]) -> RobotSimulation:
+        return simulate_robot(start[0], instants, order, state=start[1], strict=False, **options)
+
+    def traced_run(start: tuple[Robot, Any]) -> TracedRobotMotion:
+        return traced_robot_motion(simulate_robot, start[0], instants, order, state=start[1], **options)
+
+    q: Any
     if traced:  # one after another, as JAX traces in one thread; what fails has no derivatives, and raises
-        follow = of_traced_robots(simulate_robot)
-        return values, [follow(own, instants, order, state=state, **options) for own, state in starts]
-
-    def run(at: tuple[Robot, np.ndarray]) -> RobotSimulation:
-        return simulate_robot(at[0], instants, order, state=at[1], strict=False, **options)
-
-    with Threads(thread_count()) as pool:
-        return values, list(pool.map(run, starts))
+        motions = list(map(traced_run, starts))
+        runs, q = [motion.simulation for motion in motions], jnp.stack([motion.q for motion in motions])
+    else:
+        with Threads(thread_count()) as pool:
+            runs = list(pool.map(run, starts))
+        q = np.stack([run.q for run in runs])
+    outputs = {name: q[..., k] for k, name in enumerate(robot.joint_names)}
+    steps, status = np.array([len(run.steps.start) for run in runs]), np.stack([run.status for run in runs])
+    backend = joined(name for run in runs for name in run.backend.split(", "))
+    return Batch(instants, values, outputs, status, steps, robot, order, backend)
 
 
 def _checked(robot: Robot, parameters: Mapping[str, Any]) -> dict[str, Any]:

@@ -18,6 +18,7 @@ from jounce.integrate.marching.robot_state import RobotState, start_levels
 from jounce.integrate.marching.runs import AbstractRun
 from jounce.integrate.results.robot_simulation import RobotSimulation
 from jounce.integrate.steps.methods import AbstractMethod, Taylor
+from jounce.integrate.steps.options import SimulationOptions
 from jounce.kinematics import Status
 from jounce.kinematics.position_analysis.solve import raise_for_status
 from jounce.robot.algorithms.base_motion import BaseMotion, base_arrays, base_body
@@ -41,6 +42,10 @@ class RobotOptions(TypedDict, total=False):
     drives: bool
     base: BaseMotion | None
     wrenches: Sequence[Wrench]
+
+
+class RobotSimulationOptions(SimulationOptions, RobotOptions, total=False):
+    """All options of `jounce.simulate` for robots."""
 
 
 def simulate_robot(

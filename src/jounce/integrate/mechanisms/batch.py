@@ -32,8 +32,9 @@ from jounce.integrate.mechanisms.batch_equations import (
     outputs_of_runs,
 )
 from jounce.integrate.results.batch import Batch
+from jounce.integrate.results.robot_sensitivities import of_traced_robots
 from jounce.integrate.results.simulation import derivatives_of_motion
-from jounce.integrate.robot_batch import batch_of_robot, of_traced_robot_batches, simulate_robots
+from jounce.integrate.robot_batch import simulate_robots, traced_robot_batch
 from jounce.integrate.simulate_robot import RobotOptions
 from jounce.integrate.steps.events import pose_coordinates
 from jounce.integrate.steps.methods import AbstractMethod
@@ -57,7 +58,7 @@ LANES = 128  # runs marched in one call: more take memory, of fewer Python takes
 STEPS = 16  # tried before runs that have ended make room for others
 
 
-@of_traced_robot_batches
+@of_traced_robots(traced_robot_batch)
 @concrete
 def simulate_batch(
     mechanism: Mechanism | Robot,
@@ -92,7 +93,7 @@ def simulate_batch(
     -------
     Batch
         A run that fails does not stop the others: `status` says so. Of a robot of which JAX traces parameters, the
-        ``state`` or inertias, the ``time``, ``order``, ``parameters`` and ``outputs`` alone; a run that fails raises.
+        ``state`` or inertias, ``outputs`` are arrays of JAX, which have derivatives; a run that fails raises.
 
     Raises
     ------
@@ -116,7 +117,7 @@ def simulate_batch(
     """
     if isinstance(mechanism, Robot):
         options: Any = {"method": method, "tolerance": tolerance, "longest_step": longest_step, **robot}
-        return batch_of_robot(mechanism, *simulate_robots(mechanism, parameters, time, order, **options))
+        return simulate_robots(mechanism, parameters, time, order, **options)
     for name in robot:
         message = "belongs to simulations of robots in joint coordinates; a mechanism has forces and `initial`"
         raise MechanismError(message, name=name)

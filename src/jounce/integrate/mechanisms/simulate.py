@@ -8,26 +8,23 @@ import jax
 import numpy as np
 
 from jounce.base.activity import Count
-from jounce.base.shapes import ArrayLike
 from jounce.constraints import AbstractConstraint
 from jounce.dynamics.forward.ground import with_ground
 from jounce.dynamics.forward.initial_state import ConsistentStart, consistent_start
 from jounce.errors import JounceError, MechanismError, SolveError, did_you_mean
 from jounce.execution.backends import joined
 from jounce.execution.store.programs import expect
-from jounce.integrate.marching.marching import (
-    RunLimits,
-)
+from jounce.integrate.marching.marching import RunLimits
 from jounce.integrate.mechanisms.programs_ahead import prepare_run
 from jounce.integrate.mechanisms.run import MechanismRun, unsound_forces
-from jounce.integrate.results.robot_sensitivities import of_traced_robots
+from jounce.integrate.results.robot_sensitivities import of_traced_robots, traced_robot_motion
 from jounce.integrate.results.robot_simulation import RobotSimulation
 from jounce.integrate.results.sensitivities import traced_simulation
 from jounce.integrate.results.simulation import Simulation
-from jounce.integrate.simulate_robot import RobotOptions, simulate_robot
+from jounce.integrate.simulate_robot import RobotOptions, RobotSimulationOptions, simulate_robot
 from jounce.integrate.steps.events import Event, EventDetector
 from jounce.integrate.steps.methods import AbstractMethod
-from jounce.integrate.steps.options import checked_options, instants_of
+from jounce.integrate.steps.options import SimulationOptions, checked_options, instants_of
 from jounce.kinematics import Status, raise_for_status
 from jounce.kinematics.position_analysis.curve_ends import beyond_end, ends_of
 from jounce.kinematics.results.pose_outputs import check_output, output_group
@@ -36,9 +33,7 @@ from jounce.mechanism.building.belts import check_room
 from jounce.mechanism.building.preconditions import concrete_or
 from jounce.mechanism.laws.law_checks import check_laws
 from jounce.mechanism.time import TimeLike
-from jounce.robot import BaseMotion, Robot
-from jounce.robot.algorithms.wrenches import Wrench
-from jounce.robot.model.joint_laws import GivenLaws
+from jounce.robot import Robot
 
 ROBOT_OPTIONS = tuple(RobotOptions.__annotations__)
 
@@ -49,34 +44,14 @@ def simulate(
     time: TimeLike | None = None,
     order: int = 4,
     *,
-    method: AbstractMethod | None = None,
-    tolerance: float = 1e-15,
     initial: Mapping[str, AbstractConstraint] | None = None,
-    events: object = (),
-    longest_step: float = np.inf,
-    strict: bool = True,
-    progress: Callable[[int, int], None] | None = None,
+    **options: Unpack[SimulationOptions],
 ) -> Simulation: ...
 @overload
 def simulate(
-    mechanism: Robot,
-    time: TimeLike,
-    order: int = 4,
-    *,
-    method: AbstractMethod | None = None,
-    tolerance: float = 1e-15,
-    events: object = (),
-    longest_step: float = np.inf,
-    strict: bool = True,
-    progress: Callable[[int, int], None] | None = None,
-    state: ArrayLike | Mapping[str, float] | None = None,
-    torque: GivenLaws | None = None,
-    driven: Mapping[str, Any] | None = None,
-    drives: bool = True,
-    base: BaseMotion | None = None,
-    wrenches: Sequence[Wrench] = (),
+    mechanism: Robot, time: TimeLike, order: int = 4, **options: Unpack[RobotSimulationOptions]
 ) -> RobotSimulation: ...
-@of_traced_robots
+@of_traced_robots(traced_robot_motion)
 @concrete_or(traced_simulation)
 def simulate(
     mechanism: Mechanism | Robot,

@@ -48,8 +48,8 @@ class Batch(Displayed):
     """
 
     time: Float[np.ndarray, " time"]
-    parameters: dict[str, Float[np.ndarray, " run"]]
-    outputs: dict[str, Float[np.ndarray, "run time derivative *component"]]
+    parameters: dict[str, Any]
+    outputs: dict[str, Any]
     status: Int[np.ndarray, "run time"]
     steps: Int[np.ndarray, " run"]
     mechanism: Mechanism | Robot

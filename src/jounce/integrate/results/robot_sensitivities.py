@@ -56,55 +56,42 @@ class TracedRobotMotion:
         Highest derivative.
     q : jax.Array of shape (time, order + 1, n)
         Coordinates and their derivatives, rad or m by s.
+    simulation : RobotSimulation
+        At the values that JAX traces.
     """
 
     robot: Robot
     time: Float[np.ndarray, " time"]
     order: int
     q: Any
+    simulation: RobotSimulation
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
-class TracedRobotBatch:
-    """Motions of a robot of which JAX traces something in which they differ, or the robot.
+def of_traced_robots(traced: Callable[..., Any]) -> Callable[[Callable[P, R]], Callable[P, R]]:
+    """Return what guards a function of mechanisms and robots, with something to do where JAX traces those of robots.
 
-    Attributes
+    Parameters
     ----------
-    robot : Robot
-        As it was given.
-    time : numpy.ndarray of shape (time,)
-        s.
-    order : int
-        Highest derivative.
-    parameters : dict of str to array of shape (runs,)
-        What runs differ in.
-    outputs : dict of str to jax.Array of shape (runs, time, order + 1)
-        Coordinates of the joints and their derivatives, rad or m by s.
+    traced : callable
+        It gets the function, the robot, and further arguments as they were given.
     """
 
-    robot: Robot
-    time: Float[np.ndarray, " time"]
-    order: int
-    parameters: Mapping[str, Any]
-    outputs: Mapping[str, Any]
+    def guarded(function: Callable[P, R]) -> Callable[P, R]:
+        @functools.wraps(function)
+        def door(*arguments: P.args, **keywords: P.kwargs) -> R:
+            others = dict(keywords)
+            robot, *positional = arguments or (others.pop("mechanism", None),)
+            if isinstance(robot, Robot) and not robot.closures and is_traced((robot.tree, positional, others)):
+                return traced(function, robot, *positional, **others)
+            return function(*arguments, **keywords)
+
+        return door
+
+    return guarded
 
 
-def of_traced_robots(simulate: Callable[P, R]) -> Callable[P, R]:
-    """Return what simulates, also robots of which JAX traces inertias or the state at the start."""
-
-    @functools.wraps(simulate)
-    def door(*arguments: P.args, **keywords: P.kwargs) -> R:
-        robot = arguments[0] if arguments else keywords.get("mechanism")
-        if not isinstance(robot, Robot) or robot.closures or not is_traced((robot.tree, keywords.get("state"))):
-            return simulate(*arguments, **keywords)
-        others = {name: value for name, value in keywords.items() if name != "mechanism"}
-        return _traced_motion(simulate, robot, arguments[1:], others)  # type: ignore[return-value]
-
-    return door
-
-
-def _traced_motion(
-    simulate: Callable[..., Any], robot: Robot, positional: tuple[Any, ...], options: dict[str, Any]
+def traced_robot_motion(
+    simulate: Callable[..., Any], robot: Robot, *positional: Any, **options: Any
 ) -> TracedRobotMotion:
     """Return the motion of a robot as a function of its inertias and of the state at the start.
 
@@ -140,7 +127,7 @@ def _traced_motion(
     whole = np.append(start, np.full(more, start[-1] + length[-1])), np.append(length, np.zeros(more))
     series = _marched(problem, first, *whole, which, since, instants, levels=levels)
     changing = jnp.moveaxis(plain_derivatives(series), -1, 0)[:, : simulation.order + 1]
-    return TracedRobotMotion(robot, instants, simulation.order, with_value(changing, simulation.q))
+    return TracedRobotMotion(robot, instants, simulation.order, with_value(changing, simulation.q), simulation)
 
 
 def _begun(robot: Robot, problem: RobotProblem, first: RobotState, state: Any) -> RobotState:
