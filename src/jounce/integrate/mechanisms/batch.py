@@ -9,7 +9,7 @@ import numpy as np
 
 from jounce.base.padding import power_of_two
 from jounce.base.shapes import ArrayLike
-from jounce.dynamics.forward.accelerations import Equations, State
+from jounce.dynamics.forward.accelerations import State
 from jounce.dynamics.forward.initial_state import consistent_start, initial_as_drivers
 from jounce.errors import MechanismError
 from jounce.execution.backends import joined
@@ -50,7 +50,7 @@ from jounce.mechanism.building.builder import with_reference
 from jounce.mechanism.building.preconditions import concrete
 from jounce.mechanism.carriages import check_without_ends
 from jounce.mechanism.laws.law_checks import check_laws
-from jounce.mechanism.transmissions.axis_angles import measures_angle, raw_angles, with_turns
+from jounce.mechanism.transmissions.axis_angles import measures_angle, raw_angles
 from jounce.mechanism.transmissions.turn_counting import counted_along
 from jounce.robot.robot import Robot
 
@@ -143,9 +143,10 @@ def simulate_batch(
     def depart(some: np.ndarray) -> None:
         runs.depart(some, *starts.of(some))
 
+    first_chunk, *others = runs.chunks(np.arange(len(rows)))
+    depart(first_chunk)  # which makes room for all runs
     with Threads(thread_count()) as pool:
-        list(pool.map(depart, runs.chunks(np.arange(len(rows)))))
-    with Threads(thread_count()) as pool:
+        list(pool.map(depart, others))
         while len(runs.moving):
             list(pool.map(runs.advance, runs.chunks(runs.moving)))
     status = runs.status
@@ -175,7 +176,6 @@ class _Runs:
         self.width = min(LANES, power_of_two(len(rows)))
         self.steps, self.backends = np.zeros(len(rows), int), set[str]()
         self._made = parametric.of(rows)
-        _, self._outputs = self._made.at(slice(1))  # of any run
         self._reached = np.zeros((len(rows), len(instants)), bool)
         self._direction = 1.0 if instants[-1] >= instants[0] else -1.0
         self._expansion = max(derivatives_of_motion(parametric.mechanism, order), 2)  # two, by which turns are counted
@@ -183,8 +183,9 @@ class _Runs:
         self._values: dict[int, np.ndarray] = {}  # of each group, (runs, time, order + 1, components, outputs)
         self._begun = np.full(len(rows), instants[0])  # the time at which the last step began
         self._angles: dict[int, np.ndarray] = {}  # the series of turning outputs there
-        self._turns: tuple[np.ndarray, ...] = ()  # their angles about axes at the start, (instances, runs)
-        self._turns_reached: tuple[np.ndarray, ...] = ()  # and where the last step ended
+        outputs = parametric.model.system.outputs
+        self._measuring = [which for which, group in enumerate(outputs) if measures_angle(group)]
+        self._turns: dict[int, np.ndarray] = {}  # angles about axes where the last step ended, (instances, runs)
 
     @property
     def moving(self) -> np.ndarray:
@@ -220,19 +221,16 @@ class _Runs:
 
     def depart(self, runs: np.ndarray, state: State, angles: Turns) -> None:
         """Set runs off from states on the constraints, with the turns that angles about axes have there."""
-        equations, _ = self._picked(runs, angles)
-        time = np.full(len(runs), self.instants[0])
+        equations, time = self._made.at(runs)[0].near(angles.forces), np.full(len(runs), self.instants[0])
         current = unexpanded(equations, state, time, order=self.method.expansion_order(float(self.limits.tolerance)))
-        current = jax.tree.map(np.asarray, current)
+        current, begun = jax.tree.map(np.asarray, current), dict(zip(self._measuring, angles.outputs, strict=True))
         if self._current is None:
             self._current = jax.tree.map(lambda x: np.zeros((*x.shape[:-1], len(self.steps)), x.dtype), current)
+            self._turns = {which: np.zeros((len(angle), len(self.steps))) for which, angle in begun.items()}
         self._put(runs, current)
-        if not self._turns:
-            self._turns = tuple(np.zeros((len(angle), len(self.steps))) for angle in angles.outputs)
-            self._turns_reached = tuple(map(np.zeros_like, self._turns))
-        for whole, reached, part in zip(self._turns, self._turns_reached, angles.outputs, strict=True):
-            whole[:, runs] = reached[:, runs] = part
-        self._note(runs, np.zeros(len(runs), int), current.expansion.state, time, current.angles, {})
+        for which, angle in begun.items():
+            self._turns[which][:, runs] = angle
+        self._note(runs, np.zeros(len(runs), int), current.expansion.state, time, current.angles, begun)
 
     def advance(self, runs: np.ndarray) -> None:
         """March runs by some steps, and note what they pass."""
@@ -264,15 +262,6 @@ class _Runs:
         for values in self._values.values():
             values[lost] = np.nan
 
-    def _picked(self, runs: np.ndarray, angles: Turns) -> tuple[Equations, Any]:
-        """Return equations of motion and outputs of some runs, whose angles about axes have the turns of these."""
-        equations, outputs = self._made.at(runs)
-        return equations.near(angles.forces), with_turns(outputs, angles.outputs)
-
-    def _begun_with(self, runs: np.ndarray) -> tuple[np.ndarray, ...]:
-        """Return the angles about axes of outputs at the start, (instances, runs) each."""
-        return tuple(angle[:, runs] for angle in self._turns)
-
     def _put(self, runs: np.ndarray, current: IntegratorState) -> None:
         for whole, part in zip(jax.tree.leaves(self._current), jax.tree.leaves(current), strict=True):
             whole[..., runs] = part
@@ -282,8 +271,7 @@ class _Runs:
         counted = {}
         time = np.concatenate([self._begun[runs][None], steps.start])
         self._begun[runs] = time[-1]
-        every = np.tile(runs, len(steps.start))
-        _, outputs = self._picked(every, Turns((), self._begun_with(every)))
+        _, outputs = self._made.at(np.tile(runs, len(steps.start)))
         for which, group in enumerate(outputs):
             if group.element.turning and not measures_angle(group):
                 state = steps.polynomial.map(lambda part: np.moveaxis(part[:, :3], 0, -2))
@@ -315,13 +303,12 @@ class _Runs:
         number[step, lane] = np.arange(len(lane))
         last = np.append(lane[1:] != lane[:-1], True)  # of the steps of a run
         counted_angles = {}
-        measuring = [which for which, group in enumerate(self._outputs) if measures_angle(group)]
-        for which, turns in zip(measuring, self._turns_reached, strict=True):
+        for which, turns in self._turns.items():
 
             def measured(which_step: np.ndarray, share: np.ndarray, which: int = which) -> np.ndarray:
                 at, of = step[which_step], lane[which_step]
                 attitudes = attitudes_at(steps.polynomial.attitude[at, ..., of], share * steps.length[at, of])
-                _, outputs = self._picked(runs[of], Turns((), self._begun_with(runs[of])))
+                _, outputs = self._made.at(runs[of])
                 return raw_angles([outputs[which]], {"quaternion": attitudes})[0]
 
             counted = counted_along(measured, lane, turns[:, runs[lane]], POINTS_IN_STEP)
@@ -340,20 +327,18 @@ class _Runs:
     ) -> None:
         """Keep the outputs of runs at instants, given by number, a time into steps that began at others.
 
-        What forces measure where the steps begin is known, and so are the series of turning outputs there, and angles
-        about axes near the instants, but at the start.
+        What forces measure where the steps begin is known, and so are the series of turning outputs there, but at the
+        start, and angles about axes near the instants.
         """
         for lanes in self.chunks(np.arange(len(runs))):
             turned_by = tuple(angle[:, lanes] for angle in angles)
             time = self.instants[at[lanes]]
             since = time - begin[lanes]
             motion = turned_by, polynomial.map(lambda part, lanes=lanes: part[..., lanes]), since, time
-            given = self._begun_with(runs[lanes]), motion
-            how: Any = {"order": self._expansion}
-            noted, backend = mapped_runs(outputs_of_runs, self._made, runs[lanes], (), given, **how)
+            noted, backend = mapped_runs(outputs_of_runs, self._made, runs[lanes], (), (motion,), order=self._expansion)
             self.backends.add(backend)
-            for which, (group, series) in enumerate(zip(self._outputs, map(np.array, noted), strict=True)):
-                if which in before and measures_angle(group):
+            for which, series in enumerate(map(np.array, noted)):
+                if which in self._turns:
                     series[0, 0] = brought_near(series[0, 0], before[which][:, lanes])
                 elif which in before:
                     series[0] -= turned(before[which][..., lanes], series, since)

@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Bool
 
 from jounce.constraints.base import value_fields
 from jounce.dynamics.forward.accelerations import Equations, State
@@ -28,8 +29,8 @@ from jounce.kinematics.families.varied_tree import VariedTree
 from jounce.kinematics.status import Status
 from jounce.mechanism import Mechanism, Model, build
 from jounce.mechanism.building.starting_guess import starting_guess
-from jounce.mechanism.system import POSITION_COMPONENTS, Group
-from jounce.mechanism.transmissions.axis_angles import measures_angle, raw_angles, with_turns
+from jounce.mechanism.system import POSITION_COMPONENTS
+from jounce.mechanism.transmissions.axis_angles import measures_angle, raw_angles
 
 STAGES = 8  # in which parameters go from those of the first run to their own, so that positions follow
 LARGEST_STAGE = 0.5  # rad, by which a driver may turn in a stage: angles about axes count their turns on the way
@@ -123,7 +124,8 @@ def mapped_runs(
 class BatchStart:
     """Consistent states of runs at the start: positions followed from those of the first run, least velocities.
 
-    Where the starting guess of bodies that are free to move differs, each run is assembled from its own guess.
+    Where the starting guess of bodies that are free to move differs, there is no such way, and each run is assembled
+    from its own guess.
 
     Parameters
     ----------
@@ -147,19 +149,14 @@ class BatchStart:
         rows: np.ndarray,
         instant: float,
     ):
-        self._parametric, self._begun, self._state, self._instant = parametric, begun, state, instant
-        self._own: State | None = None
-        self._rows = rows
+        self._parametric, self._state, self._rows, self._instant = parametric, state, rows, instant
         self.failed: dict[int, Status] = {}  # runs that have no start, and why
+        self._made, self._stages = parametric.of(rows), list[VariedTree]()
         equations, coordinates = begun.model.system.shape
         rank = begun.model.system.rank
         if (equations if rank is None else rank) < coordinates and parametric.guesses_differ(rows):
-            own = [consistent_start(parametric.varied(row), instant) for row in rows.tolist()]
-            self._own = State(*(np.concatenate(parts, axis=-1) for parts in zip(*(s.state for s in own), strict=True)))
-            turns_of_starts = [_turns_of(s.model.system.forces, s.model.system.outputs) for s in own]
-            self._turns = jax.tree.map(lambda *xs: np.concatenate(xs, axis=-1), *turns_of_starts)
             return
-        self._made, last = parametric.of(rows), begun.of(rows)
+        last = begun.of(rows)
         count = max(STAGES, int(np.ceil(self._turned(last.at(slice(None))[0], len(rows)) / LARGEST_STAGE)))
         change = (rows - rows[0]) / count
         self._stages = [begun.of(rows[0] + stage * change) for stage in range(1, count)] + [last]
@@ -175,13 +172,11 @@ class BatchStart:
 
     def of(self, runs: np.ndarray) -> tuple[State, Turns]:
         """Return the states of some runs, and the angles about axes there."""
-        if self._own is not None:
-            return jax.tree.map(lambda x: x[..., runs], (self._own, self._turns))
         equations, outputs = self._made.at(runs)
         measuring = [group for group in (*equations.system.forces, *outputs) if measures_angle(group)]
-        angles = [np.asarray(group.element.datum.near) for group in measuring]
+        angles = [np.broadcast_to(group.element.datum.near, (group.instances, len(runs))) for group in measuring]
         state = self._state.map(lambda part: np.repeat(np.asarray(part), len(runs), axis=-1))
-        together = np.ones(len(runs), bool)
+        together = np.full(len(runs), bool(self._stages))
         for made in self._stages:
             (state, reached), _ = mapped_runs(followed, made, runs, (np.asarray(self._instant),), (state,))
             together &= reached
@@ -192,29 +187,24 @@ class BatchStart:
         count = len([group for group in equations.system.forces if measures_angle(group)])
         turns = Turns(tuple(angles[:count]), tuple(angles[count:]))
         start = jax.tree.map(np.array, (state, turns))
-        for lane in np.flatnonzero(~together).tolist():
-            self._put_one(start, lane, int(runs[lane]))
+        for run in np.unique(runs[~together]).tolist():
+            self._put_one(start, runs == run, run)
         return start
 
-    def _put_one(self, starts: tuple[State, Turns], lane: int, run: int) -> None:
-        """Put a run to which no way from the first was found together from its own guess; NaN where that fails."""
+    def _put_one(self, starts: tuple[State, Turns], lanes: Bool[np.ndarray, " lane"], run: int) -> None:
+        """Put a run to which no way from the first leads together from its own guess; NaN where that fails."""
         try:
             start = consistent_start(self._parametric.varied(self._rows[run].tolist()), self._instant)
         except JounceError as error:
             reason = Status.SINGULAR if isinstance(error, MobilityError) else Status.INADMISSIBLE
             self.failed[run] = getattr(error, "status", None) or reason
             for part in starts[0]:
-                part[..., lane] = np.nan
+                part[..., lanes] = np.nan
             return
-        own = start.state, _turns_of(start.model.system.forces, start.model.system.outputs)
-        for whole, part in zip(jax.tree.leaves(starts), jax.tree.leaves(own), strict=True):
-            whole[..., lane] = part[..., 0]
-
-
-def _turns_of(forces: Sequence[Group], outputs: Sequence[Group]) -> Turns:
-    """Return the angles about axes that groups count from."""
-    parts = ([np.asarray(g.element.datum.near) for g in part if measures_angle(g)] for part in (forces, outputs))
-    return Turns(*map(tuple, parts))
+        system = start.model.system
+        turns = [group.element.datum.near for group in (*system.forces, *system.outputs) if measures_angle(group)]
+        for whole, part in zip(jax.tree.leaves(starts), (*start.state, *turns), strict=True):
+            whole[..., lanes] = part
 
 
 @mapped(widths=(FEW_RUNS, MANY_RUNS))
@@ -241,7 +231,7 @@ def followed(shared: tuple[Any, Any], lanes: tuple[dict[int, Any], State]) -> tu
 
 @mapped(widths=(FEW_RUNS, MANY_RUNS))
 def outputs_of_runs(
-    shared: tuple[tuple[Equations, Any]], lanes: tuple[dict[int, Any], tuple[Any, ...], tuple[Any, ...]], *, order: int
+    shared: tuple[tuple[Equations, Any]], lanes: tuple[dict[int, Any], tuple[Any, ...]], *, order: int
 ) -> tuple[Any, ...]:
     """Return the series of the outputs of runs, as `expanded` does.
 
@@ -250,12 +240,10 @@ def outputs_of_runs(
     shared : tuple
         Equations and outputs.
     lanes : tuple
-        Of each run: its `own` values, as `of_design` has them; angles about axes that its outputs count from; and what
-        `expanded` takes.
+        Of each run: its `own` values, as `of_design` has them, and what `expanded` takes.
     order
         As `expanded` has it.
     """
-    ((values,), (own, angles, motion)) = shared, lanes
-    equations, outputs = of_design(values, own)
-    *_, series = expanded.function((equations, with_turns(outputs, angles)), motion, order)
+    (values,), (own, motion) = shared, lanes
+    *_, series = expanded.function(of_design(values, own), motion, order)
     return series
