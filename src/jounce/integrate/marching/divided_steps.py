@@ -6,22 +6,26 @@ looked at by how its series changes with the state at its beginning and with eac
 until all of these converge within it.
 """
 
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Collection, Sequence
+from functools import partial
 from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jax.core import Tracer
 from jaxtyping import Bool, Float, Int
 
 from jounce.base.padding import power_of_two
 from jounce.base.shapes import Numbers
-from jounce.dynamics.forward.accelerations import Equations, State
+from jounce.dynamics.forward.accelerations import Equations, Instants, State, expand
+from jounce.dynamics.forward.saddle_point import DenseInverse
 from jounce.errors import UnsupportedError
 from jounce.execution.compilation import compiled
 from jounce.integrate.marching.marching import DenseOutput
 from jounce.integrate.marching.smoothness_breaks import Break
 from jounce.integrate.steps.methods import LOWEST_ORDER, evaluated
+from jounce.kinematics.sensitivity.jacobian_series import solver
 
 MOST_STEPS = 2**17
 MOST_DIRECTIONS = 16
@@ -29,8 +33,6 @@ HALVINGS = 17
 FINER = 100.0  # times less is left out of the series of parts than of those of steps, which are fewer
 
 ROUNDS = 3  # each makes a state behind a kink and its instant better by as much as the time to it is short
-
-Expand = Callable[..., State]
 
 
 class Kinks(NamedTuple):
@@ -114,13 +116,7 @@ class Pieces(NamedTuple):
 
 
 def divided_steps(
-    dense: DenseOutput,
-    equations: Equations,
-    moving: Sequence[int],
-    length: float,
-    expand: Expand,
-    allowed: float | None,
-    kinks: Collection[Break] = (),
+    dense: DenseOutput, equations: Equations, plain: Equations, allowed: float | None, kinks: Collection[Break]
 ) -> Pieces:
     """Return the steps of a simulation, divided so that the series of all changes converge within each.
 
@@ -128,17 +124,11 @@ def divided_steps(
     ----------
     dense : DenseOutput
         The steps.
-    equations : Equations
-        Of plain numbers.
-    moving : sequence of int
-        Which of their leaves are traced.
-    length : float
-        Size of the mechanism, m.
-    expand : callable
-        Returns the series of the motion through states, from equations, states, instants (1, steps) and the order.
-    allowed : float, optional
+    equations, plain : Equations
+        Of which JAX traces some leaves, and with plain numbers in their places.
+    allowed : float or None
         Error of a step in a change, relative; the steps are not divided unless given.
-    kinks : collection of Break, optional
+    kinks : collection of Break
         Of forces, that steps go over; these are not divided.
 
     Raises
@@ -146,10 +136,11 @@ def divided_steps(
     UnsupportedError
         If there would be too many.
     """
-    order = dense.polynomial.position.shape[1] - 1
-    leaves = jax.tree.leaves(equations)
-    along, turns = _directions([leaves[k] for k in moving])
-    settings = {"moving": tuple(moving), "order": order, "expand": expand}
+    leaves, structure = jax.tree.flatten(equations)
+    numbers, plain_structure = jax.tree.flatten(plain)
+    assert structure == plain_structure
+    moving = tuple(k for k, leaf in enumerate(leaves) if isinstance(leaf, Tracer))
+    along, turns = _directions([numbers[k] for k in moving])
     used, duration = _used_coefficients(dense), abs(dense.end - float(dense.start[0]))
     count = np.ones(len(dense.start), int)
     while True:
@@ -157,8 +148,7 @@ def divided_steps(
         over = {int(np.searchsorted(which, kink.step)): kink for kink in kinks}
         if allowed is None:
             return pieces
-        sizes = _sizes(equations, pieces.padded(), along, turns, np.asarray(length), **settings)
-        sizes = np.stack(sizes)[..., : len(pieces.start)]
+        sizes = np.stack(_sizes(plain, pieces.padded(), along, turns, moving=moving))[..., : len(pieces.start)]
         lacking = which[_needed(sizes, pieces, duration, allowed) > 1]
         lacking = lacking[~np.isin(lacking, [kink.step for kink in kinks])]
         if not lacking.size:
@@ -234,27 +224,25 @@ def _directions(numbers: Sequence[Any]) -> tuple[list[np.ndarray], np.ndarray]:
     ], np.eye(count + 1)[count]
 
 
-@compiled("moving", "order", "expand")
+@compiled("moving")
 def _sizes(
     equations: Equations,
     pieces: Pieces,
     along: list[Numbers],
     turns: Float[Numbers, " direction"],
-    length: Float[Numbers, ""],
     *,
     moving: tuple[int, ...],
-    order: int,
-    expand: Expand,
 ) -> tuple[Numbers, Numbers]:
     """Return the sizes of the series of changes, of places and of velocities: (order + 1, directions, steps) each."""
     leaves, structure = jax.tree.flatten(equations)
+    order, length = pieces.used.shape[1] - 1, equations.system.column_scale[0]
     state = pieces.state.map(lambda part: jnp.moveaxis(part, 0, -1))
 
     def series(numbers: Any, state: State) -> Any:
         whole = list(leaves)
         for k, number in zip(moving, numbers, strict=True):
             whole[k] = number
-        expansion = expand(jax.tree.unflatten(structure, whole), state, pieces.start[None], order)
+        expansion = series_through(jax.tree.unflatten(structure, whole), state, pieces.start[None], order)
         scaled = expansion._replace(position=expansion.position / length, velocity=expansion.velocity / length)
         flat = scaled.map(lambda part: part.reshape(order + 1, -1, len(pieces.start)))
         return jnp.concatenate(flat[:2], axis=1), jnp.concatenate(flat[2:], axis=1)
@@ -266,3 +254,24 @@ def _sizes(
         return tuple(jnp.max(jnp.abs(x), axis=1) for x in changes)
 
     return jax.vmap(change, out_axes=1)(along, turns)
+
+
+def series_through(equations: Equations, state: State, time: Instants, order: int) -> State:
+    """Return the series of the motion through a state, which JAX may differentiate in either mode."""
+    inverse = _inverse(equations.matrix(state, time), jax.lax.stop_gradient(equations.factored(state, time).inverse()))
+    return expand(equations, state, time, order, DenseInverse(inverse), reversible=True).state
+
+
+def _inverse(matrix: Any, known: Any) -> Any:
+    """Return the inverse of matrices, which is known, with the derivatives that it has.
+
+    As the solution of equations: of a rule by `jax.custom_jvp` JAX keeps nothing where it computes again what it did
+    not keep (`jax.checkpoint`), so that derivatives of gradients were wrong.
+    """
+
+    def product(a: Any, b: Any) -> Any:
+        return jnp.sum(a[:, :, None] * b[None], axis=1)
+
+    unit = jnp.broadcast_to(jnp.eye(len(matrix))[:, :, None], matrix.shape)
+    transposed = jnp.swapaxes(known, 0, 1)
+    return solver(partial(product, matrix), partial(product, known), partial(product, transposed))(unit)

@@ -13,32 +13,17 @@ from jounce.base.shapes import Numbers
 from jounce.dynamics.forward.accelerations import Equations, Expansion, Flags, Indices, Lanes, State, expand
 from jounce.execution.compilation import compiled
 from jounce.execution.mapped import mapped
-from jounce.integrate.steps.energy_balance import (
-    Balance,
-    begun,
-    energies,
-    followed as follow_balance,
-    is_balanced,
-    unknown,
-)
-from jounce.integrate.steps.lookahead import (
-    FINEST,
-    HARMLESS,
-    SHORTEST,
-    Lookahead,
-    finest,
-    look_ahead,
-    mobility_of,
-    steps_counted,
-)
+from jounce.integrate.steps import energy_balance, lookahead
+from jounce.integrate.steps.lookahead import HARMLESS, SHORTEST, steps_counted
 from jounce.integrate.steps.methods import MARGIN, NEEDED, AbstractMethod, Number, near_singular
 from jounce.integrate.steps.projection import projected
 from jounce.integrate.steps.revolution_counts import AnglesOfForces, followed, measured
+from jounce.jet import Jet
 from jounce.kinematics.continuation.instant_program import of_design
 from jounce.mechanism.transmissions.axis_angles import measures_angle
 
 # part of the time so far, or of the time left: a shorter step that is refused ends the run
-SMALLEST_STEP = FINEST / 8.0
+SMALLEST_STEP = lookahead.FINEST / 8.0
 # factor on a step that is tried again: no power of two, so that it does not end where other steps have ended
 REFUSED = 0.45
 SHORT = 1.0 / 4.0  # part of the longest step so far: shorter steps are allowed smaller errors, see `furthest`
@@ -80,7 +65,7 @@ class IntegratorState(NamedTuple):
     longest: Lanes  # step so far, s
     crossing: Indices  # number of steps, one after the other, too short to matter, over what is not known
     short: Indices  # number of steps one after the other that hardly move on, whatever they lead over
-    balance: Balance  # of the energy, where that is to be kept
+    balance: energy_balance.Balance  # of the energy, where that is to be kept
 
 
 class RunLimits(NamedTuple):
@@ -143,7 +128,7 @@ def unexpanded(equations: Equations, state: State, time: Lanes, *, order: int) -
         longest=nothing,
         crossing=none,
         short=none,
-        balance=unknown(nothing),
+        balance=energy_balance.unknown(nothing),
     )
 
 
@@ -246,7 +231,7 @@ def _attempt(
     length = equations.system.column_scale[0]
     order, bodies = len(current.expansion.state.position) - 1, current.expansion.state.position.shape[2]
     here = current.expansion.state.map(lambda part: part[0])
-    checked = method.controlled and is_balanced(equations, here, current.time[None])
+    checked = method.controlled and energy_balance.is_balanced(equations, here, current.time[None])
 
     def attempt(current: IntegratorState) -> tuple[IntegratorState, tuple[DenseOutput, Any]]:
         running, opening = (current.outcome == int(x) for x in (Outcome.RUNNING, Outcome.UNEXPANDED))
@@ -260,11 +245,11 @@ def _attempt(
         step = jnp.sign(left) * tried
         angles = followed(equations, current.angles, start.state, step)
         if method.controlled:
-            shortest = finest(duration, current.time, current.crossing + current.refused)
+            shortest = lookahead.finest(duration, current.time, current.crossing + current.refused)
             how = current.mobility, current.time, step, duration, allowed, shortest
-            look = look_ahead(equations, start.state, angles, *how)
+            look = lookahead.look_ahead(equations, start.state, angles, *how)
         else:
-            look = Lookahead(step, jnp.ones(step.shape, bool), jnp.full(step.shape, -1), current.blocked)
+            look = lookahead.Lookahead(step, jnp.ones(step.shape, bool), jnp.full(step.shape, -1), current.blocked)
         size = jnp.abs(look.step)
         last = size >= 0.999 * jnp.abs(left)  # no sliver of a step at the end
         step = jnp.where(last, left, jnp.sign(left) * size)
@@ -291,11 +276,12 @@ def _attempt(
             good = good & ~(suspect & _lasting(kick, step, duration, MARGIN * allowed, current))
         balanced, balance = jnp.ones(step.shape, bool), current.balance
         if checked:
-            energies_there = energies(there, state, time[None])
+            energies_there = energy_balance.energies(there, there.pose(state), Jet.variable(time[None], 1))
             kick = MARGIN * allowed * order / jnp.maximum(wished, 1e-300)
             leeway = kick * length * jnp.sqrt(equations.scale * bodies)
-            balance, balanced = follow_balance(current.balance, energies_there, leeway)
-            balance = jax.tree.map(lambda a, b: jnp.where(opening, a, b), begun(energies_there), balance)
+            balance, balanced = energy_balance.followed(current.balance, energies_there, leeway)
+            begun = energy_balance.begun(energies_there)
+            balance = jax.tree.map(lambda a, b: jnp.where(opening, a, b), begun, balance)
             good = good & balanced
 
         # what becomes of the run
@@ -317,7 +303,7 @@ def _attempt(
             outcome=outcome,
             drift=jnp.where(opening, current.drift, jnp.maximum(current.drift, distance)),
             begun=current.begun,
-            mobility=mobility_of(equations, inverse),
+            mobility=lookahead.mobility_of(equations, inverse),
             singular=near_singular(equations, inverse),
             blocked=jnp.where(short > 0, limiting, -1),
             angles=measured(there, state),

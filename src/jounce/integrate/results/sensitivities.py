@@ -12,25 +12,22 @@ that of the other, and the instant changes with the state: it is where the accel
 
 import dataclasses
 from collections.abc import Callable, Mapping
-from functools import partial
 from typing import Any
 
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jax.core import Tracer
 from jax.errors import ConcretizationTypeError
 from jaxtyping import Float, Int
 
 from jounce.base.modules import with_fields
 from jounce.base.shapes import Numbers
-from jounce.dynamics.forward.accelerations import Equations, Instants, State, expand
-from jounce.dynamics.forward.initial_state import initial_as_drivers
-from jounce.dynamics.forward.saddle_point import DenseInverse
+from jounce.dynamics.forward.accelerations import Equations, Instants, State
+from jounce.dynamics.forward.initial_state import at_rest, initial_as_drivers
 from jounce.dynamics.masses import gravity_of, masses_of
 from jounce.errors import AssemblyError, MobilityError, SolveError, UnsupportedError
 from jounce.execution.compilation import compiled
-from jounce.integrate.marching.divided_steps import Kinks, Pieces, divided_steps
+from jounce.integrate.marching.divided_steps import Pieces, divided_steps, series_through
 from jounce.integrate.marching.force_discontinuities import Kinked, met, shifted, with_value
 from jounce.integrate.marching.smoothness_breaks import Break, breaks
 from jounce.integrate.results.simulation import Simulation
@@ -42,7 +39,6 @@ from jounce.integrate.steps.options import instants_of
 from jounce.integrate.steps.projection import normalized
 from jounce.jet import Jet
 from jounce.kinematics.position_analysis.solve import checked_order
-from jounce.kinematics.sensitivity.jacobian_series import solver
 from jounce.kinematics.sensitivity.sensitivities import Solved, check_not_redundant, failed, first_of, solved_shapes
 from jounce.kinematics.sensitivity.traced_motion import TracedMotion
 from jounce.kinematics.status import Status
@@ -93,7 +89,7 @@ def traced_simulation(simulate: Callable[..., Simulation], given: Mapping[str, A
     model, equations = _model_of(mechanism, simulation)
     start = _start(mechanism, simulation, equations)
     order = simulation.poses[1]["position"].shape[0] - 1
-    pieces = _pieces(simulation, equations, _model_of(made, simulation)[1], allowed, kinks)
+    pieces = divided_steps(simulation.dense_output, equations, _model_of(made, simulation)[1], allowed, kinks)
     coordinates = _coordinates(simulation, equations, pieces, start, order)
     known = {name: np.asarray(x) for name, x in simulation.poses[1].items()}
     coordinates = {name: with_value(x, known[name]) for name, x in coordinates.items()}
@@ -162,21 +158,14 @@ def _angles(simulation: Simulation) -> Angles:
 
 def _model_of(mechanism: Mechanism, simulation: Simulation) -> tuple[Model, Equations]:
     """Return the model and the equations of motion as functions of what JAX traces."""
-    first = {name: np.asarray(x)[0, ..., :1] for name, x in _first(simulation).items()}
-    known = simulation.equations
+    state = simulation.dense_output.polynomial.map(lambda part: np.asarray(part)[0, :1, ..., None])
+    first, known = first_of(pose_coordinates(state)), simulation.equations
     model = traced_model(mechanism, simulation.model.length, _angles(simulation), first)
     system = with_fields(
         model.system, outputs=(), column_scale=known.system.column_scale, row_scale=np.asarray(known.system.row_scale)
     )
     masses, gravity = masses_of(mechanism), gravity_of(mechanism)
     return model, Equations(system, masses, gravity, known.scale, known.pose_type)
-
-
-def _first(simulation: Simulation) -> dict[str, Any]:
-    """Return the coordinates of all bodies at the start."""
-    state = simulation.dense_output.polynomial.map(lambda part: np.asarray(part)[0, :1, ..., None])
-    coordinates = pose_coordinates(state)
-    return {name: coordinates[name] for name in coordinates if name != "angular_velocity"}
 
 
 def _allowed(options: Mapping[str, Any]) -> float | None:
@@ -200,17 +189,6 @@ def _kinks(simulation: Simulation) -> list[Break]:
                 )
                 raise UnsupportedError(message, name=name)
     return kinks
-
-
-def _pieces(
-    simulation: Simulation, equations: Equations, plain: Equations, allowed: float | None, kinks: list[Break]
-) -> Pieces:
-    """Return the steps of a simulation, divided as what is traced in its equations asks; `plain` are their numbers."""
-    leaves, structure = jax.tree.flatten(equations)
-    assert structure == jax.tree.structure(plain)
-    moving = [k for k, leaf in enumerate(leaves) if isinstance(leaf, Tracer)]
-    length = float(simulation.model.length)
-    return divided_steps(simulation.dense_output, plain, moving, length, _expanded, allowed, kinks)
 
 
 def _start(mechanism: Mechanism, simulation: Simulation, equations: Equations) -> State:
@@ -245,22 +223,25 @@ def _assembled(
 
     It changes by the shortest step onto the constraints, as that of the assembly: `inverse` is that of the Jacobian.
     """
-    position, attitude = guess
-    rest_pose = equations.pose_at_rest(position, attitude)
-    gap = equations.system.residual(rest_pose, Jet([instant])).coefficients[0]
-    column = -(inverse @ gap)
-    pose = rest_pose.displaced(*equations.system.coordinates(column, rest_pose.shifts))
-    state = known._replace(position=pose.position.coefficients[0][:, 1:], attitude=equations.attitude_of(pose))
+    state = known._replace(position=guess[0], attitude=guess[1])
+    state = _moved(equations, state, instant, lambda gap: -(inverse @ gap))
     factor = jax.lax.stop_gradient(equations).factored(known, instant)
     return equations.with_rates(factor, state, instant)
 
 
+def _moved(equations: Equations, state: State, time: Instants, change: Callable[[Numbers], Numbers]) -> State:
+    """Return a state with positions moved by the changes of coordinates that follow from what joints lack there."""
+    rest_pose = equations.pose_at_rest(state.position, state.attitude)
+    gap = equations.system.residual(rest_pose, Jet([time])).coefficients[0]
+    pose = rest_pose.displaced(*equations.system.coordinates(change(gap), rest_pose.shifts))
+    return state._replace(position=pose.position.coefficients[0][:, 1:], attitude=equations.attitude_of(pose))
+
+
 def _check_guessed(mechanism: Mechanism, simulation: Simulation, known: State) -> None:
     """Raise UnsupportedError unless a start that is not prescribed is the starting guess itself, at rest."""
-    guess, name = simulation.model.guess, "angle" if mechanism.space == "planar" else "quaternion"
-    attitude = np.asarray(guess[name])[None, 1:] if name == "angle" else np.asarray(guess[name])[:, 1:]
-    away = np.abs(np.asarray(guess["position"])[:, 1:] - known.position).max() / simulation.model.length
-    turned = np.abs(attitude - known.attitude).max()
+    guess = at_rest(simulation.model, simulation.model.guess)
+    away = np.abs(guess.position - known.position).max() / simulation.model.length
+    turned = np.abs(guess.attitude - known.attitude).max()
     speed = max(float(np.abs(np.asarray(part)).max()) for part in known[2:])
     if mechanism.initial or max(away, turned) > AS_GUESSED or speed > AT_REST:
         raise UnsupportedError(
@@ -277,51 +258,36 @@ def _coordinates(
     instants = simulation.time
     chosen = pieces.at(instants)
     since = instants - pieces.start[chosen]
-    pieces = pieces.padded()
-    known = pieces.state.map(lambda part: part[..., None])
-    max_order = pieces.used.shape[1] - 1
-    path = pieces.used, *pieces[:2], pieces.kinks
-    state = _marched(equations, start, known, *path, chosen, since, instants, order=order, max_order=max_order)
-    return pose_coordinates(state)
+    return pose_coordinates(_marched(equations, start, pieces.padded(), chosen, since, instants, order=order))
 
 
-@compiled("order", "max_order", narrow=True)
+@compiled("order", narrow=True)
 def _marched(
     equations: Equations,
     start: State,
-    known: State,
-    used: Any,
-    begun: Float[Numbers, " step"],
-    steps: Float[Numbers, " step"],
-    kinks: Kinks | None,
+    pieces: Pieces,
     chosen: Int[Numbers, " time"],
     since: Float[Numbers, " time"],
     instants: Float[Numbers, " time"],
     *,
     order: int,
-    max_order: int,
 ) -> State:
-    """Return the series of the motion at instants, (order + 1, ..., time), after a march over steps that are known.
+    """Return the series of the motion at instants, (order + 1, ..., time), after a march over pieces that are known.
 
-    Parameters
-    ----------
-    known : State
-        At the beginning of all steps, (steps, ..., 1): what comes of the march here has these values.
-    used : array of bool, shape (steps, max_order + 1)
-        Which coefficients of the series the steps were taken with.
-    kinks : Kinks, optional
-        Which of the steps lead over kinks.
+    What comes of the march has the values that are known at the beginnings of the pieces.
     """
+    begun, lengths, known, used, kinks = pieces
+    max_order = used.shape[1] - 1
 
     def series(state: State, used: Any, time: Any) -> State:
-        return _expanded(equations, state, time[None], max_order).map(
+        return series_through(equations, state, time[None], max_order).map(
             lambda part: jnp.where(used[:, None, None], part, 0.0)
         )
 
     @jax.checkpoint
     def march(carry: Any, step: Any) -> tuple[Any, State]:
         state, kinked = carry
-        here, used, time, length, over = step
+        time, length, here, used, over = step
         time, length, state = time[None], length[None], jax.tree.map(with_value, state, here)
         expanded = series(state, used[:, None], time)
         arrived, end = evaluated(expanded, length), time + length
@@ -333,37 +299,17 @@ def _marched(
         return (_corrected(equations, arrived, end[None]), kinked), state
 
     none = None if kinks is None else Kinked(shifted(start.map(lambda part: part[None])), jnp.zeros(1))
-    _, states = jax.lax.scan(march, (start, none), (known, used, begun, steps, kinks))
+    path = begun, lengths, known.map(lambda part: part[..., None]), used, kinks
+    _, states = jax.lax.scan(march, (start, none), path)
     chosen_states = states.map(lambda part: jnp.moveaxis(part[chosen, ..., 0], 0, -1))
     time = instants - since
 
     @jax.checkpoint
     def arrive(state: State) -> State:
         arrived = evaluated(series(state, used[chosen].T, time), since)
-        return _expanded(equations, _corrected(equations, arrived, instants[None]), instants[None], order)
+        return series_through(equations, _corrected(equations, arrived, instants[None]), instants[None], order)
 
     return arrive(chosen_states)
-
-
-def _expanded(equations: Equations, state: State, time: Instants, order: int) -> State:
-    """Return the series of the motion through a state."""
-    inverse = _inverse(equations.matrix(state, time), jax.lax.stop_gradient(equations.factored(state, time).inverse()))
-    return expand(equations, state, time, order, DenseInverse(inverse), reversible=True).state
-
-
-def _inverse(matrix: Any, known: Any) -> Any:
-    """Return the inverse of matrices, which is known, with the derivatives that it has.
-
-    As the solution of equations: of a rule by `jax.custom_jvp` JAX keeps nothing where it computes again what it did
-    not keep (`jax.checkpoint`), so that derivatives of gradients were wrong.
-    """
-
-    def product(a: Any, b: Any) -> Any:
-        return jnp.sum(a[:, :, None] * b[None], axis=1)
-
-    unit = jnp.broadcast_to(jnp.eye(len(matrix))[:, :, None], matrix.shape)
-    transposed = jnp.swapaxes(known, 0, 1)
-    return solver(partial(product, matrix), partial(product, known), partial(product, transposed))(unit)
 
 
 @compiled(narrow=True)
@@ -372,8 +318,5 @@ def _corrected(equations: Equations, state: State, time: Instants) -> State:
     state = state._replace(attitude=normalized(state.attitude))
     constant, fixed = jax.lax.stop_gradient((equations, state))
     factor = constant.factored(fixed, time)
-    rest_pose = equations.pose_at_rest(state.position, state.attitude)
-    gap = equations.system.residual(rest_pose, Jet([time])).coefficients[0]
-    pose = rest_pose.displaced(*equations.system.coordinates(equations.least_change(factor, gap), rest_pose.shifts))
-    position, attitude = pose.position.coefficients[0][:, 1:], equations.attitude_of(pose)
-    return equations.with_rates(factor, state._replace(position=position, attitude=attitude), time)
+    state = _moved(equations, state, time, lambda gap: equations.least_change(factor, gap))
+    return equations.with_rates(factor, state, time)

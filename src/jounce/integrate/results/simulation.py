@@ -8,8 +8,6 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from jounce.base.shapes import Array, ArrayLike, Numbers, seconds
-from jounce.dynamics.energy.energies import body_energy
-from jounce.dynamics.energy.potential import energy_of_forces
 from jounce.dynamics.forward.accelerations import Equations, Instants, Lanes, State, expand
 from jounce.dynamics.forward.initial_state import ConsistentStart
 from jounce.dynamics.motion_values import Coordinates, cut, pose_of
@@ -20,19 +18,14 @@ from jounce.execution.mapped import mapped
 from jounce.integrate.marching.marching import DenseOutput
 from jounce.integrate.marching.robot_marching import RobotSteps
 from jounce.integrate.marching.smoothness_breaks import breaks
+from jounce.integrate.steps import revolution_counts
+from jounce.integrate.steps.energy_balance import energies
 from jounce.integrate.steps.events import WIDTHS, in_pieces, pose_coordinates, series_of
 from jounce.integrate.steps.lookahead import watched_names
 from jounce.integrate.steps.methods import evaluated
 from jounce.integrate.steps.projection import projected
-from jounce.integrate.steps.revolution_counts import (
-    POINTS_IN_STEP,
-    AnglesOfForces,
-    attitudes_along,
-    attitudes_at,
-    followed,
-    measured,
-)
-from jounce.jet import Jet, dot
+from jounce.integrate.steps.revolution_counts import POINTS_IN_STEP, AnglesOfForces
+from jounce.jet import Jet
 from jounce.jet.derivatives import plain_derivatives
 from jounce.jet.turns import brought_near, counted_by_rates
 from jounce.kinematics import Motion, Status
@@ -88,12 +81,17 @@ class Simulation(Motion):
         self.events = [] if events is None else events
         self._ending = ending
         reached, chosen = steps_of(dense, instants)
-        outputs, max_order = start.model.system.outputs, derivatives_of_motion(mechanism, order)
-        outcome, backend = motion_at(start.equations, outputs, dense, instants, chosen, max_order)
-        state, self._angles, at_instants = outcome
+
+        def lanes_of(lanes: np.ndarray) -> Any:
+            steps, now = chosen[lanes], instants[lanes]
+            polynomial = dense.polynomial.map(lambda part: at_steps(part, steps))
+            return tuple(part[steps].T for part in dense.angles), polynomial, now - dense.start[steps], now
+
+        outputs, levels = start.model.system.outputs, {"order": derivatives_of_motion(mechanism, order)}
+        outcome, backend = expanded.at_instants((start.equations, outputs), lanes_of, len(instants), **levels)
+        state, self._angles, found = outcome
         coordinates = pose_coordinates(state)
-        at_instants = zip(outputs, at_instants, strict=True)
-        groups = tuple(self._counted(group, series, instants) for group, series in at_instants)
+        groups = tuple(self._counted(group, series, instants) for group, series in zip(outputs, found, strict=True))
         status = np.where(reached, int(Status.OK), int(Status.NOT_REACHED))
         faults = {}
         lost = reached & ~np.isfinite(np.concatenate([p.reshape(-1, len(instants)) for p in state])).all(axis=0)
@@ -202,12 +200,12 @@ class Simulation(Motion):
             return AttitudeHistory(self._attitudes_at(dense.start), dense.start)
         instants = (dense.start[:, None] + dense.length[:, None] * (np.arange(POINTS_IN_STEP) / POINTS_IN_STEP)).ravel()
         instants = np.append(instants, dense.end)
-        along = attitudes_along(dense.polynomial.attitude, dense.length, POINTS_IN_STEP)
+        along = revolution_counts.attitudes_along(dense.polynomial.attitude, dense.length, POINTS_IN_STEP)
         return AttitudeHistory(along, instants, between=self._attitudes_at)
 
     def _attitudes_at(self, instants: Float[np.ndarray, " time"]) -> Float[np.ndarray, "4 bodies time"]:
         dense, chosen = self.dense_output, self.steps_at(instants)
-        return attitudes_at(dense.polynomial.attitude[chosen], instants - dense.start[chosen])
+        return revolution_counts.attitudes_at(dense.polynomial.attitude[chosen], instants - dense.start[chosen])
 
     def _coefficients(self, group: Group) -> np.ndarray:
         pose_type, coordinates = self.poses
@@ -219,8 +217,11 @@ class Simulation(Motion):
     ) -> Float[np.ndarray, "order component instance time"]:
         """Return the series of outputs at instants; angles known up to whole turns go on from step to step."""
         dense = self.dense_output
-        if not group.element.turning or not dense.length.any():  # no steps: states that another solver gave
-            return continuous(group, series, instants)
+        if not group.element.turning:
+            return series
+        if not dense.length.any():  # no steps: states that another solver gave
+            series[0] = counted_by_rates(series[0], series[1], instants)
+            return series
         if measures_angle(group):
             (counted,) = self._attitudes.counting((group,), instants)
             series[0, 0] = brought_near(series[0, 0], counted.element.datum.near)
@@ -274,24 +275,6 @@ def derivatives_of_motion(mechanism: Mechanism, order: int) -> int:
     return order + max(1, lost_orders(mechanism.outputs.values()))
 
 
-def motion_at(
-    equations: Equations,
-    outputs: tuple[Group, ...],
-    dense: DenseOutput,
-    instants: np.ndarray,
-    chosen: np.ndarray,
-    order: int,
-) -> tuple[Any, str]:
-    """Return what `expanded` does at instants in chosen steps, all of them, and what computes it."""
-
-    def lanes_of(lanes: np.ndarray) -> Any:
-        steps, now = chosen[lanes], instants[lanes]
-        polynomial = dense.polynomial.map(lambda part: at_steps(part, steps))
-        return tuple(part[steps].T for part in dense.angles), polynomial, now - dense.start[steps], now
-
-    return expanded.at_instants((equations, outputs), lanes_of, len(instants), order=order)
-
-
 @mapped(widths=(FEW_INSTANTS, *WIDTHS), narrow=True)
 def expanded(
     shared: tuple[Equations, tuple[Group, ...]], lanes: tuple[AnglesOfForces, State, Lanes, Lanes], order: int
@@ -319,19 +302,12 @@ def expanded(
     """
     (equations, outputs), (angles, polynomial, step, instants) = shared, lanes
     equations = equations.near(angles)
-    begun = measured(equations, polynomial.map(lambda part: part[0]))
-    there = equations.near(followed(equations, begun, polynomial, step).at(step))
+    begun = revolution_counts.measured(equations, polynomial.map(lambda part: part[0]))
+    there = equations.near(revolution_counts.followed(equations, begun, polynomial, step).at(step))
     state, _, inverse = projected(there, evaluated(polynomial, step), instants[None])
     series = expand(there, state, instants[None], order, inverse).state
     outputs_found = output_series(outputs, pose_coordinates(series), equations.pose_type)
-    return series, measured(there, state), outputs_found
-
-
-def continuous(group: Any, series: np.ndarray, instants: np.ndarray) -> np.ndarray:
-    """Take the whole turns out of angles that are known up to them, from one instant to the next by their rates."""
-    if group.element.turning and len(instants) > 1:
-        series[0] = counted_by_rates(series[0], series[1], instants)
-    return series
+    return series, revolution_counts.measured(there, state), outputs_found
 
 
 @compiled("pose_type", brief=True)
@@ -340,11 +316,6 @@ def _checks(
 ) -> tuple[Lanes, Lanes, Lanes]:
     """Return the energy, the largest residual and the kinetic energy."""
     pose, clock = pose_of(coordinates, pose_type), Jet.variable(time, 1)
-    masses = equations.masses
-    translation, rotation = body_energy(pose, *masses, 0)
-    height = dot(pose.point(masses.center), equations.gravity).coefficients[0]
-    kinetic = jnp.sum(translation.coefficients[0] + rotation.coefficients[0], axis=0)
-    stored = energy_of_forces(equations.system.forces, pose, clock)
-    energy = kinetic - jnp.sum(masses.mass * height, axis=0) + stored
+    kinetic, potential, *_ = energies(equations, pose, clock)
     gaps = equations.system.residual(pose, clock).coefficients[0]
-    return energy, jnp.max(jnp.abs(gaps), axis=0, initial=0.0), kinetic
+    return kinetic + potential, jnp.max(jnp.abs(gaps), axis=0, initial=0.0), kinetic

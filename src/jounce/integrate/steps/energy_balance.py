@@ -97,9 +97,9 @@ def _is_moved(group: Group, at_rest: Pose, time: Instants) -> bool:
     return uses(jax.make_jaxpr(lambda now: group.residual(at_rest, Jet([now])).coefficients[0])(time))
 
 
-def energies(equations: Equations, state: State, time: Instants) -> Energies:
-    """Return the energies in states, and whether a force takes or gives any there."""
-    pose, clock, lanes = equations.pose(state), Jet.variable(time, 1), time.shape[-1]
+def energies(equations: Equations, pose: Pose, clock: Jet) -> Energies:
+    """Return the energies in poses with velocities, and whether a force takes or gives any there."""
+    lanes = clock.shape[-1]
     masses, gravity = equations.masses, equations.gravity
     translation, rotation = body_energy(pose, *masses, 0)
     kinetic = jnp.sum(translation.coefficients[0] + rotation.coefficients[0], axis=0)
