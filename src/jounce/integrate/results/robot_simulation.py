@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Float
 
 from jounce.base.shapes import ArrayLike, Numbers
 from jounce.errors import RobotError
@@ -18,7 +18,7 @@ from jounce.execution.backends import joined
 from jounce.execution.mapped import Mapped, mapped
 from jounce.integrate.marching.robot_marching import RobotProblem, RobotSteps
 from jounce.integrate.marching.robot_state import RobotState, at
-from jounce.integrate.results.simulation import at_steps, chosen_instants, steps_of
+from jounce.integrate.results.simulation import at_steps, chosen_instants, status_of, steps_of
 from jounce.integrate.steps.methods import Lanes
 from jounce.jet import Jet, compose
 from jounce.jet.derivatives import plain_derivatives
@@ -104,12 +104,8 @@ class RobotSimulation(Tabulated):
             rates = plain_derivatives(twist).transpose(2, 0, 1)
             self.base = BaseMotion(state.position.T.copy(), state.quaternion.T.copy(), rates)
         fine = np.isfinite(self.q).all(axis=(1, 2))
-        self.status: Int[np.ndarray, " time"] = np.where(reached, int(Status.OK), int(Status.NOT_REACHED))
-        self.faults: dict[int, str] = {}
+        self.status, self.faults = status_of(steps, instants, reached, ending)
         self.status[reached & ~fine] = int(Status.UNDEFINED)
-        beyond = np.flatnonzero(~reached)
-        if ending[0] != Status.OK and beyond.size:
-            self.status[beyond[0]], self.faults[int(beyond[0])] = int(ending[0]), ending[1]
         self.q[~reached] = np.nan
         if self.base is not None:
             for part in (self.base.position, self.base.quaternion, self.base.twist):

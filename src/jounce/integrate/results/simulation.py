@@ -5,7 +5,7 @@ from typing import Any
 
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float, Int
 
 from jounce.base.shapes import Array, ArrayLike, Numbers, seconds
 from jounce.dynamics.forward.accelerations import Equations, Instants, Lanes, State, expand
@@ -92,8 +92,7 @@ class Simulation(Motion):
         state, self._angles, found = outcome
         coordinates = pose_coordinates(state)
         groups = tuple(self._counted(group, series, instants) for group, series in zip(outputs, found, strict=True))
-        status = np.where(reached, int(Status.OK), int(Status.NOT_REACHED))
-        faults = {}
+        status, faults = status_of(dense, instants, reached, ending)
         lost = reached & ~np.isfinite(np.concatenate([p.reshape(-1, len(instants)) for p in state])).all(axis=0)
         for names, series in zip(start.model.outputs, groups, strict=True):
             bad = ~np.isfinite(series[: order + 1]).all(axis=(0, 1)) & reached & ~lost  # (outputs, time)
@@ -103,9 +102,6 @@ class Simulation(Motion):
         if lost.any():  # the state is known there, but not its derivatives
             reason = ending[0] if ending[0] == Status.LOCKED else Status.INADMISSIBLE
             status[lost], faults[int(np.argmax(lost))] = int(reason), ending[1]
-        beyond = np.flatnonzero(~reached & (np.abs(instants - dense.start[0]) > abs(dense.end - dense.start[0])))
-        if ending[0] != Status.OK and beyond.size:
-            status[beyond[0]], faults[int(beyond[0])] = int(ending[0]), ending[1]
         values = tuple(plain_derivatives(np.asarray(series)) for series in groups)
         super().__init__(mechanism, start.model, instants, order, (coordinates, values), status, faults)
         self.backend = joined({backend, *filter(None, steps_backend.split(", "))})
@@ -260,6 +256,21 @@ def steps_of(dense: DenseOutput | RobotSteps, instants: np.ndarray) -> tuple[np.
     reached = (direction * (instants - dense.start[0]) >= -rounding) & (direction * (instants - dense.end) <= rounding)
     chosen = np.searchsorted(direction * dense.start, direction * instants, side="right") - 1
     return reached, np.maximum(np.minimum(chosen, len(dense.start) - 1), 0)
+
+
+def status_of(
+    dense: DenseOutput | RobotSteps,
+    instants: Float[np.ndarray, " time"],
+    reached: Bool[np.ndarray, " time"],
+    ending: tuple[Status, str],
+) -> tuple[Int[np.ndarray, " time"], dict[int, str]]:
+    """Return the status of instants, the first beyond the last step with the reason why it was the last, and faults."""
+    status = np.where(reached, int(Status.OK), int(Status.NOT_REACHED))
+    beyond = np.flatnonzero(~reached & (np.abs(instants - dense.start[0]) > abs(dense.end - dense.start[0])))
+    if ending[0] == Status.OK or not beyond.size:
+        return status, {}
+    status[beyond[0]] = int(ending[0])
+    return status, {int(beyond[0]): ending[1]}
 
 
 def at_steps(part: np.ndarray, chosen: Int[np.ndarray, " batch"]) -> np.ndarray:

@@ -7,8 +7,6 @@ p = 2, jounce with p = 3.
 """
 
 import math
-from fractions import Fraction
-from functools import lru_cache
 from typing import Any
 
 import jax
@@ -127,7 +125,7 @@ class Obreshkov(AbstractMethod):
         known = _known(start, step, p)
         parts = zip(end.state, known, start.state, strict=True)
         departure = State(*(jnp.abs(c[0] + _terms(c, -step, p) - a) - ROUNDING * jnp.abs(c0[0]) for c, a, c0 in parts))
-        return jnp.maximum(_size(departure, measure, signed=True), 0.0)
+        return _size(departure.map(lambda x: jnp.maximum(x, 0.0)), measure)
 
 
 def _known(expansion: Expansion, step: Lanes, max_derivative: int) -> State:
@@ -139,20 +137,11 @@ def _terms(
     coefficients: Float[Numbers, "order component body batch"], step: Lanes, max_derivative: int
 ) -> Float[Numbers, "component body batch"]:
     """Return what the formula adds for the derivatives of one end; seen from the other end, the step is negative."""
-    weights = _weights(max_derivative)
-    return total(float(w) * step[None, None] ** j * coefficients[j] for j, w in enumerate(weights, 1))
+    p = max_derivative
+    weights = {j: math.perm(p, j) / math.perm(2 * p, j) for j in range(1, p + 1)}
+    return total(w * step[None, None] ** j * coefficients[j] for j, w in weights.items())
 
 
-@lru_cache(maxsize=8)
-def _weights(p: int) -> tuple[Fraction, ...]:
-    """Return the factors of the Taylor coefficients 1..p times powers of the step."""
-    factorial = math.factorial
-    return tuple(
-        Fraction(factorial(p) * factorial(2 * p - j), factorial(2 * p) * factorial(p - j)) for j in range(1, p + 1)
-    )
-
-
-@lru_cache(maxsize=8)
 def _hermite(p: int) -> np.ndarray:
     """Return how the upper coefficients follow from the ends, in units of the step.
 
@@ -175,10 +164,10 @@ def _measure(length: Number, step: Lanes) -> tuple[Any, ...]:
     return 1.0 / length, 1.0, lapse[None, None] / length, lapse[None, None]
 
 
-def _size(change: State, measure: tuple[Any, ...], *, signed: bool = False) -> Lanes:
+def _size(change: State, measure: tuple[Any, ...]) -> Lanes:
     """Return the largest component of a change of state."""
-    sizes = [(x if signed else jnp.abs(x)) * m for x, m in zip(change, measure, strict=True)]
-    return jnp.max(jnp.stack([jnp.max(x, axis=(0, 1)) for x in sizes]), axis=0)
+    sizes = [jnp.max(jnp.abs(x) * m, axis=(0, 1)) for x, m in zip(change, measure, strict=True)]
+    return jnp.max(jnp.stack(sizes), axis=0)
 
 
 def _settled(change: Lanes, before: Lanes) -> Flags:
