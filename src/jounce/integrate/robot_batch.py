@@ -81,13 +81,14 @@ def simulate_robots(
             raise
 
     def run(start: tuple[Robot, Any]) -> RobotSimulation:
-        return simulate_robot(start[0], instants, order, state=start[1], strict=False, **options)
+        return simulate_robot(start[0], instants, order, state=start[1], **options)
 
     def traced_run(start: tuple[Robot, Any]) -> TracedRobotMotion:
         return traced_robot_motion(simulate_robot, start[0], instants, order, state=start[1], **options)
 
+    options["strict"] = traced  # what fails has no derivatives, and raises
     q: Any
-    if traced:  # one after another, as JAX traces in one thread; what fails has no derivatives, and raises
+    if traced:  # one after another, as JAX traces in one thread
         motions = list(map(traced_run, starts))
         runs, q = [motion.simulation for motion in motions], jnp.stack([motion.q for motion in motions])
     else:

@@ -59,11 +59,11 @@ def simulate_robot(
     drives: bool = True,
     base: BaseMotion | None = None,
     wrenches: Sequence[Wrench] = (),
-    method: AbstractMethod | None = None,
-    tolerance: float = 1e-15,
+    method: AbstractMethod,
+    tolerance: float,
     events: Sequence[JointEvent] = (),
-    longest_step: float = np.inf,
-    strict: bool = True,
+    longest_step: float,
+    strict: bool,
     progress: Callable[[int, int], None] | None = None,
 ) -> RobotSimulation:
     """Return the motion of a robot; see `jounce.simulate`, which checks what is common to all simulations."""
@@ -76,13 +76,11 @@ def simulate_robot(
         if not isinstance(event, JointEvent):
             raise RobotError("must be a jn.integrate.JointEvent", name="events", value=event)
     detectors = [JointEventDetector(event, robot) for event in events]
-    if isinstance(method, Taylor) and method.step is not None:
-        longest_step = float(method.step)
-    elif method is not None and not isinstance(method, Taylor):
+    if not isinstance(method, Taylor):
         raise RobotError("robots are simulated by jn.Taylor", name="method", value=type(method).__name__)
-    order_of_series = (method or Taylor()).expansion_order(tolerance) - 1
-    limits = RunLimits(*map(np.float64, (instants[-1], tolerance, longest_step)))
-    run = RobotRun(problem, start, float(instants[0]), order_of_series, limits, detectors)
+    longest = longest_step if method.step is None else method.step
+    limits = RunLimits(*map(np.float64, (instants[-1], tolerance, longest)))
+    run = RobotRun(problem, start, float(instants[0]), method.expansion_order(tolerance) - 1, limits, detectors)
     with Count("simulating", report=progress) as tell:
         run.go(instants, tell)
     outcome = run.ending, run.happened, tuple(wrenches), run.backends
