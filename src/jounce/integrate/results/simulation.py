@@ -89,9 +89,11 @@ class Simulation(Motion):
 
         outputs, levels = start.model.system.outputs, {"order": derivatives_of_motion(mechanism, order)}
         outcome, backend = expanded.at_instants((start.equations, outputs), lanes_of, len(instants), **levels)
-        state, self._angles, found = outcome
+        state, self._angles, outputs_found = outcome
         coordinates = pose_coordinates(state)
-        groups = tuple(self._counted(group, series, instants) for group, series in zip(outputs, found, strict=True))
+        groups = tuple(
+            self._counted(group, series, instants) for group, series in zip(outputs, outputs_found, strict=True)
+        )
         status, faults = status_of(dense, instants, reached, ending)
         lost = reached & ~np.isfinite(np.concatenate([p.reshape(-1, len(instants)) for p in state])).all(axis=0)
         for names, series in zip(start.model.outputs, groups, strict=True):
