@@ -10,16 +10,15 @@ from jounce.kinematics.cams import (
     Undercut as Undercut,
     plate_cam as plate_cam,
 )
-from jounce.kinematics.curves import (
+from jounce.kinematics.curves.assembly_modes import (
     Assemblies as Assemblies,
     Assembly as Assembly,
-    ChangePoint as ChangePoint,
-    Curve as Curve,
-    CurveBranch as CurveBranch,
-    LimitPosition as LimitPosition,
     assemblies as assemblies,
-    trace as trace,
 )
+from jounce.kinematics.curves.branches import trace as trace
+from jounce.kinematics.curves.crossings import ChangePoint as ChangePoint
+from jounce.kinematics.curves.curve import Curve as Curve, CurveBranch as CurveBranch
+from jounce.kinematics.curves.limits import LimitPosition as LimitPosition
 from jounce.kinematics.families.solve_batch import solve_batch as solve_batch
 from jounce.kinematics.position_analysis.chunked_motion import (
     ChunkedMotion as ChunkedMotion,

@@ -91,6 +91,11 @@ class Pattern(Module):
         touched = by_body.at[self.bodies].get(mode="fill", fill_value=0.0)
         return jnp.sum(_with_zero(entries)[self.entry_indices] * touched, axis=(1, 2))
 
+    def row_scale(self, entries: Float[Numbers, "entry batch"]) -> Float[Numbers, "row batch"]:
+        """Return factors by which the largest entry of each row becomes one; one where that is zero or not finite."""
+        largest = jnp.max(jnp.abs(_with_zero(entries))[self.entry_indices], axis=(1, 2))
+        return 1 / jnp.where((largest > 0) & jnp.isfinite(largest), largest, 1.0)
+
 
 def _with_zero(entries: Float[Numbers, "entry batch"]) -> Float[Numbers, "entry+1 batch"]:
     return jnp.concatenate([entries, jnp.zeros((1, entries.shape[-1]))])

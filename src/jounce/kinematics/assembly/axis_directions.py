@@ -4,6 +4,7 @@ The rows of a hinge or a guide hold a body in two ways: as drawn, and with its a
 no assembly that a user means, and no motion leads from one to the other.
 """
 
+import itertools
 from collections.abc import Iterator
 from typing import ClassVar
 
@@ -76,8 +77,9 @@ def drawn_axis_signs(model: Model) -> AxisSigns:
 
 def pair_names(model: Model) -> list[str]:
     """Return the name of the joint of each pair of directions."""
-    names = {id(group): model.rows[rows] for group, rows in zip(model.system.groups, group_rows(model), strict=True)}
-    return [name for group, _ in _pairs(model.system) for name in names[id(group)][: group.instances]]
+    groups = zip(model.system.groups, group_rows(model), strict=True)
+    names = [model.rows[rows][: g.instances] for g, rows in groups for _ in facts_of(type(g.element)).held_parallel]
+    return list(itertools.chain(*names))
 
 
 def axis_signs_to_try(model: Model, attempt: AssemblyAttempt) -> list[AxisSigns]:

@@ -16,10 +16,9 @@ from jounce.errors import MechanismError, whole_number
 from jounce.kinematics.assembly.assemble import check_assembled, find_assembly, redundancy_of
 from jounce.kinematics.assembly.constraint_series import SINGULAR, ReducedConstraints
 from jounce.kinematics.assembly.gauss_newton import AssemblyAttempt, Displacements, assemble_from_guess
-from jounce.kinematics.assembly.initial_revolutions import Coordinates, Displace
+from jounce.kinematics.assembly.initial_revolutions import Displace
 from jounce.kinematics.assembly.redundancy import Repetition, closed_nearby
 from jounce.kinematics.assembly.tangent_cone import LocalCurve, curves
-from jounce.linear_algebra.host_jacobian import HostJacobian
 from jounce.mechanism import Mechanism, Model, build, check_mechanism
 from jounce.mechanism.building.builder import with_reference
 from jounce.mechanism.building.preconditions import check_holonomic, concrete
@@ -175,21 +174,21 @@ def mobility(mechanism: Mechanism, time: float | None = None, order: int = 10) -
     order = whole_number("order", order, 2, HIGHEST_ORDER, error=MechanismError)
     if time is None:
         time = first_instant(mechanism.time, mechanism.parameter_values)
-    model, coordinates, attempt = _released(mechanism, time)
-    columns, rows = model.system.shape[1], len(model.rows)
-    if not rows:
+    model, attempt = _released(mechanism, time)
+    rows, columns = model.system.shape
+    if attempt is None:
         return independent(columns, 0)
     matrix = attempt.jacobian.dense()
     sizes = np.linalg.svd(matrix, compute_uv=False)
     if np.sum(sizes > SINGULAR * sizes.max()) == rows:
         return independent(columns, rows)
-    constraints = ReducedConstraints.at(model, coordinates, matrix, order)
+    constraints = ReducedConstraints.at(model, attempt.coordinates, matrix, order)
     redundant = redundancy_of(model, attempt, time)[1]
     return dataclasses.replace(_analyzed(constraints, Displacements(model, time)), repetitions=redundant.repetitions)
 
 
-def _released(mechanism: Mechanism, time: float) -> tuple[Model, Coordinates, AssemblyAttempt]:
-    """Return the model of the joints alone, where drivers hold it, with rows of one size."""
+def _released(mechanism: Mechanism, time: float) -> tuple[Model, AssemblyAttempt | None]:
+    """Return the model of the joints alone, if any, where drivers hold it, with rows of one size."""
     driven = dataclasses.replace(mechanism, drivers={**mechanism.drivers, **mechanism.initial}, initial={}, outputs={})
     model = build(driven)
     coordinates = model.guess
@@ -199,12 +198,11 @@ def _released(mechanism: Mechanism, time: float) -> tuple[Model, Coordinates, As
         coordinates = attempt.coordinates
     model = build(dataclasses.replace(driven, drivers={}, forces={}))
     if not model.rows:
-        nothing = HostJacobian.of(model.system.pattern, np.zeros(model.system.pattern.entry_count))
-        return model, coordinates, AssemblyAttempt(coordinates, np.ones(0), np.zeros(0), nothing, True)
+        return model, None
     model, _ = with_reference(model, coordinates, time)
     attempt = assemble_from_guess(model, time, TOLERANCE, coordinates)
     system = with_fields(model.system, row_scale=attempt.scale[:, None])
-    return dataclasses.replace(model, system=system), attempt.coordinates, attempt
+    return dataclasses.replace(model, system=system), attempt
 
 
 def _analyzed(constraints: ReducedConstraints, displace: Displace) -> Mobility:

@@ -29,16 +29,13 @@ class AbstractFollower(abc.ABC):
         check_choice("shape", self.shape, SHAPES, MechanismError)
         for field in dataclasses.fields(self):  # type: ignore[arg-type] - every follower is a dataclass
             if field.name != "shape":
-                check = positive if field.name in ("center_distance", "arm") and not self._spare(field.name) else finite
+                needed = field.name == "center_distance" or (field.name == "arm" and not self.is_flat)
+                check = positive if needed else finite
                 object.__setattr__(self, field.name, check(field.name, getattr(self, field.name)))
         if self.shape == "roller":
             positive("radius", self.radius)
         elif self.radius:
             raise MechanismError("only a roller has a radius", name="radius", value=self.radius)
-
-    def _spare(self, field: str) -> bool:
-        """Tell whether a length is not needed for the shape."""
-        return field == "arm" and self.shape == "flat_face"
 
     @property
     def is_flat(self) -> bool:

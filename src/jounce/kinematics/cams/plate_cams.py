@@ -6,9 +6,10 @@ curvatures are read off derivatives of these jets; no formula for one is written
 """
 
 import dataclasses
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from operator import attrgetter
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -103,7 +104,7 @@ class PlateCam(Displayed):
     @cached_property
     def largest_pressure_angle(self) -> Extreme:
         """The pressure angle that is farthest from zero, with its sign, rad."""
-        return self._extreme(lambda geometry: np.abs(geometry.pressure_angle), lambda geometry: geometry.pressure_angle)
+        return self._extreme(attrgetter("pressure_angle"), np.abs)
 
     @cached_property
     def least_radius(self) -> Extreme | None:
@@ -132,8 +133,8 @@ class PlateCam(Displayed):
         """
         if not self.follower.is_flat:
             return None
-        low = self._extreme(lambda geometry: -geometry.contact, lambda geometry: geometry.contact)
-        return low, self._extreme(lambda geometry: geometry.contact, lambda geometry: geometry.contact)
+        contact = attrgetter("contact")
+        return self._extreme(contact, np.negative), self._extreme(contact, np.positive)
 
     @cached_property
     def undercuts(self) -> tuple[Undercut, ...]:
@@ -181,15 +182,15 @@ class PlateCam(Displayed):
 
         if not np.isfinite(radius(self.table)).any():
             return None
-        return self._extreme(lambda geometry: -radius(geometry), radius)
+        return self._extreme(radius, np.negative)
 
-    def _extreme(self, size: Any, value: Any) -> Extreme:
-        """Return the largest of a size, looked for nearer and nearer around the largest of the table."""
+    def _extreme(self, value: Callable[[Geometry], Numbers1], size: Callable[[Numbers1], Numbers1]) -> Extreme:
+        """Return the value of the largest size, looked for nearer and nearer around the largest of the table."""
         step = WHOLE_TURN / max(len(self.angle) - 1, 1)
-        best = float(self.angle[int(np.nanargmax(size(self.table)))])
+        best = float(self.angle[int(np.nanargmax(size(value(self.table))))])
         for _ in range(ROUNDS):
             near = best + step * np.linspace(-1, 1, POINTS)
-            best = float(near[int(np.nanargmax(size(self.at(near))))])
+            best = float(near[int(np.nanargmax(size(value(self.at(near)))))])
             step *= 2 / (POINTS - 1)
         return Extreme(float(value(self.at(best))[0]), float(best % WHOLE_TURN))
 

@@ -5,7 +5,7 @@ With redundant constraints, which agree, it has more rows than columns, and its 
 
 import jax
 import jax.numpy as jnp
-from jaxtyping import Bool, Float
+from jaxtyping import Bool
 
 from jounce.base.shapes import Numbers
 from jounce.jet import Jet
@@ -22,9 +22,12 @@ STALE = 1e-9  # part by which solutions may be off before they are refined, whic
 
 def factored(system: System, pose: Pose, time: Jet) -> Factor:
     """Return the factored Jacobian at a pose of order zero."""
-    if system.fronts is None:
-        return _of(system, system.jacobian(pose, time))
-    return FrontalFactor.of(system.fronts, system.entries(pose, time), system.row_scale)
+    if system.fronts is not None:
+        return FrontalFactor.of(system.fronts, system.entries(pose, time), system.row_scale)
+    matrix = system.jacobian(pose, time)
+    if system.rank is not None:
+        return LeastSquaresFactor.of(matrix)
+    return ReflectedFactor.of(matrix, system.elimination_order) if system.reflected else DenseFactor.of(matrix)
 
 
 def refactored(system: System, pose: Pose, time: Jet, known: Factor, anew: Bool[Numbers, ""]) -> Factor:
@@ -49,9 +52,3 @@ def blank_factor(system: System, lanes: int) -> Factor:
     if system.reflected:
         return ReflectedFactor.blank(system.elimination_order, lanes)
     return DenseFactor.blank(system.shape, lanes)
-
-
-def _of(system: System, matrix: Float[Numbers, "row column batch"]) -> Factor:
-    if system.rank is not None:
-        return LeastSquaresFactor.of(matrix)
-    return ReflectedFactor.of(matrix, system.elimination_order) if system.reflected else DenseFactor.of(matrix)

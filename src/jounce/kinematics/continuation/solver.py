@@ -68,7 +68,7 @@ class Solver:
         if lanes <= SMALL_BATCH:
             known, step, instant = jax.tree.map(lambda x: padded(x, SMALL_BATCH), (needed, step, instant))
             run = _run_from(known, (0.0,) * 4, away=step, instant=instant)
-            arrival = self._take_steps(run, NO_GRID, _limits(0.0, 0.0), 1, search=search).last
+            arrival = self._take_steps(run, NO_GRID, 1, search=search).last
         else:
             arrival = self.program((needed, step, instant, None, np.zeros(step.shape, bool)))
         return jax.tree.map(lambda x: np.asarray(x)[..., :lanes], arrival)
@@ -127,12 +127,12 @@ class Solver:
     def take_steps(self, run: StepState, grid: Float[np.ndarray, " time"], stop: float, smallest: float) -> TakenSteps:
         """Go on with a run and the next instants of a grid, as far as they fit; see `continuation_steps`."""
         run = run._replace(next_up=np.zeros((), int))
-        return self._take_steps(run, grid, _limits(stop, smallest), self._batches, search=True)
+        return self._take_steps(run, grid, self._batches, stop=stop, smallest=smallest)
 
     def prepare(self) -> None:
         """Compile the program of runs, unless it exists; nothing is solved."""
         run = self.beginning(self.model.guess, 0.0)
-        self._take_steps(run, NO_GRID, _limits(0.0, 0.0), 0, search=True, only_made=True)
+        self._take_steps(run, NO_GRID, 0, only_made=True)
 
     def run_from(
         self, solved: SolvedState, expansion_point: Sequence[float], largest: float, crawled: int = 0
@@ -205,10 +205,11 @@ class Solver:
         self,
         run: StepState,
         grid: Float[np.ndarray, " time"],
-        limits: StepLimits,
         most: int,
         *,
-        search: bool,
+        stop: float = 0.0,
+        smallest: float = 0.0,
+        search: bool = True,
         only_made: bool = False,
     ) -> Any:
         length = (self._batches + 1) * (SMALL_BATCH - 1)
@@ -217,6 +218,7 @@ class Solver:
         call = take_steps.prepare if only_made else take_steps
         native = WhenMade(self.hasty, lambda: self.program.name if isinstance(self.program, OnLlvm) else None)
         how = {"pose_type": self.model.pose_type, "order": self.order, "batches": self._batches, "native": native}
+        limits = StepLimits(np.asarray(stop), np.asarray(smallest))
         bounds = limits, self._settings, np.asarray(search), np.asarray(most)
         return call(self.model.system, run, window, *bounds, **how)
 
@@ -258,7 +260,3 @@ def _run_from(
     control = control._replace(largest=np.asarray(largest), crawled=np.asarray(crawled))
     decided, first = np.asarray(instant is not None), np.zeros((), int)
     return StepState(known, control, nothing if away is None else away, here, decided, first, NOWHERE)
-
-
-def _limits(stop: float, smallest: float) -> StepLimits:
-    return StepLimits(np.asarray(stop), np.asarray(smallest))

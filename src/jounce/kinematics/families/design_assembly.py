@@ -55,19 +55,13 @@ def _assembled(
     def gaps(pose: Any, scale: Any) -> Any:
         return jnp.sqrt(jnp.sum((scale * unscaled.residual(pose, time).coefficients[0]) ** 2, axis=0))
 
-    def scale_at(pose: Any) -> Any:
-        entries = jnp.abs(unscaled.entries(pose, time))
-        padded = jnp.concatenate([entries, jnp.zeros((1, entries.shape[-1]))])
-        largest = jnp.max(padded[system.pattern.entry_indices], axis=(1, 2))
-        return 1 / jnp.where((largest > 0) & jnp.isfinite(largest), largest, 1.0)
-
     def going(state: Any) -> Any:
         return jnp.any(state[1]) & (state[2] < MAX_STEPS)
 
     def correct(state: Any) -> Any:
         coordinates, moving, count = state
         pose = pose_at(coordinates, pose_type)
-        scale = scale_at(pose)
+        scale = system.pattern.row_scale(unscaled.entries(pose, time))
         step = factored(system, pose, time).solve(-system.residual(pose, time).coefficients[0])
         size = jnp.max(jnp.abs(step), axis=0)
         step, now = step * jnp.minimum(1.0, LONGEST_STEP / jnp.maximum(size, 1e-300))[None], gaps(pose, scale)
@@ -96,7 +90,7 @@ def _assembled(
     start = (guess, jnp.isfinite(instant), jnp.zeros((), int))
     coordinates, moving, _ = jax.lax.while_loop(going, correct, start)
     pose = pose_at(coordinates, pose_type)
-    scale = scale_at(pose)
+    scale = system.pattern.row_scale(unscaled.entries(pose, time))
     open_by = jnp.max(jnp.abs(scale * unscaled.residual(pose, time).coefficients[0]), axis=0)
     plain = ~moving & (open_by <= jnp.maximum(1e3 * tolerance, 1e-9)) & (jnp.max(lag, axis=0) < np.pi)
     plain &= factored(system, pose, time).pivot_ratio() > CLEARLY_REGULAR

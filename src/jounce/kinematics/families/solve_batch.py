@@ -113,35 +113,9 @@ def solve_batch(
     0
     """
     with Count("solving", "designs", progress) as tell:
-        family, values = _family(mechanism, parameters, time, order, tolerance, tell)
+        family = _Family(mechanism, parameters, time, order, tolerance, tell)
         family.solve(thread_count(threads), individually=alone)
-    return family.dataset(values)
-
-
-def _family(
-    mechanism: Mechanism,
-    parameters: Mapping[str, ArrayLike],
-    time: TimeLike | None,
-    order: int,
-    tolerance: float,
-    progress: Callable[[int, int], None] | None = None,
-) -> tuple["_Family", dict[str, np.ndarray]]:
-    """Return designs that are to be solved, and the values of their parameters, checked."""
-    check_mechanism(mechanism)
-    values = checked_values(parameters, "design", partial(check_parameter, mechanism))
-    for name in ("design", "status"):
-        if name in mechanism.outputs:
-            message = f"the name {name!r} is that of an array of a family; give the output another name"
-            raise MechanismError(message, name=f"outputs.{name}")
-    names, rows = tuple(values), np.stack(list(values.values()), axis=-1)
-    order = checked_settings(mechanism, order, tolerance)
-    instants = time_grid(mechanism.time if time is None else time, mechanism.parameter_values)
-    ends = [
-        mechanism.with_parameters(**dict(zip(names, row.tolist(), strict=True)))
-        for row in (rows[0], rows[len(rows) // 2], rows[-1])
-    ]
-    mechanism = with_idle_held_in_family(mechanism, ends, instants, tolerance, solve)
-    return _Family(mechanism, names, rows, instants, order, float(tolerance), progress), values
+    return family.dataset
 
 
 @under_own_settings
@@ -163,10 +137,10 @@ def solve_with_sides(
     instants : array of shape (time,)
         Strictly increasing, s.
     """
-    family, values = _family(mechanism, parameters, instants, order, tolerance)
+    family = _Family(mechanism, parameters, instants, order, tolerance)
     family.add_sides_of_breaks()
     family.solve(thread_count(threads))
-    return family.dataset(values), family.sides()
+    return family.dataset, family.sides
 
 
 class _Family:
@@ -175,19 +149,28 @@ class _Family:
     def __init__(
         self,
         mechanism: Mechanism,
-        names: tuple[str, ...],
-        rows: Float[np.ndarray, "design parameter"],
-        instants: Float[np.ndarray, " time"],
+        parameters: Mapping[str, ArrayLike],
+        time: TimeLike | None,
         order: int,
         tolerance: float,
-        progress: Callable[[int, int], None] | None,
+        progress: Callable[[int, int], None] | None = None,
     ):
-        self.mechanism, self.names, self.rows, self.instants = mechanism, names, rows, instants
-        self.held = with_output_drivers(mechanism)  # solved side by side
-        self.order, self.tolerance, self.progress = order, tolerance, progress
+        check_mechanism(mechanism)
+        self.parameters = checked_values(parameters, "design", partial(check_parameter, mechanism))
+        for name in ("design", "status"):
+            if name in mechanism.outputs:
+                message = f"the name {name!r} is that of an array of a family; give the output another name"
+                raise MechanismError(message, name=f"outputs.{name}")
+        self.names, self.rows = tuple(self.parameters), np.stack(list(self.parameters.values()), axis=-1)
+        self.order, self.tolerance = checked_settings(mechanism, order, tolerance), float(tolerance)
+        self.instants = time_grid(mechanism.time if time is None else time, mechanism.parameter_values)
+        some = [self._design(k, mechanism) for k in (0, len(self.rows) // 2, -1)]
+        self.mechanism = with_idle_held_in_family(mechanism, some, self.instants, tolerance, solve)
+        self.held = with_output_drivers(self.mechanism)  # solved side by side
+        self.progress = progress
         self.outputs: dict[str, np.ndarray] = {}
         self.backends: set[str] = set()
-        self._set_instants(np.zeros((len(rows), 0)), np.zeros((len(rows), 0)))
+        self._set_instants(np.zeros((len(self.rows), 0)), np.zeros((len(self.rows), 0)))
 
     def _set_instants(
         self, side_instants: Float[np.ndarray, "design side"], breaks: Float[np.ndarray, "design side"]
@@ -201,20 +184,17 @@ class _Family:
         """Add the instants on both sides of each jump or bend of the laws of each design."""
         first, last = float(self.instants[0]), float(self.instants[-1])
         level = self.order + lost_orders(self.mechanism.outputs.values())
-        designs = dict(zip(self.names, self.rows.T, strict=True))
-        breaks, side_instants = sides_of_designs(self.mechanism, designs, first, last, level)
+        breaks, side_instants = sides_of_designs(self.mechanism, self.parameters, first, last, level)
         self._set_instants(side_instants, breaks)
 
+    @property
     def sides(self) -> Sides:
-        """Return the outputs on both sides of the breaks."""
+        """The outputs on both sides of the breaks."""
         count = len(self.instants)
         return Sides(self.breaks, {name: values[:, count:] for name, values in self.outputs.items()})
 
-    def design(self, k: int) -> Mechanism:
-        """Return one of the designs."""
-        return self._with_values(self.mechanism, k)
-
-    def _with_values(self, mechanism: Mechanism, k: int) -> Mechanism:
+    def _design(self, k: int, mechanism: Mechanism) -> Mechanism:
+        """Return a mechanism with the values of one of the designs."""
         return mechanism.with_parameters(**dict(zip(self.names, self.rows[k].tolist(), strict=True)))
 
     def solve(self, threads: int, *, individually: bool = True) -> None:
@@ -230,15 +210,13 @@ class _Family:
             if self.progress is not None:
                 self.progress(count - len(left) + done + 1, count)
 
-    def dataset(self, values: Mapping[str, np.ndarray]) -> Any:
-        """Return the results, labeled."""
+    @property
+    def dataset(self) -> Any:
+        """The results, labeled."""
         count = len(self.instants)
         outputs = {name: series[:, :count] for name, series in self.outputs.items()}
-        title, definitions = self.mechanism.title, self.mechanism.outputs
-        return labeled_family(
-            "design", title, definitions, self.instants, self.order, values, outputs, self.status[:, :count],
-            joined(self.backends),
-        )  # fmt: skip
+        described = self.mechanism.title, self.mechanism.outputs, self.instants, self.order, self.parameters
+        return labeled_family("design", *described, outputs, self.status[:, :count], joined(self.backends))
 
     def _of_whole_motions(self) -> bool:
         """Return whether an output follows from the whole motion, not from one instant."""
@@ -269,7 +247,7 @@ class _Family:
         if model is None or model.system.rank is not None:
             return np.arange(count)
         lost = lost_orders(self.mechanism.outputs.values())
-        check_laws(self.design(known), np.array([first, last]), self.order + lost, forces=False)
+        check_laws(self._design(known, self.mechanism), np.array([first, last]), self.order + lost, forces=False)
         levels = max(self.order + lost, LOWEST_ORDER)
         system = model.system
         if any(map(measures_angle, (*system.groups, *system.outputs))) or system.shape[0] != system.shape[1]:
@@ -282,7 +260,7 @@ class _Family:
     def _assembled(self, k: int) -> tuple[Model, dict[str, Any]] | None:
         """Return the model of a design, its outputs held to their laws, and its start; None if it has no assembly."""
         try:
-            return assemble(build(self._with_values(self.held, k)), float(self.instants[0]), self.tolerance)
+            return assemble(build(self._design(k, self.held)), float(self.instants[0]), self.tolerance)
         except SPOILED:
             return None
         except JounceError as error:
@@ -330,7 +308,8 @@ class _Family:
         """Solve one design as `jounce.solve` does."""
         try:
             grid, indices = np.unique(self.all_instants[k], return_inverse=True)
-            motion: Motion = solve(self.design(k), grid, self.order, tolerance=self.tolerance, strict=False)
+            design = self._design(k, self.mechanism)
+            motion: Motion = solve(design, grid, self.order, tolerance=self.tolerance, strict=False)
             motion, outputs = with_outputs(motion)
         except SPOILED as error:
             status = getattr(error, "status", None)

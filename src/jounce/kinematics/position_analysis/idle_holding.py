@@ -111,17 +111,12 @@ def with_idle_held_in_family(
     Outputs of the designs given are checked not to depend on them.
     """
     model, first = build(with_output_drivers(designs[0])), float(instants[0])
-    rows, columns = model.system.shape
-    if rows >= columns:
-        return mechanism
+    (rows, columns), idle = model.system.shape, {}
     try:
-        assemble(model, first, tolerance)
-    except MobilityError as error:
-        idle = error.idle
-    except JounceError:  # solving the design raises it
-        return mechanism
-    else:
-        return mechanism
+        if rows < columns:
+            assemble(model, first, tolerance)
+    except JounceError as error:  # another one is raised where the design is solved
+        idle = error.idle if isinstance(error, MobilityError) else {}
     if not idle:
         return mechanism
     for design in designs:

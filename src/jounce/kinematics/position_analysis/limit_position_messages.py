@@ -5,9 +5,9 @@ import math
 import numpy as np
 
 from jounce.errors import JounceError
-from jounce.kinematics.curves import Curve, trace
-from jounce.kinematics.curves.curve import posed
-from jounce.kinematics.curves.start import TIME, law_values
+from jounce.kinematics.curves.branches import trace
+from jounce.kinematics.curves.curve import Curve
+from jounce.kinematics.curves.start import TIME, law_values, posed
 from jounce.kinematics.results.motion import Motion
 from jounce.kinematics.status import Status
 from jounce.mechanism import with_output_drivers

@@ -146,10 +146,7 @@ def solver(
 
 def _row_scale(system: System, entries: Float[Numbers, "order entry batch"]) -> Float[Numbers, "row 1"]:
     """Return factors by which the largest entry of each row, somewhere along the motion, becomes one."""
-    pattern = system.pattern
-    sizes = jnp.max(jnp.abs(jax.lax.stop_gradient(entries[0])), axis=-1)
-    sizes = jnp.concatenate([sizes, jnp.zeros(1)])[pattern.entry_indices].max(axis=(1, 2))[:, None]
-    return 1.0 / jnp.where((sizes > 0) & jnp.isfinite(sizes), sizes, 1.0)
+    return system.pattern.row_scale(jnp.max(jnp.abs(jax.lax.stop_gradient(entries[0])), axis=-1, keepdims=True))
 
 
 Product = Callable[[Any, Any], Any]
