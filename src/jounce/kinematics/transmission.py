@@ -2,7 +2,7 @@
 
 import dataclasses
 import math
-from typing import Any
+from typing import NamedTuple
 
 import numpy as np
 
@@ -57,7 +57,8 @@ class FourBar:
         a, b, c, d = self.crank, self.coupler, self.output, self.ground
         square = a * a + d * d - 2 * a * d * math.cos(value - self.offset)
         cosine = (b * b + c * c - square) / (2 * b * c)
-        return _folded(math.acos(max(-1.0, min(1.0, cosine))))
+        angle = math.acos(max(-1.0, min(1.0, cosine)))
+        return min(angle, math.pi - angle)
 
     @property
     def turning_values(self) -> tuple[float, ...]:
@@ -133,43 +134,58 @@ def recognized(mechanism: Mechanism, driver: str) -> Linkage | None:
         return None
     if law.bodies[0] != GROUND or law.offset not in (0, 0.0):
         return None
-    hinges, guides = _joints(mechanism)
-    crank = law.bodies[1]
-    if len(guides) == 0 and len(hinges) == 4:
-        loop = _loop(hinges, crank)
-        return None if loop is None else _four_bar(loop)
-    if len(guides) == 1 and len(hinges) == 3:
-        return _slider_crank(hinges, guides[0], crank)
-    return None
+    loop = _loop(_joints(mechanism), law.bodies[1])
+    if loop is None:
+        return None
+    return _four_bar(loop) if loop[-1][2].guide is None else _slider_crank(loop)
 
 
-Hinge = tuple[tuple[str, str], tuple[np.ndarray, np.ndarray]]
-"""Two bodies, and the hinge in the frame of each."""
+class _Joint(NamedTuple):
+    """A hinge, or a guide, between two bodies.
+
+    Attributes
+    ----------
+    bodies : tuple of str
+    points : tuple of array
+        In the frame of each.
+    guide : array, optional
+        Direction on the first body along which the second slides.
+    """
+
+    bodies: tuple[str, str]
+    points: tuple[np.ndarray, np.ndarray]
+    guide: np.ndarray | None = None
+
+    def on(self, body: str) -> np.ndarray:
+        """Return where it is in the frame of a body."""
+        return self.points[self.bodies.index(body)]
 
 
-def _joints(mechanism: Mechanism) -> tuple[list[Hinge], list[Any]]:
+_Link = tuple[str, _Joint, _Joint]
+"""A body, the joint by which it is reached, and the next one."""
+
+
+def _joints(mechanism: Mechanism) -> list[_Joint]:
     """Return the hinges and guides of a mechanism; a massless rod is a body with two hinges. None fits others."""
     names = [GROUND, *mechanism.bodies]
-    hinges: list[Hinge] = []
-    guides: list[Any] = []
+    joints: list[_Joint] = []
     for group in build(mechanism).system.groups:
         if group.is_driver:
             continue
         pair = facts_of(type(group.element)).pair
+        if pair not in ("revolute", "rod", "prismatic"):
+            return []
         for k in range(group.instances):
             first, second = (names[slot[k]] for slot in group.bodies[:2])
-            if pair == "revolute":
-                hinges.append(((first, second), (_value(group, "point_i", k), _value(group, "point_j", k))))
-            elif pair == "rod":
-                rod, length = f"rod {len(hinges)}", float(_value(group, "length", k))
-                hinges.append(((first, rod), (_value(group, "point_i", k), np.zeros(2))))
-                hinges.append(((rod, second), (np.array([length, 0.0]), _value(group, "point_j", k))))
-            elif pair == "prismatic":
-                fields = ("point_i", "point_j", "vector_i")
-                guides.append(((first, second), *(_value(group, name, k) for name in fields)))
+            points = _value(group, "point_i", k), _value(group, "point_j", k)
+            if pair == "rod":
+                rod, length = f"rod {len(joints)}", float(_value(group, "length", k))
+                joints.append(_Joint((first, rod), (points[0], np.zeros(2))))
+                joints.append(_Joint((rod, second), (np.array([length, 0.0]), points[1])))
             else:
-                return [], []
-    return hinges, guides
+                guide = _value(group, "vector_i", k) if pair == "prismatic" else None
+                joints.append(_Joint((first, second), points, guide))
+    return joints
 
 
 def _value(group: Group, name: str, instance: int) -> np.ndarray:
@@ -177,59 +193,41 @@ def _value(group: Group, name: str, instance: int) -> np.ndarray:
     return value[..., min(instance, value.shape[-1] - 1)]
 
 
-def _on(hinge: Hinge, body: str) -> np.ndarray:
-    return hinge[1][hinge[0].index(body)]
-
-
-def _other(hinge: Hinge, body: str) -> str:
-    return hinge[0][1 - hinge[0].index(body)]
-
-
-def _loop(hinges: list[Hinge], crank: str) -> list[tuple[str, Hinge, Hinge]] | None:
-    """Return the three links of a loop from the crank on, each with its hinges, in order."""
-    first = [h for h in hinges if set(h[0]) == {GROUND, crank}]
-    if len(first) != 1:
+def _loop(joints: list[_Joint], crank: str) -> list[_Link] | None:
+    """Return the three links of a loop from the crank on, in order, if only the last joint may be a guide."""
+    first = [joint for joint in joints if set(joint.bodies) == {GROUND, crank}]
+    if len(joints) != 4 or len(first) != 1:
         return None
-    members, body, hinge = [], crank, first[0]
-    while body != GROUND and len(members) < 3:
-        following = [h for h in hinges if body in h[0] and h is not hinge]
+    links: list[_Link] = []
+    body, joint = crank, first[0]
+    while body != GROUND and len(links) < 3 and joint.guide is None:
+        following = [other for other in joints if body in other.bodies and other is not joint]
         if len(following) != 1:
             return None
-        members.append((body, hinge, following[0]))
-        body, hinge = _other(following[0], body), following[0]
-    return members if body == GROUND and len(members) == 3 else None
+        links.append((body, joint, following[0]))
+        joint = following[0]
+        body = joint.bodies[1 - joint.bodies.index(body)]
+    return links if body == GROUND and len(links) == 3 else None
 
 
-def _four_bar(loop: list[tuple[str, Hinge, Hinge]]) -> FourBar | None:
-    arms = [_on(after, body) - _on(before, body) for body, before, after in loop]
-    ground = _on(loop[-1][2], GROUND) - _on(loop[0][1], GROUND)
+def _four_bar(loop: list[_Link]) -> FourBar | None:
+    arms = [after.on(body) - before.on(body) for body, before, after in loop]
+    ground = loop[-1][2].on(GROUND) - loop[0][1].on(GROUND)
     crank, coupler, output, base = (float(np.linalg.norm(x)) for x in (*arms, ground))
     offset = math.atan2(ground[1], ground[0]) - math.atan2(arms[0][1], arms[0][0])
     return FourBar(crank, coupler, output, base, offset) if min(crank, coupler, output, base) > 0 else None
 
 
-def _slider_crank(hinges: list[Hinge], guide: Any, crank: str) -> SliderCrank | None:
+def _slider_crank(loop: list[_Link]) -> SliderCrank | None:
     """Return a slider-crank whose guide is on the ground."""
-    (first, second), point_i, point_j, vector = guide
-    slider = second if first == GROUND else ""
-    closing = [h for h in hinges if slider and slider in h[0]]
-    start_of_curve = [h for h in hinges if set(h[0]) == {GROUND, crank}]
-    if len(closing) != 1 or len(start_of_curve) != 1:
+    (crank, first, between), (rod, _, closing), (slider, _, guide) = loop
+    if guide.guide is None or guide.bodies[0] != GROUND:
         return None
-    rod = _other(closing[0], slider)
-    between = [h for h in hinges if set(h[0]) == {crank, rod}]
-    if len(between) != 1 or rod == GROUND:
-        return None
-    arm = _on(between[0], crank) - _on(start_of_curve[0], crank)
-    length = float(np.linalg.norm(_on(closing[0], rod) - _on(between[0], rod)))
-    if np.max(np.abs(_on(closing[0], slider) - point_j)) > 0:
+    if np.max(np.abs(closing.on(slider) - guide.on(slider))) > 0:
         return None  # a hinge beside the guide's line: its distance depends on how the slider lies
-    along = vector / np.linalg.norm(vector)
+    arm, length = between.on(crank) - first.on(crank), float(np.linalg.norm(closing.on(rod) - between.on(rod)))
+    along = guide.guide / np.linalg.norm(guide.guide)
     normal = np.array([-along[1], along[0]])
-    eccentricity = float(normal @ (point_i - _on(start_of_curve[0], GROUND)))
+    eccentricity = float(normal @ (guide.on(GROUND) - first.on(GROUND)))
     offset = math.atan2(along[1], along[0]) - math.atan2(arm[1], arm[0])
     return SliderCrank(float(np.linalg.norm(arm)), length, eccentricity, offset)
-
-
-def _folded(angle: float) -> float:
-    return min(angle, math.pi - angle)

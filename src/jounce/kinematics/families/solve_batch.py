@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import jax
 import numpy as np
 from jax.core import Tracer
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float, Int
 
 from jounce.base.activity import Count
 from jounce.base.shapes import ArrayLike
@@ -239,7 +239,7 @@ class _Family:
         return any(isinstance(leaf, Tracer) for table in tables for leaf in jax.tree.leaves(table))
 
     def _side_by_side(self, threads: int) -> Int[np.ndarray, " design"]:
-        """Solve designs side by side; return those that are left to be solved individually."""
+        """Solve designs side by side and store their results; return those that are left to be solved individually."""
         count = len(self.rows)
         first, last = float(self.instants[0]), float(self.instants[-1])
         attempts = ((k, assembled) for k in range(count) if (assembled := self._assembled(k)) is not None)
@@ -248,49 +248,10 @@ class _Family:
             return np.arange(count)
         lost = lost_orders(self.mechanism.outputs.values())
         check_laws(self._design(known, self.mechanism), np.array([first, last]), self.order + lost, forces=False)
-        levels = max(self.order + lost, LOWEST_ORDER)
-        system = model.system
-        if any(map(measures_angle, (*system.groups, *system.outputs))) or system.shape[0] != system.shape[1]:
-            return self._individually_assembled(levels, threads)
-        designs = Designs(self.held, model, self.names, self.rows)
-        attempts = designs.assembled(first, self.tolerance)
-        plain = np.asarray(attempts.plain) & ~designs.unfit()
-        return self._followed(levels, designs, attempts.coordinates, plain, np.arange(count), threads)
-
-    def _assembled(self, k: int) -> tuple[Model, dict[str, Any]] | None:
-        """Return the model of a design, its outputs held to their laws, and its start; None if it has no assembly."""
-        try:
-            return assemble(build(self._design(k, self.held)), float(self.instants[0]), self.tolerance)
-        except SPOILED:
-            return None
-        except JounceError as error:
-            raise self._located(error, k) from None
-
-    def _individually_assembled(self, levels: int, threads: int) -> Int[np.ndarray, " design"]:
-        """Assemble designs one by one, as angles about axes require, and follow them side by side."""
-        assembled = {k: attempt for k in range(len(self.rows)) if (attempt := self._assembled(k)) is not None}
-        models, positions = zip(*assembled.values(), strict=True)
-        chosen = np.array(list(assembled))
-        designs = Designs.of_models(self.held, models, self.names, self.rows[chosen])
-        coordinates = {
-            name: np.concatenate([np.asarray(position[name]) for position in positions], axis=-1)
-            for name in positions[0]
-        }
-        return self._followed(levels, designs, coordinates, np.ones(len(chosen), bool), chosen, threads)
-
-    def _followed(
-        self,
-        levels: int,
-        designs: Designs,
-        coordinates: dict[str, Any],
-        plain: np.ndarray,
-        chosen: np.ndarray,
-        threads: int,
-    ) -> Int[np.ndarray, " design"]:
-        """Follow designs side by side and store their results; return those left to be solved individually."""
-        own = designs.systems.own(slice(1))
+        designs, coordinates, plain, chosen = self._assembled_designs(model)
+        levels, own = max(self.order + lost, LOWEST_ORDER), designs.systems.own(slice(1))
         solver = Solver(designs.model, levels, self.tolerance, finite_order=self.order, own=own)
-        paths = DesignPaths(solver, designs, self.all_instants[chosen], float(self.instants[-1]))
+        paths = DesignPaths(solver, designs, self.all_instants[chosen], last)
         paths.follow(coordinates, plain, threads)
         outputs, status = paths.solved(threads)
         self.backends.add(solver.backend)
@@ -301,8 +262,37 @@ class _Family:
             values[paths.individual] = np.nan
             self._put(name, chosen, values)
         if self.progress is not None:
-            self.progress(int(whole.sum()), len(self.rows))
-        return np.setdiff1d(np.arange(len(self.rows)), chosen[whole])
+            self.progress(int(whole.sum()), count)
+        return np.setdiff1d(np.arange(count), chosen[whole])
+
+    def _assembled_designs(
+        self, model: Model
+    ) -> tuple[Designs, dict[str, Any], Bool[np.ndarray, " lane"], Int[np.ndarray, " lane"]]:
+        """Return designs in lanes, where each starts, whether it may be followed from there, and which of all it is.
+
+        They are assembled one by one where angles about axes require that, and where equations are too many or too few.
+        """
+        system = model.system
+        if not any(map(measures_angle, (*system.groups, *system.outputs))) and system.shape[0] == system.shape[1]:
+            designs = Designs(self.held, model, self.names, self.rows)
+            attempts = designs.assembled(float(self.instants[0]), self.tolerance)
+            plain = np.asarray(attempts.plain) & ~designs.unfit()
+            return designs, attempts.coordinates, plain, np.arange(len(self.rows))
+        assembled = {k: attempt for k in range(len(self.rows)) if (attempt := self._assembled(k)) is not None}
+        models, positions = zip(*assembled.values(), strict=True)
+        chosen = np.array(list(assembled))
+        designs = Designs.of_models(self.held, models, self.names, self.rows[chosen])
+        coordinates = jax.tree.map(lambda *parts: np.concatenate(parts, axis=-1), *positions)
+        return designs, coordinates, np.ones(len(chosen), bool), chosen
+
+    def _assembled(self, k: int) -> tuple[Model, dict[str, Any]] | None:
+        """Return the model of a design, its outputs held to their laws, and its start; None if it has no assembly."""
+        try:
+            return assemble(build(self._design(k, self.held)), float(self.instants[0]), self.tolerance)
+        except SPOILED:
+            return None
+        except JounceError as error:
+            raise self._located(error, k) from None
 
     def _solve_individually(self, k: int) -> None:
         """Solve one design as `jounce.solve` does."""
