@@ -66,6 +66,35 @@ def test_what_is_meant_as_it_stands_is_not_doubted(tmp_path, changes):
     load(tmp_path, **changes)  # warnings are errors here
 
 
+PENDULUM = """
+space: planar
+parameters: {{L: {L}}}
+bodies:
+  bar: {{position: [0, 0], angle: 30 deg}}
+joints:
+  A: {{type: revolute, bodies: [ground, bar], points: [[{x}, 0], [0, 0]]}}
+outputs:
+  tip: {{body: bar, point: [L, {y}]}}
+"""
+
+
+@pytest.mark.parametrize("x, y, L", [("100 mm", "0", "300"), ("0", "20 mm", "300"), ("20 mm", "3 cm", "12")])
+def test_a_parameter_without_a_unit_is_compared_with_the_few_lengths_that_have_one(tmp_path, x, y, L):
+    path = tmp_path / "pendulum.yaml"
+    path.write_text(PENDULUM.format(x=x, y=y, L=L))
+    with pytest.warns(jn.errors.UnitWarning, match=f"yaml, line 3, parameters.L: {L} m is .* a unit: {L} mm\\?"):
+        jn.load(path)
+
+
+@pytest.mark.parametrize(
+    "x, y, L", [("0.1", "0", "300"), ("20 mm", "0", "0.3"), ("20 mm", "0", "300 m"), ("4 m", "0", "12"), ("0", "0", "3")]
+)
+def test_a_parameter_without_a_unit_that_suits_those_with_one_is_not_doubted(tmp_path, x, y, L):
+    path = tmp_path / "pendulum.yaml"
+    path.write_text(PENDULUM.format(x=x, y=y, L=L))
+    jn.load(path)  # warnings are errors here
+
+
 @pytest.mark.parametrize("path", sorted(Path("examples").glob("*.yaml")), ids=lambda path: path.stem)
 def test_no_false_alarm_in_the_examples(path):
     with warnings.catch_warnings():

@@ -138,16 +138,22 @@ def _has_unit(source: Source, at: Location) -> bool:
 def _warn_of_lengths(source: Source, mechanism: Mechanism, laws: Iterable[AngleLaw]) -> None:
     lengths = [(location, abs(value), plain) for location, value, plain in _lengths(source.data, mechanism) if value]
     in_order = sorted(value for _, value, _ in lengths)
+    stated = None
     for location, value, plain in lengths:
-        if not plain or len(lengths) <= TO_COMPARE:
+        if not plain:
             continue
-        usual = _median_of_others(in_order, value)
+        usual, which = math.nan, "the others"
+        if len(lengths) > TO_COMPARE:
+            usual = _median_of_others(in_order, value)
+        if value >= 1.0 and not _is_thousandfold(value, usual):
+            stated = _stated_lengths(source.data, mechanism) if stated is None else stated
+            usual, which = float(np.median(stated)) if stated else math.nan, "those with a unit"
         if _is_thousandfold(value, usual):
             times = float(f"{value / usual:.1g}")
-            _warn(source, location, f"{value:g} m is {times:g} times the others: {value:g} mm?")
+            _warn(source, location, f"{value:g} m is {times:g} times {which}: {value:g} mm?")
     if len(lengths) < TO_COMPARE or in_order[-1] < LARGE or not all(plain for *_, plain in lengths):
         return
-    if (why := _too_large(mechanism, in_order[-1], laws)) and not _any_unit(source.data, mechanism):
+    if (why := _too_large(mechanism, in_order[-1], laws)) and not _stated_lengths(source.data, mechanism):
         location = max(lengths, key=lambda x: x[1])[0]
         _warn(source, location, f"the lengths of this file go up to {in_order[-1]:g} m, {why}: millimeters?")
 
@@ -175,17 +181,20 @@ def _too_large(mechanism: Mechanism, size: float, laws: Iterable[AngleLaw]) -> s
     return ""
 
 
-def _any_unit(data: dict[str, Any], mechanism: Mechanism) -> bool:
-    """Tell whether any length of a file has a unit."""
-    names = dict.fromkeys(mechanism.parameters)
+def _stated_lengths(data: dict[str, Any], mechanism: Mechanism) -> list[float]:
+    """Return the lengths of a file that have a unit, m; expressions have none of their own."""
+    names, found = dict.fromkeys(mechanism.parameters), []
     given = [raw for _, quantity, raw in _fields(data, mechanism) if quantity == "length"]
     for raw in [*(raw for _, raw in _parameters(data, mechanism, LENGTH)), *given]:
+        if not isinstance(raw, str):
+            continue
         try:
-            if isinstance(raw, str) and parse_value(raw, "any", names).dimension == LENGTH:
-                return True
+            value = parse_value(raw, "any", names)
         except JounceError:
             continue
-    return False
+        if value.dimension == LENGTH and isinstance(value.value, float) and value.value:
+            found.append(abs(value.value))
+    return found
 
 
 def _median_of_others(in_order: list[float], value: float) -> float:
@@ -202,7 +211,7 @@ def _warn(source: Source, location: Location, hint: str) -> None:
 
 
 def _fields(data: dict[str, Any], mechanism: Mechanism) -> Iterator[tuple[Location, str, Any]]:
-    """Return the values of elements and bodies as the file has them, with their kind."""
+    """Return the values of elements, bodies and outputs as the file has them, with their kind."""
     for section, role in ROLES.items():
         for name, given in (data.get(section) or {}).items():
             own = "driver" if section == "joints" and is_cam(mechanism.space, given) else role
@@ -216,6 +225,9 @@ def _fields(data: dict[str, Any], mechanism: Mechanism) -> Iterator[tuple[Locati
         turn = (given or {}).get("orientation") or {}
         for key in ("angle", "angles"):
             yield from _leaves(("bodies", name, "orientation", key), "angle", turn.get(key))
+    for name, given in (data.get("outputs") or {}).items():
+        if isinstance(given, dict):
+            yield from _leaves(("outputs", name, "point"), "length", given.get("point"))
 
 
 def _leaves(location: Location, quantity: str, value: Any) -> Iterator[tuple[Location, str, Any]]:
