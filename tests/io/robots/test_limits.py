@@ -227,3 +227,45 @@ def test_limits_of_all_kinds_are_read_for_retiming(tmp_path):
         bad.write_text(text)
         with pytest.raises(jn.errors.RobotError, match=message):
             load_motion_limits(bad, robot)
+
+
+@pytest.mark.parametrize(
+    "text, words",
+    [
+        (
+            "joints:\n  pin: {velocity: 180}",
+            r"2, joints.pin.velocity: 180 rad/s is 60 times the robot's own 3 rad/s",
+        ),
+        ("joints: {pin: {upper: 170}}", r"line 1, joints.pin.upper: 170 rad is 27 turns: 170 deg\? A number without a"),
+        ("joints: {slide: {velocity: 900}}", r"slide.velocity: 900 m/s is 4.5e\+02 times .* own 2 m/s: 900 mm/s\?"),
+        (
+            "joints: {slide: {lower: -800, upper: 800}}",
+            r"slide.lower: -800 m is .* own 1 m: -800 mm\? \(and 1 like",
+        ),
+        ("default: {velocity: 180}", r"line 1, default.velocity: 180 rad/s .* 180 deg/s\? A"),
+    ],
+)
+def test_limits_without_a_unit_that_suit_the_robot_in_degrees_or_millimeters_are_doubted(read, text, words):
+    with pytest.warns(jn.errors.UnitWarning, match=words):
+        read(text)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "joints: {pin: {velocity: 180 deg/s}, slide: {velocity: 900 mm/s}}",
+        "joints: {pin: {velocity: 3.1}, slide: {velocity: 1.5}}",
+        "joints: {pin: {velocity: 180 rad/s}, slide: {velocity: 900 m/s}}",
+        "joints: {pin: {velocity: 2000}}",  # a rotor: neither in degrees is it what the robot has
+        "joints: {pin: {acceleration: 500, jerk: 7500, effort: 200}}",
+    ],
+)
+def test_limits_that_may_be_meant_as_they_stand_are_not_doubted(read, text):
+    read(text)  # warnings are errors here
+
+
+def test_other_words_for_the_keys_are_refused_with_the_key(refused):
+    assert refused("joints: {pin: {torque: 5 N*m}}").startswith(
+        "line 1, joints.pin.torque: the key for that is 'effort'"
+    )
+    assert "the key for that is 'velocity'" in refused("default: {max_velocity: 5 rad/s}")

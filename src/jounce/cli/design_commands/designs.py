@@ -93,11 +93,14 @@ def optimize(
     from jounce.io.files import DATA_FILES
     from jounce.io.files.assignments import assignments
     from jounce.io.files.writing import check_target
+    from jounce.io.mechanisms.schema.unit_hints import warn_of_variations
 
     if out is not None:
         check_target(out, DATA_FILES, "mechanism file", overwrite=overwrite)
-    bounds = _bounds(assignments(vary, "--vary", "a parameter is varied by NAME=LOW:HIGH, such as BC=12cm:16cm"))
+    forms = assignments(vary, "--vary", "a parameter is varied by NAME=LOW:HIGH, such as BC=12cm:16cm")
+    bounds = _bounds(forms)
     mechanism = reading.mechanism(file)
+    warn_of_variations(mechanism, forms, "--vary")
     curves = {name: _points(name, path) for name, path in assignments(curve or (), "--curve", "as NAME=FILE").items()}
     spare_inputs(out, overwrite=overwrite)
     from jounce.design import optimize

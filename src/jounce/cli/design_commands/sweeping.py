@@ -101,6 +101,7 @@ def sweep(
     from jounce.cli.compiled_programs import use_compilation_cache
     from jounce.design.tolerances.variations import named_forms
     from jounce.io.files.reading import recording
+    from jounce.io.mechanisms.schema.unit_hints import warn_of_variations
     from jounce.sweeps.facts import sweep_facts, sweep_summary, sweep_table
     from jounce.sweeps.store import find
     from jounce.sweeps.sweeping import prepare, run
@@ -109,6 +110,8 @@ def sweep(
     find(out)  # before anything is read
     with recording() as files:
         problem = _problem(file, trajectory, order, reading, payload, simulate, (method, tolerance, longest_step))
+    if (mechanism := getattr(problem, "mechanism", None)) is not None:
+        warn_of_variations(mechanism, forms, "--vary")
     user_files = {str(path.absolute()): files[os.path.realpath(path)] for path in reading.import_ or ()}
     with errors_about(file):
         plan = prepare(

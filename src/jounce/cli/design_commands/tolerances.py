@@ -69,6 +69,7 @@ def tolerance(
     """
     from jounce.design.tolerances.spread import column_of, tolerance as spread_of
     from jounce.design.tolerances.variations import named_forms
+    from jounce.io.mechanisms.schema.unit_hints import warn_of_variations
     from jounce.reporting.facts.spread_facts import columns_of, index_table, spread_facts, spread_summary, spread_table
 
     output.check()
@@ -78,6 +79,7 @@ def tolerance(
 
         check_figure(figure, overwrite=output.overwrite)
     mechanism = reading.mechanism(file)
+    warn_of_variations(mechanism, forms, "--vary")
     for target in (output.out, figure):
         spare_inputs(target, overwrite=output.overwrite)
     names = None if of is None else [name.strip() for name in of.split(",") if name.strip()]

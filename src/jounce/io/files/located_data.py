@@ -68,14 +68,21 @@ class Source:
             entry = entry.get(step) if isinstance(entry, dict) else None
         return entry
 
-    def mapping(self, location: Location = (), keys: Iterable[str] | None = None) -> dict[str, Any]:
-        """Return the mapping at a location, which is not empty and has, where they are given, known keys only."""
+    def mapping(
+        self, location: Location = (), keys: Iterable[str] | None = None, *, others: Mapping[str, str] | None = None
+    ) -> dict[str, Any]:
+        """Return the mapping at a location, which is not empty and has, where they are given, known keys only.
+
+        Other words for keys, which people may write instead, are refused with the key that is meant.
+        """
         entry = self.at(location)
         if not isinstance(entry, dict) or not entry:
             raise self.error("must be a mapping with at least one entry", location, value=entry)
         for key in entry:
             if keys is not None and key not in keys:
-                raise self.error(unknown("key", key, keys), (*location, key))
+                meant = (others or {}).get(key)
+                words = unknown("key", key, keys) if meant is None else f"the key for that is '{meant}'"
+                raise self.error(words, (*location, key))
         return entry
 
     def value(

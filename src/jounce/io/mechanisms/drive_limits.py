@@ -18,6 +18,10 @@ from jounce.units.dimensions import describe_dimension, dimension_of
 
 RATES = {"velocity": 1, "acceleration": 2, "jerk": 3}
 EFFORTS = {"effort": 2, "effort_rate": 3}
+OTHER_WORDS = {
+    **dict.fromkeys(("torque", "force", "max_torque", "max_force", "max_effort"), "effort"),
+    **dict.fromkeys(("torque_rate", "force_rate", "rotatum", "yank"), "effort_rate"),
+}
 
 
 @under_own_settings
@@ -62,7 +66,7 @@ def load_drive_limits(path: str | PathLike[str], mechanism: Mechanism) -> dict[s
                 raise source.error("a driver and an output of one name cannot both have limits; rename one", at)
             keys = (*RATES, *EFFORTS) if kind == "drivers" else tuple(RATES)
             values: dict[str, float] = {}
-            for key, raw in source.mapping(at, keys).items():
+            for key, raw in source.mapping(at, keys, others=OTHER_WORDS if kind == "drivers" else None).items():
                 value = source.value((*at, key), raw)
                 turns = _turns(mechanism, kind, name)
                 dimension = _dimension(key, turns)

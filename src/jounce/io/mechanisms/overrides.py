@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable
 
 from jounce.errors import JounceError, MechanismError, check_name
 from jounce.io.files.assignments import assignments
-from jounce.io.mechanisms.schema.unit_hints import warn_of_values
+from jounce.io.mechanisms.schema.unit_hints import is_plain, warn_of_values
 from jounce.mechanism import Mechanism
 
 
@@ -47,15 +46,7 @@ def override(mechanism: Mechanism, texts: Iterable[str]) -> Mechanism:
         name = (error.name or "").removeprefix("parameters.")
         raise type(error)(error.message, name=f"--set {name}", value=error.value) from None
     changed.parameter_values  # noqa: B018 - asked for, so that a circle is reported now
-    plain = [name for name, text in values.items() if _is_plain(text)]
+    plain = [name for name, text in values.items() if is_plain(text)]
     if plain:
         warn_of_values(mechanism, changed, plain, "--set")
     return changed
-
-
-def _is_plain(text: str) -> bool:
-    """Tell whether a text is a number without a unit."""
-    try:
-        return math.isfinite(float(text))
-    except ValueError:
-        return False

@@ -11,10 +11,11 @@ from typing import Any
 
 import numpy as np
 
-from jounce.errors import RobotError, no_such
-from jounce.io.files.located_data import Location, Source
+from jounce.errors import RobotError, UnitWarning, no_such, warn_caller
+from jounce.io.files.located_data import Location, Source, dotted
 from jounce.io.files.source import read_source
 from jounce.jet import Jet
+from jounce.mechanism.laws.angle_laws import IN_SI, number_doubt
 from jounce.planning.retiming.quantities.limits import VARYING, MotionLimits, PointLimits, PositionLaw
 from jounce.robot.model.links_and_joints import Joint, Limits
 from jounce.robot.robot import Robot
@@ -27,11 +28,26 @@ KEYS = (*FIELDS, "jounce")
 RANGE = ("lower", "upper")
 POWERS = dict(zip(KEYS, (0, 0, 1, 2, 3, 2, 3, 2, 4), strict=True))
 """Powers of 1/s in the units of each key."""
+OTHER_WORDS = {
+    **dict.fromkeys(("torque", "force", "max_torque", "max_force", "max_effort"), "effort"),
+    **dict.fromkeys(("torque_rate", "force_rate", "rotatum", "yank"), "effort_rate"),
+    **dict.fromkeys(("min", "min_position", "lower_limit"), "lower"),
+    **dict.fromkeys(("max", "max_position", "upper_limit"), "upper"),
+    "max_velocity": "velocity",
+    "max_acceleration": "acceleration",
+    "max_deceleration": "deceleration",
+    "max_jerk": "jerk",
+    "snap": "jounce",
+}
 EXAMPLES = {
     True: ("rad", "rad", "rad/s", "rad/s^2", "rad/s^3", "N*m", "N*m/s", "rad/s^2", "rad/s^4"),
     False: ("m", "m", "m/s", "m/s^2", "m/s^3", "N", "N/s", "m/s^2", "m/s^4"),
 }
 """Units of the keys for a joint that turns, and for one that slides."""
+DEGREES, MILLIMETERS = math.degrees(1.0), 1000.0
+FAR_OFF = 10.0  # times the robot's own limit, which another one rarely is
+ALIKE = 5.0  # within which it is to the robot's own where it is in degrees or millimeters
+FAST = {True: 60.0, False: 20.0}  # rad/s and m/s, which joints of robots hardly reach
 
 
 @under_own_settings
@@ -131,21 +147,25 @@ class _LimitsFile:
         self.jounce: dict[str, float] = {}
         self.varying: dict[str, dict[str, PositionLaw]] = {}
         self.backward: dict[str, dict[str, float]] = {}
+        self.doubts: dict[Location, str] = {}
 
     def limits(self) -> dict[str, Limits]:
         """Return the limits of every joint."""
         data = self.source.mapping((), ("title", "default", "joints", "points"))
         if not data.keys() & {"default", "joints", "points"}:
             raise self.source.error("a limits file has the keys 'joints', 'default' or 'points'", value=list(data))
-        default = self.source.mapping(("default",), KEYS) if "default" in data else {}
+        default = self.source.mapping(("default",), KEYS, others=OTHER_WORDS) if "default" in data else {}
         joints = self.source.mapping(("joints",)) if "joints" in data else {}
         for name in joints:
             if name not in self.robot.joint_names:
                 raise self.source.error(self._why_not(name), ("joints", name))
-            self.source.mapping(("joints", name), KEYS)
+            self.source.mapping(("joints", name), KEYS, others=OTHER_WORDS)
         for key in default:
             self._check_default(key)
         limits = {name: self._of(name, default, joints.get(name, {})) for name in self.robot.joint_names}
+        if doubt := next(iter(self.doubts.values()), None):
+            others = f" (and {count - 1} like it)" if (count := len(self.doubts)) > 1 else ""
+            warn_caller(UnitWarning(f"{doubt}{others} {IN_SI}"))
         try:
             return self.robot.limits_with(limits)
         except RobotError as error:
@@ -254,6 +274,8 @@ class _LimitsFile:
 
     def _number(self, raw: Any, key: str, at: Location, joint: Joint) -> float:
         number, dimension = self._parsed(raw, at)
+        if isinstance(raw, int | float) and (why := _doubt(number, key, joint)):
+            self.doubts[at] = f"{self.source.path}, line {self.source.line(at)}, {dotted(at)}: {why}"
         if dimension and dimension not in _dimensions(key, joint.turning):
             unit = EXAMPLES[joint.turning][KEYS.index(key)]
             kind = "turns" if joint.turning else "slides"
@@ -297,6 +319,25 @@ class _LimitsFile:
         if joint is not None:
             return "this joint is fixed and has no limits; leave it out"
         return no_such(f"moving joint of {self.robot.name}", name, self.robot.joint_names)
+
+
+def _doubt(number: float, key: str, joint: Joint) -> str:
+    """Word why a number without a unit is likely one of degrees or millimeters; nothing if it is not."""
+    if key not in (*RANGE, "velocity") or not math.isfinite(number):
+        return ""
+    unit = EXAMPLES[joint.turning][KEYS.index(key)]
+    other = unit.replace("rad", "deg") if joint.turning else unit.replace("m", "mm", 1)
+    size, part = abs(number), DEGREES if joint.turning else MILLIMETERS
+    limits = joint.limits
+    known = (limits.velocity,) if key == "velocity" else (limits.lower, limits.upper)
+    own = max((abs(x) for x in known if x is not None), default=0.0)
+    if own:
+        if not (size > FAR_OFF * own and own / ALIKE < size / part < own * ALIKE):
+            return ""
+        return f"{number:g} {unit} is {size / own:.2g} times the robot's own {own:.4g} {unit}: {number:g} {other}?"
+    if key == "velocity" and size > FAST[joint.turning]:
+        return f"{number:g} {unit}: {number:g} {other}?"
+    return number_doubt(number) if key in RANGE and joint.turning else ""
 
 
 def _wrong_unit(dimension: Dimension) -> str:

@@ -9,6 +9,7 @@ import pytest
 
 import jounce as jn
 from jounce.io.mechanisms.overrides import override
+from jounce.io.mechanisms.schema.unit_hints import warn_of_variations
 
 FOUR_BAR = """
 space: planar
@@ -87,7 +88,8 @@ def test_a_parameter_without_a_unit_is_compared_with_the_few_lengths_that_have_o
 
 
 @pytest.mark.parametrize(
-    "x, y, L", [("0.1", "0", "300"), ("20 mm", "0", "0.3"), ("20 mm", "0", "300 m"), ("4 m", "0", "12"), ("0", "0", "3")]
+    "x, y, L",
+    [("0.1", "0", "300"), ("20 mm", "0", "0.3"), ("20 mm", "0", "300 m"), ("4 m", "0", "12")],
 )
 def test_a_parameter_without_a_unit_that_suits_those_with_one_is_not_doubted(tmp_path, x, y, L):
     path = tmp_path / "pendulum.yaml"
@@ -296,3 +298,23 @@ def test_files_say_what_is_beyond_samples(tmp_path):
         assert jn.load(tmp_path / "copy.yaml") == loaded
     with pytest.raises(jn.errors.MechanismFileError, match=r"drivers.theta.motion.beyond: .*did you mean 'hold'"):
         load(tmp_path, motion="{samples: angle.csv, beyond: hld}")
+
+
+@pytest.mark.parametrize(
+    "form, words",
+    [
+        ("200:400", "--vary BC: 200 m is 1000 times what it is: 200 mm\\?"),
+        ("0.14:150:3", "150 m is 1000 times"),
+        ("normal:0.1", "a spread of 0.1 m about 0.1423 m: 0.1 mm\\?"),
+        ("uniform:200", "a spread of 200 m"),
+    ],
+)
+def test_ranges_of_parameters_without_a_unit_are_compared_with_their_values(tmp_path, form, words):
+    with pytest.warns(jn.errors.UnitWarning, match=words) as caught:
+        warn_of_variations(load(tmp_path), {"BC": form}, "--vary")
+    assert len(caught) == 1
+
+
+@pytest.mark.parametrize("form", ["0.1:0.2", "20 cm:40 cm", "normal:0.1 mm", "uniform:0.001", "1:2"])
+def test_ranges_of_parameters_that_suit_their_values_are_not_doubted(tmp_path, form):
+    warn_of_variations(load(tmp_path), {"BC": form, "nothing": "200:400"}, "--vary")  # warnings are errors here

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import warnings
 from bisect import bisect_left
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
 import numpy as np
@@ -38,6 +38,7 @@ from jounce.units.values import parse_value
 
 FAR_OFF = 100.0  # times the other lengths
 ALIKE = 30.0  # within which a thousandth of a length must be to them
+WIDE = 0.3  # of a length, more than which no tolerance is
 TO_COMPARE = 3  # lengths, at least
 LARGE = 5.0  # m, from which on a machine may be one in millimeters
 FAST = 120.0  # m/s, which nothing so large reaches
@@ -88,13 +89,7 @@ def warn_of_values(before: Mechanism, after: Mechanism, given: Iterable[str], op
     """
     old, new, warned = before.parameter_values, after.parameter_values, False
     for name in given:
-        dimensions, value = after.dimensions.get(name, ()), float(new[name])
-        was = abs(float(old[name]))
-        if ANGLE in dimensions and (hint := number_doubt(value)):
-            pass
-        elif LENGTH in dimensions and was and _is_thousandfold(abs(value), was):
-            hint = f"{value:g} m is {float(f'{abs(value) / was:.1g}'):g} times what it was: {value:g} mm?"
-        else:
+        if not (hint := _doubt(after.dimensions.get(name, ()), float(new[name]), float(old[name]), "what it was")):
             continue
         warned = True
         warnings.warn(UnitWarning(f"{option} {name}: {hint} {IN_SI}"), stacklevel=3)
@@ -107,6 +102,59 @@ def warn_of_values(before: Mechanism, after: Mechanism, given: Iterable[str], op
         settle(law.driver)
         if not warned and law.name not in known:
             warnings.warn(UnitWarning(f"{option}: now the law of drivers.{law.name} {why} {IN_SI}"), stacklevel=3)
+
+
+def warn_of_variations(mechanism: Mechanism, forms: Mapping[str, str], option: str) -> None:
+    """Warn of ranges and spreads of parameters given as plain numbers, likely in degrees or millimeters.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+        With the values of a file.
+    forms : dict of str to str
+        By parameter, ``LOW:HIGH``, ``LOW:HIGH:COUNT``, ``normal:SIGMA`` or ``uniform:HALFWIDTH``.
+    option : str
+        By which they were given.
+
+    Warns
+    -----
+    UnitWarning
+        Once for each parameter.
+    """
+    values = mechanism.parameter_values
+    for name, form in forms.items():
+        dimensions, nominal = mechanism.dimensions.get(name, ()), abs(float(values.get(name, 0.0)))
+        first, *others = (part.strip() for part in form.split(":"))
+        spread = first in ("normal", "uniform")
+        for text in others[:1] if spread else (first, *others[:1]):
+            if not is_plain(text):
+                continue
+            value = abs(float(text))
+            if not spread or ANGLE in dimensions:
+                hint = _doubt(dimensions, value, nominal, "what it is")
+            else:
+                wide = LENGTH in dimensions and value > WIDE * nominal > 0
+                hint = f"a spread of {text} m about {nominal:g} m: {text} mm?" if wide else ""
+            if hint:
+                warnings.warn(UnitWarning(f"{option} {name}: {hint} {IN_SI}"), stacklevel=3)
+                break
+
+
+def is_plain(text: str) -> bool:
+    """Tell whether a text is a number without a unit."""
+    try:
+        return math.isfinite(float(text))
+    except ValueError:
+        return False
+
+
+def _doubt(dimensions: Iterable[Dimension], value: float, was: float, which: str) -> str:
+    """Word why a number for a parameter is likely one of degrees or millimeters; nothing if it is not."""
+    if ANGLE in dimensions and (hint := number_doubt(value)):
+        return hint
+    if LENGTH in dimensions and was and _is_thousandfold(abs(value), abs(was)):
+        return f"{value:g} m is {float(f'{abs(value / was):.1g}'):g} times {which}: {value:g} mm?"
+    return ""
 
 
 def _is_thousandfold(value: float, usual: float) -> bool:
