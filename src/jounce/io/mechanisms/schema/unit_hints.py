@@ -231,7 +231,7 @@ def _too_large(mechanism: Mechanism, size: float, laws: Iterable[AngleLaw]) -> s
 
 def _stated_lengths(data: dict[str, Any], mechanism: Mechanism) -> list[float]:
     """Return the lengths of a file that have a unit, m; expressions have none of their own."""
-    names, found = dict.fromkeys(mechanism.parameters), []
+    names, lengths = dict.fromkeys(mechanism.parameters), []
     given = [raw for _, quantity, raw in _fields(data, mechanism) if quantity == "length"]
     for raw in [*(raw for _, raw in _parameters(data, mechanism, LENGTH)), *given]:
         if not isinstance(raw, str):
@@ -241,8 +241,8 @@ def _stated_lengths(data: dict[str, Any], mechanism: Mechanism) -> list[float]:
         except JounceError:
             continue
         if value.dimension == LENGTH and isinstance(value.value, float) and value.value:
-            found.append(abs(value.value))
-    return found
+            lengths.append(abs(value.value))
+    return lengths
 
 
 def _median_of_others(in_order: list[float], value: float) -> float:
