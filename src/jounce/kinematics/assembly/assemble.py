@@ -1,6 +1,7 @@
 """The first assembly, from the starting guess, and degrees of freedom counted and explained."""
 
 import dataclasses
+import itertools
 import warnings
 
 import numpy as np
@@ -175,9 +176,9 @@ def warn_of_parts_turned_over(model: Model, attempt: AssemblyAttempt) -> None:
     there = signs_of(model, attempt)
     if there.all() or not (odd := there != drawn_axis_signs(model)).any():
         return
-    names = [name for name, is_odd in zip(pair_names(model), odd, strict=True) if is_odd]
+    names = dict.fromkeys(itertools.compress(pair_names(model), odd))
     message = (
-        f"{', '.join(dict.fromkeys(names))}: assembled only with parts turned over: directions that are held "
+        f"{', '.join(names)}: assembled only with parts turned over: directions that are held "
         "parallel point opposite ways, unlike in the starting guess; guess the pose of the bodies more closely, or "
         "give one of the two directions the other sign"
     )
@@ -227,10 +228,8 @@ def check_assembled(model: Model, attempt: AssemblyAttempt, instant: float, *, f
     """
     gaps = attempt.gaps
     if not (known := np.isfinite(gaps)).all():
-        named = ", ".join(
-            dict.fromkeys(name for name, is_finite in zip(model.rows, known, strict=True) if not is_finite)
-        )
-        message = f"no finite value at t = {instant:g} s: {named}; check motion laws and the starting guess"
+        unknown = ", ".join(dict.fromkeys(itertools.compress(model.rows, ~known)))
+        message = f"no finite value at t = {instant:g} s: {unknown}; check motion laws and the starting guess"
         raise AssemblyError(message, status=Status.INADMISSIBLE)
     if attempt.closed:
         return

@@ -5,6 +5,7 @@ nearby general positions that fulfill the joints, with the drivers released.
 """
 
 import dataclasses
+import itertools
 from functools import cached_property
 from typing import NamedTuple
 
@@ -95,7 +96,7 @@ class Redundancy:
         if not self.count:
             return ()
         weights = np.linalg.norm(self.jacobian.dependences, axis=1)
-        return tuple(dict.fromkeys(row for row, x in zip(self.rows, weights, strict=True) if x > OPEN))
+        return tuple(dict.fromkeys(itertools.compress(self.rows, weights > OPEN)))
 
     def __str__(self) -> str:
         return "; ".join(map(str, self.repetitions))

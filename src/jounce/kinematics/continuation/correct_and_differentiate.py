@@ -89,10 +89,6 @@ def predictor(system: System, pose_type: type[Pose], solved: SolvedState) -> Sol
     return {name: coordinates[name] for name in pose_type.predictor}, tuple(angles), sign
 
 
-def _size(increment: Float[Numbers, "component body batch"]) -> Float[Numbers, "body batch"]:
-    return jnp.max(jnp.abs(increment), axis=0)
-
-
 def differentiated(system: System, pose: Pose, factor: Factor, time: Float[Jet, "1 batch"]) -> Pose:
     """Return the pose with all derivatives that the time jet has: order after order, one solve each.
 
@@ -109,8 +105,8 @@ def differentiated(system: System, pose: Pose, factor: Factor, time: Float[Jet, 
 
 def _departures(system: System, pose: Pose, predicted: Any) -> Float[Numbers, "body batch"]:
     """Return how far each moving body is from its prediction, rad or sizes of the mechanism: (bodies, batch)."""
-    shift, turn = pose.separation(predicted)
-    return jnp.maximum(_size(shift) / system.column_scale[0], _size(turn))[1:]
+    shift, turn = (jnp.max(jnp.abs(part), axis=0) for part in pose.separation(predicted))
+    return jnp.maximum(shift / system.column_scale[0], turn)[1:]
 
 
 def _terms(system: System, coordinates: dict[str, Jet], predictor: tuple[str, ...]) -> list[Lanes]:

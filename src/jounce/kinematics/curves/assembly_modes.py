@@ -336,18 +336,13 @@ class _Search:
         """Return the assemblies in the order of how far they are from the starting guess."""
         guess = {name: np.asarray(x)[..., 0] for name, x in self.model.guess.items()}
         away = [float(np.linalg.norm(self.tracker.difference(x.coordinates, guess))) for x in self.configurations]
-        order = np.argsort(away, kind="stable")
-        renumbered: dict[int, int] = {}
-        for k in order:
-            circuit = self.configurations[k].circuit
-            if circuit is not None:
-                renumbered.setdefault(circuit, len(renumbered) + 1)
+        order = np.argsort(away, kind="stable").tolist()
+        ranked = [k for k in dict.fromkeys(self.configurations[k].circuit for k in order) if k is not None]
         members = []
         for number, k in enumerate(order, start=1):
             x = self.configurations[k]
-            circuit = None if x.circuit is None else renumbered[x.circuit]
+            circuit = None if x.circuit is None else ranked.index(x.circuit) + 1
             mechanism = posed(self.mechanism, x.coordinates)
             members.append(Assembly(number, mechanism, circuit, x.branch, x.hits, away[k], x.smallest))
-        ranked = sorted(renumbered, key=lambda circuit: renumbered[circuit])
         ranked_circuits = tuple(circuits[k - 1] for k in ranked)
         return Assemblies(members, self.starts, self.since_last_new, ranked_circuits, self.movable)

@@ -15,6 +15,7 @@ from jounce.errors import MechanismError
 from jounce.execution.chunks import in_chunks
 from jounce.jet.derivatives import plain_derivatives
 from jounce.jet.turns import WHOLE_TURN
+from jounce.kinematics.continuation.path_following import within_steps
 from jounce.kinematics.curves.crossings import ChangePoint, departed
 from jounce.kinematics.curves.limits import LimitPosition, limits_between, values_between
 from jounce.kinematics.curves.path import End, Path, step_to_configuration, track_both_directions
@@ -339,9 +340,7 @@ class Curve(Displayed):
     def _history(self) -> AttitudeHistory | None:
         if self._tracker.is_planar:
             return None
-        parts = [np.linspace(point.arc_length, stop, SAMPLES, endpoint=False) for point, stop in self._steps]
-        instants = np.concatenate([*parts, [self.stop]])
-        instants = instants[instants >= self._track[0].arc_length]
+        instants = within_steps(np.array([*(point.arc_length for point in self._track), self.stop]), SAMPLES)
         quaternions = [self._at(s).coordinates["quaternion"][0] for s in instants]
         return AttitudeHistory(np.stack(quaternions, axis=-1), instants)
 

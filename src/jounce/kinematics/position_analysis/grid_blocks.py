@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from jounce.kinematics.continuation.path_following import Anchor, FollowedPath
+from jounce.kinematics.continuation.path_following import FollowedPath
 from jounce.kinematics.continuation.solver import SMALL_BATCH, Solver
 from jounce.kinematics.position_analysis.solve_buffers import SolveBuffer, solve_in_buffers
 from jounce.mechanism.time import nearest_instants
@@ -114,18 +114,6 @@ def _neighbors(count: int, stride: int) -> tuple[Indices, Bool[np.ndarray, " lan
     return neighbors(np.arange(count), stride)
 
 
-def _begin(buffer: SolveBuffer, time: Float[np.ndarray, " time"], anchors: Sequence[Anchor], stride: int) -> None:
-    """Load the instants of a block, s, and the anchors around it into a buffer."""
-    buffer.put_anchors(zip(*(anchor.leaves for anchor in anchors), strict=True))
-    neighbor, known = _neighbors(len(time), stride)
-    instants = np.array([anchor.instant for anchor in anchors])
-    nearest = nearest_instants(instants, time)
-    to_neighbor, to_anchor = time - time[neighbor], time - instants[nearest]
-    near = known & (np.abs(to_neighbor) <= np.abs(to_anchor))
-    sources = np.where(near, neighbor, buffer.first_anchor + nearest), np.where(near, to_neighbor, to_anchor)
-    buffer.load(time, sources, rounds(len(time), stride, buffer.width))
-
-
 def solve_blocks(
     solver: Solver,
     path: FollowedPath,
@@ -159,7 +147,15 @@ def solve_blocks(
     most = max(map(len, around.values()), default=0)
 
     def begin(buffer: SolveBuffer, block: Block) -> int:
-        _begin(buffer, time[block.indices], around[block], block.stride)
+        here, anchors = time[block.indices], around[block]
+        buffer.put_anchors(zip(*(anchor.leaves for anchor in anchors), strict=True))
+        neighbor, known = _neighbors(block.count, block.stride)
+        instants = np.array([anchor.instant for anchor in anchors])
+        nearest = nearest_instants(instants, here)
+        to_neighbor, to_anchor = here - here[neighbor], here - instants[nearest]
+        near = known & (np.abs(to_neighbor) <= np.abs(to_anchor))
+        sources = np.where(near, neighbor, buffer.first_anchor + nearest), np.where(near, to_neighbor, to_anchor)
+        buffer.load(here, sources, rounds(block.count, block.stride, buffer.width))
         return block.count
 
     def put_block(block: Block, state: Any, status: Indices) -> None:

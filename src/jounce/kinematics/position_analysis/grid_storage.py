@@ -2,6 +2,7 @@
 
 import itertools
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from functools import partial
 from typing import Any, NamedTuple
 
 import jax
@@ -84,7 +85,8 @@ def solve_grid(
     coordinates, outputs = state if store is None else store.state
     if keeps_series:
         return Solved(coordinates, outputs, status, faults)
-    return Solved(lambda: _coordinates(solver, path, time, threads), outputs, status, faults)
+    again: Any = partial(solve_grid, solver, path, time, None, threads, keep=True)
+    return Solved(lambda: again().coordinates, outputs, status, faults)
 
 
 def _without_decrease(progress: Callable[[int, int], None]) -> Callable[[int, int], None]:
@@ -160,14 +162,6 @@ class _Store:
                     plain_derivatives(part, out=whole[..., lanes])
             else:
                 whole[..., lanes] = part
-
-
-def _coordinates(
-    solver: Solver, path: FollowedPath, time: Float[np.ndarray, " time"], threads: int
-) -> dict[str, np.ndarray]:
-    """Return the jets of the coordinates of all bodies, solved once more."""
-    coordinates: Any = solve_grid(solver, path, time, None, threads, keep=True).coordinates
-    return coordinates
 
 
 def solved_chunks(

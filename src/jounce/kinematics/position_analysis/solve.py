@@ -242,8 +242,7 @@ def _followed(
         raise
     curves = ends_of(model)
     if beyond := beyond_end(curves, coordinates):
-        message = f"t = {first:g} s, {beyond}: end of curve: {Status.END_OF_CURVE.advice}"
-        raise SolveError(message, status=Status.END_OF_CURVE)
+        raise SolveError(_failure(first, Status.END_OF_CURVE, beyond), status=Status.END_OF_CURVE)
     check_turns(mechanism, model, coordinates, first)
     solver = Solver(model, *settings)
     prepare_outputs(mechanism, model, solver.order)
@@ -253,8 +252,7 @@ def _followed(
     if path.anchors:
         path = cut_at_ends(path, curves, solved_instants)
     else:
-        where = f"t = {first:g} s, {path.fault}"
-        raise SolveError(f"{where}: {_words(path.status)}: {path.status.advice}", status=path.status)
+        raise SolveError(_failure(first, path.status, path.fault), status=path.status)
     return solver, path
 
 
@@ -284,10 +282,8 @@ def raise_for_status(motion: Any) -> None:
         return
     first = int(failed[0])
     status = Status(int(motion.status[first]))
-    fault = motion.faults.get(first, "")
-    where = f"t = {motion.time[first]:g} s" + (f", {fault}" if fault else "")
+    message = _failure(float(motion.time[first]), status, motion.faults.get(first, ""))
     total = len(motion.time)
-    message = f"{where}: {_words(status)}: {status.advice}"
     if isinstance(motion, Motion) and (ahead := dead_end_words(motion, first)):
         message += f"; {ahead}"
     solved = f"{total - failed.size} of {total} instants were solved"
@@ -303,5 +299,7 @@ def checked_order(order: Any) -> int:
     return int(order)
 
 
-def _words(status: Status) -> str:
-    return status.name.lower().replace("_", " ")
+def _failure(instant: float, status: Status, fault: str) -> str:
+    """Say when and where a motion failed, how, and what to do."""
+    where = f"t = {instant:g} s" + (f", {fault}" if fault else "")
+    return f"{where}: {status.name.lower().replace('_', ' ')}: {status.advice}"

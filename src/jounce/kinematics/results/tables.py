@@ -85,14 +85,16 @@ class Tabulated(Displayed):
         import pandas
 
         columns: dict[tuple[str, str], Float[np.ndarray, " time"]] = {}
+        positions: dict[tuple[str, str], tuple[int, ...]] = {}  # so that the derivatives of a component follow it
+        variables = list(self.dataset)
         for name, order, part in _by_derivative(self.dataset):
             suffix, unit = f"_d{order}" if order else "", part.attrs["units"]
             axes = [axis for axis in part.dims if axis != "time"]
             values = part.transpose("time", *axes).values.reshape(part.sizes["time"], -1)
-            for label, column in zip(itertools.product(*(part[axis].values for axis in axes)), values.T, strict=True):
-                stem = f"{name}_{''.join(map(str, label))}" if label else name
-                columns[f"{stem}{suffix}", unit] = column
-        ordered = {key: columns[key] for key in sorted(columns, key=_stem_first(list(columns)))}
+            for k, label in enumerate(itertools.product(*(part[axis].values for axis in axes))):
+                key = f"{name}_{''.join(map(str, label))}{suffix}" if label else f"{name}{suffix}", unit
+                columns[key], positions[key] = values[:, k], (variables.index(name), k, order)
+        ordered = {key: columns[key] for key in sorted(columns, key=positions.__getitem__)}
         names = pandas.MultiIndex.from_tuples(list(ordered), names=["quantity", "unit"])
         index = pandas.Index(self.dataset["time"].values, name="time")
         return pandas.DataFrame(np.column_stack([*ordered.values(), np.zeros((len(index), 0))]), index, names)
@@ -110,14 +112,3 @@ def _by_derivative(dataset: xarray.Dataset) -> Iterator[tuple[str, int, xarray.D
             unit = derivative_unit(str(variable.attrs.get("units", "1")), order)
             words = f"derivative {order} of {name}" if order else str(name)
             yield str(name), order, part.assign_attrs(units=unit, long_name=words)
-
-
-def _stem_first(keys: list[tuple[str, str]]) -> Any:
-    """Return what sorts columns so that the derivatives of a component follow it."""
-    place = {name: number for number, (name, _) in enumerate(keys)}
-
-    def rank(key: tuple[str, str]) -> tuple[int, int]:
-        stem, _, order = key[0].rpartition("_d")
-        return (place[stem], int(order)) if order.isdecimal() and stem in place else (place[key[0]], 0)
-
-    return rank
