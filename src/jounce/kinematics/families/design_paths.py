@@ -32,7 +32,7 @@ from jounce.kinematics.continuation.step_control import (
     next_controls,
 )
 from jounce.kinematics.families.design_assembly import Coordinates
-from jounce.kinematics.families.design_values import Designs
+from jounce.kinematics.families.varied_tree import VariedTree
 from jounce.kinematics.position_analysis.solve_buffers import SolveBuffer, solve_in_buffers
 from jounce.kinematics.status import Status
 from jounce.mechanism.transmissions.axis_angles import measures_angle, raw_angles
@@ -91,8 +91,8 @@ class DesignPaths:
     ----------
     solver : Solver
         The solver of the designs.
-    designs : Designs
-        The designs to be solved.
+    systems : VariedTree
+        Those of the designs to be solved, a lane for each.
     instants : array of shape (designs, time)
         Instants of each design, s; the motions start at the first one.
     last : float
@@ -104,10 +104,10 @@ class DesignPaths:
         The designs that are left to be solved individually.
     """
 
-    def __init__(self, solver: Solver, designs: Designs, instants: Float[np.ndarray, "design time"], last: float):
-        self.solver, self.designs = solver, designs
+    def __init__(self, solver: Solver, systems: VariedTree, instants: Float[np.ndarray, "design time"], last: float):
+        self.solver, self.systems = solver, systems
         self._ends = float(instants[0, 0]), last
-        self.individual = np.zeros(len(designs.rows), bool)
+        self.individual = np.zeros(len(instants), bool)
         self._instants, self._rank = instants, None
         if np.any(instants[:, 1:] < instants[:, :-1]):
             order = np.argsort(instants, axis=1, kind="stable")
@@ -130,7 +130,7 @@ class DesignPaths:
         steps: list[tuple[Indices, Lanes, SolvedState]] = []  # designs and instants of the anchors, and what is known
         limits = StepLimits(np.asarray(last), np.asarray(SMALLEST_STEP * (last - first)))
         known = solver.needed(solver.still({name: x[..., lanes] for name, x in coordinates.items()}))
-        own = self.designs.systems.own(lanes)
+        own = self.systems.own(lanes)
         start = np.full(len(lanes), first)
         control = initial_control(
             ExpansionPoint(start, *[np.full(len(lanes), x) for x in (np.inf, np.inf, 0.0)]), start
@@ -232,7 +232,7 @@ class DesignPaths:
         near = to_one_before <= np.abs(to_anchor)
         source, step = np.where(near, -1, nearest), np.where(near, to_one_before, to_anchor)
         rounds = _rounds(count, times, length, buffer.width)
-        buffer.load(instants.ravel(), (source.ravel(), step.ravel()), rounds, self.designs.systems.own(block.designs))
+        buffer.load(instants.ravel(), (source.ravel(), step.ravel()), rounds, self.systems.own(block.designs))
         return count * times
 
     def _count_turns(self, outputs: list[list[np.ndarray]], anchors: Anchors) -> None:
@@ -240,7 +240,7 @@ class DesignPaths:
         if not any(map(measures_angle, self.solver.model.system.outputs)):
             return
         designs, owner, at = anchors.designs, anchors.owner, anchors.instant
-        system = self.designs.systems.at(designs[owner])
+        system = self.systems.at(designs[owner])
         measuring = [(g, output) for g, output in zip(system.outputs, outputs, strict=True) if measures_angle(g)]
         series = np.nan_to_num(anchors.known[0]["quaternion"][..., anchors.order], nan=0.0, posinf=0.0, neginf=0.0)
         here = np.arange(len(owner))

@@ -19,8 +19,15 @@ from jounce.mechanism.building.traced import traced_model
 from jounce.mechanism.system import POSITION_COMPONENTS, System
 
 
-class Designs:
-    """Designs that differ in parameters, as one system: values that differ have one entry for each, last.
+def assembled_designs(
+    mechanism: Mechanism,
+    model: Model,
+    names: tuple[str, ...],
+    rows: Float[np.ndarray, "design parameter"],
+    instant: float,
+    tolerance: float,
+) -> tuple[VariedTree, AssemblyAttempts]:
+    """Assemble designs that differ in parameters at an instant, side by side; return their systems, a lane for each.
 
     Parameters
     ----------
@@ -32,72 +39,35 @@ class Designs:
         Parameters in which they differ.
     rows : array of shape (designs, parameters)
         Their values.
-
-    Attributes
-    ----------
-    systems : VariedTree
-        The systems of all, a lane for each.
-    guess : dict of str to array
-        Starting guess of the coordinates of all bodies, (..., bodies, designs).
+    instant : float
+        s.
+    tolerance : float
+        Of the last correction, rad or sizes of the mechanism.
     """
 
-    def __init__(
-        self, mechanism: Mechanism, model: Model, names: tuple[str, ...], rows: Float[np.ndarray, "design parameter"]
-    ):
-        self.mechanism, self.model, self.names, self.rows = mechanism, without_forces(model), names, rows
+    def design(row: Any) -> Mechanism:
+        return mechanism.with_parameters(**dict(zip(names, row, strict=True)))
 
-        def made(row: Any) -> System:
-            return self._with_values_of(traced_model(self.design(row), model.length))
+    def made(row: Any) -> System:
+        return _with_values_of(traced_model(design(row), model.length), model)
 
-        def guess(row: Any) -> Any:
-            varied = self.design(row)
-            guess = starting_guess(varied, varied.parameter_values, POSITION_COMPONENTS[varied.space])
-            return jax.tree.map(jnp.asarray, guess)
+    def guessed(row: Any) -> Any:
+        varied = design(row)
+        guess = starting_guess(varied, varied.parameter_values, POSITION_COMPONENTS[varied.space])
+        return jax.tree.map(jnp.asarray, guess)
 
-        self.systems = VariedTree.traced(made, rows)
-        self.guess = {name: np.asarray(x)[..., 0, :] for name, x in jax.vmap(guess, out_axes=-1)(rows).items()}
+    systems = VariedTree.traced(made, rows)
+    guess = {name: np.asarray(x)[..., 0, :] for name, x in jax.vmap(guessed, out_axes=-1)(rows).items()}
+    driven = np.array([[name.startswith("drivers.")] for name in model.rows])
+    designs = guess, np.full(len(rows), instant), systems.own(slice(None))
+    shared, one = (model.system, np.asarray(tolerance), driven), jax.tree.map(lambda x: x[..., :1], designs)
+    attempts = assemble_from_guess.program(shared, one, pose_type=model.pose_type)(designs)
+    return systems, attempts._replace(plain=np.asarray(attempts.plain) & ~_unfit(systems, len(rows)))
 
-    @classmethod
-    def of_models(
-        cls, mechanism: Mechanism, models: Sequence[Model], names: tuple[str, ...], rows: np.ndarray
-    ) -> "Designs":
-        """Return designs that were assembled one by one, with the angles about axes that each counts."""
-        self = object.__new__(cls)
-        self.mechanism, self.model, self.names, self.rows = mechanism, without_forces(models[0]), names, rows
-        self.systems = VariedTree.joined([self._with_values_of(model) for model in models])
-        return self
 
-    def _with_values_of(self, model: Model) -> System:
-        """Return the common system with the values of the joints, drivers and outputs of a design."""
-        return with_fields(self.model.system, groups=model.system.groups, outputs=model.system.outputs)
-
-    def design(self, row: Any) -> Mechanism:
-        """Return the mechanism with the values of a design."""
-        return self.mechanism.with_parameters(**dict(zip(self.names, row, strict=True)))
-
-    def assembled(self, instant: float, tolerance: float) -> AssemblyAttempts:
-        """Assemble all designs at an instant, s, to a tolerance, rad or sizes of the mechanism."""
-        count, model = len(self.rows), self.model
-        driven = np.array([[name.startswith("drivers.")] for name in model.rows])
-        designs = self.guess, np.full(count, instant), self.systems.own(slice(None))
-        shared = model.system, np.asarray(tolerance), driven
-        one = jax.tree.map(lambda x: x[..., :1], designs)
-        return assemble_from_guess.program(shared, one, pose_type=model.pose_type)(designs)
-
-    def unfit(self) -> Bool[np.ndarray, " design"]:
-        """Tell which designs have a value that no mechanism may have: they are refused in words when solved alone."""
-        bad, system = np.zeros(len(self.rows), bool), self.systems.at(slice(None))
-        for group in (*system.groups, *system.outputs):
-            signs = facts_of(type(group.element)).signs
-            for name, kind in field_kinds(type(group.element)).items():
-                value = getattr(group.element, name)
-                if kind not in ("scalar", "vector", "points") or value is None:
-                    continue
-                entries = np.asarray(value)
-                entries = entries if kind == "vector" else entries.reshape(-1, *entries.shape[-2:])
-                entries = np.broadcast_to(entries, (*np.shape(entries)[:-1], len(bad)))
-                bad |= _unfit(signs[name], entries)
-        return bad
+def joined_designs(common: Model, models: Sequence[Model]) -> VariedTree:
+    """Return the systems of designs that were assembled one by one, with the angles about axes that each counts."""
+    return VariedTree.joined([_with_values_of(model, common) for model in models])
 
 
 def without_forces(model: Model) -> Model:
@@ -105,7 +75,23 @@ def without_forces(model: Model) -> Model:
     return dataclasses.replace(model, system=with_fields(model.system, forces=()))
 
 
-def _unfit(sign: str, value: Float[np.ndarray, "component instance design"]) -> Bool[np.ndarray, " design"]:
-    """Tell which designs have a value that does not fit a field; see `check_value`."""
-    unfit = has_other_sign(sign, value.min(axis=0), np.abs(value).max(axis=0))
-    return (unfit | ~np.isfinite(value).all(axis=0)).any(axis=0)
+def _with_values_of(model: Model, common: Model) -> System:
+    """Return the common system with the values of the joints, drivers and outputs of a design."""
+    return with_fields(common.system, groups=model.system.groups, outputs=model.system.outputs)
+
+
+def _unfit(systems: VariedTree, count: int) -> Bool[np.ndarray, " design"]:
+    """Tell which designs have a value that no mechanism may have: they are refused in words when solved alone."""
+    bad, system = np.zeros(count, bool), systems.at(slice(None))
+    for group in (*system.groups, *system.outputs):
+        signs = facts_of(type(group.element)).signs
+        for name, kind in field_kinds(type(group.element)).items():
+            value = getattr(group.element, name)
+            if kind not in ("scalar", "vector", "points") or value is None:
+                continue
+            entries = np.asarray(value)
+            entries = entries if kind == "vector" else entries.reshape(-1, *entries.shape[-2:])
+            entries = np.broadcast_to(entries, (*np.shape(entries)[:-1], count))
+            unfit = has_other_sign(signs[name], entries.min(axis=0), np.abs(entries).max(axis=0))  # see `check_value`
+            bad |= (unfit | ~np.isfinite(entries).all(axis=0)).any(axis=0)
+    return bad

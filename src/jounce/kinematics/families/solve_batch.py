@@ -19,10 +19,11 @@ from jounce.kinematics.assembly.assemble import assemble
 from jounce.kinematics.continuation.solver import Solver
 from jounce.kinematics.families.design_paths import DesignPaths
 from jounce.kinematics.families.design_sides import Sides, sides_of_designs
-from jounce.kinematics.families.design_values import Designs
+from jounce.kinematics.families.design_values import assembled_designs, joined_designs, without_forces
 from jounce.kinematics.families.known_outputs import with_outputs
 from jounce.kinematics.families.labels import labeled_family
 from jounce.kinematics.families.parameter_values import check_parameter, checked_values
+from jounce.kinematics.families.varied_tree import VariedTree
 from jounce.kinematics.position_analysis.idle_holding import with_idle_held_in_family
 from jounce.kinematics.position_analysis.solve import LOWEST_ORDER, checked_settings, solve
 from jounce.kinematics.results.motion import Motion
@@ -248,10 +249,11 @@ class _Family:
             return np.arange(count)
         lost = lost_orders(self.mechanism.outputs.values())
         check_laws(self._design(known, self.mechanism), np.array([first, last]), self.order + lost, forces=False)
-        designs, coordinates, plain, chosen = self._assembled_designs(model)
-        levels, own = max(self.order + lost, LOWEST_ORDER), designs.systems.own(slice(1))
-        solver = Solver(designs.model, levels, self.tolerance, finite_order=self.order, own=own)
-        paths = DesignPaths(solver, designs, self.all_instants[chosen], last)
+        model = without_forces(model)
+        systems, coordinates, plain, chosen = self._assembled_designs(model)
+        levels, own = max(self.order + lost, LOWEST_ORDER), systems.own(slice(1))
+        solver = Solver(model, levels, self.tolerance, finite_order=self.order, own=own)
+        paths = DesignPaths(solver, systems, self.all_instants[chosen], last)
         paths.follow(coordinates, plain, threads)
         outputs, status = paths.solved(threads)
         self.backends.add(solver.backend)
@@ -267,23 +269,21 @@ class _Family:
 
     def _assembled_designs(
         self, model: Model
-    ) -> tuple[Designs, dict[str, Any], Bool[np.ndarray, " lane"], Int[np.ndarray, " lane"]]:
-        """Return designs in lanes, where each starts, whether it may be followed from there, and which of all it is.
+    ) -> tuple[VariedTree, dict[str, Any], Bool[np.ndarray, " lane"], Int[np.ndarray, " lane"]]:
+        """Return the systems of designs, where each starts, whether it may be followed, and which of all it is.
 
         They are assembled one by one where angles about axes require that, and where equations are too many or too few.
         """
         system = model.system
         if not any(map(measures_angle, (*system.groups, *system.outputs))) and system.shape[0] == system.shape[1]:
-            designs = Designs(self.held, model, self.names, self.rows)
-            attempts = designs.assembled(float(self.instants[0]), self.tolerance)
-            plain = np.asarray(attempts.plain) & ~designs.unfit()
-            return designs, attempts.coordinates, plain, np.arange(len(self.rows))
+            given = self.names, self.rows, float(self.instants[0]), self.tolerance
+            systems, attempts = assembled_designs(self.held, model, *given)
+            return systems, attempts.coordinates, np.asarray(attempts.plain), np.arange(len(self.rows))
         assembled = {k: attempt for k in range(len(self.rows)) if (attempt := self._assembled(k)) is not None}
         models, positions = zip(*assembled.values(), strict=True)
-        chosen = np.array(list(assembled))
-        designs = Designs.of_models(self.held, models, self.names, self.rows[chosen])
         coordinates = jax.tree.map(lambda *parts: np.concatenate(parts, axis=-1), *positions)
-        return designs, coordinates, np.ones(len(chosen), bool), chosen
+        systems, chosen = joined_designs(model, models), np.array(list(assembled))
+        return systems, coordinates, np.ones(len(chosen), bool), chosen
 
     def _assembled(self, k: int) -> tuple[Model, dict[str, Any]] | None:
         """Return the model of a design, its outputs held to their laws, and its start; None if it has no assembly."""
