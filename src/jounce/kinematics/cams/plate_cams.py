@@ -20,7 +20,7 @@ from jounce.jet import Jet, atan2, sqrt
 from jounce.jet.turns import WHOLE_TURN
 from jounce.kinematics.cams.followers import AbstractFollower, Follower, rotated, unit
 from jounce.kinematics.cams.results import Extreme, Geometry, Numbers1, Undercut
-from jounce.kinematics.cams.undercut import Cutter, runs
+from jounce.kinematics.cams.undercut import followed_lift, runs
 from jounce.rigid import perpendicular
 from jounce.trajectory import (
     AbstractMotion,
@@ -149,7 +149,7 @@ class PlateCam(Displayed):
 
         The profile is taken as it is cut, by points; where it is not undercut, the lift is that of the law.
         """
-        return Cutter(self.follower, self.base_radius, SIGNS[self.sense]).followed(self.angle, self.table, self.at)
+        return followed_lift(self.follower, self.base_radius, SIGNS[self.sense], self.angle, self.table, self.at)
 
     @cached_property
     def dataset(self) -> "xarray.Dataset":

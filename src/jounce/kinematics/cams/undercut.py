@@ -1,6 +1,5 @@
 """Undercut: what a follower would pass through is cut away, and it comes down on what is left."""
 
-import dataclasses
 from collections.abc import Callable
 
 import numpy as np
@@ -15,9 +14,17 @@ FINEST = 3601  # points of an undercut profile, at least
 CHUNK = 200  # positions of the follower that are compared with all points at a time
 
 
-@dataclasses.dataclass(frozen=True)
-class Cutter:
-    """A follower as the tool that cuts its cam.
+def followed_lift(
+    follower: AbstractFollower,
+    base_radius: float,
+    sense: float,
+    angle: Numbers1,
+    table: Geometry,
+    at: Callable[[Numbers1], Geometry],
+) -> Numbers1:
+    """Return the lift at which a follower comes down on what it has left of a profile as its cutter, m or rad.
+
+    A point of the profile that the follower would pass through at any cam angle is cut away.
 
     Parameters
     ----------
@@ -26,59 +33,43 @@ class Cutter:
         m.
     sense : float
         1.0 or -1.0, of the cam's turning.
+    angle : array of shape (angle,)
+        Of the cam, rad.
+    table : Geometry
+        The cam at these angles.
+    at : callable
+        Gives it at others.
     """
+    start, size = follower.start(base_radius), 1.0 if follower.turning else base_radius
 
-    follower: AbstractFollower
-    base_radius: float
-    sense: float
-
-    def followed(self, angle: Numbers1, table: Geometry, at: Callable[[Numbers1], Geometry]) -> Numbers1:
-        """Return the lift at which the follower comes down on what is left of a profile, m or rad.
-
-        A point of the profile that the follower would pass through at any cam angle is cut away.
-
-        Parameters
-        ----------
-        angle : array of shape (angle,)
-            Of the cam, rad.
-        table : Geometry
-            The cam at these angles.
-        at : callable
-            Gives it at others.
-        """
-        if not (self.follower.is_flat or self.follower.radius):
-            return table.lift  # an edge is as sharp as what it cuts
-        points = self._left(angle, table)
-        if points.shape[1] < len(angle) < FINEST:  # where branches cross is found to the spacing of the points
-            finer = np.linspace(0.0, WHOLE_TURN, FINEST)
-            points = self._left(finer, at(finer))
-        turns, lift = self.sense * angle, np.full(len(angle), -np.inf)
-        if points.shape[1]:
-            for rows in _chunks(len(turns)):
-                lift[rows] = self._touching(points, turns[rows]).max(axis=1) - self.follower.start(self.base_radius)
-        return np.where(np.abs(lift - table.lift) <= 1e-12 * self._size, table.lift, lift)
-
-    @property
-    def _size(self) -> float:
-        return 1.0 if self.follower.turning else self.base_radius
-
-    def _left(self, angle: Numbers1, geometry: Geometry) -> Float[np.ndarray, "2 left"]:
-        """Return the points of a profile through which the follower passes at no cam angle."""
-        start, turns = self.follower.start(self.base_radius), self.sense * angle
-        cut = np.zeros(len(angle), bool)
-        for rows in _chunks(len(turns)):
-            touched = self._touching(geometry.profile, turns[rows])
-            cut |= np.any(touched > (start + geometry.lift[rows] + LOST * self._size)[:, None], axis=0)
-        return geometry.profile[:, ~cut]
-
-    def _touching(
-        self, points: Float[np.ndarray, "2 point"], turns: Float[np.ndarray, " turn"]
+    def touching(
+        points: Float[np.ndarray, "2 point"], turns: Float[np.ndarray, " turn"]
     ) -> Float[np.ndarray, "turn point"]:
         """Return the coordinate at which the follower touches each point of the cam, turned by each angle."""
         c, s = np.cos(turns)[:, None], np.sin(turns)[:, None]
         x, y = points
         placed = np.stack([c * x - s * y, s * x + c * y]).reshape(2, -1)
-        return self.follower.touching(placed).reshape(len(turns), -1)
+        return follower.touching(placed).reshape(len(turns), -1)
+
+    def left(angle: Numbers1, geometry: Geometry) -> Float[np.ndarray, "2 left"]:
+        """Return the points of a profile through which the follower passes at no cam angle."""
+        cut = np.zeros(len(angle), bool)
+        for rows in _chunks(len(angle)):
+            touched = touching(geometry.profile, sense * angle[rows])
+            cut |= np.any(touched > (start + geometry.lift[rows] + LOST * size)[:, None], axis=0)
+        return geometry.profile[:, ~cut]
+
+    if not (follower.is_flat or follower.radius):
+        return table.lift  # an edge is as sharp as what it cuts
+    points = left(angle, table)
+    if points.shape[1] < len(angle) < FINEST:  # where branches cross is found to the spacing of the points
+        finer = np.linspace(0.0, WHOLE_TURN, FINEST)
+        points = left(finer, at(finer))
+    lift = np.full(len(angle), -np.inf)
+    if points.shape[1]:
+        for rows in _chunks(len(angle)):
+            lift[rows] = touching(points, sense * angle[rows]).max(axis=1) - start
+    return np.where(np.abs(lift - table.lift) <= 1e-12 * size, table.lift, lift)
 
 
 def _chunks(count: int) -> list[slice]:
