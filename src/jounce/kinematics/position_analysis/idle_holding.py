@@ -36,11 +36,6 @@ def with_idle_motions_held(mechanism: Mechanism, idle: IdleMotions) -> Mechanism
     return dataclasses.replace(mechanism, joints={**mechanism.joints, **holds})
 
 
-def spin_holds(mechanism: Mechanism) -> dict[str, SpinHold]:
-    """Return the joints that hold idle motions of a mechanism, by name."""
-    return {name: joint for name, joint in mechanism.joints.items() if isinstance(joint, SpinHold)}
-
-
 def idle_words(idle: IdleMotions, *, axes: bool = False) -> str:
     """Say which bodies may spin, and about which axes, in the frame of the first of each.
 
@@ -143,10 +138,8 @@ def check_independent(
         return
     instants = instants_of(mechanism.time if time is None else time, mechanism.parameter_values)
     first, duration = float(instants[0]), abs(float(instants[-1]) - float(instants[0])) or 1.0
-    holds = {
-        name: dataclasses.replace(joint, rate=rate / duration)
-        for rate, (name, joint) in enumerate(spin_holds(mechanism).items(), 1)
-    }
+    held = [name for name, joint in mechanism.joints.items() if isinstance(joint, SpinHold)]
+    holds = {name: dataclasses.replace(mechanism.joints[name], rate=k / duration) for k, name in enumerate(held, 1)}
     posed = dataclasses.replace(mechanism, outputs=checked, forces={}, initial={})
     spinning = dataclasses.replace(posed, joints={**posed.joints, **holds})
     middle = float(instants[0] + BETWEEN * (instants[-1] - instants[0]))
