@@ -263,6 +263,34 @@ def jit_over_arrays(function: F) -> F:
     return cast(F, called)
 
 
+class ReadOnlyDict(dict):
+    """A dictionary that does not change, and says what to do instead.
+
+    Examples
+    --------
+    >>> ReadOnlyDict({"a": 1}, "make another one")["a"] = 2
+    Traceback (most recent call last):
+    TypeError: these entries do not change: make another one
+    """
+
+    def __init__(self, entries: Mapping[str, Any], instead: str) -> None:
+        super().__init__(entries)
+        self.instead = instead
+
+    def __reduce__(self) -> Any:
+        return ReadOnlyDict, (dict(self), self.instead)
+
+    def _refuse(self, *_: Any, **__: Any) -> Any:
+        raise TypeError(f"these entries do not change: {self.instead}")
+
+    __setitem__ = __delitem__ = __ior__ = update = pop = popitem = clear = setdefault = _refuse  # type: ignore[assignment]
+
+
+def read_only(entries: Mapping[str, Any], instead: str) -> ReadOnlyDict:
+    """Return a dictionary that does not change, the same one if it is one."""
+    return entries if isinstance(entries, ReadOnlyDict) else ReadOnlyDict(entries, instead)
+
+
 def is_ours(thing: Any) -> bool:
     """Tell whether a class or a function is one of this package, by the name of its module.
 

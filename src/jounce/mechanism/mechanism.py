@@ -7,6 +7,7 @@ from functools import cached_property
 from typing import Any
 
 from jounce.base.display import Displayed
+from jounce.base.modules import read_only
 from jounce.constraints import AbstractConstraint
 from jounce.errors import ExpressionError, JounceError, MechanismError, check_choice, check_name
 from jounce.forces import AbstractForce
@@ -38,6 +39,7 @@ RESERVED_OUTPUTS = (  # the axes of a result
 NEAREST = "nearest"
 SIDES = {"above": (-1, 1), "below": (-1, -1), "right": (0, 1), "left": (0, -1)}
 """Where a body may be wished to lie: the component of the global frame, and its sign."""
+MAPPINGS = ("bodies", "joints", "drivers", "forces", "initial", "outputs", "parameters", "units", "dimensions")
 RATE_COLUMN = re.compile(r".*_d[0-9]+", re.DOTALL)
 
 
@@ -204,6 +206,9 @@ class Mechanism(Displayed):
             check_stated_units(self, known)
             object.__setattr__(self, "dimensions", {**self.dimensions, **stated})
         _ = self.shown_units
+        for name in MAPPINGS:
+            way = "with_parameters" if name == "parameters" else "dataclasses.replace"
+            object.__setattr__(self, name, read_only(getattr(self, name), f"{way} gives another mechanism"))
 
     def __repr__(self) -> str:
         kinds = {"bodies": self.rigid_bodies, **self.elements}
@@ -283,8 +288,7 @@ class Mechanism(Displayed):
     @property
     def elements(self) -> dict[str, Mapping[str, Any]]:
         """Joints, drivers, forces, initial conditions and outputs, by kind."""
-        kinds = ("joints", "drivers", "forces", "initial", "outputs")
-        return {kind: getattr(self, kind) for kind in kinds}
+        return {kind: getattr(self, kind) for kind in MAPPINGS[1:6]}
 
     @cached_property
     def parameter_values(self) -> dict[str, Any]:
@@ -310,10 +314,8 @@ class Mechanism(Displayed):
                     expression.check(self.parameters)
                 except ExpressionError as error:
                     raise error.located(name=f"parameters.{name}") from None
-                circle = ", ".join(waiting)
-                raise MechanismError(
-                    f"parameters depend on each other in a circle: {circle}", name=f"parameters.{name}"
-                )
+                message = f"parameters depend on each other in a circle: {', '.join(waiting)}"
+                raise MechanismError(message, name=f"parameters.{name}")
         return values
 
     @cached_property

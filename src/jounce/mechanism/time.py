@@ -102,7 +102,7 @@ def instants_of(time: TimeLike | None, parameters: Mapping[str, Any]) -> Instant
         raise MechanismError("no time grid is given, by the mechanism or by the call", name="time")
     if isinstance(time, TimeGrid):
         return _spaced(time, parameters)
-    instants = seconds("time", time, MechanismError)
+    instants = np.array(seconds("time", time, MechanismError))  # a copy: what is given may change
     if instants.ndim != 1 or not instants.size:
         raise MechanismError("the time grid must be a list of at least one instant", name="time", value=time)
     if not np.isfinite(instants).all():

@@ -16,7 +16,7 @@ from typing import Any, TypeVar
 import jax
 import numpy as np
 
-from jounce.base.modules import Module, is_ours
+from jounce.base.modules import Module, ReadOnlyDict, is_ours
 from jounce.constraints.friction import Friction, GearFriction
 from jounce.mechanism.mechanism import Mechanism
 from jounce.mechanism.user_code import has_own_methods
@@ -52,7 +52,7 @@ def contents_of(mechanism: Mechanism, *more: Any) -> Contents | None:
             else:
                 values += (..., kind is list, len(value))  # no value of a user is an ellipsis
                 pending += value
-        elif kind is dict and set(map(type, value)) <= {str}:
+        elif (kind is dict or kind is ReadOnlyDict) and set(map(type, value)) <= {str}:
             values += (..., tuple(value))
             pending += value.values()
         elif kind is np.ndarray and value.dtype.kind in "fiu" and value.size <= LARGE:

@@ -1,0 +1,52 @@
+"""Mechanisms and motions stay as they were made: what they were given may change, and they may not."""
+
+import copy
+import pickle
+
+import numpy as np
+import pytest
+
+import jounce as jn
+
+
+def pendulum(point, arm, parameters, time):
+    return jn.Mechanism(
+        space="planar",
+        parameters=parameters,
+        bodies={"rod": jn.Body(position=point)},
+        joints={"O": jn.planar.Revolute(("ground", "rod"), point_i=point, point_j=[0, 0])},
+        drivers={"theta": jn.drivers.CoordinateDriver(("ground", "rod"), "angle", motion="speed*t")},
+        outputs={"tip": jn.outputs.PointOutput("rod", point=arm)},
+        time=time,
+    )
+
+
+def test_the_parameters_that_a_mechanism_was_given_may_change_afterwards():
+    parameters, times = {"speed": 2.0}, [0.0, 0.25]
+    late, early = (pendulum([0.1, 0.2], [0.3, 0.0], parameters, times) for _ in range(2))
+    jn.solve(early, order=0)
+    parameters["speed"] = 9.0
+    for mechanism in (early, late):
+        found = jn.solve(mechanism, order=0).dataset["tip"].sel(component="x", derivative=0)
+        np.testing.assert_allclose(found, [0.4, 0.1 + 0.3 * np.cos(0.5)], atol=1e-14)
+
+
+def test_instants_that_were_given_may_change_afterwards():
+    times = np.linspace(0.0, 1.0, 5)
+    motion = jn.solve(pendulum([0.0, 0.0], [1.0, 0.0], {"speed": 1.0}, None), times, order=0)
+    times += 3.0
+    np.testing.assert_allclose(motion.dataset["tip"].sel(component="x", derivative=0), np.cos(times - 3.0), atol=1e-14)
+    np.testing.assert_array_equal(motion.dataset["time"], times - 3.0)
+
+
+def test_a_mechanism_does_not_change_and_says_what_to_do():
+    mechanism = pendulum([0.0, 0.0], [1.0, 0.0], {"speed": 1.0}, None)
+    with pytest.raises(TypeError, match="do not change: with_parameters gives another mechanism"):
+        mechanism.parameters["speed"] = 2.0
+    with pytest.raises(TypeError, match=r"do not change: dataclasses\.replace gives another mechanism"):
+        mechanism.joints.clear()
+    for same in (copy.deepcopy(mechanism), pickle.loads(pickle.dumps(mechanism))):
+        assert same == mechanism
+        assert same.parameters == {"speed": 1.0}
+        with pytest.raises(TypeError, match="with_parameters"):
+            same.parameters.update(speed=2.0)
