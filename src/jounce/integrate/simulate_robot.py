@@ -9,7 +9,6 @@ import numpy as np
 from jounce.base.activity import Count
 from jounce.base.shapes import ArrayLike, is_traced
 from jounce.errors import RobotError, UnsupportedError, check_name, flag
-from jounce.execution.backends import backend_of
 from jounce.integrate.marching.exact_numbers import ExactNumbers
 from jounce.integrate.marching.joint_events import JointEvent, JointEventDetector
 from jounce.integrate.marching.marching import Outcome, RunLimits, steps_between_looks
@@ -154,26 +153,23 @@ class RobotRun(AbstractRun):
         running, none, nothing = np.asarray(int(Outcome.RUNNING)), np.asarray(0), np.zeros(1)
         begun = Progress(np.array([instant]), start, running, none, none, nothing, nothing)
         super().__init__(begun, limits, detectors)
-        self.problem, self.begun, self.taken = problem, np.float64(instant), 0
+        self.problem, self.begun, self.tried = problem, np.float64(instant), 0
         count = steps_between_looks((order + 2) * 2 * len(problem.scale), watched=bool(detectors))
         self._settings: Any = {"order": order, "count": count, "exact": ExactNumbers.of_parallel(problem.equations)}
 
-    def march(self) -> RobotSteps | None:
+    def attempted(self) -> tuple[Any, tuple[Any, Any], Any]:
         """See `AbstractRun`."""
         try:
-            current, steps, taken = march_robot(self.problem, self.current, self.begun, self.limits, **self._settings)
+            current, steps, count = march_robot(self.problem, self.current, self.begun, self.limits, **self._settings)
         except TypeError as error:
             if "has no rule for Taylor series" not in str(error):
                 raise
             message = f"{error}; a law of a joint uses it: write it with other operations"
             raise UnsupportedError(message, name="torque") from error
-        self.backends.add(backend_of(current))
-        count = int(taken)
-        self.taken += count
-        if self.taken > MOST and int(current.outcome) == Outcome.RUNNING:
+        self.tried += int(count)
+        if self.tried > MOST and int(current.outcome) == Outcome.RUNNING:
             current = current._replace(outcome=np.asarray(int(Outcome.COLLAPSED)))
-        self.current = current
-        return jax.tree.map(lambda x: np.asarray(x)[:count], steps) if count else None
+        return current, steps, count
 
     def standing(self) -> RobotSteps:
         """See `AbstractRun`."""
@@ -183,8 +179,8 @@ class RobotRun(AbstractRun):
     def explained(self) -> tuple[Status, str]:
         """See `AbstractRun`."""
         time = float(self.current.time[0])
-        if self.taken > MOST:
-            return Status.COLLAPSED, f"after {self.taken} steps"
+        if self.tried > MOST:
+            return Status.COLLAPSED, f"after {self.tried} steps"
         if int(self.current.stuck) >= STUCK // 2:
             words = (
                 f"a force of a joint switches without end at t = {time:g} s, as friction of a joint that sticks does: "

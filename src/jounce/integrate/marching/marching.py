@@ -165,6 +165,11 @@ def march(
         How many of them there are.
     """
     attempt = _attempt(equations, current, limits, method)
+    return attempts(attempt, current, room_for_steps(method, current, count), count)
+
+
+def attempts(attempt: Callable[[Any], tuple[Any, Any]], current: Any, room: Any, count: int) -> tuple[Any, Any, Any]:
+    """Return where up to so many attempts at a step lead, room with what they give, and how many there were."""
 
     def unfinished(carry: Any) -> Any:
         current, _, tried = carry
@@ -176,7 +181,7 @@ def march(
         previous = jax.tree.map(lambda k, s: jax.lax.dynamic_update_index_in_dim(k, s, tried, 0), previous, steps)
         return current, previous, tried + 1
 
-    return jax.lax.while_loop(unfinished, iterate, (current, room_for_steps(method, current, count), 0))
+    return jax.lax.while_loop(unfinished, iterate, (current, room, 0))
 
 
 @mapped(widths=(FEW_RUNS, MANY_RUNS))

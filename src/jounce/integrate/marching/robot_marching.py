@@ -16,7 +16,7 @@ from jounce.base.shapes import Numbers
 from jounce.execution.compilation import LARGE, compiled
 from jounce.execution.llvm.text.values import UnsupportedOperationError
 from jounce.integrate.marching.exact_numbers import ExactNumbers, forms_of
-from jounce.integrate.marching.marching import SHORT as UNUSUAL, Outcome, RunLimits
+from jounce.integrate.marching.marching import SHORT as UNUSUAL, Outcome, RunLimits, attempts
 from jounce.integrate.marching.robot_state import RobotState, at, polynomial_of, rates_at
 from jounce.integrate.steps.lookahead import HARMLESS, NEAR, POINTS, RUN_POINTS, SHORTEST, finest, steps_counted
 from jounce.integrate.steps.methods import MARGIN, NEEDED, ROUNDING, Lanes, furthest
@@ -176,12 +176,15 @@ class RobotProblem(Module):
 
 
 class RobotSteps(NamedTuple):
-    """Steps one after the other, as polynomials in the time from their beginnings, (steps, order + 1, n)."""
+    """Steps one after the other, as polynomials in the time from their beginnings, (steps, order + 1, n).
 
-    start: Float[Any, " steps"]
-    length: Float[Any, " steps"]
+    While they are taken, there is a last axis of one.
+    """
+
+    start: Float[Any, "steps *batch"]
+    length: Float[Any, "steps *batch"]
     polynomial: RobotState
-    kink: Bool[Any, " steps"]  # whether a jump lies in a step, which is too short to matter
+    kink: Bool[Any, "steps *batch"]  # whether a jump lies in a step, which is too short to matter
 
     @property
     def end(self) -> float:
@@ -238,7 +241,7 @@ def march_robot(
     order: int,
     count: int,
     exact: ExactNumbers | None = None,
-) -> tuple[Progress, RobotSteps, Int[Numbers, ""]]:
+) -> tuple[Progress, tuple[RobotSteps, Bool[Numbers, "steps 1"]], Int[Numbers, ""]]:
     """Take up to `count` steps toward a time.
 
     Parameters
@@ -254,17 +257,17 @@ def march_robot(
     order : int
         Of the series.
     count : int
-        Steps at most.
+        Steps to try at most.
     exact : ExactNumbers, optional
         Of the robot, for which the program is made.
 
     Returns
     -------
     current : Progress
-    steps : RobotSteps
-        With room for `count` of them.
-    taken : int
-        How many there are.
+    steps : tuple of RobotSteps and array of bool, shape (steps, 1)
+        Steps tried, in the order of trial, and whether they were taken.
+    tried : int
+        How many of them there are.
     """
     problem, still = (problem, None) if exact is None else (problem.made_for(exact), problem.still(exact))
     stop, tolerance, longest = limits
@@ -311,7 +314,7 @@ def march_robot(
         _, error, finite = jax.lax.while_loop(open_, further, (jnp.zeros(()), jnp.zeros(()), jnp.ones((), bool)))
         return finite & (error <= 1.0), finite, (error > 0.0) & (jnp.abs(step) <= SHORTEST * duration)
 
-    def attempt(current: Progress) -> tuple[Progress, Any, Any]:
+    def attempt(current: Progress) -> tuple[Progress, tuple[RobotSteps, Any]]:
         time, left = current.time, stop - current.time[0] - current.rest[0]
         whole = polynomial_of(problem.series(current.state, time[None], order, still=still))
         sizes = _sizes(problem, whole)
@@ -358,20 +361,10 @@ def march_robot(
         crossing = steps_counted(current.crossing, step, duration, over | (low == 0.0))
         longest_so_far = jnp.maximum(current.longest, step)
         after = Progress(onwards[None], arrived, outcome, stuck, crossing, rest[None], longest_so_far)
-        steps = RobotSteps(time[0], direction * step, jax.tree.map(lambda c: c[..., 0], polynomial), short | over)
+        steps = RobotSteps(time, direction * step[None], polynomial, (short | over)[None])
         stay = current._replace(outcome=outcome, crossing=crossing)
-        return jax.tree.map(lambda a, b: jnp.where(moves, a, b), after, stay), steps, moves
+        return jax.tree.map(lambda a, b: jnp.where(moves, a, b), after, stay), (steps, moves[None])
 
-    def iterate(carry: Any) -> Any:
-        current, used, taken = carry
-        current, steps, moves = attempt(current)
-        used = jax.tree.map(lambda k, s: jax.lax.dynamic_update_index_in_dim(k, s, taken, 0), used, steps)
-        return current, used, taken + moves.astype(int)
-
-    def unfinished(carry: Any) -> Any:
-        current, _, taken = carry
-        return (current.outcome == int(Outcome.RUNNING)) & (taken < count)
-
-    room = jax.tree.map(lambda x: jnp.zeros((count, order + 2, x.shape[0])), current.state)
-    used = RobotSteps(jnp.zeros(count), jnp.zeros(count), room, jnp.zeros(count, bool))
-    return jax.lax.while_loop(unfinished, iterate, (current, used, jnp.zeros((), int)))
+    flags, numbers = jnp.zeros((count, 1), bool), jnp.zeros((count, 1))
+    polynomial = jax.tree.map(lambda x: jnp.zeros((count, order + 2, *x.shape)), current.state)
+    return attempts(attempt, current, (RobotSteps(numbers, numbers, polynomial, flags), flags), count)

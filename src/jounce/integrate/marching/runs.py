@@ -7,6 +7,7 @@ from typing import Any
 import jax
 import numpy as np
 
+from jounce.execution.backends import backend_of
 from jounce.integrate.marching.marching import MOVING, Outcome, RunLimits
 from jounce.integrate.steps.events import AbstractDetector
 from jounce.kinematics import Status
@@ -51,8 +52,8 @@ class AbstractRun(abc.ABC):
         self.parts: list[Any] = []
 
     @abc.abstractmethod
-    def march(self) -> Any:
-        """Go on by some steps, and return those that were taken; None if there are none."""
+    def attempted(self) -> tuple[Any, tuple[Any, Any], Any]:
+        """Return where some attempts at a step lead, the steps and whether they were taken, and how many there were."""
 
     @abc.abstractmethod
     def standing(self) -> Any:
@@ -70,7 +71,7 @@ class AbstractRun(abc.ABC):
     def go(self, instants: np.ndarray, progress: Callable[[int, int], None] | None) -> None:
         """March from the first to the last instant."""
         while self.current.outcome.item() in GOING and self.stopped_at is None:
-            if (part := self.march()) is not None:
+            if (part := self._march()) is not None:
                 self.parts.append(self._until_stopped(part))
             if progress is not None:
                 passed = self.direction * instants <= self.direction * self.current.time.item()
@@ -79,6 +80,17 @@ class AbstractRun(abc.ABC):
             self.parts.append(self.standing())
         if self.current.outcome.item() in FAILED:
             self.ending = self.explained()
+
+    def _march(self) -> Any:
+        """Go on by some steps, and return those that were taken; None if there are none."""
+        self.current, (steps, taken), count = self.attempted()
+        self.backends.add(backend_of(steps))
+        taken = np.asarray(taken)[: int(count), 0]
+        if not taken.any():
+            return None
+        # a view, unless some were refused: they are joined, and so copied, at the end
+        chosen = slice(len(taken)) if taken.all() else np.flatnonzero(taken)
+        return jax.tree.map(lambda x: np.asarray(x)[chosen, ..., 0], steps)
 
     def _until_stopped(self, part: Any) -> Any:
         """Note the events in some steps; return those up to the first that is terminal, the last step cut there."""

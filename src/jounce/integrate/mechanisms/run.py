@@ -2,8 +2,8 @@
 
 import dataclasses
 from collections.abc import Sequence
+from typing import Any
 
-import jax
 import numpy as np
 from jaxtyping import Bool
 
@@ -12,7 +12,6 @@ from jounce.dynamics.forward.accelerations import Equations, Instants, State
 from jounce.dynamics.forward.initial_state import ConsistentStart
 from jounce.dynamics.friction.coupling import joints_with_friction
 from jounce.dynamics.motion_values import Coordinates, cut, pose_of
-from jounce.execution.backends import backend_of
 from jounce.execution.compilation import compiled
 from jounce.integrate.marching.marching import STUCK, DenseOutput, Outcome, RunLimits, march, unexpanded
 from jounce.integrate.marching.runs import AbstractRun
@@ -47,18 +46,9 @@ class MechanismRun(AbstractRun):
         self.start = start
         self._settings = march_settings(start.equations, self.current, method, watched=watched)
 
-    def march(self) -> DenseOutput | None:
+    def attempted(self) -> tuple[Any, tuple[Any, Any], Any]:
         """See `AbstractRun`."""
-        self.current, (output, taken), attempts = march(
-            self.start.equations, self.current, self.limits, **self._settings
-        )
-        self.backends.add(backend_of(output))
-        taken = np.asarray(taken)[: int(attempts), 0]
-        if not taken.any():
-            return None
-        # a view, unless some were refused: they are joined, and so copied, at the end
-        chosen = slice(len(taken)) if taken.all() else np.flatnonzero(taken)
-        return jax.tree.map(lambda x: np.asarray(x)[chosen, ..., 0], output)
+        return march(self.start.equations, self.current, self.limits, **self._settings)
 
     def standing(self) -> DenseOutput:
         """See `AbstractRun`."""
