@@ -8,7 +8,7 @@ for any motion. On jets the same two products give the rates.
 
 import dataclasses
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import jax.numpy as jnp
 import numpy as np
@@ -35,9 +35,6 @@ from jounce.robot.recursions.kinematics import body_frames
 from jounce.robot.recursions.tree_scan import Series
 from jounce.robot.robot import Robot
 from jounce.units.shown_units import derivative_unit
-
-if TYPE_CHECKING:
-    pass
 
 Energies = Float[Numbers, "order body time"]
 """Taylor coefficients of energies of bodies along a motion."""

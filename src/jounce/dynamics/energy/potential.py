@@ -25,7 +25,7 @@ from jounce.jet import Jet, dot
 from jounce.jet.algebra import stacked
 from jounce.kinematics import Motion
 from jounce.mechanism.system import Group
-from jounce.mechanism.transmissions.axis_angles import angles_along, at_lanes, with_turns
+from jounce.mechanism.transmissions.axis_angles import angles_at, at_lanes, with_turns
 from jounce.rigid.pose import Pose
 
 if TYPE_CHECKING:
@@ -112,12 +112,12 @@ def stored_energy(motion: Motion) -> Any:
     """
     check_motion(motion)
     pose_type, coordinates = motion.poses
-    angles, bodies = angles_along(motion.forces), coordinates_along(cut(coordinates, 1))
+    bodies = coordinates_along(cut(coordinates, 1))
     stored = at_instants(
         motion,
         _stored,
         at_lanes(motion.forces, np.zeros(1, int)),
-        lambda lanes: (bodies(lanes), angles(lanes), motion.time[lanes]),
+        lambda lanes: (bodies(lanes), angles_at(motion.forces, lanes), motion.time[lanes]),
         pose_type=pose_type,
     )
     return labeled(motion, stored[None], "J")[:, 0].drop_vars("derivative")
@@ -128,13 +128,7 @@ def _stored(
     groups: tuple[Group, ...], lanes: tuple[Coordinates, Sequence[Any], Lanes], *, pose_type: type[Pose]
 ) -> Any:
     coordinates, angles, instants = lanes
-    return energy_of_forces(
-        with_turns(groups, angles), pose_of(coordinates, pose_type), Jet.variable(instants[None], 1)
-    )
-
-
-def energy_of_forces(groups: Sequence[Group], pose: Pose, time: Jet) -> Float[Numbers, " batch"]:
-    """Return the energy that forces have stored, J, in a pose with velocities."""
-    lanes = time.shape[-1]
-    parts = [jnp.broadcast_to(g.energy(pose, time).coefficients[0], (g.instances, lanes)) for g in groups]
-    return jnp.sum(jnp.concatenate([*parts, jnp.zeros((1, lanes))]), axis=0)
+    pose, time, count = pose_of(coordinates, pose_type), Jet.variable(instants[None], 1), len(instants)
+    counted = with_turns(groups, angles)
+    parts = [jnp.broadcast_to(g.energy(pose, time).coefficients[0], (g.instances, count)) for g in counted]
+    return jnp.sum(jnp.concatenate([*parts, jnp.zeros((1, count))]), axis=0)

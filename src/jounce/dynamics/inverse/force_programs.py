@@ -212,12 +212,12 @@ def exerted(driver: Any, lanes: tuple[Sequence[Coordinates], Lanes, Multipliers]
 @Mapped
 def applied(force: Group, lanes: tuple[Acting, Lanes], *, pose_type: type[Pose], levels: int) -> Any:
     """Return the applied forces, as Taylor coefficients."""
-    element, poses, time = acting_at(force, lanes, pose_type, levels)
+    element, poses, time = force_at(force, lanes, pose_type, levels)
     exerted = element.force(element.displacement(*poses, time), element.velocity(*poses, time), time)
     return stacked(with_rows(exerted.truncate(levels - 1)))
 
 
-def acting_at(force: Group, lanes: tuple[Acting, Lanes], pose_type: type[Pose], order: int) -> tuple[Any, Any, Jet]:
+def force_at(force: Group, lanes: tuple[Acting, Lanes], pose_type: type[Pose], order: int) -> tuple[Any, Any, Jet]:
     """Return forces with the turns of the angles that they measure, the poses of their bodies, and the time."""
     (poses, angles), instants = lanes
     (group,) = with_turns((force,), angles)
@@ -263,7 +263,7 @@ def force_wrench(
 ) -> Any:
     """Return the wrenches of applied forces on the body in a slot, as `joint_wrench` does."""
     acting, instants, sizes = lanes
-    element, poses, time = acting_at(force, (acting, instants), pose_type, levels - 1)
+    element, poses, time = force_at(force, (acting, instants), pose_type, levels - 1)
     built = tuple(map(movable, poses))
     unchanged = [jax.tree.map(jnp.zeros_like, pose) for pose in built]
 

@@ -29,8 +29,8 @@ class JointFriction:
     @property
     def first_rows(self) -> dict[int, int]:
         """First rows of the normal forces of groups with friction, below the multipliers, by the index of the group."""
-        rubbing = [k for k, group in enumerate(self.forces._joined.groups) if rubs(group)]
-        counts = [self.forces._joined.groups[k].instances for k in rubbing]
+        rubbing = [k for k, group in enumerate(self.forces.joined.groups) if rubs(group)]
+        counts = [self.forces.joined.groups[k].instances for k in rubbing]
         return {k: len(self.forces.model.rows) + sum(counts[:n]) for n, k in enumerate(rubbing)}
 
     @property
@@ -40,7 +40,7 @@ class JointFriction:
 
     def resisted(self, index: int) -> Float[Numbers, "order instance time"]:
         """Return the friction power of a group for a unit normal force, as Taylor coefficients."""
-        forces, group = self.forces, self.forces._joined.groups[index]
+        forces, group = self.forces, self.forces.joined.groups[index]
 
         def lanes_of(lanes: np.ndarray) -> Any:
             return [forces.coordinates_at(slot, lanes, forces.levels + 1) for slot in group.bodies]
@@ -54,7 +54,7 @@ class JointFriction:
         multiplier.
         """
         place = self.forces.indices[name]
-        group = self.forces._joined.groups[place.group]
+        group = self.forces.joined.groups[place.group]
         own = multipliers[:, place.rows].reshape(len(multipliers), -1, group.instances, len(lanes))
         if loses_torque(group.element):
             return np.asarray(own)[:, :, place.instance]
@@ -78,7 +78,7 @@ class JointFriction:
 
     def _of_joints(self, of_gears: Callable[[Any], Any], of_others: Callable[[Any], Any]) -> np.ndarray:
         """Return a value of the friction of each joint, in their order by their groups."""
-        groups = [self.forces._joined.groups[k] for k in self.first_rows]
+        groups = [self.forces.joined.groups[k] for k in self.first_rows]
         values = [(of_gears if loses_torque(g.element) else of_others)(g.element.friction) for g in groups]
         pairs = zip(values, groups, strict=True)
         return np.concatenate([np.zeros(0), *(np.broadcast_to(np.ravel(x), g.instances) for x, g in pairs)])
@@ -89,14 +89,14 @@ class JointFriction:
         for index in self.first_rows:
             count = self._slips(index)
             first = joints[-1] + 1 if joints else 0
-            joints += [first + k for k in range(self.forces._joined.groups[index].instances) for _ in range(count)]
+            joints += [first + k for k in range(self.forces.joined.groups[index].instances) for _ in range(count)]
         return joints
 
     def _slips(self, index: int) -> int:
         """Return the number of directions in which the joints of a group slip."""
         lanes = np.zeros(1, int)
-        moving = [self.forces.coordinates_at(slot, lanes, 2) for slot in self.forces._joined.groups[index].bodies]
-        return programs.slip_directions(self.forces._joined.groups[index].element, moving, self.forces.pose_type)
+        moving = [self.forces.coordinates_at(slot, lanes, 2) for slot in self.forces.joined.groups[index].bodies]
+        return programs.slip_directions(self.forces.joined.groups[index].element, moving, self.forces.pose_type)
 
     def responses(self) -> Float[np.ndarray, "direction row time"]:
         """Return the multipliers that balance a unit friction force in each direction of slip, at rest."""
@@ -104,14 +104,14 @@ class JointFriction:
 
         def lanes_of(lanes: np.ndarray) -> Any:
             loads = np.concatenate([self._unit_loads(index, lanes) for index in self.first_rows])
-            bodies, _, flanks, instants = forces._lanes(lanes)
+            bodies, _, flanks, instants = forces.balance_at(lanes)
             return cut(bodies, 0), flanks, instants, loads
 
-        return forces.along(programs.responses, forces._joined, lanes_of)
+        return forces.along(programs.responses, forces.joined, lanes_of)
 
     def _unit_loads(self, index: int, lanes: np.ndarray) -> Float[np.ndarray, "direction coordinate body time"]:
         """Return the wrenches on bodies for a unit friction force in each direction of slip of a group."""
-        forces, group = self.forces, self.forces._joined.groups[index]
+        forces, group = self.forces, self.forces.joined.groups[index]
         moving = [forces.coordinates_at(slot, lanes, 2) for slot in group.bodies]
         count, bodies = self._slips(index), len(forces.model.bodies)
         components = forces.pose_type.shifts + forces.pose_type.turns
@@ -135,7 +135,7 @@ class JointFriction:
 
         components = []
         for index in self.first_rows:
-            group = forces._joined.groups[index]
+            group = forces.joined.groups[index]
             own = multipliers[self._rows(index)].reshape(-1, group.instances, multipliers.shape[-1])
 
             def lanes_of(lanes: np.ndarray, index: int = index, own: Any = own) -> Any:

@@ -27,7 +27,7 @@ from jounce.kinematics.continuation.change_points import spoiled
 from jounce.mechanism.building.element_indices import ElementIndex, element_indices
 from jounce.mechanism.redundant_reactions import resolved_reactions
 from jounce.mechanism.system import Group, law_left_out
-from jounce.mechanism.transmissions.axis_angles import angles_along, at_lanes
+from jounce.mechanism.transmissions.axis_angles import angles_at, at_lanes
 
 NOTHING = 1e-9  # of the largest multiplier: what is less is rounding
 
@@ -68,8 +68,8 @@ class MotionForces:
         self.indices = element_indices(self.model)
         system = self.model.system  # programs without laws serve all of them, also those that a motion has found
         groups = system.groups if friction else map(friction_left_out, system.groups)
-        self._joined = dataclasses.replace(system, groups=tuple(map(law_left_out, groups)), outputs=())
-        check_unique_pressing(self.model, self._joined)
+        self.joined = dataclasses.replace(system, groups=tuple(map(law_left_out, groups)), outputs=())
+        check_unique_pressing(self.model, self.joined)
         self._numbers: dict[tuple[Any, ...], Numbers] = {}
         self.flanks: teeth.Flanks = teeth.either_flank(system.groups, len(motion.time)) if flanks else {}
         self._reversals: dict[int, np.ndarray] = {}
@@ -101,7 +101,7 @@ class MotionForces:
         """Multipliers that balance the loads, followed by self-balanced ones if these are needed."""
         if not self.flanks:
             return self._balanced({})
-        check_meshing(self.motion, self._joined.groups, self.coordinates_at)
+        check_meshing(self.motion, self.joined.groups, self.coordinates_at)
         multipliers, known, self._reversals = teeth.settled(self._balanced, self.flanks, self.model, self.motion)
         if self._looks_for_open:  # what is open presses on no flank that is known: any others tell what depends on it
             multipliers = np.stack([multipliers[0], self._balanced(teeth.by_chance(known))[1]])
@@ -113,24 +113,24 @@ class MotionForces:
         cases, rows = 1 + self._looks_for_open, len(self.model.rows)
         choice = np.zeros(rows), np.zeros(cases), np.zeros((cases, rows))
         shared = self._balance(None if self.model.system.rank is None else choice)
-        programs.balanced.prepare(shared, self._lanes, large=programs.LARGE, pose_type=self.pose_type)
+        programs.balanced.prepare(shared, self.balance_at, large=programs.LARGE, pose_type=self.pose_type)
 
     def _balanced(self, flanks: teeth.Flanks) -> Float[Numbers, "case level row time"]:
         """Return the multipliers that balance the loads, and self-balanced ones, given the loaded tooth flanks."""
         self.flanks = flanks
         shared = self._balance(None if self.model.system.rank is None else self._choice)
-        multipliers, finite = self.along(programs.balanced, shared, self._lanes, large=programs.LARGE)
+        multipliers, finite = self.along(programs.balanced, shared, self.balance_at, large=programs.LARGE)
         check_finite_forces(self, finite)
-        check_not_locked(self.motion, self._joined, multipliers[0])
+        check_not_locked(self.motion, self.joined, multipliers[0])
         check_finite_values(self, multipliers[0])
         return without_open_rates(self, multipliers)
 
     def _balance(self, choice: tuple[Numbers, Numbers, Numbers] | None) -> Any:
         """Return what a balance has at all instants, for a choice among the multipliers of redundant rows."""
-        free = programs.without_constraints(self._joined, at_lanes(self.forces, np.zeros(1, int)))
-        return self._joined, free, self.masses, self.gravity, choice
+        free = programs.without_constraints(self.joined, at_lanes(self.forces, np.zeros(1, int)))
+        return self.joined, free, self.masses, self.gravity, choice
 
-    def _lanes(self, lanes: np.ndarray) -> Any:
+    def balance_at(self, lanes: np.ndarray) -> Any:
         """Return the arguments of a balance for some instants."""
         bodies, angles, instants = self.acting_at(lanes)
         pressed = tuple(flank[..., lanes] for flank in self.flanks.values())
@@ -138,7 +138,7 @@ class MotionForces:
 
     def acting_at(self, lanes: np.ndarray) -> tuple[Any, tuple[Any, ...], Any]:
         """Return the coordinates of all bodies at some instants, the angles that forces measure, and the time."""
-        angles = angles_along(self.motion.forces)(lanes)
+        angles = angles_at(self.motion.forces, lanes)
         return self.coordinates_at(None, lanes, self.levels + 2), angles, self.motion.time[lanes]
 
     @property
@@ -202,7 +202,7 @@ class MotionForces:
     def open(self) -> OpenMultipliers:
         """Forces that redundant constraints do not determine, at the first solved instant."""
         lanes = np.array([np.argmax(self.motion.status == Status.OK)])  # 0 where none is
-        system, bodies = dataclasses.replace(self._joined, forces=()), self.coordinates_at(None, lanes, 1)
+        system, bodies = dataclasses.replace(self.joined, forces=()), self.coordinates_at(None, lanes, 1)
         scaled = programs.scaled_jacobian(system, bodies, self.motion.time[lanes], self.pose_type)
         mechanism = self.motion.mechanism
         selection = resolved_reactions(mechanism.redundant_reactions, mechanism.parameter_values)
@@ -295,7 +295,7 @@ class MotionForces:
         It consists of the force along the global axes and the moment about the origin of the body along its own axes.
         """
         if place := self.indices.get(name):
-            first, group = self.friction.first_rows.get(place.group), self._joined.groups[place.group]
+            first, group = self.friction.first_rows.get(place.group), self.joined.groups[place.group]
 
             def of_constraint(lanes: np.ndarray) -> Any:
                 rubbed = None
@@ -346,7 +346,7 @@ class MotionForces:
     def _acting(self, index: int, lanes: np.ndarray, levels: int) -> tuple[programs.Acting, Any]:
         """Return the poses of the bodies of forces, the angles about axes between them, and the instants."""
         group = self.motion.forces[index]
-        angles = angles_along((group,))(lanes)
+        angles = angles_at((group,), lanes)
         poses = [self.coordinates_at(slot, lanes, levels) for slot in group.bodies]
         return (poses, angles), self.motion.time[lanes]
 

@@ -21,13 +21,10 @@ class Eigenmodes(NamedTuple):
         1/s; the imaginary part is not negative.
     shapes : array of shape (coordinates, modes)
         Of unit modal mass, ``shape^H M shape = 1``; the largest component of each, weighted by the masses, is positive.
-    undamped : bool
-        Whether no force depends on velocities and the stiffness is symmetric, so that shapes are real.
     """
 
     eigenvalues: Complex[np.ndarray, " mode"]
     shapes: Complex[np.ndarray, "coordinate mode"]
-    undamped: bool
 
 
 def eigenmodes(mass: Square, damping: Square, stiffness: Square, noise: tuple[Square, Square]) -> Eigenmodes:
@@ -55,8 +52,7 @@ def eigenmodes(mass: Square, damping: Square, stiffness: Square, noise: tuple[Sq
     reached = np.abs(solve_triangular(lower, np.eye(len(mass)), lower=True))
     c, k = weighted(damping), weighted(stiffness)
     c_noise, k_noise = (_with_rounding(reached @ part @ reached.T, x) for part, x in zip(noise, (c, k), strict=True))
-    undamped = bool((np.abs(c) <= c_noise).all()) and is_symmetric(k, k_noise)
-    if undamped:
+    if (np.abs(c) <= c_noise).all() and is_symmetric(k, k_noise):  # shapes are real
         squares, weighted_shapes = np.linalg.eigh((k + k.T) / 2)
         squares = np.where(np.abs(squares) <= _along(weighted_shapes, k_noise, weighted_shapes), 0.0, squares)
         values = np.where(squares < 0, np.sqrt(np.abs(squares)), 1j * np.sqrt(np.abs(squares)))
@@ -69,7 +65,7 @@ def eigenmodes(mass: Square, damping: Square, stiffness: Square, noise: tuple[Sq
     shapes = shapes * np.conj(largest) / np.abs(largest)
     order = np.lexsort((np.real(values), np.abs(values)))
     vectors = solve_triangular(lower.T, shapes[:, order], lower=False)
-    return Eigenmodes(values[order], vectors, undamped)
+    return Eigenmodes(values[order], vectors)
 
 
 def is_symmetric(matrix: Square, noise: Square) -> bool:

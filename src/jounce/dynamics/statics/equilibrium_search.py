@@ -12,8 +12,8 @@ from jounce.base.shapes import Numbers
 from jounce.dynamics.forward.accelerations import Equations
 from jounce.dynamics.forward.initial_state import TOLERANCE
 from jounce.dynamics.masses import gravity_of, masses_of
-from jounce.dynamics.statics.independent_coordinates import OperatingPoint
-from jounce.dynamics.statics.variations import LEVELS, at_rest, clock_at, residuals_at, sizes_of_forces
+from jounce.dynamics.statics.operating_point import OperatingPoint, of_place
+from jounce.dynamics.statics.variations import at_rest, clock_at, residuals_at, sizes_of_forces
 from jounce.errors import SolveError
 from jounce.execution.compilation import compiled
 from jounce.jet import Jet
@@ -131,7 +131,7 @@ def _scale(point: OperatingPoint, stiffness: np.ndarray) -> float:
 
 def _stiffness(point: OperatingPoint) -> Float[np.ndarray, "direction direction"]:
     free = point.free
-    return free.T @ point.varied(np.stack([free, *[np.zeros_like(free)] * 2]))[0].sum(axis=0)
+    return free.T @ point.varied(of_place(free))[0].sum(axis=0)
 
 
 def _largest_load(point: OperatingPoint) -> float:
@@ -139,8 +139,8 @@ def _largest_load(point: OperatingPoint) -> float:
     borne = point.jacobian.T @ point.multipliers
     largest = [np.abs([*point.loads, borne]).max(initial=0.0)]
     if point.equations.system.forces:
-        unchanged = np.zeros((LEVELS, len(point.scale), 1))
-        sizes = sizes_of_forces(point.equations, point.coordinates, point.clock, point.changes(unchanged))
+        unchanged = point.changes(of_place(np.zeros((len(point.scale), 1))))
+        sizes = sizes_of_forces(point.equations, point.coordinates, point.clock, unchanged)
         for group, size in zip(point.equations.system.forces, sizes, strict=True):
             lever = point.model.length if group.element.unit == "N" else 1.0
             largest.append(np.abs(size).max(initial=0.0) * lever)

@@ -129,9 +129,9 @@ def _at_rest(motion: Motion) -> Motion:
 def _check_determined(forces: MotionForces, name: str) -> None:
     """Raise UnsupportedError, by the name of a friction, where holding forces do not follow from friction alone."""
     model, reasons = forces.model, []
-    if forces._joined.shape[0] != forces._joined.shape[1]:
+    if forces.joined.shape[0] != forces.joined.shape[1]:
         reasons.append("drivers do not hold all that can move: drive it, and look whether zero is within the range")
-    groups = forces._joined.groups
+    groups = forces.joined.groups
     if forces.flanks and not all(loses_torque(groups[k].element) for k in forces.friction.first_rows):
         reasons.append(
             "teeth press on either flank, which loads joints with friction: give gears without pressure_angle"

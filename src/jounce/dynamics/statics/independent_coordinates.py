@@ -13,11 +13,8 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
-from jounce.dynamics.statics.operating_point import Lanes, OperatingPoint as OperatingPoint, null_space as null_space
-from jounce.dynamics.statics.variations import (
-    LEVELS,
-    law_variations,
-)
+from jounce.dynamics.statics.operating_point import Lanes, OperatingPoint, null_space, of_place
+from jounce.dynamics.statics.variations import LEVELS, law_variations
 from jounce.errors import MechanismError, check_name
 from jounce.linear_algebra.host_jacobian import RANK_TOLERANCE
 from jounce.mechanism import Mechanism
@@ -151,10 +148,10 @@ def _check_nowhere(
     """
     gradients, inverse, basis, sizes = reduction
     count, chosen = len(point.scale), names[released:]
-    rows = point.varied(np.stack([np.eye(count), *[np.zeros((count, count))] * 2]))[1][0]
+    rows = point.varied(of_place(np.eye(count)))[1][0]
     directions = null_space(rows)
     directions = directions - basis @ (gradients @ directions) if len(gradients) else directions
-    changes = np.stack([directions, *[np.zeros_like(directions)] * 2])
+    changes = of_place(directions)
     for level in (1, 2):
         gaps = point.varied(changes)[1][level]
         measured = _measured(point, chosen, changes, level) if chosen else np.zeros((0, gaps.shape[1]))

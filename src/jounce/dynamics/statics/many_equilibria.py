@@ -7,7 +7,7 @@ import numpy as np
 from jounce.base.shapes import Real, Refused
 from jounce.dynamics.forward.initial_state import TOLERANCE
 from jounce.dynamics.statics.equilibrium_search import displaced, load_scale, rest_point, search
-from jounce.dynamics.statics.independent_coordinates import OperatingPoint
+from jounce.dynamics.statics.operating_point import OperatingPoint
 from jounce.dynamics.statics.static_equilibrium import Equilibrium, as_mechanism, at_rest_from, equilibrium_of
 from jounce.errors import MechanismError, whole_number
 from jounce.kinematics.assembly.axis_directions import axis_signs

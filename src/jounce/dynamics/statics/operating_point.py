@@ -9,7 +9,7 @@ from jaxtyping import Float
 
 from jounce.dynamics.forward.accelerations import Equations
 from jounce.dynamics.friction.coupling import pressing_teeth
-from jounce.dynamics.statics.variations import borne_at, loads_at, masses_at, output_variations, variations
+from jounce.dynamics.statics.variations import LEVELS, borne_at, loads_at, masses_at, output_variations, variations
 from jounce.linear_algebra.host_jacobian import RANK_TOLERANCE
 from jounce.mechanism import Mechanism, Model
 
@@ -115,7 +115,7 @@ class OperatingPoint:
     def output_gradients(self) -> dict[str, Float[np.ndarray, " column"]]:
         """Gradients, by the scaled coordinates, of the components of outputs that are positions or angles, by name."""
         count = len(self.scale)
-        varied = self.outputs_varied(np.stack([np.eye(count), *[np.zeros((count, count))] * 2]))
+        varied = self.outputs_varied(of_place(np.eye(count)))
         components = self.components([x.shape[1] for x in varied])
         groups = self.model.system.outputs
         return {name: varied[g][0, c, k] for name, (g, c, k) in components.items() if not groups[g].element.lost_orders}
@@ -134,6 +134,11 @@ class OperatingPoint:
         """Return the position of the output that a component belongs to in the order of the mechanism."""
         names = list(self.mechanism.outputs)
         return max(k for k, name in enumerate(names) if component == name or component.startswith(f"{name}_"))
+
+
+def of_place(columns: Float[np.ndarray, "column lane"]) -> Lanes:
+    """Return changes of the scaled coordinates alone, and of none of their rates."""
+    return np.stack([columns, *[np.zeros_like(columns)] * (LEVELS - 1)])
 
 
 def null_space(jacobian: Float[np.ndarray, "row column"]) -> Float[np.ndarray, "column direction"]:

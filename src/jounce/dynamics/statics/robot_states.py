@@ -11,7 +11,8 @@ from typing_extensions import TypeAliasType
 from jounce.base.shapes import ArrayLike
 from jounce.dynamics.forward.initial_state import TOLERANCE
 from jounce.dynamics.statics.equilibrium_search import driven, rest_point
-from jounce.dynamics.statics.independent_coordinates import OperatingPoint, chosen_outputs
+from jounce.dynamics.statics.independent_coordinates import chosen_outputs
+from jounce.dynamics.statics.operating_point import OperatingPoint
 from jounce.errors import RobotError, check_name
 from jounce.forces.actuators import SlideForce, SpatialTorque
 from jounce.kinematics.assembly.assemble import assemble

@@ -14,8 +14,9 @@ from jounce.dynamics.forward.initial_state import TOLERANCE
 from jounce.dynamics.inverse.outputs.components import JointForceOutput
 from jounce.dynamics.masses import check_loads
 from jounce.dynamics.statics.equilibrium_search import SearchResult, check_forces, remains, rest_point, search
-from jounce.dynamics.statics.independent_coordinates import OperatingPoint, Reduction, reduced
+from jounce.dynamics.statics.independent_coordinates import Reduction, reduced
 from jounce.dynamics.statics.kinks import kinked
+from jounce.dynamics.statics.operating_point import OperatingPoint
 from jounce.dynamics.statics.robot_states import standing
 from jounce.dynamics.statics.stability import Verdict, judged
 from jounce.errors import MechanismError, RobotError, SolveError, check_choice, check_name, flag

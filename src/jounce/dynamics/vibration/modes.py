@@ -7,7 +7,7 @@ import numpy as np
 from jaxtyping import Complex, Float
 
 from jounce.base.display import Displayed
-from jounce.dynamics.statics.eigenmodes import Eigenmodes, eigenmodes
+from jounce.dynamics.statics.eigenmodes import eigenmodes
 from jounce.dynamics.statics.independent_coordinates import COLUMNS, Reduction
 from jounce.dynamics.vibration.mode_motion import checked_amplitude, mode_motion
 from jounce.errors import MechanismError, whole_number
@@ -40,8 +40,8 @@ class Modes(Displayed):
     def __init__(self, reduction: Reduction):
         self._reduction = reduction
         mass, damping, stiffness = (reduction.part(level) for level in (2, 1, 0))
-        solved: Eigenmodes = eigenmodes(mass, damping, stiffness, (reduction.noise(1), reduction.noise(0)))
-        self.eigenvalues, self.shapes, self.undamped = solved
+        noise = reduction.noise(1), reduction.noise(0)
+        self.eigenvalues, self.shapes = eigenmodes(mass, damping, stiffness, noise)
         self.coordinates, self.bodies = reduction.names, reduction.point.model.bodies
 
     def __len__(self) -> int:

@@ -12,8 +12,9 @@ from jounce.dynamics.friction.coupling import check_no_friction, check_unique_pr
 from jounce.dynamics.masses import gravity_of, masses_of, required_masses
 from jounce.dynamics.motion_values import cut
 from jounce.dynamics.statics.equilibrium_search import BALANCED, SearchResult, remains
-from jounce.dynamics.statics.independent_coordinates import OperatingPoint, Reduction, reduced, with_joints
+from jounce.dynamics.statics.independent_coordinates import Reduction, reduced, with_joints
 from jounce.dynamics.statics.kinks import kinked
+from jounce.dynamics.statics.operating_point import OperatingPoint
 from jounce.dynamics.statics.robot_states import DRIVE, GivenState, through_state
 from jounce.dynamics.statics.static_equilibrium import Equilibrium, equilibrium
 from jounce.dynamics.statics.variations import clock_at

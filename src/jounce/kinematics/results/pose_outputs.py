@@ -17,7 +17,7 @@ from jounce.mechanism import AbstractOutput, AbstractQuantity, Mechanism, Model
 from jounce.mechanism.building.builder import counted_as_in
 from jounce.mechanism.mechanism import GROUND
 from jounce.mechanism.system import POSITION_COMPONENTS, Group, group_elements
-from jounce.mechanism.transmissions.axis_angles import angles_along, at_lanes, with_turns
+from jounce.mechanism.transmissions.axis_angles import angles_at, at_lanes, with_turns
 
 
 def check_output(output: AbstractQuantity, mechanism: Mechanism, name: str = "output") -> None:
@@ -53,10 +53,9 @@ def series_along(
     groups: tuple[Group, ...], coordinates: dict[str, Any], count: int, pose_type: type
 ) -> tuple[Float[Numbers, "_ _ _ batch"], ...]:
     """Return what `output_series` does for so many instants, whose turns of angles about axes the groups hold."""
-    angles = angles_along(groups)
 
     def lanes_of(lanes: np.ndarray) -> Any:
-        return {name: part[..., lanes] for name, part in coordinates.items()}, angles(lanes)
+        return {name: part[..., lanes] for name, part in coordinates.items()}, angles_at(groups, lanes)
 
     return _of_instant.at_instants(at_lanes(groups, np.zeros(1, int)), lanes_of, count, pose_type=pose_type)[0]
 

@@ -169,14 +169,14 @@ def _with_data(groups: Sequence[Group], values: Sequence[Any], put: Callable[[Da
     return tuple(holding(g, "datum", put(g.element.datum, next(remaining))) if measures_angle(g) else g for g in groups)
 
 
-def angles_along(groups: Sequence[Group]) -> Callable[[Int[np.ndarray, " lane"]], tuple[Any, ...]]:
-    """Return what gives the angles about axes that groups measure, with their turns, for some lanes of a batch."""
-    return lambda lanes: tuple(group.element.datum.near[..., lanes] for group in groups if measures_angle(group))
+def angles_at(groups: Sequence[Group], lanes: Int[np.ndarray, " lane"]) -> tuple[Any, ...]:
+    """Return the angles about axes that groups measure, with their turns, for some lanes of a batch."""
+    return tuple(group.element.datum.near[..., lanes] for group in groups if measures_angle(group))
 
 
 def at_lanes(groups: Sequence[Group], lanes: Int[np.ndarray, " lane"]) -> tuple[Group, ...]:
     """Return groups whose angles about axes have the turns of a whole batch, for some of its lanes."""
-    return with_turns(groups, angles_along(groups)(lanes))
+    return with_turns(groups, angles_at(groups, lanes))
 
 
 def _with_datum(group: Group, coordinates: Coordinates, prescribed: Sequence[PrescribedAngle], *, keep: bool) -> Group:
