@@ -8,7 +8,7 @@ import numpy as np
 
 from jounce.base.activity import Count
 from jounce.base.shapes import ArrayLike, is_traced
-from jounce.errors import RobotError, UnsupportedError, check_name, flag
+from jounce.errors import JounceError, MechanismError, RobotError, UnsupportedError, check_name, did_you_mean, flag
 from jounce.integrate.marching.exact_numbers import ExactNumbers
 from jounce.integrate.marching.joint_events import JointEvent, JointEventDetector
 from jounce.integrate.marching.marching import Outcome, RunLimits, steps_between_looks
@@ -43,8 +43,21 @@ class RobotOptions(TypedDict, total=False):
     wrenches: Sequence[Wrench]
 
 
+ROBOT_OPTIONS = tuple(RobotOptions.__annotations__)
+
+
 class RobotSimulationOptions(SimulationOptions, RobotOptions, total=False):
     """All options of `jounce.simulate` for robots."""
+
+
+def check_robot_options(mechanism: object, given: Mapping[str, Any]) -> None:
+    """Raise JounceError for an option that there is not, or that belongs to simulations of robots only."""
+    for name in given:
+        if name not in ROBOT_OPTIONS:
+            raise JounceError(f"simulate has no such option; {did_you_mean(name, ROBOT_OPTIONS)}", name=name)
+        if not isinstance(mechanism, Robot):
+            message = "belongs to simulations of robots in joint coordinates; a mechanism has forces and `initial`"
+            raise MechanismError(message, name=name)
 
 
 def simulate_robot(

@@ -11,7 +11,6 @@ from jounce.base.padding import power_of_two
 from jounce.base.shapes import ArrayLike
 from jounce.dynamics.forward.accelerations import State
 from jounce.dynamics.forward.initial_state import consistent_start, initial_as_drivers
-from jounce.errors import MechanismError
 from jounce.execution.backends import joined
 from jounce.execution.threads import Threads, thread_count
 from jounce.integrate.marching.marching import (
@@ -35,7 +34,7 @@ from jounce.integrate.results.batch import Batch
 from jounce.integrate.results.robot_sensitivities import of_traced_robots
 from jounce.integrate.results.simulation import derivatives_of_motion
 from jounce.integrate.robot_batch import simulate_robots, traced_robot_batch
-from jounce.integrate.simulate_robot import RobotOptions
+from jounce.integrate.simulate_robot import RobotOptions, check_robot_options
 from jounce.integrate.steps.events import pose_coordinates
 from jounce.integrate.steps.methods import AbstractMethod
 from jounce.integrate.steps.options import checked_options, instants_of
@@ -115,12 +114,10 @@ def simulate_batch(
     >>> jn.simulate_batch(pendulum, {"lift": [0.1, 0.2, 0.3]}, [0.0, 0.5]).outputs["angle"].shape
     (3, 2, 5)
     """
+    check_robot_options(mechanism, robot)
     if isinstance(mechanism, Robot):
         options: Any = {"method": method, "tolerance": tolerance, "longest_step": longest_step, **robot}
         return simulate_robots(mechanism, parameters, time, order, **options)
-    for name in robot:
-        message = "belongs to simulations of robots in joint coordinates; a mechanism has forces and `initial`"
-        raise MechanismError(message, name=name)
     check_mechanism(mechanism)
     check_without_ends(mechanism, "a batch of simulations")
     values = checked_values(parameters, "run", functools.partial(check_parameter, mechanism))
@@ -219,11 +216,11 @@ class _Runs:
         """Return runs in chunks of one size; the last chunk repeats its last run."""
         return [runs[np.minimum(np.arange(k, k + self.width), len(runs) - 1)] for k in range(0, len(runs), self.width)]
 
-    def depart(self, runs: np.ndarray, state: State, angles: Turns) -> None:
+    def depart(self, runs: np.ndarray, state: State, of_forces: Turns, of_outputs: Turns) -> None:
         """Set runs off from states on the constraints, with the turns that angles about axes have there."""
-        equations, time = self._made.at(runs)[0].near(angles.forces), np.full(len(runs), self.instants[0])
+        equations, time = self._made.at(runs)[0].near(of_forces), np.full(len(runs), self.instants[0])
         current = unexpanded(equations, state, time, order=self.method.expansion_order(float(self.limits.tolerance)))
-        current, begun = jax.tree.map(np.asarray, current), dict(zip(self._measuring, angles.outputs, strict=True))
+        current, begun = jax.tree.map(np.asarray, current), dict(zip(self._measuring, of_outputs, strict=True))
         if self._current is None:
             self._current = jax.tree.map(lambda x: np.zeros((*x.shape[:-1], len(self.steps)), x.dtype), current)
             self._turns = {which: np.zeros((len(angle), len(self.steps))) for which, angle in begun.items()}

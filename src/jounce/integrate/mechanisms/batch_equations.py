@@ -2,12 +2,12 @@
 
 import dataclasses
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Bool
+from jaxtyping import Bool, Float
 
 from jounce.constraints.base import value_fields
 from jounce.dynamics.forward.accelerations import Equations, State
@@ -36,17 +36,8 @@ STAGES = 8  # in which parameters go from those of the first run to their own, s
 LARGEST_STAGE = 0.5  # rad, by which a driver may turn in a stage: angles about axes count their turns on the way
 
 
-class Turns(NamedTuple):
-    """Angles about axes that forces and outputs measure at the start of runs, with their turns, rad.
-
-    Attributes
-    ----------
-    forces, outputs : tuple of array of shape (instances, runs)
-        For each group that measures some.
-    """
-
-    forces: tuple[np.ndarray, ...]
-    outputs: tuple[np.ndarray, ...]
+Turns = tuple[Float[np.ndarray, "instance run"], ...]
+"""Angles about axes with their turns, rad, for each group that measures some."""
 
 
 class ParametricMechanism:
@@ -170,8 +161,8 @@ class BatchStart:
             largest = max(largest, float(np.max(np.abs(law - law[:, :1]))))
         return largest if np.isfinite(largest) else 0.0
 
-    def of(self, runs: np.ndarray) -> tuple[State, Turns]:
-        """Return the states of some runs, and the angles about axes there."""
+    def of(self, runs: np.ndarray) -> tuple[State, Turns, Turns]:
+        """Return the states of some runs, and the angles about axes that forces and outputs measure there."""
         equations, outputs = self._made.at(runs)
         measuring = [group for group in (*equations.system.forces, *outputs) if measures_angle(group)]
         angles = [np.broadcast_to(group.element.datum.near, (group.instances, len(runs))) for group in measuring]
@@ -185,13 +176,12 @@ class BatchStart:
                 raw = raw_angles(measuring, {"quaternion": coordinates["quaternion"][0]})
                 angles = [brought_near(angle, near) for near, angle in zip(angles, raw, strict=True)]
         count = len([group for group in equations.system.forces if measures_angle(group)])
-        turns = Turns(tuple(angles[:count]), tuple(angles[count:]))
-        start = jax.tree.map(np.array, (state, turns))
+        start = jax.tree.map(np.array, (state, tuple(angles[:count]), tuple(angles[count:])))
         for run in np.unique(runs[~together]).tolist():
             self._put_one(start, runs == run, run)
         return start
 
-    def _put_one(self, starts: tuple[State, Turns], lanes: Bool[np.ndarray, " lane"], run: int) -> None:
+    def _put_one(self, starts: tuple[State, Turns, Turns], lanes: Bool[np.ndarray, " lane"], run: int) -> None:
         """Put a run to which no way from the first leads together from its own guess; NaN where that fails."""
         try:
             start = consistent_start(self._parametric.varied(self._rows[run].tolist()), self._instant)

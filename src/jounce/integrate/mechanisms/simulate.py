@@ -2,7 +2,7 @@
 
 import dataclasses
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, Unpack, overload
+from typing import Unpack, overload
 
 import jax
 import numpy as np
@@ -11,7 +11,7 @@ from jounce.base.activity import Count
 from jounce.constraints import AbstractConstraint
 from jounce.dynamics.forward.ground import with_ground
 from jounce.dynamics.forward.initial_state import ConsistentStart, consistent_start
-from jounce.errors import JounceError, MechanismError, SolveError, did_you_mean
+from jounce.errors import JounceError, MechanismError, SolveError
 from jounce.execution.backends import joined
 from jounce.execution.store.programs import expect
 from jounce.integrate.marching.marching import RunLimits
@@ -21,7 +21,7 @@ from jounce.integrate.results.robot_sensitivities import of_traced_robots, trace
 from jounce.integrate.results.robot_simulation import RobotSimulation
 from jounce.integrate.results.sensitivities import traced_simulation
 from jounce.integrate.results.simulation import Simulation
-from jounce.integrate.simulate_robot import RobotOptions, RobotSimulationOptions, simulate_robot
+from jounce.integrate.simulate_robot import RobotOptions, RobotSimulationOptions, check_robot_options, simulate_robot
 from jounce.integrate.steps.events import Event, EventDetector
 from jounce.integrate.steps.methods import AbstractMethod
 from jounce.integrate.steps.options import SimulationOptions, checked_options, instants_of
@@ -34,8 +34,6 @@ from jounce.mechanism.building.preconditions import concrete_or
 from jounce.mechanism.laws.law_checks import check_laws
 from jounce.mechanism.time import TimeLike
 from jounce.robot import Robot
-
-ROBOT_OPTIONS = tuple(RobotOptions.__annotations__)
 
 
 @overload
@@ -144,7 +142,9 @@ def simulate(
         raise MechanismError("must be a function of two numbers", name="progress", value=progress)
     if not isinstance(events, Sequence):
         raise MechanismError("must be a list of jn.Event", name="events", value=events)
-    _check_names(mechanism, robot, initial)
+    check_robot_options(mechanism, robot)
+    if isinstance(mechanism, Robot) and initial is not None:
+        raise JounceError("belongs to simulations of mechanisms; a robot begins in a `state`", name="initial")
     if isinstance(mechanism, Robot):
         options = {"method": method, "tolerance": float(tolerance), "longest_step": float(longest_step)}
         options |= {"events": events, "strict": strict, "progress": progress}
@@ -180,18 +180,6 @@ def simulate(
     if strict and run.stopped_at is None:
         raise_for_status(simulation)
     return simulation
-
-
-def _check_names(mechanism: Mechanism | Robot, given: Mapping[str, Any], initial: object) -> None:
-    """Raise JounceError for an option that there is not, or that belongs to simulations of the other kind."""
-    for name in given:
-        if name not in ROBOT_OPTIONS:
-            raise JounceError(f"simulate has no such option; {did_you_mean(name, ROBOT_OPTIONS)}", name=name)
-        if not isinstance(mechanism, Robot):
-            message = "belongs to simulations of robots in joint coordinates; a mechanism has forces and `initial`"
-            raise MechanismError(message, name=name)
-    if isinstance(mechanism, Robot) and initial is not None:
-        raise JounceError("belongs to simulations of mechanisms; a robot begins in a `state`", name="initial")
 
 
 def _check_event(event: object, mechanism: Mechanism) -> None:
