@@ -30,18 +30,18 @@ def marched(ready, method, stop, tolerance, longest=np.inf, *, lanes=1, instant=
     """Run from the start of a mechanism to a time; `longest` holds the largest steps of the runs side by side."""
     order = method.expansion_order(tolerance)
     current = unexpanded(ready.equations, widened(ready.state, lanes), np.full(lanes, instant), order=order)
-    current, tried = onwards(ready, method, current, stop, tolerance, longest)
+    current, tried = onwards(ready, method, current, stop, tolerance, longest, instant=instant)
     return current, tried - 1  # the first expands the motion
 
 
-def onwards(ready, method, current, stop, tolerance, longest=np.inf):
-    """Go on from where other runs are to a time; return where they then are and the number of steps tried."""
+def onwards(ready, method, current, stop, tolerance, longest=np.inf, *, instant=0.0):
+    """Go on from where runs are that began at an instant; return where they then are and the number of steps tried."""
     arrived = np.asarray(current.outcome) == Outcome.ARRIVED
     running = np.where(arrived, int(Outcome.RUNNING), current.outcome)
     current, _, tried = march_side_by_side(
         ready.equations,
         current._replace(outcome=running),
-        RunLimits(stop, tolerance, jnp.broadcast_to(jnp.asarray(longest, float), current.time.shape)),
+        RunLimits(stop, tolerance, jnp.broadcast_to(jnp.asarray(longest, float), current.time.shape), instant),
         method=method,
         count=COUNT,
     )

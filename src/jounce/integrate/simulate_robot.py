@@ -91,8 +91,8 @@ def simulate_robot(
     if not isinstance(method, Taylor):
         raise RobotError("robots are simulated by jn.Taylor", name="method", value=type(method).__name__)
     longest = longest_step if method.step is None else method.step
-    limits = RunLimits(*map(np.float64, (instants[-1], tolerance, longest)))
-    run = RobotRun(problem, start, float(instants[0]), method.expansion_order(tolerance) - 1, limits, detectors)
+    limits = RunLimits(*map(np.float64, (instants[-1], tolerance, longest, instants[0])))
+    run = RobotRun(problem, start, method.expansion_order(tolerance) - 1, limits, detectors)
     with Count("simulating", report=progress) as tell:
         run.go(instants, tell)
     outcome = run.ending, run.happened, tuple(wrenches), run.backends
@@ -158,22 +158,21 @@ class RobotRun(AbstractRun):
         self,
         problem: RobotProblem,
         start: RobotState,
-        instant: float,
         order: int,
         limits: RunLimits,
         detectors: list[JointEventDetector],
     ):
         running, none, nothing = np.asarray(int(Outcome.RUNNING)), np.asarray(0), np.zeros(1)
-        begun = Progress(np.array([instant]), start, running, none, none, nothing, nothing)
+        begun = Progress(np.array([limits.start]), start, running, none, none, nothing, nothing)
         super().__init__(begun, limits, detectors)
-        self.problem, self.begun, self.tried = problem, np.float64(instant), 0
+        self.problem, self.tried = problem, 0
         count = steps_between_looks((order + 2) * 2 * len(problem.scale), watched=bool(detectors))
         self._settings: Any = {"order": order, "count": count, "exact": ExactNumbers.of_parallel(problem.equations)}
 
     def attempted(self) -> tuple[Any, tuple[Any, Any], Any]:
         """See `AbstractRun`."""
         try:
-            current, steps, count = march_robot(self.problem, self.current, self.begun, self.limits, **self._settings)
+            current, steps, count = march_robot(self.problem, self.current, self.limits, **self._settings)
         except TypeError as error:
             if "has no rule for Taylor series" not in str(error):
                 raise
@@ -187,7 +186,7 @@ class RobotRun(AbstractRun):
     def standing(self) -> RobotSteps:
         """See `AbstractRun`."""
         at_rest = jax.tree.map(lambda x: np.asarray(x)[None, None, :, 0], self.current.state)
-        return RobotSteps(np.array([self.begun]), np.zeros(1), at_rest, np.zeros(1, bool))
+        return RobotSteps(np.array([self.limits.start]), np.zeros(1), at_rest, np.zeros(1, bool))
 
     def explained(self) -> tuple[Status, str]:
         """See `AbstractRun`."""

@@ -23,7 +23,7 @@ def test_what_a_run_begins_with_is_compiled_for_once():
     equations, state = start.equations, start.state
     begun = jax.eval_shape(lambda: unexpanded(equations, state, np.zeros(1), order=4))
     going = partial(march.function, method=jn.Taylor(4), count=1)
-    onwards = jax.eval_shape(going, equations, begun, RunLimits(1.0, 1e-9, np.inf))[0]
+    onwards = jax.eval_shape(going, equations, begun, RunLimits(1.0, 1e-9, np.inf, 0.0))[0]
     assert jax.tree.structure(begun) == jax.tree.structure(onwards)
     kinds = [[(x.shape, x.dtype, x.weak_type) for x in jax.tree.leaves(part)] for part in (begun, onwards)]
     assert kinds[0] == kinds[1]

@@ -56,8 +56,6 @@ class IntegratorState(NamedTuple):
     expansion: Expansion
     refused: Indices  # number of steps refused from here, one after the other
     outcome: Indices  # see Outcome
-    drift: Lanes  # largest distance from the constraints before a projection, rad or sizes of the mechanism
-    begun: Lanes  # when the runs began, s
     mobility: Float[Numbers, "body batch"]  # how readily forces move the bodies here, as `mobility_of` gives it
     singular: Flags  # whether the equations of motion are near to singular here
     blocked: Indices  # index of the force or law over which no step is possible from here, or -1
@@ -74,6 +72,7 @@ class RunLimits(NamedTuple):
     stop: Number  # s; steps end there exactly
     tolerance: Number  # of the error of a step, rad or sizes of the mechanism
     longest: Number | Float[Numbers, "*batch"]  # step, s
+    start: Number  # when they began, s
 
 
 class DenseOutput(NamedTuple):
@@ -119,8 +118,6 @@ def unexpanded(equations: Equations, state: State, time: Lanes, *, order: int) -
         expansion=expansion,
         refused=none,
         outcome=np.full(time.shape, int(Outcome.UNEXPANDED)),
-        drift=nothing,
-        begun=time,
         mobility=np.zeros((bodies + 1, lanes)),
         singular=np.zeros(time.shape, bool),
         blocked=np.full(time.shape, -1),
@@ -232,15 +229,15 @@ def _attempt(
     equations: Equations, current: IntegratorState, limits: RunLimits, method: AbstractMethod
 ) -> Callable[[IntegratorState], tuple[IntegratorState, tuple[DenseOutput, Any]]]:
     """Return what tries a step of each run that has not ended, with the arguments of `march`."""
-    stop, tolerance, longest = limits
-    length = equations.system.column_scale[0]
+    stop, tolerance, longest, started = limits
+    length, duration = equations.system.column_scale[0], jnp.abs(stop - started)
     order, bodies = len(current.expansion.state.position) - 1, current.expansion.state.position.shape[2]
     here = current.expansion.state.map(lambda part: part[0])
     checked = method.controlled and energy_balance.is_balanced(equations, here, current.time[None])
 
     def attempt(current: IntegratorState) -> tuple[IntegratorState, tuple[DenseOutput, Any]]:
         running, opening = (current.outcome == int(x) for x in (Outcome.RUNNING, Outcome.UNEXPANDED))
-        left, duration = stop - current.time - current.rest, jnp.abs(stop - current.begun)
+        left = stop - current.time - current.rest
 
         # how long the step is: as the series carries, and as what lies ahead permits
         usual = SHORT * current.longest
@@ -306,8 +303,6 @@ def _attempt(
             expansion=expansion,
             refused=jnp.zeros_like(current.refused),
             outcome=outcome,
-            drift=jnp.where(opening, current.drift, jnp.maximum(current.drift, distance)),
-            begun=current.begun,
             mobility=lookahead.mobility_of(equations, inverse),
             singular=near_singular(equations, inverse),
             blocked=jnp.where(short > 0, limiting, -1),
@@ -352,7 +347,7 @@ def room_for_steps(
     return jax.tree.map(lambda part: jnp.zeros((count, *part.shape), part.dtype), room)
 
 
-def _lasting(kick: Lanes, step: Lanes, duration: Lanes, bound: Lanes, current: IntegratorState) -> Flags:
+def _lasting(kick: Lanes, step: Lanes, duration: Number, bound: Lanes, current: IntegratorState) -> Flags:
     """Tell where a kink at the beginning of a step kicks bodies so that they move by more than is harmless in the run.
 
     What is left of it in the accelerations at the end is no next term of a series there: `kick` is the displacement

@@ -235,7 +235,6 @@ def _sizes(problem: RobotProblem, polynomial: RobotState) -> Any:
 def march_robot(
     problem: RobotProblem,
     current: Progress,
-    begun: Any,
     limits: RunLimits,
     *,
     order: int,
@@ -250,8 +249,6 @@ def march_robot(
         What moves the robot.
     current : Progress
         Where to go on from.
-    begun : float
-        When the run began, s.
     limits : RunLimits
         Where it goes, and in what steps.
     order : int
@@ -270,8 +267,8 @@ def march_robot(
         How many of them there are.
     """
     problem, still = (problem, None) if exact is None else (problem.made_for(exact), problem.still(exact))
-    stop, tolerance, longest = limits
-    duration = jnp.abs(stop - begun)
+    stop, tolerance, longest, started = limits
+    duration = jnp.abs(stop - started)
     points = SMOOTH_POINTS if problem.smooth else POINTS
 
     small = 9 * problem.equations.tree.shape.bodies <= LARGE  # axes of all bodies, as single numbers

@@ -44,7 +44,7 @@ class AbstractRun(abc.ABC):
 
     def __init__(self, current: Any, limits: RunLimits, detectors: Sequence[AbstractDetector]):
         self.current, self.limits, self.detectors = current, limits, detectors
-        self.direction = np.sign(limits.stop - current.time.item())  # of time
+        self.direction = np.sign(limits.stop - limits.start)  # of time
         self.happened: list[list[float]] = [[] for _ in detectors]
         self.stopped_at: float | None = None
         self.ending = (Status.OK, "")

@@ -132,7 +132,7 @@ def simulate_batch(
     if first.initial:
         model, _ = with_reference(build(initial_as_drivers(first)), nominal.model.reference, float(instants[0]))
         begun = ParametricMechanism(initial_as_drivers(first), model, names)
-    limits = RunLimits(instants[-1], float(tolerance), float(longest_step))
+    limits = RunLimits(instants[-1], float(tolerance), float(longest_step), instants[0])
     runs = _Runs(parametric, rows, instants, order, limits, method)
 
     starts = BatchStart(parametric, begun, nominal.state, rows, float(instants[0]))
@@ -174,7 +174,7 @@ class _Runs:
         self.steps, self.backends = np.zeros(len(rows), int), set[str]()
         self._made = parametric.of(rows)
         self._reached = np.zeros((len(rows), len(instants)), bool)
-        self._direction = 1.0 if instants[-1] >= instants[0] else -1.0
+        self._direction = np.sign(limits.stop - limits.start)
         self._expansion = max(derivatives_of_motion(parametric.mechanism, order), 2)  # two, by which turns are counted
         self._current: Any = None
         self._values: dict[int, np.ndarray] = {}  # of each group, (runs, time, order + 1, components, outputs)

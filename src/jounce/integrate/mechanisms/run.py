@@ -34,15 +34,14 @@ class MechanismRun(AbstractRun):
     def __init__(
         self,
         start: ConsistentStart,
-        instant: float,
         method: AbstractMethod,
         limits: RunLimits,
         detectors: Sequence[EventDetector],
         *,
         watched: bool,
     ):
-        order = method.expansion_order(float(limits.tolerance))
-        super().__init__(unexpanded(start.equations, start.state, np.array([instant]), order=order), limits, detectors)
+        order, instant = method.expansion_order(float(limits.tolerance)), np.array([limits.start])
+        super().__init__(unexpanded(start.equations, start.state, instant, order=order), limits, detectors)
         self.start = start
         self._settings = march_settings(start.equations, self.current, method, watched=watched)
 
@@ -70,7 +69,7 @@ class MechanismRun(AbstractRun):
         current = self.current
         series, time = current.expansion.state, current.time.item()
         here = dataclasses.replace(self.start, equations=self.start.equations.near(current.angles))
-        onwards = self.direction * AHEAD * max(abs(time), abs(time - current.begun.item()))
+        onwards = self.direction * AHEAD * max(abs(time), abs(time - self.limits.start))
         ahead = evaluated(series.map(lambda part: part[:2]), np.array([onwards]))
         for state, instant in ((series.map(lambda part: part[0]), time), (ahead, time + onwards)):
             finite = all(np.isfinite(part).all() for part in state)

@@ -159,7 +159,7 @@ def simulate(
     for event in events:
         _check_event(event, mechanism)
     first = float(instants[0])
-    limits = RunLimits(instants[-1], float(tolerance), float(longest_step))
+    limits = RunLimits(instants[-1], float(tolerance), float(longest_step), first)
 
     def prepare(model: Model) -> None:
         prepare_run(mechanism, model, instants, order, method, limits, watched=bool(events))
@@ -170,7 +170,7 @@ def simulate(
     watched = [*events, *_events_at_ends(start)]
     detectors = [_detector_of(event, mechanism, start) for event in watched]
     prepare(start.model)
-    run = MechanismRun(start, first, method, limits, detectors, watched=bool(events))
+    run = MechanismRun(start, method, limits, detectors, watched=bool(events))
     with Count("simulating", report=progress) as tell:
         run.go(instants, tell)
     run.note_ends(len(events))
