@@ -266,7 +266,9 @@ def _attempt(
         arrived = method.arrive(there, start, current.time, step)
         state, distance, inverse = projected(there, arrived, time[None])
         state = jax.tree.map(lambda a, b: jnp.where(opening, a, b), arrived, state)  # it is on the constraints already
-        expansion = _without_unused(expand(there, state, time[None], order, inverse))
+        expansion = expand(there, state, time[None], order, inverse)
+        acceleration, multipliers = expansion.acceleration[:1], expansion.multipliers[:1]  # no step needs their rates
+        expansion = expansion._replace(acceleration=acceleration, multipliers=multipliers)
         error = method.error(start, expansion, step, length)
         polynomial = method.polynomial(start, expansion, step)
 
@@ -356,11 +358,6 @@ def _lasting(kick: Lanes, step: Lanes, duration: Number, bound: Lanes, current: 
     duration = jnp.maximum(duration, jnp.abs(step))
     moved = kick * duration / jnp.maximum(jnp.abs(step), SHORTEST * duration)
     return (moved > jnp.maximum(bound, HARMLESS)) & (jnp.abs(step) > SHORTEST * duration) & ~current.singular
-
-
-def _without_unused(expansion: Expansion) -> Expansion:
-    """Return an expansion without what steps do not need."""
-    return expansion._replace(acceleration=expansion.acceleration[:1], multipliers=expansion.multipliers[:1])
 
 
 def _finite(expansion: Expansion) -> Flags:

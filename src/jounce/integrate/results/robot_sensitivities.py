@@ -26,6 +26,7 @@ from jounce.integrate.marching.force_discontinuities import with_value
 from jounce.integrate.marching.robot_marching import RobotProblem
 from jounce.integrate.marching.robot_state import RobotState, at, polynomial_of, start_levels
 from jounce.integrate.results.robot_simulation import RobotSimulation
+from jounce.integrate.results.simulation import steps_of
 from jounce.integrate.steps.host_calls import recorded
 from jounce.jet.derivatives import plain_derivatives
 from jounce.rigid.inertia import Inertia, TracedInertia
@@ -117,11 +118,9 @@ def traced_robot_motion(
     start, length = _divided(known, simulation)
     first = jax.tree.map(lambda x: jnp.asarray(x)[0, 0, :, None], simulation.steps.polynomial)
     first = _begun(robot, problem, first, options.get("state"))
-    direction = 1.0 if length[0] >= 0 else -1.0
     instants = simulation.time
-    which = np.searchsorted(direction * start, direction * instants, side="right") - 1
-    which = np.clip(which, 0, len(start) - 1)
-    since = np.clip(direction * (instants - start[which]), 0.0, None) * direction
+    _, which = steps_of(simulation.steps._replace(start=start, length=length), instants)
+    since = instants - start[which]
     levels = max(simulation.order - 2, 0)
     more = -len(start) % PADDED  # steps of no length
     whole = np.append(start, np.full(more, start[-1] + length[-1])), np.append(length, np.zeros(more))

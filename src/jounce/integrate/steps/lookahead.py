@@ -19,7 +19,7 @@ from jounce.dynamics.forward.accelerations import Equations, Flags, Indices, Ins
 from jounce.dynamics.forward.ground import with_ground
 from jounce.integrate.steps.events import INTERPOLATION, NODES
 from jounce.integrate.steps.exact_programs import is_plain
-from jounce.integrate.steps.methods import MARGIN, evaluated
+from jounce.integrate.steps.methods import MARGIN, Number, evaluated
 from jounce.integrate.steps.revolution_counts import Angles
 from jounce.jet import Jet
 from jounce.mechanism import Model
@@ -112,7 +112,7 @@ def look_ahead(
     mobility: BodyMobility,
     time: Lanes,
     step: Lanes,
-    duration: Lanes,
+    duration: Number,
     bound: Lanes,
     shortest: Lanes,
 ) -> Lookahead:
@@ -130,7 +130,7 @@ def look_ahead(
         As `mobility_of` gives it.
     time, step : array of shape (batch,)
         Where the step begins, and its length, negative backward in time, s.
-    duration : array of shape (batch,)
+    duration : float
         Of the whole run, s: the longer the step in it, the more points it is looked at.
     bound : array of shape (batch,)
         By how much a body may move otherwise than seen, rad or sizes of the mechanism.
@@ -232,7 +232,7 @@ class _Signals:
         jump = jnp.where(index < forces, jnp.finfo(float).max, jnp.maximum(JUMP, bound)[None])
         return jnp.where(short[None], jump, least)
 
-    def departure(self, step: Lanes, duration: Lanes, mobility: BodyMobility) -> tuple[Signals, Signals]:
+    def departure(self, step: Lanes, duration: Number, mobility: BodyMobility) -> tuple[Signals, Signals]:
         """Return how far forces and laws are from the polynomials through the nodes of a step, and what that moves.
 
         Of joints, how far they are from being fulfilled. What may be rounding is taken off. The second is in rad or
