@@ -1,31 +1,25 @@
 """Where a mechanism can stand still: positions of equilibrium by a damped Newton method along the constraints."""
 
 import dataclasses
-from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
 from jaxtyping import Float
 
 from jounce.base.modules import with_fields
-from jounce.base.shapes import Numbers
 from jounce.dynamics.forward.accelerations import Equations
-from jounce.dynamics.forward.initial_state import TOLERANCE
 from jounce.dynamics.masses import gravity_of, masses_of
 from jounce.dynamics.statics.operating_point import OperatingPoint, of_place
 from jounce.dynamics.statics.variations import at_rest, clock_at, residuals_at, sizes_of_forces
 from jounce.errors import SolveError
-from jounce.execution.compilation import compiled
 from jounce.jet import Jet
 from jounce.kinematics import Status
-from jounce.kinematics.assembly.gauss_newton import assemble_from_guess
 from jounce.kinematics.assembly.initial_revolutions import Coordinates
 from jounce.linear_algebra.host_jacobian import RANK_TOLERANCE
 from jounce.mechanism import Mechanism, Model
 from jounce.mechanism.building.builder import with_reference
 from jounce.mechanism.building.element_indices import force_names
 from jounce.mechanism.building.starting_guess import pose_at
-from jounce.rigid.pose import Pose
 
 MAX_STEPS = 300
 LONGEST = 0.25  # rad or sizes of the mechanism, of a step
@@ -63,8 +57,8 @@ def rest_point(mechanism: Mechanism, model: Model, coordinates: Coordinates, ins
 
 def driven(point: OperatingPoint) -> OperatingPoint:
     """Return a mechanism that its drivers hold whole with the velocities and accelerations that their laws give."""
-    instant, coordinates = float(point.clock[0, 0, 0]), {name: x.copy() for name, x in point.coordinates.items()}
-    clock, shifts = clock_at(instant, stopped=False), point.model.pose_type.shifts
+    coordinates = {name: x.copy() for name, x in point.coordinates.items()}
+    clock, shifts = clock_at(point.instant, stopped=False), point.model.pose_type.shifts
     for level in (1, 2):  # the residual of each order is affine in the coordinates of that order
         gaps = np.asarray(residuals_at(point.equations, coordinates, clock))[level]
         column = np.linalg.lstsq(point.jacobian, -gaps, rcond=RANK_TOLERANCE)[0]
@@ -195,38 +189,22 @@ def _moved(point: OperatingPoint, step: Float[np.ndarray, " column"]) -> Operati
 
     Angles about axes go on from those before the step, and so count their turns.
     """
-    model, instant = point.model, float(point.clock[0, 0, 0])
-    change = point.changes(np.broadcast_to(step[None, :, None], (1, len(step), 1)))[0]
-    shifts = model.pose_type.shifts
-    coordinates = {name: x[0] for name, x in point.coordinates.items() if name != "angular_velocity"}
-    moved = displaced(coordinates, change[:shifts], change[shifts:], model.pose_type)
-    coordinates = {name: np.asarray(x) for name, x in moved.items()}
-    if model.rows:
-        trial = assemble_from_guess(model, instant, TOLERANCE, coordinates)
-        if not trial.closed:
-            return None
-        coordinates = trial.coordinates
-    model, _ = with_reference(model, coordinates, instant, model.prescribed, keep=True)
+    coordinates = point.closed(point.displaced(point.changes(step[None, :, None])[0]))
+    if coordinates is None:
+        return None
+    model, _ = with_reference(point.model, coordinates, point.instant, point.model.prescribed, keep=True)
     system = with_fields(model.system, outputs=())
     equations = dataclasses.replace(point.equations, system=system)
     return dataclasses.replace(point, model=model, equations=equations, coordinates=at_rest(coordinates))
 
 
-@compiled("pose_type")
-def displaced(coordinates: Mapping[str, Numbers], shift: Numbers, turn: Numbers, pose_type: type[Pose]) -> Any:
-    """Return coordinates of order zero after all bodies, the ground first, have shifted, m, and turned, rad."""
-    pose = pose_at(coordinates, pose_type).displaced(shift, turn)
-    return {name: jet.coefficients[0] for name, jet in pose.coordinates().items()}
-
-
 def check_forces(point: OperatingPoint) -> None:
     """Raise SolveError where an applied force has no finite value at rest."""
-    system, instant = point.equations.system, float(point.clock[0, 0, 0])
+    system = point.equations.system
     if not system.forces:
         return
-    coordinates = {name: x[0] for name, x in point.coordinates.items() if name != "angular_velocity"}
-    pose = pose_at(coordinates, point.model.pose_type).extended(None, None)
-    fit = np.asarray(system.finite_forces(pose, Jet([np.full((1, 1), instant), np.zeros((1, 1))])))[:, 0]
+    pose = pose_at(point.place, point.model.pose_type).extended(None, None)
+    fit = np.asarray(system.finite_forces(pose, Jet([np.full((1, 1), point.instant), np.zeros((1, 1))])))[:, 0]
     bad = [f"forces.{name}" for name, good in zip(force_names(point.model), fit, strict=True) if not good]
     if bad:
         message = (

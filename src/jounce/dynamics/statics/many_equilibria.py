@@ -5,13 +5,11 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from jounce.base.shapes import Real, Refused
-from jounce.dynamics.forward.initial_state import TOLERANCE
-from jounce.dynamics.statics.equilibrium_search import displaced, load_scale, rest_point, search
+from jounce.dynamics.statics.equilibrium_search import load_scale, rest_point, search
 from jounce.dynamics.statics.operating_point import OperatingPoint
 from jounce.dynamics.statics.static_equilibrium import Equilibrium, as_mechanism, at_rest_from, equilibrium_of
 from jounce.errors import MechanismError, whole_number
 from jounce.kinematics.assembly.axis_directions import axis_signs
-from jounce.kinematics.assembly.gauss_newton import assemble_from_guess
 from jounce.kinematics.assembly.initial_revolutions import Coordinates
 from jounce.mechanism import Mechanism, build
 from jounce.mechanism.building.preconditions import concrete
@@ -116,23 +114,15 @@ def _random_poses(start: OperatingPoint, random: np.random.Generator) -> Coordin
     shape = (len(model.bodies), 1)
     shift = random.uniform(-1.0, 1.0, (model.pose_type.shifts, *shape)) * model.length
     turn = random.uniform(-np.pi, np.pi, (model.pose_type.turns, *shape))
-    parts = (np.pad(x, ((0, 0), (1, 0), (0, 0))) for x in (shift, turn))
-    coordinates = {name: x[0] for name, x in start.coordinates.items() if name != "angular_velocity"}
-    return {name: np.asarray(x) for name, x in displaced(coordinates, *parts, model.pose_type).items()}
+    return start.displaced(np.pad(np.concatenate([shift, turn]), ((0, 0), (1, 0), (0, 0))))
 
 
 def _closed(start: OperatingPoint, coordinates: Coordinates) -> OperatingPoint | None:
     """Return the mechanism assembled from a position, or None if that fails or reverses a part."""
-    model, instant = start.model, float(start.clock[0, 0, 0])
-    if model.rows:
-        trial = assemble_from_guess(model, instant, TOLERANCE, coordinates)
-        drawn = {name: x[0] for name, x in start.coordinates.items()}
-        if not trial.closed or not np.array_equal(
-            axis_signs(model.system, trial.coordinates), axis_signs(model.system, drawn)
-        ):
-            return None
-        coordinates = trial.coordinates
-    return rest_point(start.mechanism, model, coordinates, instant)
+    system, closed = start.model.system, start.closed(coordinates)
+    if closed is None or not np.array_equal(axis_signs(system, closed), axis_signs(system, start.place)):
+        return None
+    return rest_point(start.mechanism, start.model, closed, start.instant)
 
 
 def _same(one: OperatingPoint, other: OperatingPoint) -> bool:

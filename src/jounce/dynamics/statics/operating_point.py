@@ -8,8 +8,18 @@ import numpy as np
 from jaxtyping import Float
 
 from jounce.dynamics.forward.accelerations import Equations
+from jounce.dynamics.forward.initial_state import TOLERANCE
 from jounce.dynamics.friction.coupling import pressing_teeth
-from jounce.dynamics.statics.variations import LEVELS, borne_at, loads_at, masses_at, output_variations, variations
+from jounce.dynamics.statics.variations import (
+    LEVELS,
+    borne_at,
+    displaced,
+    loads_at,
+    masses_at,
+    output_variations,
+    variations,
+)
+from jounce.kinematics.assembly.gauss_newton import assemble_from_guess
 from jounce.linear_algebra.host_jacobian import RANK_TOLERANCE
 from jounce.mechanism import Mechanism, Model
 
@@ -40,6 +50,27 @@ class OperatingPoint:
     equations: Equations
     coordinates: dict[str, np.ndarray]
     clock: np.ndarray
+
+    @property
+    def instant(self) -> float:
+        """When it is, s."""
+        return float(self.clock[0, 0, 0])
+
+    @property
+    def place(self) -> dict[str, np.ndarray]:
+        """Coordinates of all bodies, of order zero."""
+        return {name: x[0] for name, x in self.coordinates.items() if name != "angular_velocity"}
+
+    def displaced(self, change: Float[np.ndarray, "coordinate all 1"]) -> dict[str, np.ndarray]:
+        """Return the coordinates of all bodies after shifts and turns, as `changes` has them."""
+        return {name: np.asarray(x) for name, x in displaced(self.place, change, self.model.pose_type).items()}
+
+    def closed(self, coordinates: dict[str, np.ndarray]) -> dict[str, np.ndarray] | None:
+        """Return coordinates near others at which all constraints hold; None where none are found."""
+        if not self.model.rows:
+            return coordinates
+        trial = assemble_from_guess(self.model, self.instant, TOLERANCE, coordinates)
+        return trial.coordinates if trial.closed else None
 
     @cached_property
     def _loads_and_jacobian(self) -> tuple[np.ndarray, np.ndarray]:

@@ -65,7 +65,7 @@ class Equilibrium(Displayed):
 
     def __init__(self, point: OperatingPoint, singular: bool, *, of_robot: bool = False):
         self.point, self.of_robot = point, of_robot
-        self.mechanism, self.time = point.mechanism, float(point.clock[0, 0, 0])
+        self.mechanism, self.time = point.mechanism, point.instant
         self.singular = singular
 
     def __repr__(self) -> str:

@@ -22,6 +22,7 @@ from jounce.dynamics.motion_values import pose_of
 from jounce.execution.compilation import compiled
 from jounce.jet import Jet
 from jounce.jet.algebra import stacked
+from jounce.mechanism.building.starting_guess import pose_at
 from jounce.mechanism.system import Group, movable
 from jounce.rigid.pose import Pose
 
@@ -185,6 +186,13 @@ def residuals_at(equations: Equations, coordinates: Coordinates, clock: Clock) -
 def masses_at(equations: Equations, coordinates: Coordinates) -> Float[Numbers, "coordinate coordinate body"]:
     """Return the mass matrix of each moving body, about the origin of its frame."""
     return mass_matrices(_moving(equations, coordinates).truncate(0), equations.masses)[:, :, 1:, 0]
+
+
+@compiled("pose_type")
+def displaced(coordinates: Mapping[str, Numbers], change: Numbers, pose_type: type[Pose]) -> dict[str, Any]:
+    """Return coordinates of order zero after all bodies, the ground first, have shifted, m, and turned, rad."""
+    pose = pose_at(coordinates, pose_type).displaced(change[: pose_type.shifts], change[pose_type.shifts :])
+    return {name: jet.coefficients[0] for name, jet in pose.coordinates().items()}
 
 
 def at_rest(coordinates: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:

@@ -68,7 +68,7 @@ class Linearization(Displayed):
 
     def __init__(self, reduction: Reduction, about: Equilibrium | None, *, by_forces: bool = True):
         self._reduction, self.equilibrium, self._by_forces = reduction, about, by_forces
-        self.mechanism, self.time = reduction.point.mechanism, float(reduction.point.clock[0, 0, 0])
+        self.mechanism, self.time = reduction.point.mechanism, reduction.point.instant
         self.coordinates, self.units, self.held = reduction.names, reduction.units, reduction.held
         self.mass, self.damping, self.stiffness = (reduction.part(level) for level in (2, 1, 0))
 

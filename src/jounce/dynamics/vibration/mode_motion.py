@@ -6,12 +6,9 @@ import jax
 import numpy as np
 from jaxtyping import Complex, Float
 
-from jounce.dynamics.forward.initial_state import TOLERANCE
-from jounce.dynamics.statics.equilibrium_search import displaced
 from jounce.dynamics.statics.independent_coordinates import Reduction
 from jounce.errors import MechanismError, SolveError
 from jounce.kinematics import Motion, Status
-from jounce.kinematics.assembly.gauss_newton import assemble_from_guess
 from jounce.kinematics.results.pose_outputs import output_values
 
 
@@ -47,20 +44,12 @@ def mode_motion(
     columns = columns * (amplitude / np.abs(columns).max())
     phases = np.exp(2j * math.pi * np.linspace(0.0, 1.0, len(instants)))
     moved = np.real(columns[:, None] * phases / 1j)  # a swing begins in the middle
-    model, instant = point.model, float(point.clock[0, 0, 0])
-    changes, shifts = point.changes(moved[None])[0], model.pose_type.shifts
-    start = {key: x[0] for key, x in point.coordinates.items() if key != "angular_velocity"}
-    frames = []
+    model, changes, frames = point.model, point.changes(moved[None])[0], []
     for k in range(len(instants)):
-        change = changes[..., k : k + 1]
-        displaced_bodies = displaced(start, change[:shifts], change[shifts:], model.pose_type)
-        coordinates = {key: np.asarray(x) for key, x in displaced_bodies.items()}
-        if model.rows:
-            trial = assemble_from_guess(model, instant, TOLERANCE, coordinates)
-            if not trial.closed:
-                message = f"{name} cannot be shown with an amplitude of {amplitude:g}: joints stay open; choose less"
-                raise SolveError(message, status=Status.NOT_ASSEMBLED)
-            coordinates = trial.coordinates
+        coordinates = point.closed(point.displaced(changes[..., k : k + 1]))
+        if coordinates is None:
+            message = f"{name} cannot be shown with an amplitude of {amplitude:g}: joints stay open; choose less"
+            raise SolveError(message, status=Status.NOT_ASSEMBLED)
         frames.append(coordinates)
     whole = jax.tree.map(lambda *xs: np.concatenate(xs, axis=-1)[None], *frames)
     groups = output_values(model.system.outputs, whole, model.pose_type)
