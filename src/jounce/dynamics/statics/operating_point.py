@@ -137,7 +137,7 @@ class OperatingPoint:
         forces, rows = (np.asarray(x) for x in variations(*arguments))
         return self.as_columns(forces), rows
 
-    def outputs_varied(self, columns: Lanes) -> list[Float[np.ndarray, "level component instance lane"]]:
+    def outputs_varied(self, columns: Lanes) -> list[Float[np.ndarray, "_ _ _ lane"]]:
         """Return how outputs, group by group, vary with changes of the scaled coordinates."""
         groups, pose_type = self.model.system.outputs, self.model.pose_type
         return [np.asarray(x) for x in output_variations(groups, self.coordinates, pose_type, self.changes(columns))]

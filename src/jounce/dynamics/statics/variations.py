@@ -104,7 +104,7 @@ def borne_at(
 @compiled("pose_type")
 def output_variations(
     groups: Sequence[Group], coordinates: Coordinates, pose_type: type[Pose], changes: Changes
-) -> tuple[Float[Numbers, "level component instance lane"], ...]:
+) -> tuple[Float[Numbers, "_ _ _ lane"], ...]:
     """Return how outputs and their rates vary with changes of a motion, as Taylor coefficients."""
     pose: Any = movable(pose_of(coordinates, pose_type))
 
