@@ -224,10 +224,14 @@ def force_at(force: Group, lanes: tuple[Acting, Lanes], pose_type: type[Pose], o
     return group.element, [pose_of(pose, pose_type, order) for pose in poses], Jet.variable(instants[None], order)
 
 
+Pressing = Float[Numbers, "order 1 instance batch"]
+"""Taylor coefficients of the normal forces of joints with friction."""
+
+
 @Mapped
 def joint_wrench(
     element: Any,
-    lanes: tuple[Sequence[Coordinates], Lanes, Any, Multipliers, tuple[Sequence[Coordinates], Multipliers] | None],
+    lanes: tuple[Sequence[Coordinates], Lanes, Any, Multipliers, tuple[Sequence[Coordinates], Pressing] | None],
     *,
     pose_type: type[Pose],
     slot: int,
