@@ -304,7 +304,7 @@ def robot_problem(
     if isinstance(trajectory, str | PathLike):
         from jounce.io import load_trajectory
 
-        trajectory = load_trajectory(trajectory)
+        trajectory = load_trajectory(trajectory, robot=robot)
     return Torques(robot, trajectory, time, order - 2)
 
 

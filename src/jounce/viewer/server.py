@@ -278,6 +278,6 @@ def robot_subject(
     from jounce.viewer.subjects.robots import RobotSubject
 
     if isinstance(trajectory, str | PathLike):
-        trajectory = load_trajectory(trajectory)
+        trajectory = load_trajectory(trajectory, robot=robot)
     kind = ClosedRobotSubject if robot.closures else RobotSubject
     return kind(robot, robot_appearance(robot, path, allow), trajectory)

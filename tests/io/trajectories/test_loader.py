@@ -5,6 +5,7 @@ import pickle
 import numpy as np
 import pytest
 
+import jounce as jn
 from jounce.errors import TrajectoryError
 from jounce.io import load_trajectory
 
@@ -244,3 +245,37 @@ def test_a_folder(tmp_path):
     (tmp_path / "folder.csv").mkdir()
     with pytest.raises(TrajectoryError, match="is a directory"):
         load_trajectory(tmp_path / "folder.csv")
+
+
+def table(folder, *names):
+    times = np.linspace(0.0, 1.0, 21)
+    path = folder / "log.csv"
+    rows = np.stack([times, *(np.sin((k + 1) * times) for k in range(len(names)))], axis=1)
+    np.savetxt(path, rows, delimiter=",", header=",".join(("time", *names)), comments="")
+    return path
+
+
+@pytest.mark.parametrize("other", ["tau_elbow", "effort_elbow", "motorTorque", "current 1", "elbow_temperature"])
+def test_columns_named_after_torques_and_the_like_are_no_positions(tmp_path, other):
+    path = table(tmp_path, "elbow", other)
+    with pytest.warns(jn.errors.RecordingWarning, match=f"left out: {other}; to read one as a joint, choose joints by"):
+        found = jn.load_trajectory(path)
+    assert found.names == ("elbow",)
+    np.testing.assert_allclose(found.derivatives([0.5], order=0), [[[np.sin(0.5)]]], atol=1e-6)
+    assert jn.load_trajectory(path, only=["elbow", other]).names == ("elbow", other)
+
+
+def test_a_file_of_torques_alone_is_refused(tmp_path):
+    with pytest.raises(jn.errors.TrajectoryError, match=r"tau_a: .*other quantities: tau_a, tau_b; to read one"):
+        jn.load_trajectory(table(tmp_path, "tau_a", "tau_b"))
+
+
+def test_joints_of_a_robot_may_be_named_after_torques(tmp_path):
+    links = [jn.Link("base"), jn.Link("a", jn.Inertia(1.0)), jn.Link("b", jn.Inertia(1.0))]
+    joints = [jn.Joint("torque_tube", "base", "a"), jn.Joint("elbow", "a", "b")]
+    robot = jn.Robot("arm", links, joints)
+    assert jn.load_trajectory(table(tmp_path, "torque_tube", "elbow"), robot=robot).names == ("torque_tube", "elbow")
+    assert jn.load_trajectory(table(tmp_path, "elbow_joint", "current_position")).names == (
+        "elbow_joint",
+        "current",
+    )

@@ -20,6 +20,8 @@ from jounce.robot import Robot
 from jounce.settings import under_own_settings
 from jounce.trajectory import JointTrajectory
 
+CHOOSE = "to read one as a joint, choose joints by only=, or --joints on the command line"
+
 
 @under_own_settings
 def load_trajectory(
@@ -80,7 +82,8 @@ def load_trajectory(
         Straight lines between positions in the place of splines through samples, as `jounce.smooth` needs no more: an
         hour at 1 kHz takes a third of the memory.
     only : iterable of str, optional
-        Joints that are read, where a file has more of them than a robot; all of them unless given.
+        Joints that are read, where a file has more of them than a robot; unless given, all of them, but for columns of
+        CSV files that are named after torques, currents and the like.
 
     Returns
     -------
@@ -115,6 +118,8 @@ def load_trajectory(
         return _selected_laws(recording.trajectory(), chosen, str(fspath(path)))
     if robot is not None and recording.unnamed:
         recording = _named_by(recording, robot)
+    if chosen is None and joints is None and not recording.unnamed:
+        recording = _positions_alone(recording, robot)
     if chosen is not None:
         try:
             recording = recording.selected(chosen)
@@ -179,6 +184,22 @@ def _named_by(recording: Recording, robot: Robot) -> Recording:
         f"{len(turning)} of which turn; name the columns after joints"
     )
     raise TrajectoryError(message, path=recording.path, name="joints")
+
+
+def _positions_alone(recording: Recording, robot: Robot | None) -> Recording:
+    """Return a recording without columns whose names say that they hold torques or the like of no joint of a robot."""
+    known = () if robot is None else robot.joints
+    others = [name for name in recording.names if name in recording.others and name not in known]
+    if not others:
+        return recording
+    listed = ", ".join(others)
+    positions = [name for name in recording.names if name not in others]
+    if not positions:
+        message = f"columns hold positions, and these have names of other quantities: {listed}; {CHOOSE}"
+        raise TrajectoryError(message, path=recording.path, name=others[0])
+    note = f"by their names no positions, and left out: {listed}; {CHOOSE}"
+    chosen = recording.selected(positions)
+    return dataclasses.replace(chosen, notes=(*chosen.notes, note))
 
 
 def _check_taken(recording: Recording) -> None:

@@ -38,6 +38,8 @@ class Recording:
         What joints move by, where units say it.
     unnamed : bool
         Whether the file does not name its joints.
+    others : frozenset of str
+        Names by which columns say that they hold torques or the like, and no positions of a joint.
     """
 
     path: str
@@ -49,6 +51,7 @@ class Recording:
     notes: tuple[str, ...] = ()
     measures: Mapping[str, str] = dataclasses.field(default_factory=dict)
     unnamed: bool = False
+    others: frozenset[str] = frozenset()
 
     def error(self, message: str, row: Any = None, **fields: object) -> TrajectoryError:
         """Return an error about a row of the file."""

@@ -28,6 +28,11 @@ _NUMBERED = {
     VELOCITY: ("dq", "qd", "velocity", "velocities", "vel", "joint_velocities", "actual_qd"),
     ACCELERATION: ("ddq", "qdd", "acceleration", "accelerations", "acc"),
 }
+OTHER_QUANTITIES = frozenset(
+    "tau torque torques effort efforts force forces current currents voltage voltages temp temperature".split()
+)
+"""Words of names of columns that hold no positions."""
+_BETWEEN_WORDS = re.compile(r"[^A-Za-z]+|(?<=[a-z])(?=[A-Z])")
 _WITH_NUMBER = re.compile(r"(?P<word>[A-Za-z_/.]*[A-Za-z])_?(?P<open>\[)?(?P<number>[0-9]+)(?(open)\])$")
 _SUFFIX = re.compile(rf"(?P<joint>.+)[_./ ](?P<word>{'|'.join(WORDS)})$")
 _RATE = re.compile(r"(?P<joint>.+)_d[0-9]+$")
@@ -59,6 +64,20 @@ class Columns:
     checked: Mapping[str, int] = dataclasses.field(default_factory=dict)
     names: Mapping[str, int] = dataclasses.field(default_factory=dict)
     per_second: int = 1
+
+
+def other_quantity(name: str) -> str | None:
+    """Return the word by which the name of a column says that it holds no positions; None where none does.
+
+    Examples
+    --------
+    >>> [other_quantity(name) for name in ("tau_a", "motorTorque", "elbow", "current_pos", "torque_tube_joint")]
+    ['tau', 'Torque', None, None, 'torque']
+    """
+    words = _BETWEEN_WORDS.split(name)
+    if any(WORDS.get(word.lower()) == POSITION for word in words):
+        return None
+    return next((word for word in words if word.lower() in OTHER_QUANTITIES), None)
 
 
 def take_units(table: Table) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 
 import numpy as np
 from jaxtyping import Float
@@ -14,7 +14,7 @@ from jounce.io.trajectories.agreement import check_agreement
 from jounce.io.trajectories.controller_formats import ControllerFormat, format_of, joint_count
 from jounce.io.trajectories.recordings import Recording
 from jounce.io.trajectories.stamps import NANO, epoch, in_sequence, relative
-from jounce.io.trajectories.table_columns import Columns, columns_of, take_units
+from jounce.io.trajectories.table_columns import POSITION, Columns, columns_of, other_quantity, take_units
 from jounce.units.dimensions import TIME, Dimension
 
 NOTHING = ("", "nan", "NaN", "NAN")
@@ -100,7 +100,12 @@ def _recording(table: Table, columns: Columns, *, points: bool) -> Recording:
         notes=tuple(notes),
         measures={name: measure for name, own in zip(names, dimensions, strict=True) if (measure := measured(own))},
         unnamed=columns.unnamed,
+        others=frozenset(n for n, x in zip(names, columns.joints.values(), strict=True) if _is_other(table, x)),
     )
+
+
+def _is_other(table: Table, levels: Mapping[int, int]) -> bool:
+    return other_quantity(table.header[levels[POSITION]]) is not None
 
 
 def measured(dimension: Dimension | None) -> str | None:
