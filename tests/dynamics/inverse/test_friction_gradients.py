@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import jounce as jn
+from jounce.kinematics import Status
 from tests.dynamics.inverse.test_friction import vars_of, wedge
 
 O2, O3, X, Y, Z = [0.0, 0.0], [0.0, 0.0, 0.0], [1.0, 0, 0], [0, 1.0, 0], [0, 0, 1.0]
@@ -107,5 +108,8 @@ def test_a_family_has_the_friction_of_each_design():
     for k, mu in enumerate((0.2, 1.0, 1.9)):
         push = -(0.2 + 0.5 * 30.3 / (1 - 0.5 * mu))
         np.testing.assert_allclose(found[k], [[push, 0, 0]] * 2, rtol=1e-12, atol=1e-12)
+    locked = jn.solve_batch(family, {"mu": [1.0, 2.5]}, [0.0, 1.0], order=2)
+    np.testing.assert_array_equal(locked["status"], [[Status.OK] * 2, [Status.LOCKED] * 2])
+    np.testing.assert_array_equal(np.isnan(locked["force"]).all(axis=2), [[False] * 2, [True] * 2])
     with pytest.raises(jn.errors.SolveError, match=r"joints\.guide\.friction: friction locks at t = 0 s"):
-        jn.solve_batch(family, {"mu": [1.0, 2.5]}, [0.0, 1.0], order=2)
+        _ = jn.solve(family.with_parameters(mu=2.5), [0.0, 1.0], order=2).outputs["force"]
