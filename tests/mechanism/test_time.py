@@ -1,10 +1,11 @@
-"""The nearest of some instants, by whichever way it is found."""
+"""Grids that are doubted, and the nearest of some instants, by whichever way it is found."""
 
 import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
-from jounce.mechanism.time import nearest_instants
+import jounce as jn
+from jounce.mechanism.time import nearest_instants, time_grid
 
 MOMENTS = st.lists(st.floats(-10, 10).map(lambda x: round(x, 2)), min_size=1, max_size=12)
 
@@ -23,3 +24,15 @@ def test_of_two_it_is_the_earlier(instants):
     known = np.array([2.0, 0.0, 1.0])
     expected = [1 if t <= 0.5 else 2 if t <= 1.5 else 0 for t in instants]
     assert nearest_instants(known, instants).tolist() == expected
+
+
+def test_a_step_that_is_likely_a_number_of_instants_is_warned_of():
+    with pytest.warns(jn.errors.UnitWarning, match=r"121 s is longer than the grid: .* count=121 gives") as caught:
+        grid = jn.TimeGrid(0, 2, 121)
+    assert caught[0].filename == __file__
+    assert time_grid(grid, {}).tolist() == [0.0, 2.0]
+
+
+@pytest.mark.parametrize("values", [(0, 2, 0.01), (0, 2, 5.0), (0, 2, "121 s"), (0, 200, 121), (0, 2, None, 121)])
+def test_other_steps_are_not_doubted(values):
+    jn.TimeGrid(*values)  # warnings are errors here

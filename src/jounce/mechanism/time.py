@@ -9,11 +9,12 @@ from jaxtyping import Float, Int
 from typing_extensions import TypeAliasType
 
 from jounce.base.shapes import Array, ArrayLike, seconds
-from jounce.errors import MechanismError
+from jounce.errors import MechanismError, UnitWarning, warn_caller
 from jounce.mechanism.resolve import resolve
 from jounce.trajectory import Expression
 
 MAX_INSTANTS = 10_000_000
+FEW = 3  # instants, fewer than which no count is
 PART_OF_STEP = 1e-6  # a last step that is so short is added to the one before
 
 
@@ -29,6 +30,11 @@ class TimeGrid:
         Spacing, s, the last step being shorter where the others do not arrive at the stop; or `count`, the number of
         instants with both ends.
 
+    Warns
+    -----
+    UnitWarning
+        The step is a whole number longer than the grid: the number of instants was likely meant.
+
     Examples
     --------
     >>> from jounce.mechanism import time_grid
@@ -40,6 +46,12 @@ class TimeGrid:
     stop: Any
     step: Any = None
     count: Any = None
+
+    def __post_init__(self) -> None:
+        plain = all(isinstance(x, int | float) for x in (self.start, self.stop))
+        if plain and type(self.step) is int and self.step >= FEW and 0 < self.stop - self.start < self.step:
+            words = f"the third value of a TimeGrid is its step, s, and {self.step} s is longer than the grid"
+            warn_caller(UnitWarning(f"{words}: it has two instants; count={self.step} gives so many"))
 
 
 TimeLike = TypeAliasType("TimeLike", ArrayLike | TimeGrid)
