@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import jounce as jn
+from jounce.dynamics.inverse import force_programs
 from jounce.dynamics.inverse.motion_forces import MotionForces
 from jounce.execution.llvm import programs, self_test
 
@@ -95,3 +96,18 @@ def test_multipliers_of_redundant_rows(name, monkeypatch):
     np.testing.assert_array_equal(np.isfinite(MotionForces(motion).unique_multipliers), known)
     assert known.any()
     assert known.all() == (motion.mechanism.redundant_reactions != "unique")
+
+
+def test_few_bodies_in_space_are_balanced_by_single_values_and_others_by_loops(monkeypatch):
+    door = jn.solve(turning_door(), order=4)
+    single, loops = force_programs.largest_array(door.model), force_programs.SMALL
+    assert single > loops
+    found = MotionForces(door).multipliers
+    monkeypatch.setattr(force_programs, "largest_array", lambda model: loops)
+    agree(MotionForces(door).multipliers, found)
+
+
+@pytest.mark.parametrize("name", ["four_bar", "bennett"])  # in the plane, and with redundant constraints
+def test_balances_without_certain_zeros_stay_in_memory(name):
+    model = jn.solve(jn.load(f"examples/{name}.yaml"), [0.0]).model
+    assert force_programs.largest_array(model) == force_programs.SMALL

@@ -26,11 +26,14 @@ from jounce.jet import Jet, cross
 from jounce.jet.algebra import stacked, total
 from jounce.kinematics.sensitivity.jacobian_series import along_displacements, slopes
 from jounce.linear_algebra.pattern import Pattern
+from jounce.mechanism import Model
 from jounce.mechanism.system import Group, System, movable, with_rows
 from jounce.mechanism.transmissions.axis_angles import with_turns
 from jounce.rigid.pose import Pose
+from jounce.rigid.spatial import SpatialPose
 
-LARGE = 16  # largest size of an array that is kept in memory by the machine code of an instant
+SMALL, ALL = 16, 10_000  # numbers of the largest array that is single values in the machine code of a balance
+MOST_COLUMNS = 48  # coordinates of a mechanism in space for which all arrays are single values
 SMALL_CHUNK = 16  # number of instants whose dense matrices are factored together
 Acting = tuple[Sequence[Coordinates], Sequence[Any]]  # the poses of bodies, and the angles about axes between them
 
@@ -107,6 +110,15 @@ def pressing(
     )
     bodies = tuple(pose_of(pose, pose_type, 0) for pose in placed)
     return pressing_force(element, bodies, Jet([wrench[0, : bodies[0].shifts]])).coefficients[0]
+
+
+def largest_array(model: Model) -> int:
+    """Return of how many numbers an array may be single values in the machine code of a balance; larger ones are loops.
+
+    In space, most changes of a residual with a displacement are zero for certain: single values leave them out.
+    """
+    few = model.pose_type is SpatialPose and model.system.shape[1] <= MOST_COLUMNS
+    return ALL if few and model.system.rank is None else SMALL  # redundant rows take loops over dense matrices
 
 
 def _blocks(

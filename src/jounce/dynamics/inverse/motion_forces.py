@@ -113,13 +113,15 @@ class MotionForces:
         cases, rows = 1 + self._looks_for_open, len(self.model.rows)
         choice = np.zeros(rows), np.zeros(cases), np.zeros((cases, rows))
         shared = self._balance(None if self.model.system.rank is None else choice)
-        programs.balanced.prepare(shared, self.balance_at, large=programs.LARGE, pose_type=self.pose_type)
+        large = programs.largest_array(self.model)
+        programs.balanced.prepare(shared, self.balance_at, large=large, pose_type=self.pose_type)
 
     def _balanced(self, flanks: teeth.Flanks) -> Float[Numbers, "case level row time"]:
         """Return the multipliers that balance the loads, and self-balanced ones, given the loaded tooth flanks."""
         self.flanks = flanks
         shared = self._balance(None if self.model.system.rank is None else self._choice)
-        multipliers, finite = self.along(programs.balanced, shared, self.balance_at, large=programs.LARGE)
+        large = programs.largest_array(self.model)
+        multipliers, finite = self.along(programs.balanced, shared, self.balance_at, large=large)
         check_finite_forces(self, finite)
         check_not_locked(self.motion, self.joined, multipliers[0])
         check_finite_values(self, multipliers[0])

@@ -180,7 +180,7 @@ class Solver:
         system = self.model.system
         nothing, still = np.zeros(1), self.still(self.model.guess)
         instants = self.needed(still), nothing, nothing, self.own, np.zeros(1, bool)
-        small = system.shape[1] <= FEW_COLUMNS and not self.hasty
+        small = system.shape[1] <= FEW_COLUMNS
         laws = [getattr(group.element, "motion", ()) for group in system.groups]
         tables = max(map(np.size, jax.tree.leaves(laws)), default=0) > LARGE
         how = {"large": (LARGE_BESIDE_TABLES if tables else None) if small else LARGE, "hasty": self.hasty}

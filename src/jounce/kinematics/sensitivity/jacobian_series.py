@@ -11,6 +11,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
+from jounce.base.jax_internals import by_certain_entries
 from jounce.base.shapes import Numbers
 from jounce.constraints import AbstractConstraint
 from jounce.jet import Jet
@@ -71,7 +72,8 @@ def along_displacements(body: Any, changed: Callable[[Any], Any]) -> Slope:
     def along(direction: Any) -> Any:
         unit = jnp.broadcast_to(direction[:, None, None], (size, *shape))
         shift, turn = (Jet.constant(part, order) for part in (unit[: body.shifts], unit[body.shifts :]))
-        return changed(jax.lax.optimization_barrier(movable(body.varied(shift, turn).truncate(order))))
+        with by_certain_entries():  # most components do not change
+            return changed(jax.lax.optimization_barrier(movable(body.varied(shift, turn).truncate(order))))
 
     return jnp.moveaxis(jax.vmap(along)(jnp.eye(size)), 0, 1)
 
