@@ -359,7 +359,11 @@ class DamageWarning(_BoundedWarning):
 
 
 class OutputError(JounceError):
-    """A file of results cannot be written or read."""
+    """A file of results cannot be written or read; ``while_writing``: what was computed, as where a disk is full."""
+
+    def __init__(self, message: str, *, while_writing: bool = False, **location: Any) -> None:
+        super().__init__(message, **location)
+        self.while_writing = while_writing
 
 
 class SolveError(JounceError):

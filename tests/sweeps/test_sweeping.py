@@ -286,8 +286,9 @@ def test_a_full_disk_loses_nothing(done, tmp_path, monkeypatch):
 
     monkeypatch.setattr(store, "_sync", sync)
     out = tmp_path / "full.zarr"
-    with pytest.raises(OutputError, match=r"No space left.*16 of 27 designs .*kept"):
+    with pytest.raises(OutputError, match=r"No space left.*16 of 27 designs .*kept") as caught:
         swept(out)
+    assert caught.value.while_writing  # for which the command ends with 1
     assert [x.name for x in marks(out).iterdir()] == ["0"]
     assert np.isfinite(xarray.open_zarr(out)["psi_peak"].values[3:16]).any()
     full[0] = False

@@ -170,7 +170,7 @@ def _status(given: list[str], as_json: bool, verbose: bool) -> int:
         return 2 if error.motion is None else 1
     except JounceError as error:
         complain(error, json=as_json)
-        return 2
+        return 1 if getattr(error, "while_writing", False) else 2
     except WritingError as error:
         complain(error, json=as_json)
         return 1

@@ -28,6 +28,7 @@ def complete(app: Any, shell: str, install: bool, out: Path | None) -> int:
     try:
         path = app.install_completion(shell=shell)
     except OSError as error:
-        raise OutputError(f"cannot be written: {reason_of(error)}", path=error.filename) from None
+        message = f"cannot be written: {reason_of(error)}"
+        raise OutputError(message, while_writing=True, path=error.filename) from None
     say(f"Written to {path}\nIt works in every {shell} that you start from now on.")
     return 0

@@ -4,6 +4,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import Any
 
 import jax
+import numpy as np
 
 from jounce.errors import did_you_mean, show_value
 from jounce.settings import under_own_settings
@@ -59,6 +60,14 @@ class OnDemand(Mapping[str, Any]):
     def __repr__(self) -> str:
         """Show all values, as a dictionary does."""
         return repr(dict(self))
+
+
+def read_only(arrays: dict[str, Any]) -> dict[str, Any]:
+    """Make arrays of NumPy read-only, as they are views of what others use; those that JAX traces are so anyway."""
+    for array in arrays.values():
+        if isinstance(array, np.ndarray):
+            array.setflags(write=False)
+    return arrays
 
 
 def _of_values(names: tuple[str, ...], values: Iterable[Any]) -> OnDemand:

@@ -73,7 +73,8 @@ def worded(path: Path) -> Iterator[None]:
         raise OutputError(message, path=os.fsdecode(error.filename2 or error.filename or path)) from error
     except OSError as error:
         named = error.filename2 or error.filename or path
-        raise OutputError(f"cannot be written: {reason_of(error)}", path=os.fsdecode(named)) from error
+        message = f"cannot be written: {reason_of(error)}"
+        raise OutputError(message, while_writing=True, path=os.fsdecode(named)) from error
 
 
 def put(path: Path, content: bytes) -> None:

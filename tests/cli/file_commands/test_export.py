@@ -66,3 +66,19 @@ def test_bad_input_is_reported(run, files, tmp_path, monkeypatch, options, words
     assert status == 2
     assert words in message
     assert not list(tmp_path.glob("x.*"))
+
+
+def test_a_disk_that_fills_while_a_table_is_written_is_no_bad_input(run, files, tmp_path):
+    resource = pytest.importorskip("resource")
+    out = tmp_path / "motion.yaml"
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (1000, limits[1]))
+    try:
+        status, _, err = run(*files, "--format", "ros", "--rate", "1kHz", "--out", out)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+    assert (status, out.exists()) == (1, False)
+    assert "motion.yaml: cannot be written: File too large" in err
+    missing = tmp_path / "none" / "motion.yaml"
+    status, _, err = run(*files, "--format", "ros", "--out", missing)
+    assert (status, "does not exist" in err) == (2, True)

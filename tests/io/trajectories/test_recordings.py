@@ -442,6 +442,33 @@ def test_bags_of_ros_2(tmp_path, version):
         jn.load_trajectory(folder, topic="/plan")
 
 
+@pytest.mark.parametrize("whole", [True, False])
+def test_a_bag_that_was_cut_short_says_how_it_is_mended(tmp_path, whole):
+    rosbags = pytest.importorskip("rosbags.rosbag2")
+    typesys = pytest.importorskip("rosbags.typesys")
+    store = typesys.get_typestore(typesys.Stores.ROS2_HUMBLE)
+    kinds = store.types
+    state, head = kinds["sensor_msgs/msg/JointState"], kinds["std_msgs/msg/Header"]
+    folder = tmp_path / "bag"
+    with rosbags.Writer(folder, version=9, storage_plugin=rosbags.StoragePlugin.MCAP) as writer:
+        connection = writer.add_connection("/joint_states", state.__msgtype__, typestore=store)
+        for t in TIMES:
+            header = head(kinds["builtin_interfaces/msg/Time"](int(t), round((t % 1) * 1e9)), "")
+            values = [motion(np.array(t), k) for k in (0, 1)]
+            raw = store.serialize_cdr(state(header, list(JOINTS), *values, np.zeros(0)), state.__msgtype__)
+            writer.write(connection, int(t * 1e9), raw)
+    (file,) = folder.glob("*.mcap")
+    if whole:
+        check(jn.load_trajectory(folder))
+        return
+    file.write_bytes(file.read_bytes()[:-200])
+    alone = tmp_path / "alone.mcap"
+    alone.write_bytes(file.read_bytes())
+    for path in (folder, file, alone):
+        with pytest.raises(TrajectoryError, match=r"the bag cannot be read: .*cut short, .*mend it by `mcap recover`"):
+            jn.load_trajectory(path)
+
+
 @pytest.mark.parametrize("kept", ["feedback", "actual"])
 def test_controller_states_in_a_bag_are_what_was_measured(tmp_path, kept):
     rosbags = pytest.importorskip("rosbags.rosbag2")

@@ -141,3 +141,20 @@ def test_what_cannot_be_asked_for(planar, ask, message):
 def test_planar_angle_of_a_spatial_body(spatial):
     with pytest.raises(jn.errors.MechanismError, match="planar"):
         spatial.angle("spindle")
+
+
+def test_outputs_are_read_only_as_the_motion_uses_them():
+    motion = jn.solve(four_bar(), np.linspace(0.0, 0.2, 3), order=1)
+    before = {name: values.copy() for name, values in motion.outputs.items()}
+    for name, values in motion.outputs.items():
+        with pytest.raises(ValueError, match="read-only"):
+            values[1] = 7.0
+        with pytest.raises(ValueError, match="read-only"):
+            values *= 1000.0
+        np.testing.assert_array_equal(motion.outputs[name], before[name])
+        np.testing.assert_array_equal(motion.dataset[name].values, before[name])
+        with pytest.raises(ValueError, match=r"read-only|is a view"):
+            motion.dataset[name][1] = 7.0
+        assert np.array(values).flags.writeable
+    again = jn.solve(four_bar(), np.linspace(0.0, 0.2, 3), order=1)
+    assert all(np.array_equal(motion.outputs[name], again.outputs[name]) for name in before)

@@ -93,7 +93,8 @@ def copy_example(name: str, path: str | PathLike[str] | None = None, *, overwrit
             target.parent.mkdir(parents=True, exist_ok=True)
             shutil.copyfile(file, target)
         except OSError as error:
-            raise OutputError(f"cannot be written: {error.strerror or error}", path=target) from None
+            message = f"cannot be written: {error.strerror or error}"
+            raise OutputError(message, while_writing=True, path=target) from None
     return [target for _, target in pairs]
 
 

@@ -107,7 +107,8 @@ def replacing(path: str | PathLike[str], *, overwrite: bool = False) -> Iterator
     except OutputError as error:
         raise error.located(path=fspath(path)) from None
     except (OSError, ValueError) as error:
-        raise OutputError(f"cannot be written: {reason_of(error)}", path=fspath(path)) from error
+        message = f"cannot be written: {reason_of(error)}"
+        raise OutputError(message, while_writing=isinstance(error, OSError), path=fspath(path)) from error
 
 
 def _replace_target(scratch: Path, target: Path, before: os.stat_result | None) -> None:

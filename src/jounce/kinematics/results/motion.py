@@ -13,7 +13,7 @@ from jounce.base.modules import with_fields
 from jounce.base.shapes import ArrayLike, Numbers
 from jounce.errors import MechanismError, check_name
 from jounce.execution.backends import xla_backend
-from jounce.execution.on_demand import OnDemand
+from jounce.execution.on_demand import OnDemand, read_only
 from jounce.jet.derivatives import plain_derivatives
 from jounce.jet.turns import brought_near
 from jounce.kinematics.continuation.path_following import ChangePoint
@@ -214,7 +214,8 @@ class Motion(Tabulated):
     def outputs(self) -> Mapping[str, Any]:
         """Outputs by name: arrays of shape (time, order + 1) or (time, order + 1, component), SI.
 
-        The nine components of a rotation matrix stand row by row. An output is computed when it is first requested.
+        The nine components of a rotation matrix stand row by row. An output is computed when it is first requested. Its
+        array is read-only, since the motion uses it; `numpy.array` copies it.
         """
         # not kept, as it refers to the motion: its arrays are to go with the last reference, not with the next search
         outputs = OnDemand(self.mechanism.outputs, self._outputs_with, self._known_outputs)
@@ -224,10 +225,10 @@ class Motion(Tabulated):
         """Return an output, and those that are found with it."""
         output = self.mechanism.outputs[name]
         if isinstance(output, AbstractMotionOutput):
-            return {name: self._derivatives(output.coefficients(self))}
+            return read_only({name: self._derivatives(output.coefficients(self))})
         groups = zip(self._groups.items(), self.model.system.outputs, strict=True)
         ((names, values), group) = next(entry for entry in groups if name in entry[0][0])
-        return dict(zip(names, self._each_shown(self._continued(group, values)), strict=True))
+        return read_only(dict(zip(names, self._each_shown(self._continued(group, values)), strict=True)))
 
     def _each_shown(self, values: Float[Numbers, "order component instance time"]) -> Sequence[Any]:
         """Return each output of a group as `outputs` has it."""
