@@ -3,6 +3,7 @@
 import copy
 import pickle
 
+import jax
 import numpy as np
 import pytest
 
@@ -50,3 +51,16 @@ def test_a_mechanism_does_not_change_and_says_what_to_do():
         assert same.parameters == {"speed": 1.0}
         with pytest.raises(TypeError, match="with_parameters"):
             same.parameters.update(speed=2.0)
+
+
+def test_jax_sees_the_parameters_of_a_mechanism_as_those_of_a_dictionary():
+    mechanism = pendulum([0.0, 0.0], [1.0, 0.0], {"speed": 2.0, "other": 5.0}, [0.0, 0.25])
+
+    def height(parameters):
+        return jn.solve(mechanism.with_parameters(**parameters), order=0).outputs["tip"][-1, 0, 1]
+
+    with jax.enable_x64(True):
+        slope = jax.grad(height)(mechanism.parameters)
+        moved = jax.tree.map(lambda value, rate: value + rate, mechanism.parameters, slope)
+    assert slope == pytest.approx({"speed": 0.25 * np.cos(0.5), "other": 0.0}, abs=1e-14)
+    assert moved == pytest.approx({"speed": 2.0 + 0.25 * np.cos(0.5), "other": 5.0}, abs=1e-14)

@@ -263,8 +263,9 @@ def jit_over_arrays(function: F) -> F:
     return cast(F, called)
 
 
+@jax.tree_util.register_pytree_node_class
 class ReadOnlyDict(dict):
-    """A dictionary that does not change, and says what to do instead.
+    """A dictionary that does not change, and says what to do instead; for JAX a pytree, as dictionaries are.
 
     Examples
     --------
@@ -279,6 +280,17 @@ class ReadOnlyDict(dict):
 
     def __reduce__(self) -> Any:
         return ReadOnlyDict, (dict(self), self.instead)
+
+    def tree_flatten(self) -> tuple[list[Any], tuple[tuple[str, ...], str]]:
+        """See `jax.tree_util.register_pytree_node_class`."""
+        names = tuple(sorted(self))
+        return [self[name] for name in names], (names, self.instead)
+
+    @classmethod
+    def tree_unflatten(cls, form: tuple[tuple[str, ...], str], values: Iterable[Any]) -> "ReadOnlyDict":
+        """See `jax.tree_util.register_pytree_node_class`."""
+        names, instead = form
+        return cls(dict(zip(names, values, strict=True)), instead)
 
     def _refuse(self, *_: Any, **__: Any) -> Any:
         raise TypeError(f"these entries do not change: {self.instead}")
