@@ -8,6 +8,7 @@ import pytest
 
 import jounce as jn
 from jounce.reporting.peaks import Peak, derivative_name, peaks
+from jounce.reporting.text.tables import peaks_table
 
 CRANK = jn.Mechanism(
     space="planar",
@@ -209,3 +210,10 @@ def test_peaks_at_the_instants_only(run, tmp_path):
     status, printed, _ = run("run", path, "--order", 2, "--no-refine", "--json")
     assert status == 0
     assert [row["maximum"] for row in json.loads(printed)["peaks"]] == [peak.maximum for peak in found]
+
+
+def test_a_table_has_no_times_for_what_is_constant():
+    fixed = Peak("C_x", "jerk", "m/s^3", -3e-16, 0.25, 2e-16, 0.75, 4.0)
+    moving = dataclasses.replace(fixed, output="C_y", maximum=4.0)
+    shown = {row[0]: row[3:] for row in peaks_table([fixed, moving]).rows}
+    assert shown == {"C_x": ["0", "-", "0", "-"], "C_y": ["0", "0.25", "4", "0.75"]}

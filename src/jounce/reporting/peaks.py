@@ -29,7 +29,7 @@ LEAST = 200  # instants that are looked at, at least
 PEAKS, POINTS, ROUNDS = 2, 7, 3  # highest maxima of each curve, instants around each, and how often these close in
 CHUNK, COMPARED = 1000, 50  # instants solved together, and compared
 ROUNDING = 1e-9
-SMALLEST = 1e-15  # share of the size of an output
+SMALLEST, ALIKE = 1e-15, 1e-12  # shares of the size of an output
 _Around = Float[np.ndarray, "points peaks curves"]
 
 
@@ -68,12 +68,15 @@ class Peak:
         return low, high
 
     @property
+    def varies(self) -> bool:
+        """Whether the minimum and the maximum differ by more than rounding."""
+        return self.maximum - self.minimum > ALIKE * self.size
+
+    @property
     def largest(self) -> tuple[bool, bool]:
         """Whether the minimum and the maximum have the largest magnitude; both where they differ by rounding only."""
-        low, high = abs(self.minimum), abs(self.maximum)
-        near = 1e-12 * self.size
-        varies = self.maximum - self.minimum > near
-        return varies and low >= high - near, varies and high >= low - near
+        low, high, near = abs(self.minimum), abs(self.maximum), ALIKE * self.size
+        return self.varies and low >= high - near, self.varies and high >= low - near
 
 
 def derivative_name(order: int) -> str:

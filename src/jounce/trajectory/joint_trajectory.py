@@ -361,7 +361,7 @@ class JointTrajectory(Displayed):
                 phrases.append((doubt[0], -doubt[1], name))
         if phrases:
             worst, error, name = min(phrases)
-            words = unsupported_words(name, worst, -error, self.laws[name])
+            words = unsupported_words(name, worst, -error, self.laws[name], " by jn.smooth or jounce smooth")
             warnings.warn(SampleWarning(words), stacklevel=3)
 
     def _chosen(self, names: Iterable[str] | None) -> tuple[str, ...]:

@@ -94,7 +94,7 @@ def unsupported_derivative(errors: Float[np.ndarray, " derivative"], order: int)
     return worst, float(known[worst])
 
 
-def unsupported_words(name: str, order: int, error: float, law: Any) -> str:
+def unsupported_words(name: str, order: int, error: float, law: Any, by: str = "") -> str:
     """Word why the samples of a `SplineMotion` do not support a derivative, and what to do."""
     size = "cannot be known from them" if error >= 1 else f"is about {100 * error:.0f} %"
     with_rates = law.joined < law.degree - 1
@@ -102,8 +102,8 @@ def unsupported_words(name: str, order: int, error: float, law: Any) -> str:
         remedy = "leave out the rates beside them" if with_rates else "choose a higher degree"
         cause = f"splines of degree {law.degree} have continuous derivatives to order {law.joined}; {remedy}"
     else:
-        remedy = ", smooth them, or leave out the rates beside them" if with_rates else ", or smooth the samples"
-        cause = f"sample more often or more exactly{remedy}"
+        remedy = f"smooth them{by}, or leave out the rates beside them" if with_rates else f"or smooth the samples{by}"
+        cause = f"sample more often or more exactly, {remedy}"
     return f"samples of '{name}' do not support its derivative of order {order}: its error {size}; {cause}"
 
 

@@ -86,7 +86,7 @@ def test_rounded_rates_are_worse_than_none_which_the_warning_says():
 
     with pytest.warns(SampleWarning, match="order 4: .*sample more .*leave out the rates beside them"):
         with_rates = error(HermiteSplineMotion(times, rounded))
-    with pytest.warns(SampleWarning, match="or smooth the samples$"):
+    with pytest.warns(SampleWarning, match="or smooth the samples by jn.smooth or jounce smooth$"):
         alone = error(jn.laws.SplineMotion(times, rounded[:, 0]))
     assert alone < with_rates / 3
 

@@ -146,12 +146,14 @@ def _count(closure: Facts, key: str) -> str:
 
 
 def peaks_table(given: Sequence[Peak]) -> Table:
-    """Return peak values with their times; the largest magnitudes stand out."""
+    """Return peak values with their times, unless they are constant; the largest magnitudes stand out."""
     latest = max((abs(at) for p in given for at in (p.minimum_at, p.maximum_at) if math.isfinite(at)), default=1.0)
     decimals = 3 - math.floor(math.log10(latest or 1.0))  # of times: a table is read, not computed with
     rows = []
     for peak in given:
         early, late = (x if float(f"{x:.3g}") == x else round(x, decimals) for x in (peak.minimum_at, peak.maximum_at))
+        if not peak.varies:
+            early = late = math.nan
         low, high = peak.shown
         rows.append([peak.output, peak.derivative, peak.unit, *map(number, (low, early, high, late))])
     marks = [[k for k, largest in zip((3, 5), peak.largest, strict=True) if largest] for peak in given]
