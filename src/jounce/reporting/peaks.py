@@ -28,8 +28,7 @@ NAMES = ("position", "velocity", "acceleration", "jerk", "jounce")
 LEAST = 200  # instants that are looked at, at least
 PEAKS, POINTS, ROUNDS = 2, 7, 3  # highest maxima of each curve, instants around each, and how often these close in
 CHUNK, COMPARED = 1000, 50  # instants solved together, and compared
-ROUNDING = 1e-9
-SMALLEST, ALIKE = 1e-15, 1e-12  # shares of the size of an output
+SMALLEST, ALIKE, ROUNDING = 1e-15, 1e-12, 1e-9  # shares of the size of an output
 _Around = Float[np.ndarray, "points peaks curves"]
 
 
@@ -44,10 +43,8 @@ class Peak:
     derivative : str
         ``position``, ``velocity``, ..., or ``torque``, ``yank``, ..., see `rate_name`.
     unit : str
-    minimum, maximum : float
-        In the unit; NaN where no instant was solved.
-    minimum_at, maximum_at : float
-        Where they are reached, s.
+    minimum, maximum, minimum_at, maximum_at : float
+        In the unit, NaN where no instant was solved, and when they are reached, s.
     size : float
         The largest magnitude that any component of the output has in this derivative.
     """
