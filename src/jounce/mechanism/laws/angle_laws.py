@@ -1,12 +1,13 @@
 """Laws of angles that are likely in degrees: a warning, once, when a file is read or a mechanism is first solved."""
 
 from collections.abc import Iterator
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 from weakref import WeakValueDictionary
 
 import numpy as np
 
 from jounce.constraints import AbstractConstraint
+from jounce.constraints.facts import dimension_of_field
 from jounce.errors import JounceError, UnitWarning, warn_caller
 from jounce.mechanism.laws.driver_outputs import is_turning
 from jounce.mechanism.laws.output_drivers import with_output_drivers
@@ -26,8 +27,8 @@ IN_SI = "A number without a unit is in SI"
 _settled: WeakValueDictionary[int, AbstractConstraint] = WeakValueDictionary()
 
 
-class AngleLaw(NamedTuple):
-    """The law of a driver that turns something.
+class DriverLaw(NamedTuple):
+    """The law of a driver.
 
     Attributes
     ----------
@@ -43,22 +44,28 @@ class AngleLaw(NamedTuple):
     law: AbstractMotion
 
 
-def laws_of_angles(mechanism: Mechanism) -> Iterator[AngleLaw]:
+def laws_of_angles(mechanism: Mechanism) -> Iterator[DriverLaw]:
     """Yield the laws of drivers that turn something, without invalid ones, which their use refuses."""
+    return laws_of(mechanism, "angle")
+
+
+def laws_of(mechanism: Mechanism, dimension: Literal["angle", "length"]) -> Iterator[DriverLaw]:
+    """Yield the laws of drivers that turn or move something, without invalid ones, which their use refuses."""
     try:
         held, parameters = with_output_drivers(mechanism), mechanism.parameter_values
     except JounceError:
         return
     for name, driver in held.drivers.items():
         motion = getattr(driver, "motion", None)
-        if motion is None or not is_turning(driver):
+        fits = is_turning(driver) if dimension == "angle" else dimension_of_field(driver, "motion") == dimension
+        if motion is None or not fits:
             continue
         try:
             law = FunctionMotion(motion) if callable(motion) and not isinstance(motion, AbstractMotion) else motion
             law = law.resolved(parameters) if isinstance(law, AbstractMotion) else resolve_motion(law, parameters)
         except JounceError:
             continue
-        yield AngleLaw(name, mechanism.drivers[name], law)
+        yield DriverLaw(name, mechanism.drivers[name], law)
 
 
 def degrees_doubt(law: AbstractMotion, first: float, last: float) -> str:
@@ -71,7 +78,7 @@ def degrees_doubt(law: AbstractMotion, first: float, last: float) -> str:
     return ""
 
 
-def names_angle(of: AngleLaw, angles: frozenset[str] = frozenset()) -> bool:
+def names_angle(of: DriverLaw, angles: frozenset[str] = frozenset()) -> bool:
     """Tell whether a law is a formula with a unit of an angle, or with one of the parameters that are angles."""
     if not isinstance(of.law, ExpressionMotion) or not isinstance(getattr(of.driver, "motion", None), Expression | str):
         return False

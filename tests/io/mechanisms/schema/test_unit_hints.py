@@ -318,3 +318,49 @@ def test_ranges_of_parameters_without_a_unit_are_compared_with_their_values(tmp_
 @pytest.mark.parametrize("form", ["0.1:0.2", "20 cm:40 cm", "normal:0.1 mm", "uniform:0.001", "1:2"])
 def test_ranges_of_parameters_that_suit_their_values_are_not_doubted(tmp_path, form):
     warn_of_variations(load(tmp_path), {"BC": form, "nothing": "200:400"}, "--vary")  # warnings are errors here
+
+
+SLIDER = """
+space: planar
+parameters: {{x0: 50 mm, L: {L}}}
+bodies:
+  slide: {{position: [x0, 0]}}
+joints:
+  guide: {{type: prismatic, bodies: [ground, slide], points: [[0, 0], [0, 0]], vectors: [[1, 0], [1, 0]]}}
+drivers:
+  push: {{type: coordinate, bodies: [ground, slide], coordinate: x, motion: {motion}}}
+outputs:
+  edge: {{body: slide, point: [120 mm, 0]}}
+time: {{start: 0, stop: {stop}, step: 0.1}}
+"""
+
+
+def slider(folder, motion, L="300", stop="1"):
+    path = folder / "slider.yaml"
+    path.write_text(SLIDER.format(motion=motion, L=L, stop=stop))
+    return jn.load(path)
+
+
+@pytest.mark.parametrize(
+    "motion, farthest, fastest",
+    [("x0 + L*t**2", "300", "59[89]"), ("x0 + 300*t**2", "300", "59[89]"), ("L*sin(2*pi*t)", "300", "1.88e.03"),
+     ("{profile: [{profile: cycloidal, duration: 1, to: 250}]}", "250", "500")],
+)  # fmt: skip
+def test_a_law_of_a_length_in_millimeters_is_reported(tmp_path, motion, farthest, fastest):
+    """Speeds by hand: 300 (2 - 1/200) m/s of the squares, on a grid of 201 instants; 2 (250) of the cycloid."""
+    words = f"line 9, drivers.push.motion: goes to {farthest} m at up to {fastest} m/s, .* about 0.085 m: millimeters"
+    with pytest.warns(jn.errors.UnitWarning, match=words):
+        slider(tmp_path, motion)
+
+
+@pytest.mark.parametrize(
+    "motion, L, stop",
+    [
+        ("x0 + L*t**2", "0.3", "1"),
+        ("x0 + L*t**2", "300 m/s^2", "1"),  # a unit was thought of
+        ("x0 + L*t", "25", "10"),  # a vehicle with small wheels
+        ("x0 + L*t", "2e6", "1"),  # 2 km of which 1/1000 is no length of these
+    ],
+)
+def test_a_law_of_a_length_as_it_is_meant_is_not_doubted(tmp_path, motion, L, stop):
+    slider(tmp_path, motion, L, stop)  # warnings are errors here

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 import warnings
 from bisect import bisect_left
 from collections.abc import Iterable, Iterator, Mapping
@@ -21,8 +22,9 @@ from jounce.io.mechanisms.schema.keys import file_keys, is_cam
 from jounce.mechanism import Mechanism
 from jounce.mechanism.laws.angle_laws import (
     IN_SI,
-    AngleLaw,
+    DriverLaw,
     degrees_doubt,
+    laws_of,
     laws_of_angles,
     names_angle,
     number_doubt,
@@ -31,6 +33,7 @@ from jounce.mechanism.laws.angle_laws import (
 from jounce.mechanism.laws.driver_outputs import is_turning
 from jounce.mechanism.resolve import resolve
 from jounce.mechanism.time import instants_of
+from jounce.trajectory import AbstractMotion, ExpressionMotion
 from jounce.trajectory.law_checks.unit_doubts import values_of
 from jounce.units import Expression
 from jounce.units.dimensions import ANGLE, LENGTH, Dimension
@@ -43,6 +46,7 @@ TO_COMPARE = 3  # lengths, at least
 LARGE = 5.0  # m, from which on a machine may be one in millimeters
 FAST = 120.0  # m/s, which nothing so large reaches
 LIGHT = 0.1  # kg/m, less than which nothing so large has
+NUMBER = re.compile(r"(?<![\w.])\d+\.?\d*(?:[eE][-+]?\d+)?")
 SLENDER = 1e-5  # of the mass by the square of the size, less than which no body's inertia is
 
 
@@ -183,7 +187,32 @@ def _has_unit(source: Source, at: Location) -> bool:
         return False
 
 
-def _warn_of_lengths(source: Source, mechanism: Mechanism, laws: Iterable[AngleLaw]) -> None:
+def _warn_of_length_laws(source: Source, mechanism: Mechanism, usual: float) -> None:
+    """Warn of laws of lengths over the run that go as far and as fast as no machine of the usual length does."""
+    first, last = _run(mechanism)
+    for name, _, law in laws_of(mechanism, "length"):
+        at: Location = ("drivers", name, "motion")
+        values = values_of(law, first, last) if last > first else None
+        if values is None or _has_unit(source, at) or not _has_plain_number(source, law, FAR_OFF * usual):
+            continue
+        farthest = float(np.abs(values).max())
+        fastest = float(np.abs(np.diff(values)).max()) * (len(values) - 1) / (last - first)
+        if fastest > FAST and _is_thousandfold(farthest, usual):
+            ways = f"goes to {farthest:.3g} m at up to {fastest:.3g} m/s, where lengths are about {usual:.3g} m"
+            _warn(source, at, f"{ways}: millimeters?")
+
+
+def _has_plain_number(source: Source, law: AbstractMotion, least: float) -> bool:
+    """Tell whether a formula has a number without a unit of a size, its parameters included; other laws may have."""
+    if not isinstance(law, ExpressionMotion):
+        return True
+    parameters = source.data.get("parameters") or {}
+    given = [parameters.get(name) for name in law.expression.names]
+    numbers = [*(x for x in given if isinstance(x, int | float)), *map(float, NUMBER.findall(law.expression.text))]
+    return max(map(abs, numbers), default=0.0) > least
+
+
+def _warn_of_lengths(source: Source, mechanism: Mechanism, laws: Iterable[DriverLaw]) -> None:
     lengths = [(location, abs(value), plain) for location, value, plain in _lengths(source.data, mechanism) if value]
     in_order = sorted(value for _, value, _ in lengths)
     stated = None
@@ -199,6 +228,8 @@ def _warn_of_lengths(source: Source, mechanism: Mechanism, laws: Iterable[AngleL
         if _is_thousandfold(value, usual):
             times = float(f"{value / usual:.1g}")
             _warn(source, location, f"{value:g} m is {times:g} times {which}: {value:g} mm?")
+    if all_lengths := (_stated_lengths(source.data, mechanism) if stated is None else stated) or in_order:
+        _warn_of_length_laws(source, mechanism, float(np.median(all_lengths)))
     if len(lengths) < TO_COMPARE or in_order[-1] < LARGE or not all(plain for *_, plain in lengths):
         return
     if (why := _too_large(mechanism, in_order[-1], laws)) and not _stated_lengths(source.data, mechanism):
@@ -206,7 +237,7 @@ def _warn_of_lengths(source: Source, mechanism: Mechanism, laws: Iterable[AngleL
         _warn(source, location, f"the lengths of this file go up to {in_order[-1]:g} m, {why}: millimeters?")
 
 
-def _too_large(mechanism: Mechanism, size: float, laws: Iterable[AngleLaw]) -> str:
+def _too_large(mechanism: Mechanism, size: float, laws: Iterable[DriverLaw]) -> str:
     """Word why no mechanism of this one's motion or masses is of a size, m; nothing if there may be one."""
     first, last = _run(mechanism)
     for law in laws:
