@@ -197,3 +197,47 @@ def test_samples_too_noisy_for_the_curvature_of_a_cam_are_named():
     second = [np.abs(c.law(jn.jet.Jet.variable(angle, 2)).coefficients[2] * 2).max() for c in (smooth, rough)]
     assert abs(second[0] - 0.006) < 1e-6
     assert second[1] > 1.1 * second[0]  # what is read off such a law is noise
+
+
+CAM = """
+parameters: {{base: 30 mm, roller: 10 mm, lift: 5 mm}}
+cam: {{base_radius: {base}, count: 37}}
+follower: {{type: translating, shape: roller, radius: {radius}}}
+law: {law}
+"""
+
+
+def cam_file(folder, base="base", radius="roller", law="lift*(1 - cos(t))", lifts=None):
+    if lifts is not None:
+        angles = np.linspace(0.0, 360.0, 37)
+        rows = [f"{x},{lifts * (1 - math.cos(math.radians(x)))}" for x in angles]
+        (folder / "lift.csv").write_text("\n".join(["angle [deg],lift", *rows, ""]))
+        law = "{samples: lift.csv}"
+    path = folder / "cam.yaml"
+    path.write_text(CAM.format(base=base, radius=radius, law=law))
+    return path
+
+
+@pytest.mark.parametrize(
+    "changes, words",
+    [
+        ({"law": "5*(1 - cos(t))"}, r"cam.yaml, line 5, law: goes to 10 m, 500 times the other lengths: 10 mm\?"),
+        ({"law": "1*(1 - cos(t))"}, r"law: goes to 2 m, 100 times"),
+        ({"lifts": 4.0}, r"law: goes to 8 m, 400 times"),
+        ({"base": "30"}, r"line 3, cam.base_radius: 30 m, 3000 times the other lengths: 30 mm\?"),
+        ({"radius": "10"}, r"line 4, follower.radius: 10 m, 500 times the other lengths"),
+    ],
+)
+def test_lengths_of_a_cam_that_are_likely_in_millimeters_are_reported(tmp_path, changes, words):
+    """Ratios by hand: the median of the other two lengths is 20 mm, but 10 mm where the base radius is in doubt."""
+    with pytest.warns(jn.errors.UnitWarning, match=words):
+        jn.cams.load_cam(cam_file(tmp_path, **changes))
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [{}, {"base": "0.03", "radius": "0.01"}, {"base": "300 mm"}, {"radius": "200 mm"}, {"law": "0.02*(1 - cos(t))"},
+     {"lifts": 0.005}],
+)  # fmt: skip
+def test_lengths_of_a_cam_as_they_are_meant_are_not_doubted(tmp_path, changes):
+    jn.cams.load_cam(cam_file(tmp_path, **changes))  # warnings are errors here

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import dataclasses
+import math
+import statistics
 from collections.abc import Iterable
 from os import PathLike
 from types import SimpleNamespace
@@ -10,20 +12,32 @@ from typing import Any
 
 from pydantic_core import PydanticCustomError
 
-from jounce.errors import JounceError, MechanismFileError, check_choice, check_name, did_you_mean
+from jounce.errors import (
+    JounceError,
+    MechanismFileError,
+    UnitWarning,
+    check_choice,
+    check_name,
+    did_you_mean,
+    warn_caller,
+)
 from jounce.io.files.assignments import assignments
 from jounce.io.files.located_data import Source
 from jounce.io.files.samples import rates, read_samples
 from jounce.io.files.source import read_source
+from jounce.io.mechanisms.schema.unit_hints import is_thousandfold
 from jounce.io.mechanisms.values.motion_values import Samples, motion
 from jounce.kinematics import OscillatingFollower, PlateCam, TranslatingFollower, plate_cam
 from jounce.kinematics.cams.plate_cams import SIGNS
+from jounce.mechanism.laws.angle_laws import IN_SI
 from jounce.mechanism.resolve import resolve_motion
 from jounce.settings import under_own_settings
 from jounce.trajectory import AbstractMotion, Expression, SplineMotion
+from jounce.trajectory.law_checks.unit_doubts import values_of
 from jounce.units.dimensions import Dimension
 from jounce.units.expression import check_parameter_name
 
+FAR_OFF = 20.0  # times the other lengths of a cam, which are more alike than those of a mechanism
 KEYS = ("title", "parameters", "units", "cam", "follower", "law")
 CAM_KEYS = ("base_radius", "sense", "count")
 FOLLOWERS = {
@@ -110,6 +124,7 @@ class _CamFile:
         check_choice("sense", sense, SIGNS, self.source.error_type, **self.source.error_fields(("cam", "sense")))
         follower = self._follower()
         law = self._law("angle" if follower.turning else "length")
+        self._warn_of_lengths(base, follower, law)
         title = self.data.get("title", "")
         points = body.get("count", 721) if count is None else count
         try:
@@ -124,6 +139,31 @@ class _CamFile:
         except JounceError as error:
             raise self.source.error(error.message, tuple(str(error.name).split(".")), value=error.value) from None
         return profile
+
+    def _warn_of_lengths(
+        self, base: float, follower: TranslatingFollower | OscillatingFollower, law: AbstractMotion
+    ) -> None:
+        """Warn of a lift, or a length without a unit, that would suit the others in millimeters."""
+        fields = {("follower", field.name): getattr(follower, field.name) for field in dataclasses.fields(follower)}
+        lengths: dict[tuple[str, ...], float] = {("cam", "base_radius"): base}
+        lengths |= {at: abs(x) for at, x in fields.items() if isinstance(x, int | float) and x}
+        if not follower.turning and (values := values_of(law, 0.0, 2 * math.pi)) is not None and values.any():
+            lengths["law",] = float(abs(values).max())
+        for at, length in lengths.items():
+            others = [x for place, x in lengths.items() if place != at]
+            if not others or (at != ("law",) and not self._is_plain(self.source.at(at))):
+                continue
+            if is_thousandfold(length, usual := statistics.median(others), FAR_OFF):
+                times, what = float(f"{length / usual:.1g}"), "goes to " if at == ("law",) else ""
+                words = f"{what}{length:.4g} m, {times:g} times the other lengths: {length:.4g} mm? {IN_SI}"
+                fault = self.source.error(words, at)
+                warn_caller(UnitWarning(str(fault)))
+
+    def _is_plain(self, raw: Any) -> bool:
+        """Tell whether a length is a number without a unit, or the parameter of one."""
+        return isinstance(
+            (self.data.get("parameters") or {}).get(raw, raw) if isinstance(raw, str) else raw, int | float
+        )
 
     def _length(self, at: tuple[str, ...], data: dict[str, Any]) -> float:
         if at[-1] not in data:

@@ -156,14 +156,14 @@ def _doubt(dimensions: Iterable[Dimension], value: float, was: float, which: str
     """Word why a number for a parameter is likely one of degrees or millimeters; nothing if it is not."""
     if ANGLE in dimensions and (hint := number_doubt(value)):
         return hint
-    if LENGTH in dimensions and was and _is_thousandfold(abs(value), abs(was)):
+    if LENGTH in dimensions and was and is_thousandfold(abs(value), abs(was)):
         return f"{value:g} m is {float(f'{abs(value / was):.1g}'):g} times {which}: {value:g} mm?"
     return ""
 
 
-def _is_thousandfold(value: float, usual: float) -> bool:
+def is_thousandfold(value: float, usual: float, times: float = FAR_OFF) -> bool:
     """Tell whether a length is far larger than usual, and a usual one where it is in millimeters."""
-    return value > FAR_OFF * usual and usual / ALIKE < value / 1000 < ALIKE * usual
+    return value > times * usual and usual / ALIKE < value / 1000 < ALIKE * usual
 
 
 def _run(mechanism: Mechanism) -> tuple[float, float]:
@@ -197,7 +197,7 @@ def _warn_of_length_laws(source: Source, mechanism: Mechanism, usual: float) -> 
             continue
         farthest = float(np.abs(values).max())
         fastest = float(np.abs(np.diff(values)).max()) * (len(values) - 1) / (last - first)
-        if fastest > FAST and _is_thousandfold(farthest, usual):
+        if fastest > FAST and is_thousandfold(farthest, usual):
             ways = f"goes to {farthest:.3g} m at up to {fastest:.3g} m/s, where lengths are about {usual:.3g} m"
             _warn(source, at, f"{ways}: millimeters?")
 
@@ -222,10 +222,10 @@ def _warn_of_lengths(source: Source, mechanism: Mechanism, laws: Iterable[Driver
         usual, which = math.nan, "the others"
         if len(lengths) > TO_COMPARE:
             usual = _median_of_others(in_order, value)
-        if value >= 1.0 and not _is_thousandfold(value, usual):
+        if value >= 1.0 and not is_thousandfold(value, usual):
             stated = _stated_lengths(source.data, mechanism) if stated is None else stated
             usual, which = float(np.median(stated)) if stated else math.nan, "those with a unit"
-        if _is_thousandfold(value, usual):
+        if is_thousandfold(value, usual):
             times = float(f"{value / usual:.1g}")
             _warn(source, location, f"{value:g} m is {times:g} times {which}: {value:g} mm?")
     if all_lengths := (_stated_lengths(source.data, mechanism) if stated is None else stated) or in_order:
