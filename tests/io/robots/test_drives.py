@@ -94,3 +94,14 @@ def test_drives_of_a_mechanism_are_by_its_drivers(read):
     assert (drives["leg1"].stiffness, drives["leg2"].stiffness, drives["leg2"].lead) == (55e3, 50e3, 0.005)
     with pytest.raises(jn.errors.RobotError, match="'drivers'"):
         read("joints: {leg1: {stiffness: 1}}", platform)
+
+
+def test_a_lead_that_is_likely_in_millimeters_is_reported(read):
+    """A ball screw of 20 mm, given as 20: the motor would turn a thousandth of what it does."""
+    with pytest.warns(jn.errors.UnitWarning, match=r"line 2, joints.slide.lead: a lead of 20 m .*: 20 mm\?"):
+        given = read("joints:\n  slide: {stiffness: 50 N/mm, lead: 20}\n")["slide"]
+    assert given.ratio == pytest.approx(2 * math.pi / 20)
+    for lead, factor in (("20 mm", 100 * math.pi), ("0.02", 100 * math.pi), ("1.9", 2 * math.pi / 1.9)):
+        drive = read(f"joints:\n  slide: {{stiffness: 50 N/mm, lead: {lead}}}\n")["slide"]  # warnings are errors here
+        assert drive.ratio == pytest.approx(factor)
+    assert read("joints:\n  slide: {stiffness: 50 N/mm, lead: 3 m}\n")["slide"].lead == 3.0

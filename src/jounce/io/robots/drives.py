@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from os import PathLike
 from typing import Any
 
-from jounce.errors import RobotError, no_such
+from jounce.errors import RobotError, UnitWarning, no_such, warn_caller
 from jounce.io.files.located_data import Location, Source
 from jounce.io.files.source import read_source
 from jounce.mechanism import Mechanism
@@ -30,6 +30,7 @@ UNITS = {
     "velocity_limit": ("rad/s", "m/s"),
 }
 """Units of each key where it turns, and where it slides; those of a motor itself are by what the motor does."""
+LONG = 2.0  # m, more than which no spindle and no pinion travels in a turn: a number without a unit may be in mm
 OF_MOTOR = ("rotor_inertia", "torque_limit", "velocity_limit")
 
 
@@ -131,6 +132,10 @@ class _DrivesFile:
             message = "is for joints and drivers that slide; this one turns, give a gear_ratio"
             raise self.source.error(message, (*locations["lead"], "lead"), value=values["lead"])
         numbers = {key: self._number(raw, key, (*locations[key], key), turning, motor) for key, raw in values.items()}
+        if numbers.get("lead", 0.0) > LONG and isinstance(values["lead"], int | float):
+            lead = values["lead"]
+            hint = f"a lead of {lead:g} m in each turn: {lead:g} mm? A number without a unit is in SI"
+            warn_caller(UnitWarning(str(self.source.error(hint, (*locations["lead"], "lead")))))
         try:
             return Drive(**numbers)
         except RobotError as error:
