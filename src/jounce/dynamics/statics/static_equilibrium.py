@@ -95,7 +95,7 @@ class Equilibrium(Displayed):
             return verdict.reason
         direction = self._reduction.basis @ verdict.direction
         moving = freely_moving(self.point.model, np.abs(direction)[None])
-        tail = {"energy falls": "as {} move", "no stiffness": "resists motions of {}"}.get(
+        tail = {"energy falls": "in motions of {}", "no stiffness": "resists motions of {}"}.get(
             verdict.reason, "those of {}"
         )
         start = {"no stiffness": "no force", "energy falls": "energy falls"}.get(verdict.reason, verdict.reason)
