@@ -115,10 +115,12 @@ def pressing(
 def largest_array(model: Model) -> int:
     """Return of how many numbers an array may be single values in the machine code of a balance; larger ones are loops.
 
-    In space, most changes of a residual with a displacement are zero for certain: single values leave them out.
+    In space, most changes of a residual with a displacement are zero for certain: single values leave them out. Dense
+    matrices take loops: those of redundant rows, and those with masses where a motion is free.
     """
-    few = model.pose_type is SpatialPose and model.system.shape[1] <= MOST_COLUMNS
-    return ALL if few and model.system.rank is None else SMALL  # redundant rows take loops over dense matrices
+    rows, columns = model.system.shape
+    few = model.pose_type is SpatialPose and columns <= MOST_COLUMNS
+    return ALL if few and rows == columns and model.system.rank is None else SMALL
 
 
 def _blocks(
