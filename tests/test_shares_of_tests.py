@@ -45,6 +45,14 @@ def test_the_tests_of_what_changed_most_are_added():
     assert most_changed(Counter(), files, root, 1) == set()
 
 
+def test_of_files_of_as_many_changed_lines_every_process_chooses_the_same():
+    root = pathlib.Path("/root")
+    files = [root / f"tests/test_{name}.py" for name in "abcdefgh"]
+    lines = Counter({f"tests/test_{name}.py": 3 for name in "abcdefgh"})
+    for order in (files, files[::-1], files[4:] + files[:4]):
+        assert most_changed(lines, order, root, 4) == set(files[:2])
+
+
 def test_lines_are_counted_since_a_commit(tmp_path):
     def git(*words):
         who = ["-c", "user.name=a", "-c", "user.email=a@b.c", "-c", "core.hooksPath=/dev/null"]
