@@ -62,7 +62,7 @@ class OnDemand(Mapping[str, Any]):
         return repr(dict(self))
 
 
-def read_only(arrays: dict[str, Any]) -> dict[str, Any]:
+def read_only_arrays(arrays: dict[str, Any]) -> dict[str, Any]:
     """Make arrays of NumPy read-only, as they are views of what others use; those that JAX traces are so anyway."""
     for array in arrays.values():
         if isinstance(array, np.ndarray):

@@ -13,7 +13,7 @@ from jounce.base.modules import with_fields
 from jounce.base.shapes import ArrayLike, Numbers
 from jounce.errors import MechanismError, check_name
 from jounce.execution.backends import xla_backend
-from jounce.execution.on_demand import OnDemand, read_only
+from jounce.execution.on_demand import OnDemand, read_only_arrays
 from jounce.jet.derivatives import plain_derivatives
 from jounce.jet.turns import brought_near
 from jounce.kinematics.continuation.path_following import ChangePoint
@@ -225,10 +225,10 @@ class Motion(Tabulated):
         """Return an output, and those that are found with it."""
         output = self.mechanism.outputs[name]
         if isinstance(output, AbstractMotionOutput):
-            return read_only({name: self._derivatives(output.coefficients(self))})
+            return read_only_arrays({name: self._derivatives(output.coefficients(self))})
         groups = zip(self._groups.items(), self.model.system.outputs, strict=True)
         ((names, values), group) = next(entry for entry in groups if name in entry[0][0])
-        return read_only(dict(zip(names, self._each_shown(self._continued(group, values)), strict=True)))
+        return read_only_arrays(dict(zip(names, self._each_shown(self._continued(group, values)), strict=True)))
 
     def _each_shown(self, values: Float[Numbers, "order component instance time"]) -> Sequence[Any]:
         """Return each output of a group as `outputs` has it."""

@@ -192,8 +192,9 @@ def _warn_of_length_laws(source: Source, mechanism: Mechanism, usual: float) -> 
     first, last = _run(mechanism)
     for name, _, law in laws_of(mechanism, "length"):
         at: Location = ("drivers", name, "motion")
-        values = values_of(law, first, last) if last > first else None
-        if values is None or _has_unit(source, at) or not _has_plain_number(source, law, FAR_OFF * usual):
+        if last <= first or _has_unit(source, at) or not _has_plain_number(source, law, FAR_OFF * usual):
+            continue
+        if (values := values_of(law, first, last)) is None:
             continue
         farthest = float(np.abs(values).max())
         fastest = float(np.abs(np.diff(values)).max()) * (len(values) - 1) / (last - first)
