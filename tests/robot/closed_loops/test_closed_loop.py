@@ -8,8 +8,10 @@ import mujoco
 import numpy as np
 import pytest
 from mpmath import mp
+from scipy.spatial.transform import Rotation
 
 import jounce as jn
+from jounce.robot.closed_loops.closures import Loops
 from jounce.robot.model.floating_base import floating_joints
 from tests.problems.closed_robots import FIVE_BAR, forward, in_contact, in_pinocchio, inverse
 from tests.problems.random_loops import random_loop
@@ -247,6 +249,26 @@ def test_a_ball_driven_along_its_coordinates_keeps_its_joints():
     links, joints = floating_joints("rod", world="base_frame_3")
     robot = jn.Robot("rod", [*links[3:], jn.Link("rod", ROD)], joints[3:])
     agrees_with_newton_euler(robot, waves(robot), order=2)
+
+
+@pytest.mark.parametrize(("kind", "count"), [("weld", 6), ("slider", 5), ("pin", 5)])
+def test_closures_of_a_free_body_hold_it_as_they_say_from_any_attitude_between(kind, count):
+    """The sine of a missing turn also vanishes for bodies half a turn apart, and for a pin that is turned by half."""
+    axis = None if kind == "weld" else [0, 0, 1]
+    for seed in range(12):
+        turn = Rotation.random(random_state=seed) if seed else Rotation.from_rotvec([0, 0, np.pi])
+        free = jn.Robot("free", [jn.Link("load", ROD)], []).with_floating_base()
+        points = [[0.1, 0.2, 0.3], [0, 0, 0.1]]
+        held = jn.robot.Closure("held", (free.base, "load"), kind, points, axis=axis, rotation=turn.as_matrix())
+        robot = jn.Robot("held", [*free.links.values()], [*free.joints.values()], closures=[held])
+        borne, redundant = jn.robot.closure_wrenches(robot)["held"]
+        assert (len(borne), len(redundant)) == (count, 0)
+        q = Loops(robot).closed(robot.coordinates())
+        frame = jn.forward_kinematics(robot.opened(), q[None], "load", point=points[1])
+        left = frame.rotation[0] @ turn.as_matrix().T
+        assert np.abs(frame.position[0][:2] - points[0][:2]).max() <= 1e-12
+        assert np.abs(left @ [0, 0, 1] - [0, 0, 1]).max() <= 1e-12
+        assert kind == "pin" or np.abs(left - np.eye(3)).max() <= 1e-12
 
 
 def bennett(a=0.3, b=0.4, alpha=0.7):

@@ -5,6 +5,7 @@ redundant: the forces in them have no unique value. They are found by the rank o
 the coordinates of the tree, near the closed position as well as in it, and left out.
 """
 
+import math
 from collections.abc import Mapping
 from typing import Any
 
@@ -20,7 +21,7 @@ from jounce.constraints import AbstractConstraint, Scalar, Vector
 from jounce.constraints.base import Wrenches
 from jounce.errors import MechanismError, RobotError
 from jounce.jet import Jet, cross, dot, stack
-from jounce.jet.algebra import stacked, total
+from jounce.jet.algebra import stacked
 from jounce.rigid import SpatialPose
 from jounce.rigid.inertia import finite_numbers
 from jounce.robot.model.abstract_robot import AbstractRobot
@@ -98,10 +99,10 @@ def constraint_wrenches(closure: Closure) -> np.ndarray:
 
 
 @Batched
-def _gaps(
+def _placed(
     tree: Tree, arrays: tuple[Series], link_frames: tuple[Frame, Frame]
-) -> Float[Numbers, "order 2 3 closure batch"]:
-    """Return offset of the points and missing turn of each closure, in axes of its first link."""
+) -> Float[Numbers, "order 4 3 closure batch"]:
+    """Return offset of the points, and axes of the second link, of each closure, in axes of its first link."""
     frames = body_frames(tree, arrays[0])
 
     def point_and_axes(link_frame: Frame) -> tuple[Jet, list[Jet]]:
@@ -111,9 +112,26 @@ def _gaps(
         return frame.point(point), [frame.direction(axis) for axis in axes]
 
     (origin, axes), (other, others) = map(point_and_axes, link_frames)
-    turn = total(cross(a, b) for a, b in zip(axes, others, strict=True)) * 0.5
-    seen = [stack([axis.dot(vector) for axis in axes]) for vector in (other - origin, turn)]
+    seen = [stack([axis.dot(vector) for axis in axes]) for vector in (other - origin, *others)]
     return jnp.stack([stacked(part) for part in seen], axis=1)
+
+
+def _missing_turn(closure: Closure, rotation: np.ndarray) -> np.ndarray:
+    """Return by how much the second link of a closure is turned from where it is closed, rad, as a vector.
+
+    That is the angle, up to half a turn: the sine of it would vanish for links that are half a turn apart. What a pin
+    leaves free does not count.
+    """
+    if closure.type != "pin":
+        from scipy.spatial.transform import Rotation  # here, since importing SciPy takes half a second
+
+        return Rotation.from_matrix(rotation).as_rotvec()
+    axis = np.asarray(closure.axis)
+    turned = rotation @ axis
+    across = np.cross(axis, turned)
+    sine = float(np.linalg.norm(across))
+    across = across / sine if sine > 1e-12 else axes_with_z_along(axis)[:, 0]
+    return math.atan2(sine, float(axis @ turned)) * across
 
 
 class Loops:
@@ -127,25 +145,34 @@ class Loops:
 
     def __init__(self, robot: AbstractRobot):
         self.tree, self.size = robot.opened(), size_of(robot)
-        self.names = tuple(robot.closures)
+        self.names, self.closures = tuple(robot.closures), tuple(robot.closures.values())
         turning = [robot.joints[name].turning for name in robot.joint_names]
         self.scale = np.where(turning, 1.0, self.size)  # of the coordinates
-        self.wrenches = [constraint_wrenches(closure) for closure in robot.closures.values()]
+        self.wrenches = [constraint_wrenches(closure) for closure in self.closures]
         sides: list[list[Frame]] = [[], []]
-        for closure in robot.closures.values():
+        for closure in self.closures:
             first, second = (frame_at(robot, link, p) for link, p in zip(closure.links, closure.points, strict=True))
             sides[0].append(first)
             sides[1].append(second._replace(rotation=second.rotation @ closure.rotation.T))
         self.frames = tuple(jax.tree.map(lambda *xs: np.stack(xs), *side) for side in sides)
 
     def gaps(self, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the scaled gaps of all closures, (closures, 6), and their slopes by the scaled coordinates."""
+        """Return the scaled gaps of all closures, (closures, 6), and velocities by the scaled coordinates.
+
+        The velocities of gaps that are turns are angular: those of the gaps themselves near where they are closed.
+        """
         count = len(q)
         directions = np.diag(self.scale) if count else np.zeros((1, 0))
         states = np.stack([np.broadcast_to(q, directions.shape), directions], axis=1)
-        values = _gaps(self.tree, (states,), self.frames)  # (coordinates, 2, 2, 3, closures)
-        values = np.moveaxis(values.reshape(*values.shape[:2], 6, -1), -1, 2) / np.repeat([self.size, 1.0], 3)
-        return values[0, 0], np.moveaxis(values[:count, 1], 0, -1)
+        placed = _placed(self.tree, (states,), self.frames)  # (coordinates, 2, 4, 3, closures)
+        here, rates = placed[0, 0], placed[:count, 1]
+        gaps, slopes = [], []
+        for k, closure in enumerate(self.closures):
+            rotation, turning = here[1:, :, k].T, np.swapaxes(rates[:, 1:, :, k], 1, 2) @ here[1:, :, k]
+            gaps.append(np.concatenate([here[0, :, k] / self.size, _missing_turn(closure, rotation)]))
+            spins = 0.5 * (turning - np.swapaxes(turning, 1, 2))[:, [2, 0, 1], [1, 2, 0]]  # angular velocities
+            slopes.append(np.concatenate([rates[:, 0, :, k] / self.size, spins], axis=1).T)
+        return np.array(gaps), np.array(slopes)
 
     def closed(self, q: Float[np.ndarray, " joint"], free: Any = slice(None)) -> Float[np.ndarray, " joint"]:
         """Return the coordinates nearest to the given ones at which the loops are closed; only those free change.
