@@ -251,7 +251,7 @@ def test_a_ball_driven_along_its_coordinates_keeps_its_joints():
     agrees_with_newton_euler(robot, waves(robot), order=2)
 
 
-@pytest.mark.parametrize(("kind", "count"), [("weld", 6), ("slider", 5), ("pin", 5)])
+@pytest.mark.parametrize("kind, count", [("weld", 6), ("slider", 5), ("pin", 5)])
 def test_closures_of_a_free_body_hold_it_as_they_say_from_any_attitude_between(kind, count):
     """The sine of a missing turn also vanishes for bodies half a turn apart, and for a pin that is turned by half."""
     axis = None if kind == "weld" else [0, 0, 1]

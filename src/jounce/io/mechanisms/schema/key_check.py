@@ -22,6 +22,19 @@ _HINTS = {
     ("spatial", "angle"): "a spatial body has an orientation",
 }
 
+_OTHER_WORDS = {
+    "fixed": ("weld", "welded", "rigid", "clamp"),
+    "revolute": ("hinge", "pin", "pivot", "rotational", "turning"),
+    "prismatic": ("slider", "sliding", "linear", "translational"),
+    "spherical": ("ball", "ball_joint", "ball_and_socket"),
+    "double_revolute": ("rod", "link", "bar"),
+    "double_spherical": ("rod", "link", "bar"),
+    "universal": ("cardan", "hooke"),
+    "screw": ("helical",),
+    "parallel2": ("pin_in_slot", "slot"),
+}
+"""What else types of joints are called, in words that name no type."""
+
 
 def check_keys(path: str | PathLike[str]) -> None:
     """Raise the error that `load` would, where a file breaks its syntax, or has an unknown key or type.
@@ -82,7 +95,9 @@ def unknown_type(
         if isinstance(name, str) and name in types(other_space, other_role)
     ]
     note = f"it is the type of {' and '.join(elsewhere)}; " if elsewhere else ""
-    message = f"no {space} {role} has this type; {note}{did_you_mean(name, valid)}"
+    meant = [word for word in valid if str(name).lower() in _OTHER_WORDS.get(word, ()) and not elsewhere]
+    hint = f"it is called '{meant[0]}' here" if meant else note + did_you_mean(name, valid)
+    message = f"no {space} {role} has this type; {hint}"
     return source.error(message, (*at, "type"), value=name)
 
 
