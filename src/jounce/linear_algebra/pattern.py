@@ -87,13 +87,25 @@ class Pattern(Module):
         self, entries: Float[Numbers, "entry #batch"], columns: Float[Numbers, "column batch"]
     ) -> Float[Numbers, "row batch"]:
         """Return the products of the matrices with these entries and columns."""
+        return jnp.sum(self.by_row(entries) * self.touched(columns), axis=(1, 2))
+
+    def by_row(self, entries: Float[Numbers, "entry batch"]) -> Float[Numbers, "row slot width batch"]:
+        """Return the entries of each row, in the columns of each body that it touches."""
+        return _with_zero(entries)[self.entry_indices]
+
+    def touched(self, columns: Float[Numbers, "column batch"]) -> Float[Numbers, "row slot width batch"]:
+        """Return the components that belong to the bodies that each row touches."""
         by_body = jnp.reshape(columns, (self.body_count, self.width, -1))
-        touched = by_body.at[self.bodies].get(mode="fill", fill_value=0.0)
-        return jnp.sum(_with_zero(entries)[self.entry_indices] * touched, axis=(1, 2))
+        return by_body.at[self.bodies].get(mode="fill", fill_value=0.0)
+
+    def summed(self, shares: Float[Numbers, "row slot width batch"]) -> Float[Numbers, "column batch"]:
+        """Return the sums of the shares of all rows in each component: the transpose of `touched`."""
+        sums = jnp.zeros((self.body_count, self.width, shares.shape[-1])).at[self.bodies].add(shares, mode="drop")
+        return sums.reshape(self.shape[1], -1)
 
     def row_scale(self, entries: Float[Numbers, "entry batch"]) -> Float[Numbers, "row batch"]:
         """Return factors by which the largest entry of each row becomes one; one where that is zero or not finite."""
-        largest = jnp.max(jnp.abs(_with_zero(entries))[self.entry_indices], axis=(1, 2))
+        largest = jnp.max(jnp.abs(self.by_row(entries)), axis=(1, 2))
         return 1 / jnp.where((largest > 0) & jnp.isfinite(largest), largest, 1.0)
 
 

@@ -4,7 +4,7 @@ How the residuals change with virtual displacements of the bodies is a jet, as e
 """
 
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -118,15 +118,16 @@ def solved_series(system: System, entries: Float[Numbers, "order entry batch"], 
     array of shape (order + 1, columns, batch)
     """
     scale = _row_scale(system, entries)
-    matrices, product, transposed = _products(system, entries, scale)
     fixed = jax.lax.stop_gradient(entries[0])
     if system.fronts is None:
         factor: Any = DenseFactor.of(system.pattern.dense(fixed) * scale[:, :, None])
     else:
         factor = FrontalFactor.of(system.fronts, fixed, scale)
+    matrices, product, transposed = _products(system, entries, scale)
 
     def multiplied(x: Any) -> Any:
-        return _convolution(product, matrices, x)
+        spread = jax.vmap(product.spread)(x)
+        return jnp.stack([product.sum(matrices[: k + 1], spread[k::-1]) for k in range(len(x))])
 
     def solve(_: Any, b: Any) -> Any:
         return _in_order(product, jax.lax.stop_gradient(matrices), factor.solve, b)
@@ -151,39 +152,40 @@ def _row_scale(system: System, entries: Float[Numbers, "order entry batch"]) -> 
     return system.pattern.row_scale(jnp.max(jnp.abs(jax.lax.stop_gradient(entries[0])), axis=-1, keepdims=True))
 
 
-Product = Callable[[Any, Any], Any]
+class _Product(NamedTuple):
+    """How matrices multiply columns: these are spread along the entries, multiplied with them, and added up."""
+
+    spread: Callable[[Any], Any]
+    added: Callable[[Any], Any]
+    collected: Callable[[Any], Any] = lambda sums: sums
+
+    def sum(self, matrices: Any, spread: Any) -> Any:
+        """Return the sum of the products of matrices with columns that are spread."""
+        return self.collected(jnp.sum(self.added(matrices * spread), axis=0))
 
 
-def _products(system: System, entries: Any, scale: Any) -> tuple[Any, Product, Product]:
-    """Return the matrices of a series of them, and how one, or its transpose, multiplies columns, (columns, batch)."""
+def _products(system: System, entries: Any, scale: Any) -> tuple[Any, _Product, _Product]:
+    """Return the matrices of a series of them, and how they, or their transposes, multiply columns, (columns, batch)."""
     pattern = system.pattern
     if system.fronts is None:
         matrices = jax.vmap(pattern.dense)(entries) * scale[None, :, :, None]
-        return matrices, lambda m, x: jnp.sum(m * x[None], axis=1), lambda m, x: jnp.sum(m * x[:, None], axis=0)
-
-    def product(m: Any, x: Any) -> Any:
-        return pattern.product(m, x) * scale
-
-    def transposed(m: Any, y: Any) -> Any:
-        columns = jax.ShapeDtypeStruct((pattern.shape[1], y.shape[-1]), y.dtype)
-        return jax.linear_transpose(lambda x: product(m, x), columns)(y)[0]
-
-    return entries, product, transposed
+        forward = _Product(lambda x: x[None], lambda terms: jnp.sum(terms, axis=-2))
+        return matrices, forward, _Product(lambda y: y[:, None], lambda terms: jnp.sum(terms, axis=-3))
+    matrices = jnp.stack([pattern.by_row(each) * scale[:, None, None] for each in entries])
+    forward = _Product(pattern.touched, lambda terms: jnp.sum(terms, axis=(-3, -2)))
+    return matrices, forward, _Product(lambda y: y[:, None, None], lambda terms: terms, pattern.summed)
 
 
-def _convolution(product: Product, matrices: Any, x: Series) -> Series:
-    """Return the product of a series of matrices with one of columns."""
-    each = jax.vmap(product)
-    return jnp.stack([jnp.sum(each(matrices[: k + 1], x[k::-1]), axis=0) for k in range(len(x))])
-
-
-def _in_order(product: Product, matrices: Any, solve: Callable[[Any], Any], right: Series) -> Series:
+def _in_order(product: _Product, matrices: Any, solve: Callable[[Any], Any], right: Series) -> Series:
     """Return the series whose product with one of matrices is known, coefficient after coefficient, in one loop."""
-    orders = np.arange(len(right))
 
-    def step(solved: Any, k: Any) -> tuple[Any, None]:
-        # those not found yet are zero, also where an index runs round
-        known = jnp.sum(jax.vmap(product)(matrices, solved[(k - orders) % len(orders)]), axis=0)
-        return solved.at[k].set(solve(right[k] - known)), None
+    def step(spread: Any, k: Any) -> tuple[Any, Any]:
+        def added(j: Any, sums: Any) -> Any:
+            return sums + product.added(matrices[j] * spread[k - j])
 
-    return jax.lax.scan(step, jnp.zeros_like(right), orders)[0]
+        known = jax.lax.fori_loop(1, k + 1, added, jnp.zeros_like(product.added(matrices[0] * spread[0])))
+        solved = solve(right[k] - product.collected(known))
+        return spread.at[k].set(product.spread(solved)), solved
+
+    blank = jnp.zeros((len(right), *jax.eval_shape(product.spread, right[0]).shape))
+    return jax.lax.scan(step, blank, np.arange(len(right)))[1]

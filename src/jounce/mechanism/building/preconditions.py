@@ -109,7 +109,7 @@ def holds_tracer(given: Mapping[str, Any]) -> bool:
         kind = type(value)
         if kind in PLAIN:
             continue
-        names = _fields(kind)
+        names = fields_of(kind)
         if names is None:
             pending += value.values()
         elif names:
@@ -124,7 +124,7 @@ def holds_tracer(given: Mapping[str, Any]) -> bool:
 
 def _entries(value: Any) -> list[tuple[str | int, Any]]:
     """Return what an object, a mapping or a list holds, by name or index."""
-    names = _fields(type(value))
+    names = fields_of(type(value))
     if names is None:
         return list(value.items())
     if names:  # those of an object are looked up at once: Equinox has a slow way of its own for each
@@ -135,7 +135,7 @@ def _entries(value: Any) -> list[tuple[str | int, Any]]:
 
 
 @lru_cache(maxsize=1000)
-def _fields(kind: type[Any]) -> tuple[str, ...] | None:
+def fields_of(kind: type[Any]) -> tuple[str, ...] | None:
     """Return the names of the fields of a class, or those that it says; none for one without; None for a mapping."""
     if issubclass(kind, Tracer):
         return ()

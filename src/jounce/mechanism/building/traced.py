@@ -6,7 +6,8 @@ from the starting guess, and the position in which angles about axes are counted
 """
 
 import dataclasses
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import partial
 from typing import Any, NamedTuple
 
 import jax.numpy as jnp
@@ -21,7 +22,7 @@ from jounce.errors import UnsupportedError
 from jounce.jet.turns import brought_near
 from jounce.mechanism.building.builder import Model, grouped_elements, model_of
 from jounce.mechanism.building.derived_values import with_offsets, with_sense, with_turn_unit
-from jounce.mechanism.building.preconditions import PLAIN
+from jounce.mechanism.building.preconditions import PLAIN, fields_of
 from jounce.mechanism.building.starting_guess import pose_at, starting_guess
 from jounce.mechanism.mechanism import Mechanism
 from jounce.mechanism.resolve import resolve
@@ -56,55 +57,44 @@ def template(tree: Any) -> tuple[list[Any], Callable[[Sequence[Any]], Any]]:
     The second holds none of them. Numbers become plain ones on the way, as a mechanism is checked for.
     """
     values: list[Any] = []
+    maker = _maker(tree, values)
+    return values, (lambda _: tree) if maker is None else lambda others: maker(iter(others))
 
-    def taken(value: Any) -> Any:
+
+def _maker(value: Any, values: list[Any]) -> Callable[[Iterator[Any]], Any] | None:
+    """Return what makes a nesting again from other values in place of the traced ones; None where it holds none."""
+    kind = type(value)
+    if isinstance(value, Tracer):
         values.append(value)
-        return _PLACEHOLDER
-
-    holder = _mapped(tree, taken)
-
-    def made(values: Sequence[Any]) -> Any:
-        left = iter(values)
-        return _mapped(holder, lambda _: next(left))
-
-    return values, made
-
-
-class _Placeholder:
-    """Stands where a traced value stood."""
-
-
-_PLACEHOLDER = _Placeholder()
-
-
-def _mapped(value: Any, function: Callable[[Any], Any]) -> Any:
-    """Return a nesting with what a function makes of each traced value; what holds none stays the same object."""
-    if isinstance(value, Tracer | _Placeholder):
-        return function(value)
-    if type(value) in PLAIN or isinstance(value, type):
-        return value
+        return next
+    if kind in PLAIN or isinstance(value, type):
+        return None
     if isinstance(value, Mapping):
-        entries = {key: _mapped(entry, function) for key, entry in value.items()}
-        return value if _same(entries.values(), value.values()) else entries
-    if isinstance(value, list | tuple):
-        parts = [_mapped(entry, function) for entry in value]
-        if _same(parts, value):
-            return value
-        return type(value)(*parts) if hasattr(value, "_fields") else type(value)(parts)
-    if not dataclasses.is_dataclass(value):
-        return value
-    names = [field.name for field in dataclasses.fields(value) if hasattr(value, field.name)]
-    fields = {name: _mapped(getattr(value, name), function) for name in names}
-    if _same(fields.values(), (getattr(value, name) for name in names)):
-        return value
-    copy = object.__new__(type(value))  # its values were checked before JAX traced them, or are when it is solved
+        parts, joined = dict(value), dict
+    elif isinstance(value, list | tuple):
+        parts = dict(enumerate(value))
+        joined = partial(_as_sequence, kind)
+    elif dataclasses.is_dataclass(kind):
+        names = [name for name in fields_of(kind) or () if hasattr(value, name)]
+        parts, joined = {name: getattr(value, name) for name in names}, partial(_copied, kind)
+    else:
+        return None
+    makers = {key: maker for key, part in parts.items() if (maker := _maker(part, values)) is not None}
+    if not makers:
+        return None
+    fixed = parts | dict.fromkeys(makers)  # which holds no traced values
+    return lambda left: joined(fixed | {key: maker(left) for key, maker in makers.items()})
+
+
+def _as_sequence(kind: type[Any], parts: Mapping[Any, Any]) -> Any:
+    return kind(*parts.values()) if hasattr(kind, "_fields") else kind(parts.values())
+
+
+def _copied(kind: type[Any], fields: Mapping[str, Any]) -> Any:
+    copy = object.__new__(kind)  # its values were checked before JAX traced them, or are when it is solved
     for name, field in fields.items():
         object.__setattr__(copy, name, field)
     return copy
-
-
-def _same(new: Any, old: Any) -> bool:
-    return all(a is b for a, b in zip(new, old, strict=True))
 
 
 def traced_model(
