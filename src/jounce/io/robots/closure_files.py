@@ -13,7 +13,7 @@ import numpy as np
 from jounce.errors import RobotError, no_such
 from jounce.io.files.located_data import Location, Source
 from jounce.io.files.source import read_source
-from jounce.robot.closed_loops.closures import Loops
+from jounce.robot.closed_loops.closures import Loops, given_coordinates
 from jounce.robot.model.links_and_joints import CLOSURES, Closure, Joint
 from jounce.robot.robot import Robot
 from jounce.units.dimensions import Dimension, describe_dimension, dimension_of
@@ -226,7 +226,7 @@ def _check_closed(robot: Robot) -> None:
     lower = np.minimum(lower, upper)
     first: RobotError | None = None
     for k in range(STARTS):
-        q = np.zeros(len(lower)) if k == 0 else random.uniform(lower, upper)
+        q = given_coordinates(robot, None) if k == 0 else random.uniform(lower, upper)
         try:
             loops.closed(q)
             return

@@ -49,8 +49,8 @@ def mechanism(
     robot : Robot
         With closures or without.
     q : array_like of shape (n,) or dict of str to float, optional
-        Coordinates near which the mechanism is assembled, zero unless given. Driven joints start where their laws
-        do, the others are moved until the loops are closed.
+        Coordinates near which the mechanism is assembled, where the joints start unless given: at zero, or in the pose
+        of an MJCF file. Driven joints start where their laws do, the others are moved until the loops are closed.
     drivers : dict of str to law, or JointTrajectory, optional
         Laws of coordinates, by name of the joint: expressions of t, functions of time, motions or numbers; rad or m.
         The driver of joint A is named ``A_drive``, and its force is the torque or force of the joint.

@@ -32,7 +32,7 @@ from jounce.robot.recursions.kinematics import body_frames, frame_at
 from jounce.robot.recursions.tree_scan import Series
 
 GivenCoordinates = TypeAliasType("GivenCoordinates", Mapping[str, float] | ArrayLike | None)
-"""Coordinates in order, or by name of the joint; those not given are zero."""
+"""Coordinates in order, or by name of the joint; those not given are where the joints start."""
 
 RANK_TOLERANCE = 1e-5  # rad, or sizes of the robot: files give axes with six digits
 MAX_STEPS = 100
@@ -277,9 +277,9 @@ def _null_space(matrix: np.ndarray) -> np.ndarray:
 
 
 def given_coordinates(robot: AbstractRobot, q: GivenCoordinates) -> Float[np.ndarray, " joint"]:
-    """Return coordinates from an array, or from values by name of the joint; zero where none are given."""
+    """Return coordinates from an array, or from values by name of the joint; of others those where they start."""
     if q is None or isinstance(q, Mapping):
-        return robot.coordinates(**(q or {}))
+        return robot.coordinates(**{**{name: robot.joints[name].start for name in robot.joint_names}, **(q or {})})
     return np.array(finite_numbers("q", q, (len(robot.joint_names),)))
 
 
@@ -303,7 +303,7 @@ def closure_wrenches(
     robot : Robot
         With closures.
     q : array_like of shape (n,) or dict of str to float, optional
-        Coordinates near which the loops are closed; zero unless given.
+        Coordinates near which the loops are closed; where the joints start unless given.
 
     Returns
     -------

@@ -183,6 +183,8 @@ class Joint:
         Of a spring that holds the joint, N m/rad or N/m.
     spring_reference : float, default 0
         Coordinate at which the spring is free, rad or m.
+    start : float, default 0
+        Coordinate from which loops are closed and equilibria looked for, unless another is given, rad or m.
 
     Raises
     ------
@@ -214,6 +216,7 @@ class Joint:
     friction: Any = 0.0
     stiffness: float = 0.0
     spring_reference: float = 0.0
+    start: float = 0.0
 
     def __post_init__(self) -> None:
         where = f"joints.{self.name}"
@@ -236,8 +239,8 @@ class Joint:
             raise RobotError("must be zero or greater", name=f"{where}.friction", value=friction.tolist())
         forward, backward = (float(x) for x in np.broadcast_to(friction, 2))
         object.__setattr__(self, "friction", forward if forward == backward else (forward, backward))
-        reference = float(finite_numbers(f"{where}.spring_reference", self.spring_reference, ()))
-        object.__setattr__(self, "spring_reference", reference)
+        for field in ("spring_reference", "start"):
+            object.__setattr__(self, field, float(finite_numbers(f"{where}.{field}", getattr(self, field), ())))
 
     @property
     def moving(self) -> bool:

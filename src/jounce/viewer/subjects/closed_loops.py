@@ -6,11 +6,9 @@ import dataclasses
 from collections.abc import Mapping
 from itertools import combinations, islice
 
-import numpy as np
-
 from jounce.errors import JounceError, RobotError
 from jounce.kinematics import solve
-from jounce.robot.closed_loops.closures import Loops
+from jounce.robot.closed_loops.closures import Loops, given_coordinates
 from jounce.robot.robot import Robot
 from jounce.viewer.shapes.recording import Recording
 from jounce.viewer.subjects.mechanisms import recorded
@@ -56,7 +54,7 @@ def independent(robot: Robot) -> tuple[str, ...]:
         If there are none.
     """
     loops = Loops(robot)
-    start = loops.closed(np.zeros(len(robot.joint_names)), np.ones(len(robot.joint_names), bool))
+    start = loops.closed(given_coordinates(robot, None))
     freedom = len(start) - sum(len(chosen_here) for chosen_here, _ in loops.independent(start))
     names = sorted(robot.joint_names, key=lambda name: (robot.limits[name].effort is None, _depth(robot, name)))
     for chosen in islice(combinations(names, freedom), MOST_TRIED):

@@ -473,6 +473,32 @@ def test_connects_and_welds_are_closures_that_miss_what_mujoco_says(tmp_path):
             assert np.sin(turn / 2) == pytest.approx(np.linalg.norm(gap[3:]), rel=1e-13)
 
 
+def test_loops_are_closed_from_the_pose_of_the_file(tmp_path):
+    """Which of the two sides a plate on two legs is on, is told by nothing else."""
+    plate = '<freejoint name="f"/><site name="l" pos="-0.2 0 0"/><site name="r" pos="0.2 0 0"/>'
+    text = written(tmp_path, plate).read_text().replace('name="a"', 'name="a" pos="0.1 0 -0.8" euler="10 20 30"')
+    legs = "".join(
+        f'<body name="{name}" pos="{x} 0 0"><joint name="{name}x" axis="1 0 0" ref="20"/><joint name="{name}y" '
+        f'axis="0 1 0"/><joint name="{name}s" type="slide" axis="0 0 1" ref="-0.8"/>{INERTIAL}'
+        f'<site name="{name}e" pos="0 0 -0.8"/></body>'
+        for name, x in (("p", -0.2), ("q", 0.2))
+    )
+    ties = '<equality><connect site1="pe" site2="l"/><connect site1="qe" site2="r"/></equality>'
+    path = tmp_path / "platform.xml"
+    path.write_text(text.replace("</worldbody>", f"{legs}</worldbody>{ties}"))
+    robot, model = load_robot(path), mujoco.MjModel.from_xml_path(str(path))
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    start = {name: robot.joints[name].start for name in robot.joint_names}
+    for name, pose in ((name, poses(robot, start)[name]) for name in "apq"):
+        np.testing.assert_allclose(pose[:3, 3], data.body(name).xpos, rtol=0, atol=1e-15)
+        np.testing.assert_allclose(pose[:3, :3].ravel(), data.body(name).xmat, rtol=0, atol=1e-15)
+    body = robot.mechanism().bodies["a"]
+    assert np.linalg.norm(np.array(body.position) - data.body("a").xpos) < 0.5
+    origin = np.array(robot.mechanism({"f_z": 0.8, "ps": 0.8, "qs": 0.8}).bodies["a"].position)
+    assert origin[2] > 0  # the other side is where it was asked for
+
+
 def test_moments_without_mass_count_as_in_mujoco_and_are_warned_of(tmp_path):
     path = tmp_path / "rotor.xml"
     rotor = '<body name="rotor" pos="0.1 0 0"><inertial pos="0 0 0" mass="0" diaginertia="0.2 0.3 0.4"/></body>'

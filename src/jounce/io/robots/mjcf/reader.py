@@ -332,16 +332,24 @@ class _Reader:
         lower, upper = (float(value) for value in model.jnt_range[j]) if limited else (None, None)
         kind = "prismatic" if not turning else "revolute" if limited else "continuous"
         limits = Limits(lower=lower, upper=upper, effort=self.drives.efforts.get(j))
+        mimic = self.mimics.get(name)
         self.joints.append(
-            Joint(name, parent, child, kind, position, rotation, axis, limits, self.mimics.get(name), **drives)
+            Joint(name, parent, child, kind, position, rotation, axis, limits, mimic, **drives, start=reference)
         )
 
     def _expand(self, j: int, parent: str, child: str, position: _Vector, rotation: _Matrix) -> None:
         """Add the slides and turns that a free joint or a ball stands for."""
         model, name = self.model, self.joint_names[j]
         _, joints = floating_joints(child, prefix=name)
+        start = [0.0] * 6
         if model.jnt_type[j] == self.kind["ball"]:
             joints = joints[3:]
+        else:
+            first = model.jnt_qposadr[j]
+            from scipy.spatial.transform import Rotation  # here, since importing SciPy takes half a second
+
+            turns = Rotation.from_matrix(quaternion_matrix(model.qpos0[first + 3 : first + 7])).as_euler("ZYX")
+            start = [*model.qpos0[first : first + 3], *turns]
         drives = self.drives.of_several(j)
         if model.dof_dampingpoly[model.jnt_dofadr[j]].any():
             raise self.error("damping must be one number, proportional to the velocity", f"joints.{name}.damping")
@@ -353,11 +361,11 @@ class _Reader:
                     value = np.ravel(values).tolist()
                     raise self.error(f"{message}; set it to zero", f"joints.{name}.{field}", value=value)
         pose = {"position": position, "rotation": rotation}
-        for made in joints:  # each with a name of its own: base_x may be that of another joint in the file
+        for made, at in zip(joints, start[-len(joints) :], strict=True):  # base_x may be that of another joint in the file
             end = child if made is joints[-1] else self._unused(made.child)
             if end != child:
                 self.links.append(Link(end))
-            own = {"name": self._unused(made.name), "parent": parent, "child": end}
+            own = {"name": self._unused(made.name), "parent": parent, "child": end, "start": float(at)}
             along = {} if made.turning else drives
             self.joints.append(dataclasses.replace(made, **own, **pose, **along))
             parent, pose = end, {}
