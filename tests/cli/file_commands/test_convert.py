@@ -122,6 +122,22 @@ def test_the_torque_of_a_pendulum_from_a_file_made_of_a_robot(call):
     np.testing.assert_allclose(motion.outputs["pin_torque"][:, 0], torque, rtol=1e-12)
 
 
+def test_loops_of_a_file_beside_the_robot_are_closed_in_the_mechanism_too(call):
+    """A second pendulum that is welded to the first."""
+    second = PENDULUM[PENDULUM.index("<link", PENDULUM.index("<link") + 1) : PENDULUM.index("</robot>")]
+    second = second.replace('"rod"', '"other"').replace('"pin"', '"free"')
+    pathlib.Path("p.urdf").write_text(PENDULUM.replace("</robot>", second + "</robot>"))
+    frames = "[{link: rod, xyz: [0, 0, 1]}, {link: other, xyz: [0, 0, 1]}]"
+    pathlib.Path("weld.yaml").write_text(f"closures:\n  w: {{type: weld, frames: {frames}}}\n")
+    status, _, err = call("p.urdf", "p.yaml", "--drive", "pin=0.5*t**2", "--closures", "weld.yaml")
+    assert (status, err) == (0, "")
+    motion = jn.solve(jn.load("p.yaml"), np.array([0.0, 1.0]), order=2)
+    torque = 2 * ((0.2 + 2 * 0.25) * 1.0 + 2 * 9.81 * 0.5 * np.sin([0.0, 0.5]))
+    np.testing.assert_allclose(motion.outputs["pin_torque"][:, 0], torque, rtol=1e-12)
+    status, _, err = call("p.yaml", "p.json", "--closures", "weld.yaml")
+    assert (status, err) == (2, "error: p.yaml, --closures: is for robots; a mechanism file keeps its drivers\n")
+
+
 ROD = """<inertial><origin xyz="0.1 0.05 -0.5"/><mass value="2"/>
 <inertia ixx="0.2" iyy="0.25" izz="0.1" ixy="0.01" ixz="0.02" iyz="0.03"/></inertial>"""
 TREE = f"""<robot name="tree"><link name="base"/><link name="cart">{ROD}</link><link name="left">{ROD}</link>

@@ -27,6 +27,8 @@ def convert(
     hold: bool = False,
     no_drives: bool = False,
     strict: bool = False,
+    model: str | None = None,
+    closures: Path | None = None,
     import_: list[Path] | None = None,
     allow: list[Path] | None = None,
     overwrite: Overwrite = False,
@@ -54,6 +56,10 @@ def convert(
         Leave out armature, damping and friction of a robot.
     strict
         Refuse a robot whose inertias no real body can have.
+    model
+        Model to read from an SDF file with several.
+    closures
+        File with loops, springs and rotors to add to the robot.
     import_
         Python file with your own joints; repeatable.
     allow
@@ -78,10 +84,10 @@ def convert(
     check_target(target, DATA_FILES, "mechanism file", overwrite=overwrite)
     refuse_existing(target, overwrite=overwrite)
     if suffix in ROBOT_FILES:
-        model = RobotReading(strict=strict, allow=allow).robot(source)
-        return _robot(source, model, target, drive, start, hold, not no_drives)
+        robot = RobotReading(strict=strict, allow=allow, model=model, closures=closures).robot(source)
+        return _robot(source, robot, target, drive, start, hold, not no_drives)
     given = {"--drive": drive, "--start": start, "--hold": hold, "--no-drives": no_drives, "--strict": strict}
-    for option, value in given.items():
+    for option, value in {**given, "--model": model, "--closures": closures}.items():
         if value:
             raise JounceError("is for robots; a mechanism file keeps its drivers", name=option, path=source)
     return _mechanism(source, target, import_, allowed(allow), overwrite)

@@ -361,7 +361,7 @@ class _Reader:
                     value = np.ravel(values).tolist()
                     raise self.error(f"{message}; set it to zero", f"joints.{name}.{field}", value=value)
         pose = {"position": position, "rotation": rotation}
-        for made, at in zip(joints, start[-len(joints) :], strict=True):  # base_x may be that of another joint in the file
+        for made, at in zip(joints, start[-len(joints) :], strict=True):  # base_x may be the name of another joint
             end = child if made is joints[-1] else self._unused(made.child)
             if end != child:
                 self.links.append(Link(end))
