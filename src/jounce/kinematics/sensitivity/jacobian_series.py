@@ -165,7 +165,7 @@ class _Product(NamedTuple):
 
 
 def _products(system: System, entries: Any, scale: Any) -> tuple[Any, _Product, _Product]:
-    """Return the matrices of a series of them, and how they, or their transposes, multiply columns, (columns, batch)."""
+    """Return the matrices of a series of them, and how they, or transposed ones, multiply columns, (columns, batch)."""
     pattern = system.pattern
     if system.fronts is None:
         matrices = jax.vmap(pattern.dense)(entries) * scale[None, :, :, None]
