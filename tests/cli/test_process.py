@@ -10,6 +10,7 @@ import time
 
 import pytest
 
+import jounce as jn
 from jounce.cli.standard_streams import FailSafeStream
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
@@ -176,6 +177,11 @@ def test_a_file_is_written_though_nobody_reads_the_table(tmp_path, cache):
 def test_bad_input_is_2_though_nobody_can_read_it():
     assert shell("jounce run none.yaml 2>/dev/full").returncode == 2
     assert shell("jounce run none.yaml 2>&-").returncode == 2
+
+
+def test_a_folder_that_was_removed_meanwhile_is_no_hindrance(tmp_path):
+    done = shell(f'mkdir gone; cd gone; rmdir "$PWD"; PYTHONPATH={ROOT / "src"} jounce --version', cwd=tmp_path)
+    assert (done.returncode, done.stdout.strip()) == (0, jn.__version__), done.stderr
 
 
 def test_text_goes_through_a_stream_that_lasts(capsys):

@@ -231,6 +231,15 @@ def test_what_cannot_be_written_is_said_before_computing(tmp_path, name, words):
         assert str(caught.value).startswith(path.replace("\x00", r"\x00"))
 
 
+def test_a_file_that_is_read_only_is_not_replaced(tmp_path, monkeypatch):
+    (tmp_path / "motion.csv").write_text("precious")
+    monkeypatch.setattr("os.access", lambda path, _mode: str(path) != str(tmp_path / "motion.csv"))
+    for call in (lambda path: check_writable(path), lambda path: write(example(), path)):
+        with pytest.raises(OutputError, match="the file there is read-only; give another name"):
+            call(tmp_path / "motion.csv")
+    assert (tmp_path / "motion.csv").read_text() == "precious"
+
+
 def test_a_folder_without_the_right_to_write(tmp_path, monkeypatch):
     def refuse(*_arguments, **_keywords):
         raise PermissionError(13, "Permission denied")

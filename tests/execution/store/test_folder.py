@@ -56,6 +56,12 @@ def test_an_entry_that_cannot_be_replaced_is_compiled_each_time(tmp_path):
     assert entries.get("key") is None
 
 
+def test_a_tilde_is_the_home_folder_where_no_shell_has_read_it(tmp_path, monkeypatch):
+    monkeypatch.setenv("HOME", str(tmp_path))
+    monkeypatch.setenv("JOUNCE_CACHE_DIR", "~/programs")
+    assert program_folder.chosen_folder() == tmp_path / "programs"
+
+
 def test_those_that_were_not_used_for_longest_go_first(tmp_path, monkeypatch):
     monkeypatch.setattr(program_folder, "LARGEST", 3 * (len(PROGRAM) + 32))
     for key in "abcde":

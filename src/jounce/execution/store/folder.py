@@ -25,7 +25,7 @@ def chosen_folder() -> Path | None:
     """
     given = os.environ.get(VARIABLE)
     if given is not None:
-        return Path(given) if given.strip() else None
+        return Path(given).expanduser() if given.strip() else None
     home = Path.home()
     if sys.platform == "win32":
         return Path(os.environ.get("LOCALAPPDATA", home / "AppData" / "Local")) / "jounce" / "cache"

@@ -67,8 +67,10 @@ def _check_replaceable(target: Path, overwrite: bool) -> None:
         raise OutputError("is a circle of symbolic links")
     if not target.exists():
         return
-    if not (target.is_file() and os.access(target, os.W_OK)):
+    if not target.is_file():
         raise OutputError("the file there may not be replaced")
+    if not os.access(target, os.W_OK):
+        raise OutputError("the file there is read-only; give another name, or make it writable")
     if not overwrite and is_input(target):
         message = "was read as an input; give another name, or replace it with --overwrite (in Python overwrite=True)"
         raise OutputError(message)
