@@ -1,6 +1,7 @@
 """Mechanisms and motions stay as they were made: what they were given may change, and they may not."""
 
 import copy
+import dataclasses
 import pickle
 
 import jax
@@ -38,6 +39,14 @@ def test_instants_that_were_given_may_change_afterwards():
     times += 3.0
     np.testing.assert_allclose(motion.dataset["tip"].sel(component="x", derivative=0), np.cos(times - 3.0), atol=1e-14)
     np.testing.assert_array_equal(motion.dataset["time"], times - 3.0)
+
+
+def test_a_law_may_be_an_array_without_axes_as_an_entry_of_a_dataset_is():
+    mechanism = pendulum([0.0, 0.0], [1.0, 0.0], {"speed": 2.0}, [0.0])
+    angle = jn.solve(mechanism, [0.0, 0.3], order=1).dataset["tip"].values[1, 0, 0].reshape(())
+    driver = jn.drivers.CoordinateDriver(("ground", "rod"), "angle", motion=angle)
+    held = dataclasses.replace(mechanism, drivers={"theta": driver})
+    assert jn.solve(held, order=0).outputs["tip"][0, 0, 0] == pytest.approx(np.cos(np.cos(0.6)), abs=1e-15)
 
 
 def test_a_mechanism_does_not_change_and_says_what_to_do():

@@ -35,6 +35,13 @@ def test_a_step_that_is_likely_a_number_of_instants_is_warned_of():
     assert time_grid(grid, {}).tolist() == [0.0, 2.0]
 
 
+@pytest.mark.parametrize("field", ["start", "stop", "step"])
+def test_what_is_no_number_is_refused_by_its_name(field):
+    grid = jn.TimeGrid(**{"start": 0.0, "stop": 1.0, "step": 0.1, field: np.array([0.5])})
+    with pytest.raises(jn.errors.MechanismError, match=rf"time\.{field}: must be one number, got array"):
+        time_grid(grid, {})
+
+
 @pytest.mark.parametrize("values", [(0, 2, 0.01), (0, 2, 5.0), (0, 2, "121 s"), (0, 200, 121), (0, 2, None, 121)])
 def test_other_steps_are_not_doubted(values):
     with warnings.catch_warnings(record=True) as caught:

@@ -53,6 +53,11 @@ def resolve(value: Any, parameters: Mapping[str, Any]) -> Any:
     return value
 
 
+def _is_number(value: Any) -> bool:
+    """Tell whether a value is one number: also an array without axes, as an entry of a dataset is."""
+    return isinstance(value, numbers.Real) or (isinstance(value, np.ndarray) and not value.ndim)
+
+
 def _number(value: Any) -> float:
     return float(real_numbers(None, value, MechanismError, "one number"))
 
@@ -69,7 +74,7 @@ def resolve_motion(motion: Any, parameters: Mapping[str, Any]) -> AbstractMotion
     """Return the motion law that a number, an expression, a Python function or a law stands for."""
     if isinstance(motion, AbstractMotion):
         return _traceable(motion.resolved(parameters))
-    if isinstance(motion, numbers.Real):
+    if _is_number(motion):
         motion = Expression(repr(_number(motion)))
     if isinstance(motion, str):
         motion = expression_in_si(motion)
@@ -134,7 +139,7 @@ def _scalar_law(law: Any, force: AbstractForce, parameters: Mapping[str, Any]) -
         return law
     if isinstance(law, AbstractMotion):
         return TimeLaw(law.resolved(parameters))
-    if isinstance(law, numbers.Real) and not isinstance(law, bool):
+    if _is_number(law) and not isinstance(law, bool):
         size = _number(law)
         if not np.isfinite(size):
             raise MechanismError("must be finite", value=size)

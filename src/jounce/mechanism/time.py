@@ -133,7 +133,11 @@ def _resolved(name: str, value: Any, parameters: Mapping[str, Any]) -> Any:
 
 def _spaced(grid: TimeGrid, parameters: Mapping[str, Any]) -> SpacedInstants:
     given = {k: getattr(grid, k) for k in ("start", "stop", "step", "count") if getattr(grid, k) is not None}
-    values = {k: float(_resolved(f"time.{k}", v, parameters)) for k, v in given.items()}
+    resolved = {k: _resolved(f"time.{k}", v, parameters) for k, v in given.items()}
+    for name, value in resolved.items():
+        if np.ndim(value):
+            raise MechanismError("must be one number", name=f"time.{name}", value=given[name])
+    values = {k: float(value) for k, value in resolved.items()}
     for name, value in values.items():
         if not np.isfinite(value):
             raise MechanismError("must be finite", name=f"time.{name}", value=value)

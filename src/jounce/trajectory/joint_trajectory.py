@@ -23,6 +23,7 @@ from jounce.trajectory.checks import (
     positive,
     whole_number,
 )
+from jounce.trajectory.labels import in_order
 from jounce.trajectory.laws.profiles import motion_profile
 from jounce.trajectory.laws.stacking import evaluate_laws, law_derivatives
 from jounce.trajectory.laws.trapezoid import LIMITS
@@ -151,7 +152,7 @@ class JointTrajectory(Displayed):
         """
         names = names_of_joints(names)
         check_odd(degree)
-        times, positions = check_samples(times, positions)
+        times, positions = check_samples(times, in_order("positions", positions, names, TrajectoryError))
         if positions.ndim != 2 or positions.shape[1] != len(names):
             message = f"positions of {len(names)} joints have the shape (samples, {len(names)})"
             raise TrajectoryError(message, name="positions", value=f"shape {positions.shape}")

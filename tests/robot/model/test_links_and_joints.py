@@ -48,6 +48,7 @@ def test_parts_do_not_change():
 def test_limits_take_numbers_of_numpy():
     assert jn.Limits(velocity=np.float64(2.0)).velocity == 2.0
     assert jn.Limits(lower=1.0, upper=1.0).lower == 1.0
+    assert type(jn.Limits(velocity=np.float64(2.0)).velocity) is float
 
 
 REFUSED = [

@@ -21,6 +21,7 @@ from jounce.robot import Robot
 from jounce.robot.closed_loops.closures import GivenCoordinates, given_coordinates
 from jounce.robot.closed_loops.mechanism_parts import RobotParts
 from jounce.robot.model.arguments import floats
+from jounce.trajectory.labels import in_order
 
 DRIVE = "_drive"
 
@@ -114,7 +115,7 @@ def _levels(robot: Robot, state: GivenState) -> Float[np.ndarray, "3 joint"]:
     """Return coordinates, rates and second derivatives, zero where they are not given."""
     count = len(robot.joint_names)
     values = robot.coordinates(**state) if isinstance(state, Mapping) else np.zeros(count) if state is None else state
-    given = np.atleast_2d(np.asarray(floats("q", values)))
+    given = np.atleast_2d(np.asarray(floats("q", in_order("q", values, robot.joint_names, RobotError))))
     if given.ndim != 2 or given.shape[1] != count or not 1 <= len(given) <= 3:
         shown = f"not {given.shape if len(given) > 1 else given.shape[1:]}"
         message = f"must have the shape (n,), or (k, n) with q, q' and q'' for k to 3, n = {count}, {shown}"

@@ -11,7 +11,7 @@ from jounce.base.shapes import is_traced
 from jounce.errors import RobotError
 from jounce.integrate.steps.methods import Lanes
 from jounce.robot.algorithms.motion_series import MotionSeries
-from jounce.robot.model.arguments import checked_state, floats
+from jounce.robot.model.arguments import checked_state
 from jounce.robot.robot import Robot
 
 
@@ -49,7 +49,7 @@ def start_levels(robot: Robot, state: Any) -> Any:
     shape = 2, len(names)
     if is_traced(state):
         return checked_state(robot, jnp.asarray(state, float))
-    levels = np.zeros(shape) if state is None else np.array(checked_state(robot, floats("state", state)))
+    levels = np.zeros(shape) if state is None else np.array(checked_state(robot, state))
     if levels.shape != shape or not np.isfinite(levels).all():
         raise RobotError(f"must hold finite q and q', the shape {shape}", name="state", value=levels.tolist())
     return levels

@@ -13,6 +13,7 @@ from jounce.planning.paths.path import Path
 from jounce.planning.pieces import JoinedPieces
 from jounce.robot.model.links_and_joints import Limits
 from jounce.trajectory import AbstractMotion, ExpressionMotion, FollowingMotion, PiecewiseMotion, SplineMotion
+from jounce.trajectory.labels import in_order
 
 FIELDS = ("velocity", "acceleration", "jerk")
 MET = 4  # positions to jerk of the path, where it is joined
@@ -45,7 +46,7 @@ def clean_state(given: ArrayLike, names: Sequence[str], limits: dict[str, Limits
         If it is no such state, or has accelerations at rest.
     """
     message = f"must hold positions, velocities and perhaps accelerations and jerks of {len(names)} joints"
-    state = real_numbers("state", given, TrajectoryError, message).copy()
+    state = real_numbers("state", in_order("state", given, names, TrajectoryError), TrajectoryError, message).copy()
     if state.ndim != 2 or not 2 <= len(state) <= MET or state.shape[1] != len(names):
         raise TrajectoryError(message, name="state", value=f"shape {state.shape}")
     if not np.isfinite(state).all():

@@ -19,6 +19,7 @@ from jounce.planning.paths.straight_lines import Lines, polynomials_at, rounded
 from jounce.trajectory import AbstractMotion, Expression, JointTrajectory, PiecewiseMotion, SplineMotion
 from jounce.trajectory.checks import finite, finite_row, positive
 from jounce.trajectory.knots import knot_jumps
+from jounce.trajectory.labels import in_order
 from jounce.trajectory.law_checks.seen_jumps import level_sizes, unexplained
 from jounce.trajectory.splines import HIGHEST_DEGREE
 
@@ -135,7 +136,7 @@ def path_of(
         if len({np.shape(x) for x in lists}) != 1:
             raise TrajectoryError("waypoints of all joints must be equally many", name="path")
         path = np.stack(lists, axis=-1)
-    points = _numbers(path)
+    points = _numbers(path if names is None else in_order("path", path, names, TrajectoryError))
     if names is None or points.shape[1] != len(names):
         expected = "" if names is None else f" with {len(names)} joints: {', '.join(names)}"
         message = f"waypoints have the shape (points, joints){expected}; or give a mapping from names to positions"

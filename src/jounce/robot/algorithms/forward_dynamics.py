@@ -21,6 +21,7 @@ from jounce.robot.recursions.batches import Batched
 from jounce.robot.recursions.kinematics import frame_at
 from jounce.robot.recursions.tree_equations import TreeEquations, Unknowns, free_base
 from jounce.robot.robot import Robot
+from jounce.trajectory.labels import in_order
 
 MOST_UNROLLED = 5  # orders, each with code of its own
 WIDE = 32  # samples side by side where there are rates: their histories shall stay in the cache
@@ -154,7 +155,7 @@ def forward_dynamics(
 
 def _checked_forces(robot: Robot, tau: Any, lead: tuple[int, ...], free: bool) -> tuple[Any, Any]:
     """Return the forces of the joints, and those on a free base, of the same number of levels."""
-    tau, n = floats("tau", tau), len(robot.joint_names)
+    tau, n = floats("tau", in_order("tau", tau, robot.joint_names, RobotError)), len(robot.joint_names)
     columns = (n, 6 + n) if free else (n,)
     if tau.ndim != len(lead) + 2 or tau.shape[:-2] != lead or tau.shape[-1] not in columns or not tau.shape[-2]:
         expected = " or ".join(f"({', '.join([*map(str, lead), 'order + 1', str(c)])})" for c in columns)

@@ -30,6 +30,7 @@ from jounce.robot.model.tree import Frame, Tree, axes_with_z_along
 from jounce.robot.recursions.batches import Batched
 from jounce.robot.recursions.kinematics import body_frames, frame_at
 from jounce.robot.recursions.tree_scan import Series
+from jounce.trajectory.labels import in_order
 
 GivenCoordinates = TypeAliasType("GivenCoordinates", Mapping[str, float] | ArrayLike | None)
 """Coordinates in order, or by name of the joint; those not given are where the joints start."""
@@ -280,7 +281,7 @@ def given_coordinates(robot: AbstractRobot, q: GivenCoordinates) -> Float[np.nda
     """Return coordinates from an array, or from values by name of the joint; of others those where they start."""
     if q is None or isinstance(q, Mapping):
         return robot.coordinates(**{**{name: robot.joints[name].start for name in robot.joint_names}, **(q or {})})
-    return np.array(finite_numbers("q", q, (len(robot.joint_names),)))
+    return np.array(finite_numbers("q", in_order("q", q, robot.joint_names, RobotError), (len(robot.joint_names),)))
 
 
 def size_of(robot: AbstractRobot) -> float:

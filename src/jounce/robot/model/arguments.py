@@ -12,6 +12,7 @@ from jounce.base.shapes import Numbers, is_real, real_numbers
 from jounce.errors import RobotError
 from jounce.robot.model.abstract_robot import AbstractRobot
 from jounce.trajectory.joint_trajectory import MAX_ORDER, JointTrajectory
+from jounce.trajectory.labels import in_order
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -83,7 +84,7 @@ def _numbered(robot: AbstractRobot, name: str, q: object) -> tuple[int, Float[Nu
     if isinstance(q, str) and q in robot.frames:
         message = "must be an array of real numbers; the arguments are the robot, q, then the name of a link"
         raise RobotError(message, name=name, value=q)
-    return count, floats(name, q)
+    return count, floats(name, in_order(name, q, robot.joint_names, RobotError))
 
 
 def checked_position(robot: AbstractRobot, q: object, name: str = "q") -> Float[Numbers, "*batch 1 joint"]:
@@ -108,7 +109,7 @@ def checked_state(robot: AbstractRobot, state: object) -> Float[Numbers, "*batch
     RobotError
         If there is no robot, or their shape, (..., 2, n), does not fit it.
     """
-    n, state = len(joints_of(robot)), floats("state", state)
+    n, state = len(joints_of(robot)), floats("state", in_order("state", state, robot.joint_names, RobotError))
     if state.ndim < 2 or state.shape[-2:] != (2, n):
         message = f"must hold q and q', the shape (..., 2, {n}) for the joints of {robot.name}, not {state.shape}"
         raise RobotError(message, name="state")

@@ -58,6 +58,7 @@ class Limits:
                 raise RobotError("must be a finite number", name=field.name, value=value)
             if field.name not in ("lower", "upper") and value <= 0:
                 raise RobotError("must be greater than zero", name=field.name, value=value)
+            object.__setattr__(self, field.name, float(number))
         if self.lower is not None and self.upper is not None and self.lower > self.upper:
             raise RobotError("the lower limit must not exceed the upper one", value=[self.lower, self.upper])
 

@@ -1,0 +1,46 @@
+"""Arrays with labels, of xarray and pandas: what they say of a joint by its name is not taken by its place."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from typing import Any
+
+
+def in_order(name: str, values: Any, labels: Sequence[str], error: Callable[..., Exception]) -> Any:
+    """Return values with the labels of their last axis in the order given; as they are where they have no such labels.
+
+    Raises
+    ------
+    Exception
+        That given, if some of their labels are among those given and others are not, or another axis has them.
+
+    Examples
+    --------
+    >>> import xarray as xr
+    >>> q = xr.DataArray([[0.1, 0.2]], dims=("derivative", "joint"), coords={"joint": ["b", "a"]})
+    >>> in_order("q", q, ("a", "b"), ValueError).values.tolist()
+    [[0.2, 0.1]]
+    """
+    if hasattr(values, "isel") and hasattr(values, "indexes"):
+        axes = [_texts(values.indexes.get(axis)) for axis in values.dims]
+        moved = "joint" in values.dims[:-1]
+    elif hasattr(values, "iloc") and hasattr(values, "axes"):
+        axes, moved = [_texts(axis) for axis in values.axes], False
+    else:
+        return values
+    last, expected = (axes[-1] if axes else []), set(labels)
+    if expected.isdisjoint(last) and (moved or any(expected <= set(axis) for axis in axes)):
+        raise error("the joints must be along the last axis: transpose it", name=name)
+    if expected.isdisjoint(last) or last == list(labels):
+        return values
+    if len(last) != len(expected) or set(last) != expected:
+        message = f"its last axis must have each of the joints {', '.join(labels)} once, and nothing else"
+        raise error(message, name=name, value=", ".join(last))
+    order = [last.index(label) for label in labels]
+    return values.isel({values.dims[-1]: order}) if hasattr(values, "isel") else values.iloc[..., order]
+
+
+def _texts(index: Iterable[object] | None) -> list[str]:
+    """Return the labels of an axis, none unless all are text."""
+    labels = [] if index is None else list(index)
+    return [label for label in labels if isinstance(label, str)] if all(isinstance(x, str) for x in labels) else []
