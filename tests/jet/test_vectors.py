@@ -109,9 +109,11 @@ def test_concatenation_of_vectors(random):
     np.testing.assert_array_equal(values(joined), np.concatenate([values(a), values(b)], axis=1))
 
 
-def test_scalar_product_of_vectors_of_unequal_length_is_refused(random):
-    with pytest.raises(ValueError, match="shorter"):
-        jet.dot(some(random, 3), some(random, 2))
+@pytest.mark.parametrize("product", [jet.dot, jet.cross])
+@pytest.mark.parametrize("lengths", [(3, 2), (2, 3), (3, 1), (1, 3)])
+def test_product_of_vectors_of_unequal_length_is_refused(random, product, lengths):
+    with pytest.raises(ValueError, match="vectors of {} and {} components".format(*lengths)):
+        product(*(some(random, length) for length in lengths))
 
 
 def test_products_of_orders_that_differ(random):

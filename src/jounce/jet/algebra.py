@@ -13,19 +13,23 @@ from jounce.base.shapes import ArrayLike, Labeled, Numbers, Real, no_numbers, re
 from jounce.jet.coefficients import (
     Coefficient,
     Product,
+    component_sum,
     convolution,
+    cycled,
     divided,
     minus,
     multiplied,
     negated,
     next_of_chain,
+    of_components,
     plus,
     quotient,
     raised,
     ranked,
     self_convolution,
     square_root,
-    total,
+    total as total,
+    turned_back,
 )
 from jounce.settings import in_full
 
@@ -260,10 +264,6 @@ def symmetric(product: Product, a: Jet) -> Jet:
     return Jet(self_convolution(product, a.coefficients))
 
 
-# Components are cut out once for each coefficient, as slices that keep their axis, and their products are written out:
-# high orders trace them hundreds of times, and XLA vectorizes them along the batch, which it does not do for sums.
-
-
 def components(vector: Jet | Numbers) -> list[Any]:
     """Return the components of a vector of shape (components, ...), each of shape (1, ...)."""
     return [vector[i : i + 1] for i in range(vector.shape[0])]
@@ -271,21 +271,21 @@ def components(vector: Jet | Numbers) -> list[Any]:
 
 def dot(a: Jet | Numbers, b: Jet | Numbers) -> Any:
     """Return the scalar product of two vectors, of shape (components, ...), as shape (...)."""
-    if isinstance(a, Jet) and a is b:
-        return total(symmetric(multiplied, x) for x in components(a))[0]
-    return total(bilinear(multiplied, x, y) for x, y in zip(components(a), components(b), strict=True))[0]
+    product = symmetric(multiplied, a) if isinstance(a, Jet) and a is b else bilinear(of_components, a, b)
+    return _of_each(component_sum, product)
 
 
 def cross(a: Jet | Numbers, b: Jet | Numbers) -> Any:
     """Return the vector product of two 3-vectors, or the scalar ``a_x b_y - a_y b_x`` of two plane vectors."""
-    x, y = components(a), components(b)
+    if a.shape[0] == 2:
+        return dot(a, _of_each(turned_back, b))
+    p, q = (_of_each(cycled, vector) for vector in (a, b))
+    return _of_each(cycled, bilinear(of_components, a, q) - bilinear(of_components, p, b))
 
-    def entry(i: int, j: int) -> Any:
-        return bilinear(multiplied, x[i], y[j]) - bilinear(multiplied, x[j], y[i])
 
-    if len(x) == 2:
-        return entry(0, 1)[0]
-    return concatenate([entry(1, 2), entry(2, 0), entry(0, 1)])
+def _of_each(function: Callable[[Any], Any], vector: Any) -> Any:
+    """Apply a linear function to an array, or to the coefficients of a jet."""
+    return vector.map(function) if isinstance(vector, Jet) else function(vector)
 
 
 def concatenate(parts: Sequence[Jet | Numbers]) -> Any:

@@ -19,12 +19,12 @@ from jounce.dynamics.inverse import constraint_forces, redundant_forces
 from jounce.dynamics.inverse.constraint_forces import Multipliers, Slope, Slopes
 from jounce.dynamics.inverse.friction_of_motion import Rubbed, rubbing_of, with_friction
 from jounce.dynamics.inverse.tooth_flanks import with_flanks
-from jounce.dynamics.motion_values import Coordinates, cut, in_small_chunks, part_of, pose_of
+from jounce.dynamics.motion_values import Coordinates, cut, in_small_chunks, pose_of
 from jounce.execution.compilation import compiled
 from jounce.execution.mapped import Mapped
 from jounce.jet import Jet, cross
 from jounce.jet.algebra import stacked, total
-from jounce.kinematics.sensitivity.jacobian_series import along_displacements, slopes
+from jounce.kinematics.sensitivity.jacobian_series import along_displacements, slopes, slopes_of_groups
 from jounce.linear_algebra.pattern import Pattern
 from jounce.mechanism import Model
 from jounce.mechanism.system import Group, System, movable, with_rows
@@ -78,7 +78,8 @@ def responses(system: System, lanes: tuple[Coordinates, Any, Lanes, Any], *, pos
     (loads, coordinates, bodies, batch).
     """
     bodies, flanks, instants, loads = lanes
-    blocks = _blocks(system, flanks, bodies, instants, pose_type, 1)
+    groups = with_flanks(system.groups, flanks)
+    blocks = slopes_of_groups(groups, pose_of(bodies, pose_type, 0), Jet([instants[None]]))
 
     def of_chunk(blocks: Slopes, loads: Numbers) -> Any:
         return jax.vmap(constraint_forces.load_solver(system, blocks, None))(loads)
@@ -123,18 +124,6 @@ def largest_array(model: Model) -> int:
     return ALL if few and rows == columns and model.system.rank is None else SMALL
 
 
-def _blocks(
-    system: System, flanks: Any, bodies: Coordinates, instants: Lanes, pose_type: type[Pose], levels: int
-) -> list[list[Slope]]:
-    """Return the derivatives of the residuals of all groups with respect to the bodies in their moving slots."""
-    blocks = []
-    for group in with_flanks(system.groups, flanks):
-        poses = [part_of(bodies, its, levels) for its in group.bodies]
-        of_slots = [element_slopes(group.element, poses, instants, pose_type, k, levels) for k in group.moving_slots]
-        blocks.append(of_slots)
-    return blocks
-
-
 @Mapped
 def balanced(shared: Any, lanes: Any, *, pose_type: type[Pose]) -> tuple[Any, Any]:
     """Return the multipliers of an instant for several cases, and normal forces, and which applied forces are finite.
@@ -157,24 +146,23 @@ def balanced(shared: Any, lanes: Any, *, pose_type: type[Pose]) -> tuple[Any, An
     loaded = dataclasses.replace(loaded, forces=with_turns(loaded.forces, angles))
     pose, time = pose_of(bodies, pose_type, levels + 1), Jet.variable(instants[None], levels + 1)
     load, finite = loads(loaded, pose, time, masses, gravity), loaded.finite_forces(pose, time)
-    blocks = _blocks(system, flanks, bodies, instants, pose_type, levels)
+    groups = with_flanks(system.groups, flanks)
+    blocks = slopes_of_groups(groups, pose.truncate(levels - 1), Jet.variable(instants[None], levels - 1))
     if choice is not None:
         return _least_multipliers(system, blocks, load, *choice), finite
     square = system.shape[0] == system.shape[1]
-    mass = None if square else mass_matrices(pose_of(part_of(bodies, None, 1), pose_type, 0), masses)[:, :, 1:]
+    mass = None if square else mass_matrices(pose.truncate(0), masses)[:, :, 1:]
 
     def rubbed(group: Group) -> Rubbed:
-        moving, placed = ([part_of(bodies, its, n) for its in group.bodies] for n in (levels + 1, levels))
-        how: Any = {"pose_type": pose_type, "levels": levels}
-        slopes = [friction_slopes.function(group.element, moving, slot=slot, **how) for slot in group.moving_slots]
-        if not loses_torque(group.element):
-            return slopes, placed, None
-        return slopes, placed, stacked(resisting(group.element, [pose_of(p, pose_type, levels) for p in moving]))
+        moving = [pose.truncate(levels).take(indices) for indices in group.bodies]
+        slopes = [friction_slope(group.element, moving, slot) for slot in group.moving_slots]
+        placed = [body.truncate(levels - 1) for body in moving]
+        return slopes, placed, stacked(resisting(group.element, moving)) if loses_torque(group.element) else None
 
     def of_chunk(blocks: Slopes, load: Numbers, mass: Any, rubbed: Sequence[Rubbed]) -> Any:
         if not rubbed:
             return constraint_forces.multipliers(system, blocks, load, mass)
-        return with_friction(system, blocks, load, mass, rubbing_of(system, blocks, rubbed, pose_type))
+        return with_friction(system, blocks, load, mass, rubbing_of(system, blocks, rubbed))
 
     given = blocks, load, mass, [rubbed(group) for group in system.groups if rubs(group)]
     is_dense = mass is not None or system.fronts is None

@@ -12,14 +12,13 @@ from jounce.base.modules import Module, field
 from jounce.base.shapes import Numbers
 from jounce.dynamics.friction.coupling import Coupling, pressed, rubs, torque_lost
 from jounce.dynamics.inverse.constraint_forces import BodyMatrices, Slopes, load_solver, onto_bodies
-from jounce.dynamics.motion_values import Coordinates, pose_of
 from jounce.jet import Jet
 from jounce.jet.algebra import stacked, total
 from jounce.kinematics.sensitivity.jacobian_series import Slope
 from jounce.mechanism.system import Group, System
 from jounce.rigid.pose import Pose
 
-Rubbed = tuple[Sequence[Float[Numbers, "order coordinate _ _ batch"]], Sequence[Coordinates], Any]
+Rubbed = tuple[Sequence[Float[Numbers, "order coordinate _ _ batch"]], Sequence[Pose], Any]
 """Of a group of joints with friction: `friction_slope` for each moving slot, where the bodies are, and of gears which
 part of the torque lost resists, (levels, 1, instances, batch); None of others.
 """
@@ -65,13 +64,12 @@ class Rubbing(Module):
         return stacked(pressed(self.group.element, self.poses, Jet(tuple(force))))
 
 
-def rubbing_of(system: System, blocks: Slopes, rubbed: Sequence[Rubbed], pose_type: type[Pose]) -> list[Rubbing]:
+def rubbing_of(system: System, blocks: Slopes, rubbed: Sequence[Rubbed]) -> list[Rubbing]:
     """Return the groups of joints with friction; `rubbed` is in the order of the groups."""
     rubbing, first, left = [], 0, iter(rubbed)
     for group, slopes in zip(system.groups, blocks, strict=True):
         if rubs(group):
-            friction, bodies, resisting = next(left)
-            poses = [pose_of(body, pose_type, len(slopes[0]) - 1) for body in bodies]
+            friction, poses, resisting = next(left)
             rubbing.append(Rubbing(group, poses, slopes, friction, resisting, first))
         first += slopes[0].shape[2] * group.instances
     return rubbing

@@ -4,6 +4,7 @@ How the residuals change with virtual displacements of the bodies is a jet, as e
 """
 
 from collections.abc import Callable, Sequence
+from itertools import chain
 from typing import Any, NamedTuple
 
 import jax
@@ -18,7 +19,7 @@ from jounce.jet import Jet
 from jounce.jet.algebra import stacked
 from jounce.linear_algebra.frontal import FrontalFactor
 from jounce.linear_algebra.linear import DenseFactor
-from jounce.mechanism.system import System, movable, with_rows
+from jounce.mechanism.system import Group, System, movable, with_rows
 from jounce.rigid.pose import Pose
 
 Slope = Float[Numbers, "order coordinate row instance batch"]
@@ -57,6 +58,15 @@ def slopes(element: AbstractConstraint, poses: Sequence[Pose], time: Jet, slot: 
     return along_displacements(body, changed)
 
 
+def slopes_of_groups(groups: Sequence[Group], pose: Pose, time: Jet) -> list[list[Slope]]:
+    """Return, for each group of joints and drivers, the `slopes` of each moving slot, along a motion of all bodies.
+
+    The pose, (..., bodies, batch), with the ground first, has the order of the time.
+    """
+    at = [(group, [pose.take(indices) for indices in group.bodies]) for group in groups]
+    return [[slopes(group.element, poses, time, slot) for slot in group.moving_slots] for group, poses in at]
+
+
 def along_displacements(body: Any, changed: Callable[[Any], Any]) -> Slope:
     """Return how jets change, shape (order + 1, rows, instances, batch), with each displacement of a body in turn.
 
@@ -90,13 +100,9 @@ def jacobian_series(system: System, pose: Pose, time: Jet) -> Float[Numbers, "or
     time : Jet
         Of shape (1, batch).
     """
-    terms, scale = [], jnp.asarray(system.column_scale)[None, :, None, None, None]
-    for group in system.groups:
-        poses = [pose.take(indices) for indices in group.bodies]
-        for slot in group.moving_slots:
-            slope = slopes(group.element, poses, time, slot) * scale
-            terms.append(slope.reshape(len(slope), -1, slope.shape[-1]))
-    return jnp.concatenate(terms, axis=1)
+    scale = jnp.asarray(system.column_scale)[None, :, None, None, None]
+    blocks = chain.from_iterable(slopes_of_groups(system.groups, pose, time))
+    return jnp.concatenate([(slope * scale).reshape(len(slope), -1, slope.shape[-1]) for slope in blocks], axis=1)
 
 
 def solved_series(system: System, entries: Float[Numbers, "order entry batch"], right: Series) -> Series:
