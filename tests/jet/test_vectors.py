@@ -116,6 +116,11 @@ def test_product_of_vectors_of_unequal_length_is_refused(random, product, length
         product(*(some(random, length) for length in lengths))
 
 
+def test_vector_product_beyond_space_is_refused(random):
+    with pytest.raises(ValueError, match="2 or 3 components, got 4"):
+        jet.cross(some(random, 4), some(random, 4))
+
+
 def test_products_of_orders_that_differ(random):
     assert jet.cross(some(random, 3, order=2), some(random, 3)).order == 2
     assert jet.matvec(some(random, 3, 3), some(random, 3, order=0)).order == 0

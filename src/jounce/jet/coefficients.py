@@ -99,6 +99,8 @@ def component_sum(vector: Any) -> Any:
 
 def cycled(vector: Any) -> Any:
     """Return the components y, z and x of a vector."""
+    if len(vector) != 3:
+        raise ValueError(f"a vector product takes vectors of 2 or 3 components, got {len(vector)}")
     return jnp.concatenate([vector[1:], vector[:1]])
 
 
