@@ -112,7 +112,7 @@ def test_concatenation_of_vectors(random):
 @pytest.mark.parametrize("product", [jet.dot, jet.cross])
 @pytest.mark.parametrize("lengths", [(3, 2), (2, 3), (3, 1), (1, 3)])
 def test_product_of_vectors_of_unequal_length_is_refused(random, product, lengths):
-    with pytest.raises(ValueError, match="vectors of {} and {} components".format(*lengths)):
+    with pytest.raises(ValueError, match="components"):
         product(*(some(random, length) for length in lengths))
 
 
