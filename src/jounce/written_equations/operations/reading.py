@@ -147,7 +147,7 @@ class GraphReader(ProgramReader):
         if name == "select_n":
             return [self._each(dtypes[0], self._selected, *given)]
         if name in _REDUCED:
-            return [self._reduced(_REDUCED[name], given[0], parameters["axes"], dtypes[0])]
+            return [self._reduced(_REDUCED[name], given[0], list(map(int, parameters["axes"])), dtypes[0])]
         if name == "cumsum":
             return [self._summed_up(given[0], parameters["axis"], reverse=parameters["reverse"])]
         if name == "dynamic_update_slice":
