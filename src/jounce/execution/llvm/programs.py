@@ -11,9 +11,9 @@ import jax
 import numpy as np
 
 from jounce.base.padding import padded
-from jounce.execution.buffer_pool import lend
+from jounce.execution.buffer_pool import address_of, lend
 from jounce.execution.llvm.machine import MachineCode, vector_width
-from jounce.execution.llvm.rounds import Column, RoundRunner, address_of
+from jounce.execution.llvm.rounds import Column, RoundRunner
 
 
 class Layout:

@@ -14,6 +14,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from jaxtyping import Int
 
+from jounce.execution.buffer_pool import address_of
+
 LINE = 64  # bytes of the cache's lines, at which vectors begin
 ENTRY = 8  # bytes of a number that is copied
 
@@ -286,8 +288,3 @@ def _pairs(columns: Sequence[Column], begins: Iterator[int], width: int, least: 
         if column.whole is not None:
             result += zip(column.addresses(least), itertools.count(begin, width * ENTRY), strict=False)
     return result
-
-
-def address_of(array: np.ndarray) -> int:
-    """Return where the numbers of an array begin in memory."""
-    return array.__array_interface__["data"][0]  # half as long as by its `ctypes`

@@ -1,9 +1,7 @@
 """JAX's operations on arrays that stay in memory: views where numbers keep their places, and loops elsewhere."""
 
-import itertools
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
 from typing import Any
 
 from jax.lax import GatherScatterMode
@@ -11,7 +9,7 @@ from jax.lax import GatherScatterMode
 from jounce.execution.llvm.rules.indexing import clamped_starts, filler, within
 from jounce.execution.llvm.rules.loops_along_axes import REDUCTIONS, StoredRule, dot, extreme
 from jounce.execution.llvm.rules.operations import ELEMENTWISE, RULES
-from jounce.execution.llvm.text.arrays import filled
+from jounce.execution.llvm.text.arrays import Rule, filled
 from jounce.execution.llvm.text.code import Code
 from jounce.execution.llvm.text.stored import (
     any_lanes,
@@ -24,7 +22,6 @@ from jounce.execution.llvm.text.stored import (
     put,
     reshaped,
     result_storage,
-    row,
     stored,
     values_of,
     without_home,
@@ -38,8 +35,10 @@ from jounce.execution.llvm.text.views import (
     as_read,
     between,
     further,
+    part_at,
     spread,
     transposed,
+    views_of,
 )
 
 # -- number by number -------------------------------------------------------------------------------------------------
@@ -83,20 +82,19 @@ def _same(_: Code, __: Any, given: Sequence[Array]) -> Sequence[Array]:
 # -- views ------------------------------------------------------------------------------------------------------------
 
 
-def _part(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Array]:
-    p, array = equation.params, stored(code, given[0])
-    steps = p["strides"] or (1,) * array.ndim
-    for axis, (start, limit, step) in enumerate(zip(p["start_indices"], p["limit_indices"], steps, strict=True)):
-        array = between(code, array, axis, int(start), len(range(start, limit, step)), step)
-    return [array]
+def _moved(rule: Rule) -> StoredRule:
+    """Return the rule for an operation that gives views of an array, as that for single values gives them."""
 
+    def moved(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Array]:
+        def views(array: Stored) -> list[Stored]:
+            return views_of(code, array, lambda places: rule(code, equation, [places]))
 
-def _broadcast(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Array]:
-    p, array = equation.params, given[0]
-    axes = tuple(map(int, p["broadcast_dimensions"]))
-    if isinstance(array, Deferred) and array.size == equation.outvars[0].aval.size:
-        return [array.viewed(lambda x: spread(x, p["shape"], axes))]
-    return [spread(stored(code, array), p["shape"], axes)]
+        (array,) = given
+        if isinstance(array, Deferred) and array.size == equation.outvars[0].aval.size:
+            return [array.viewed(lambda x: views(x)[0])]
+        return views(stored(code, array))
+
+    return moved
 
 
 def _reshape(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Array]:
@@ -104,32 +102,6 @@ def _reshape(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Arra
     if isinstance(array, Deferred) and (result := array.in_shape(shape)) is not None:
         return [result]
     return [reshaped(code, stored(code, array), shape)]
-
-
-def _transpose(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Array]:
-    array, axes = given[0], equation.params["permutation"]
-    if isinstance(array, Deferred):
-        return [array.viewed(lambda x: transposed(x, axes))]
-    return [transposed(stored(code, array), axes)]
-
-
-def _reverse(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Array]:
-    array = stored(code, given[0])
-    for axis in map(int, equation.params["dimensions"]):
-        array = between(code, array, axis, array.shape[axis] - 1, array.shape[axis], -1)
-    return [array]
-
-
-def _unstack(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Array]:
-    array, axis = stored(code, given[0]), int(equation.params["axis"])
-    rows = transposed(array, [axis, *(k for k in range(array.ndim) if k != axis)])
-    return [row(code, rows, k) for k in range(rows.shape[0])]
-
-
-def _split(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Array]:
-    array, axis, sizes = stored(code, given[0]), int(equation.params["axis"]), equation.params["sizes"]
-    starts = [0, *itertools.accumulate(map(int, sizes))]
-    return [between(code, array, axis, start, int(size)) for start, size in zip(starts, sizes, strict=False)]
 
 
 def _dynamic_slice(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Array]:
@@ -160,8 +132,7 @@ def _stack(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Array]
     result, axis = result_storage(code, equation, given), int(equation.params["axis"])
     rows = transposed(result, [axis, *(k for k in range(result.ndim) if k != axis)])
     for k, array in enumerate(given):
-        target = between(code, rows, 0, k, 1)
-        put(code, replace(target, shape=target.shape[1:], strides=target.strides[1:]), array)
+        put(code, part_at(code, rows, k), array)
     return [result]
 
 
@@ -345,16 +316,11 @@ STORED: Mapping[str, StoredRule] = {
     **dict.fromkeys(("reshape", "squeeze", "expand_dims"), _reshape),
     **dict.fromkeys(("scatter", "scatter-add"), _scatter),
     "dot_general": dot,
-    "slice": _part,
-    "broadcast_in_dim": _broadcast,
+    **{name: _moved(RULES[name]) for name in ("slice", "broadcast_in_dim", "transpose", "rev", "split", "unstack")},
     "tile": _tile,
     "concatenate": _concatenate,
     "stack": _stack,
-    "unstack": _unstack,
-    "transpose": _transpose,
-    "rev": _reverse,
     "pad": _pad,
-    "split": _split,
     "dynamic_slice": _dynamic_slice,
     "dynamic_update_slice": _dynamic_update_slice,
     "gather": _gather,

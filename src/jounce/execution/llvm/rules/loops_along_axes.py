@@ -8,7 +8,7 @@ from jounce.execution.llvm.rules.axes import REDUCED, combination, is_better, no
 from jounce.execution.llvm.text.code import Code
 from jounce.execution.llvm.text.stored import counted, fill, nest, new_storage, put, result_storage, stored
 from jounce.execution.llvm.text.values import Value
-from jounce.execution.llvm.text.views import Array, Deferred, Stored, as_read, between, spread, transposed
+from jounce.execution.llvm.text.views import Array, Deferred, Stored, as_read, between, part_at, spread, transposed
 
 ORDERLESS = ("max", "min", "and", "or")  # operations that give the same in any order
 StoredRule = Callable[[Code, Any, Sequence[Array]], Sequence[Array]]
@@ -71,25 +71,22 @@ def extreme(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Array
     """Return where the largest or smallest number along an axis is, the first of equals; NaN before all."""
     array, result, word = stored(code, given[0]), result_storage(code, equation, given), equation.primitive.name
     (axis,) = map(int, equation.params["axes"])
-    rows = transposed(array, [k for k in range(array.ndim) if k != axis] + [axis])
+    rows = transposed(array, [axis, *(k for k in range(array.ndim) if k != axis)])
     best = new_storage(code, result.shape, array.kind, lanes=array.lanes)
-    first = between(code, rows, rows.ndim - 1, 0, 1)
-    put(code, best, replace(first, shape=first.shape[:-1], strides=first.strides[:-1]))
+    put(code, best, part_at(code, rows, 0))
     fill(code, result, code.constant(0, result.kind))
 
     def look(k: int | Value) -> None:
         index = code.converted(k, result.kind) if isinstance(k, Value) else code.constant(k, result.kind)
-        part = between(code, rows, rows.ndim - 1, k, 1)
-        part = replace(part, shape=part.shape[:-1], strides=part.strides[:-1])
 
         def body(values: Sequence[Value]) -> Sequence[Value]:
             value, largest, position = values
             better = is_better(code, word, value, largest)
             return code.select(better, value, largest), code.select(better, index, position)
 
-        nest(code, [part, best, result], [best, result], body, adds=True)
+        nest(code, [part_at(code, rows, k), best, result], [best, result], body, adds=True)
 
-    counted(code, rows.shape[-1], look)
+    counted(code, rows.shape[0], look)
     return [result]
 
 

@@ -5,7 +5,6 @@ A loop takes a number of each array, or as many as a vector has where they lie o
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -19,11 +18,11 @@ from jounce.execution.llvm.text.views import (
     InMemory,
     Stored,
     as_read,
-    between,
     contiguous,
     further,
     in_shape,
     merged,
+    part_at,
     spread,
 )
 
@@ -71,8 +70,7 @@ def row(code: Code, array: Array, index: int | Value) -> Array:
     if isinstance(array, np.ndarray):
         assert isinstance(index, int)
         return array[index, ...]
-    part = between(code, stored(code, array), 0, index, 1)
-    return settled(code, replace(part, shape=part.shape[1:], strides=part.strides[1:]))
+    return settled(code, part_at(code, stored(code, array), index))
 
 
 def reshaped(code: Code, array: Stored, shape: Sequence[int]) -> Stored:

@@ -11,10 +11,14 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from numpy.lib.stride_tricks import as_strided
 
+from jounce.execution.buffer_pool import address_of
 from jounce.execution.llvm.text.arrays import Values
 from jounce.execution.llvm.text.code import Code
 from jounce.execution.llvm.text.values import Region, Value
+
+PLACES = np.zeros(1, np.int8)  # where arrays begin whose views are asked for, of numbers that nobody reads
 
 
 class Shaped:
@@ -142,6 +146,21 @@ def _whole(code: Code, number: int | Value) -> Value:
 
 def _plain(value: Value) -> int | Value:
     return value if value.constant is None else int(value.constant)
+
+
+def views_of(code: Code, array: Stored, views: Callable[[np.ndarray], Sequence[np.ndarray]]) -> list[Stored]:
+    """Return what a function of an array of NumPy, one byte a number, gives that returns views of it."""
+    places, begin = as_strided(PLACES, array.shape, array.strides), address_of(PLACES)
+    return [
+        Stored(array.region, view.shape, view.strides, further(code, array.first, address_of(view) - begin, 1))
+        for view in views(places)
+    ]
+
+
+def part_at(code: Code, array: Stored, index: int | Value) -> Stored:
+    """Return the part of an array at an index of its first axis."""
+    first = further(code, array.first, index, array.strides[0])
+    return Stored(array.region, array.shape[1:], array.strides[1:], first)
 
 
 def between(code: Code, array: Stored, axis: int, start: int | Value, size: int, step: int = 1) -> Stored:
