@@ -6,12 +6,11 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Float
 
 from jounce.base.shapes import Numbers
 from jounce.errors import MechanismError
 from jounce.execution.device import on_processor
-from jounce.execution.mapped import Mapped
 from jounce.jet import Jet
 from jounce.jet.derivatives import plain_derivatives
 from jounce.kinematics import Motion, Status
@@ -24,9 +23,6 @@ if TYPE_CHECKING:
 Coordinates = Mapping[str, Float[Numbers, "_ ... _"]]
 """Taylor coefficients of the coordinates of poses, by name: as `Motion.poses` has them."""
 
-LanesOf = Callable[[Int[np.ndarray, " instant"]], Any]
-"""Returns the arguments of a `Mapped` at some instants, by their indices."""
-
 Values = TypeVar("Values")
 
 
@@ -34,16 +30,6 @@ def check_motion(motion: object) -> None:
     """Raise MechanismError unless this is a motion."""
     if not isinstance(motion, Motion):
         raise MechanismError("must be a jn.Motion, as jn.solve and jn.simulate give it", name="motion", value=motion)
-
-
-def at_instants(motion: Motion, program: Mapped, shared: Any, lanes_of: LanesOf, **static: Any) -> Any:
-    """Return the results of a function of one instant for all of a motion, as `Mapped.at_instants` gives them."""
-    return program.at_instants(shared, lanes_of, len(motion.time), **static)[0]
-
-
-def coordinates_along(coordinates: Coordinates) -> LanesOf:
-    """Return what gives coordinates at some instants."""
-    return lambda lanes: {name: values[..., lanes] for name, values in coordinates.items()}
 
 
 def in_small_chunks(function: Callable[..., Values], size: int, *arrays: Any) -> Values:

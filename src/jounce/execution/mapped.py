@@ -8,7 +8,7 @@ Instants may start from the results of others: they are solved in rounds, each o
 import dataclasses
 import math
 from collections.abc import Callable, Sequence
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any
 
 import jax
@@ -212,6 +212,11 @@ def _taken(array: np.ndarray, indices: Int[np.ndarray, " lane"], axis: int) -> n
     return np.zeros((len(indices), *array.shape[1:]) if axis == 0 else (*array.shape[:-1], len(indices)), array.dtype)
 
 
+def at_lanes(arrays: Any, lanes: Int[np.ndarray, " lane"]) -> Any:
+    """Return arrays at some instants, which are along their last axis."""
+    return jax.tree.map(lambda x: x[..., lanes], arrays)
+
+
 class Mapped:
     """A function of one instant, of which `program` makes what runs it for many.
 
@@ -320,9 +325,14 @@ class Mapped:
         widths = program.together(sum(np.size(x) for x in jax.tree.leaves(lanes)))
         return in_chunks(lambda some: program(lanes_of(some)), count, widths, filled=False), program.backend
 
-    def prepare(self, shared: Any, lanes_of: Callable[[np.ndarray], Any], *, large: int = LARGE, **static: Any) -> None:
-        """Make the machine code that `at_instants` calls; XLA's programs depend on how many instants there are."""
-        self.program(shared, lanes_of(np.zeros(1, int)), large=large, hasty=is_in_haste(), **static)
+    def along(self, shared: Any, lanes: Any, *, large: int = LARGE, **static: Any) -> Any:
+        """Return the results for all instants of arrays, which are along their last axis, as `at_instants` does."""
+        count = np.shape(jax.tree.leaves(lanes)[0])[-1]
+        return self.at_instants(shared, partial(at_lanes, lanes), count, large=large, **static)[0]
+
+    def prepare(self, shared: Any, lanes: Any, *, large: int = LARGE, **static: Any) -> None:
+        """Make the machine code that `along` calls; XLA's programs depend on how many instants there are."""
+        self.program(shared, lanes, large=large, hasty=is_in_haste(), **static)
 
     def _block(self, shared: Any, lanes: Any, how: tuple[tuple[str, Any], ...]) -> Any:
         return self._many(shared, lanes, **dict(how))

@@ -17,7 +17,7 @@ from jounce.dynamics.energy.slopes import Columns, Form, column_of, slope_values
 from jounce.dynamics.forward.loads import inertia_forces
 from jounce.dynamics.inverse.constraint_equations import COLUMNS
 from jounce.dynamics.masses import Gravity, Masses, gravity_of, required_masses
-from jounce.dynamics.motion_values import Coordinates, at_instants, coordinates_along, cut, labeled, pose_of
+from jounce.dynamics.motion_values import Coordinates, cut, labeled, pose_of
 from jounce.errors import MechanismError
 from jounce.execution.mapped import Mapped
 from jounce.jet import Jet
@@ -98,8 +98,7 @@ def _of_bodies(
     mechanism, coordinates = motion.mechanism, motion.poses[1]
     if len(coordinates["position"]) - 1 < needed:
         raise MechanismError(f"this needs a motion of order {needed} or higher", name="order", value=motion.order)
-    start = coordinates_along(cut(coordinates, needed))
-    values = at_instants(motion, program, shared, start, pose_type=motion.poses[0], **static)
+    values = program.along(shared, cut(coordinates, needed), pose_type=motion.poses[0], **static)
     values = np.where(spoiled(motion.passages, motion.time, needed), np.nan, values)
     names = COLUMNS[mechanism.space]
     efforts = ["N" if name in "xyz" else "N*m" for name in names] * len(mechanism.bodies)

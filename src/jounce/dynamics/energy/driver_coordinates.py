@@ -19,7 +19,7 @@ from jounce.dynamics.energy.slopes import Columns, Form, column_of, slope_values
 from jounce.dynamics.forward.accelerations import Lanes
 from jounce.dynamics.inverse.motion_forces import MotionForces
 from jounce.dynamics.masses import Masses, required_masses
-from jounce.dynamics.motion_values import Coordinates, at_instants, coordinates_along, cut, labeled, pose_of
+from jounce.dynamics.motion_values import Coordinates, cut, labeled, pose_of
 from jounce.errors import MechanismError
 from jounce.execution.mapped import Mapped
 from jounce.jet import Jet
@@ -80,16 +80,8 @@ def in_driver_coordinates(
     order = tuple((indices[name].group, indices[name].instance) for name in names)
     pose_type, coordinates = motion.poses
     masses = required_masses(motion.mechanism)
-    start = coordinates_along(cut(coordinates, 0))
-    values = at_instants(
-        motion,
-        _evaluated,
-        (model.system, masses),
-        lambda lanes: (start(lanes), motion.time[lanes]),
-        pose_type=pose_type,
-        order=order,
-        form=form,
-    )
+    lanes, how = (cut(coordinates, 0), motion.time), {"pose_type": pose_type, "order": order, "form": form}
+    values = _evaluated.along((model.system, masses), lanes, **how)
     values = np.where(spoiled(motion.passages, motion.time, form.order), np.nan, values)
     return _of_drivers(motion, values, power)
 

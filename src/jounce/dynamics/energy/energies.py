@@ -16,7 +16,7 @@ from jaxtyping import Float
 
 from jounce.base.shapes import ArrayLike, Numbers
 from jounce.dynamics.masses import Masses, required_masses, second_moments
-from jounce.dynamics.motion_values import Coordinates, at_instants, coordinates_along, labeled, pose_of
+from jounce.dynamics.motion_values import Coordinates, labeled, pose_of
 from jounce.errors import JounceError, MechanismError, RobotError, flag, whole_number
 from jounce.execution.mapped import Mapped
 from jounce.jet import Jet, dot
@@ -314,7 +314,7 @@ def energy_coefficients(motion: Motion, order: int, function: EnergyFunction = b
     pose_type, coordinates = motion.poses
     _check_known(motion, order, len(coordinates["position"]) - 1)
     how = {"pose_type": pose_type, "order": order, "function": function}
-    return at_instants(motion, _of_bodies, required_masses(motion.mechanism), coordinates_along(coordinates), **how)
+    return _of_bodies.along(required_masses(motion.mechanism), coordinates, **how)
 
 
 def _check_known(motion: Motion, order: int, known: int) -> None:

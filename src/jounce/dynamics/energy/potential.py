@@ -4,7 +4,6 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import jax.numpy as jnp
-import numpy as np
 from jaxtyping import Float
 
 from jounce.base.shapes import Numbers
@@ -13,9 +12,7 @@ from jounce.dynamics.forward.accelerations import Lanes
 from jounce.dynamics.masses import Gravity, gravity_of, required_masses
 from jounce.dynamics.motion_values import (
     Coordinates,
-    at_instants,
     check_motion,
-    coordinates_along,
     cut,
     labeled,
     pose_of,
@@ -25,7 +22,7 @@ from jounce.jet import Jet, dot
 from jounce.jet.algebra import stacked
 from jounce.kinematics import Motion
 from jounce.mechanism.system import Group
-from jounce.mechanism.transmissions.axis_angles import angles_at, at_lanes, with_turns
+from jounce.mechanism.transmissions.axis_angles import angles_of, of_one_lane, with_turns
 from jounce.rigid.pose import Pose
 
 if TYPE_CHECKING:
@@ -72,7 +69,7 @@ def potential_coefficients(motion: Motion) -> Energies:
     """Return the potential energies of bodies as Taylor coefficients, the ground first."""
     masses, (pose_type, coordinates) = required_masses(motion.mechanism), motion.poses
     shared = masses.center, gravity_of(motion.mechanism)
-    heights = at_instants(motion, _heights, shared, coordinates_along(coordinates), pose_type=pose_type)
+    heights = _heights.along(shared, coordinates, pose_type=pose_type)
     return 0.0 - heights * masses.mass[None]  # no -0
 
 
@@ -112,14 +109,8 @@ def stored_energy(motion: Motion) -> Any:
     """
     check_motion(motion)
     pose_type, coordinates = motion.poses
-    bodies = coordinates_along(cut(coordinates, 1))
-    stored = at_instants(
-        motion,
-        _stored,
-        at_lanes(motion.forces, np.zeros(1, int)),
-        lambda lanes: (bodies(lanes), angles_at(motion.forces, lanes), motion.time[lanes]),
-        pose_type=pose_type,
-    )
+    lanes = cut(coordinates, 1), angles_of(motion.forces), motion.time
+    stored = _stored.along(of_one_lane(motion.forces), lanes, pose_type=pose_type)
     return labeled(motion, stored[None], "J")[:, 0].drop_vars("derivative")
 
 

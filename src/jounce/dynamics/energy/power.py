@@ -12,13 +12,13 @@ from jounce.dynamics.forward.accelerations import Lanes
 from jounce.dynamics.inverse.finite_forces import check_finite_values
 from jounce.dynamics.inverse.motion_forces import MotionForces
 from jounce.dynamics.masses import Gravity, Masses
-from jounce.dynamics.motion_values import Coordinates, at_instants, check_motion, labeled, pose_of
+from jounce.dynamics.motion_values import Coordinates, check_motion, labeled, pose_of
 from jounce.execution.mapped import Mapped
 from jounce.jet import Jet, dot
 from jounce.jet.algebra import stacked, total
 from jounce.kinematics import Motion
 from jounce.mechanism.system import Group
-from jounce.mechanism.transmissions.axis_angles import at_lanes, with_turns
+from jounce.mechanism.transmissions.axis_angles import of_one_lane, with_turns
 from jounce.rigid import PlanarPose
 from jounce.rigid.pose import Pose
 
@@ -75,9 +75,8 @@ def power_balance(motion: Motion) -> "xarray.Dataset":
     forces = MotionForces.of(motion)
     nothing = np.zeros((forces.levels, len(motion.time)))
     driven = [(nothing, nothing), *(_driver_power(forces, name) for name in motion.mechanism.drivers)]
-    free = at_lanes(forces.motion.forces, np.zeros(1, int))
-    shared = free, forces.masses, forces.gravity, forces.model.length
-    applied, kinetic, potential, sizes = forces.along(_powers, shared, forces.acting_at, levels=forces.levels)
+    shared = of_one_lane(forces.motion.forces), forces.masses, forces.gravity, forces.model.length
+    applied, kinetic, potential, sizes = forces.along(_powers, shared, forces.acting, levels=forces.levels)
     check_finite_values(forces, applied)
     power, size = np.sum(driven, axis=0)
     taken, rubbed = np.sum([(nothing, nothing), *_friction_powers(forces)], axis=0)
@@ -110,7 +109,7 @@ def _driver_power(forces: MotionForces, name: str) -> tuple[np.ndarray, np.ndarr
     index = forces.indices[name]
     group = forces.model.system.groups[index.group]
     motion = forces.motion
-    laws = at_instants(motion, _law, group.element, lambda lanes: motion.time[lanes], levels=forces.levels)
+    laws = _law.along(group.element, motion.time, levels=forces.levels)
     law = np.broadcast_to(laws, (len(laws), group.instances, laws.shape[-1]))[:, index.instance]  # equal ones are one
     rate, force = Jet(tuple(law)).differentiate(), Jet(tuple(forces.driver_force(name)[:, 0]))
     power, size = force * rate, force.map(np.abs) * rate.map(np.abs)

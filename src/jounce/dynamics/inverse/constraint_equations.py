@@ -20,7 +20,7 @@ from jounce.dynamics.forward.mechanism_state import MotionAtState, at_state
 from jounce.dynamics.forward.saddle_point import Jacobian, MassMatrix, block_diagonal, even_scale, saddle_point
 from jounce.dynamics.inverse.motion_forces import MotionForces
 from jounce.dynamics.masses import Masses, masses_of
-from jounce.dynamics.motion_values import Coordinates, at_instants, coordinates_along, cut, derivatives_along, pose_of
+from jounce.dynamics.motion_values import Coordinates, cut, derivatives_along, pose_of
 from jounce.errors import MechanismError
 from jounce.execution.chunks import in_chunks
 from jounce.execution.compilation import compiled
@@ -327,7 +327,7 @@ def _mass_matrix(motion: Motion) -> Float[np.ndarray, "time column column"]:
     """Return the mass matrix at all instants."""
     pose_type, coordinates = motion.poses
     masses = masses_of(motion.mechanism)
-    matrices = at_instants(motion, _body_masses, masses, coordinates_along(cut(coordinates, 0)), pose_type=pose_type)
+    matrices = _body_masses.along(masses, cut(coordinates, 0), pose_type=pose_type)
     return np.moveaxis(matrices, -1, 0)
 
 

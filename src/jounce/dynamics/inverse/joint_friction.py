@@ -11,6 +11,7 @@ from jounce.constraints.friction import UnitFriction
 from jounce.dynamics.friction.coupling import loses_torque, rubs
 from jounce.dynamics.inverse import force_programs as programs
 from jounce.dynamics.motion_values import cut
+from jounce.execution.mapped import at_lanes
 from jounce.mechanism.system import holding
 
 
@@ -41,11 +42,8 @@ class JointFriction:
     def resisted(self, index: int) -> Float[Numbers, "order instance time"]:
         """Return the friction power of a group for a unit normal force, as Taylor coefficients."""
         forces, group = self.forces, self.forces.joined.groups[index]
-
-        def lanes_of(lanes: np.ndarray) -> Any:
-            return [forces.coordinates_at(slot, lanes, forces.levels + 1) for slot in group.bodies]
-
-        return forces.along(programs.resisted, group.element, lanes_of, levels=forces.levels)
+        moving = [forces.coordinates_of(slot, forces.levels + 1) for slot in group.bodies]
+        return forces.along(programs.resisted, group.element, moving, levels=forces.levels)
 
     def pressing_force(
         self, name: str, multipliers: Numbers, lanes: np.ndarray
@@ -58,12 +56,9 @@ class JointFriction:
         own = multipliers[:, place.rows].reshape(len(multipliers), -1, group.instances, len(lanes))
         if loses_torque(group.element):
             return np.asarray(own)[:, :, place.instance]
-
-        def lanes_of(some: np.ndarray) -> Any:
-            return *self.forces.joint_at(place.group, lanes[some]), own[..., some], None
-
-        how = {"pose_type": self.forces.pose_type, "slot": group.moving_slots[-1], "levels": self.forces.levels}
-        works, _ = programs.joint_wrench.at_instants(group.element, lanes_of, len(lanes), **how)
+        joint, how = at_lanes(self.forces.joint(place.group), lanes), {"slot": group.moving_slots[-1]}
+        joined = *joint, own, None
+        works = self.forces.along(programs.joint_wrench, group.element, joined, levels=self.forces.levels, **how)
         return works[:, : self.forces.pose_type.shifts, place.instance]
 
     @property
@@ -94,9 +89,9 @@ class JointFriction:
 
     def _slips(self, index: int) -> int:
         """Return the number of directions in which the joints of a group slip."""
-        lanes = np.zeros(1, int)
-        moving = [self.forces.coordinates_at(slot, lanes, 2) for slot in self.forces.joined.groups[index].bodies]
-        return programs.slip_directions(self.forces.joined.groups[index].element, moving, self.forces.pose_type)
+        group = self.forces.joined.groups[index]
+        moving = at_lanes([self.forces.coordinates_of(slot, 2) for slot in group.bodies], np.zeros(1, int))
+        return programs.slip_directions(group.element, moving, self.forces.pose_type)
 
     def responses(self) -> Float[np.ndarray, "direction row time"]:
         """Return the multipliers that balance a unit friction force in each direction of slip, at rest."""
@@ -104,15 +99,16 @@ class JointFriction:
 
         def lanes_of(lanes: np.ndarray) -> Any:
             loads = np.concatenate([self._unit_loads(index, lanes) for index in self.first_rows])
-            bodies, _, flanks, instants = forces.balance_at(lanes)
+            bodies, _, flanks, instants = at_lanes(forces.balance, lanes)
             return cut(bodies, 0), flanks, instants, loads
 
-        return forces.along(programs.responses, forces.joined, lanes_of)
+        how = {"pose_type": forces.pose_type}
+        return programs.responses.at_instants(forces.joined, lanes_of, len(forces.motion.time), **how)[0]
 
     def _unit_loads(self, index: int, lanes: np.ndarray) -> Float[np.ndarray, "direction coordinate body time"]:
         """Return the wrenches on bodies for a unit friction force in each direction of slip of a group."""
         forces, group = self.forces, self.forces.joined.groups[index]
-        moving = [forces.coordinates_at(slot, lanes, 2) for slot in group.bodies]
+        moving = at_lanes([forces.coordinates_of(slot, 2) for slot in group.bodies], lanes)
         count, bodies = self._slips(index), len(forces.model.bodies)
         components = forces.pose_type.shifts + forces.pose_type.turns
         loads = np.zeros((group.instances, count, components, bodies + 1, len(lanes)))
@@ -137,11 +133,8 @@ class JointFriction:
         for index in self.first_rows:
             group = forces.joined.groups[index]
             own = multipliers[self._rows(index)].reshape(-1, group.instances, multipliers.shape[-1])
-
-            def lanes_of(lanes: np.ndarray, index: int = index, own: Any = own) -> Any:
-                return *forces.joint_at(index, lanes), own[..., lanes]
-
-            part = forces.along(programs.pressing, group.element, lanes_of, slot=group.moving_slots[-1])
+            joined = *forces.joint(index), own
+            part = forces.along(programs.pressing, group.element, joined, slot=group.moving_slots[-1])
             components.append(np.pad(part, [(0, forces.pose_type.shifts - len(part)), (0, 0), (0, 0)]))
         return np.concatenate(components, axis=1).swapaxes(0, 1)
 

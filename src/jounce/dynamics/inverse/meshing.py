@@ -35,14 +35,14 @@ def check_meshing(motion: Motion, groups: Sequence[Group], coordinates: Callable
     groups : sequence of Group
         Groups of joints and drivers.
     coordinates : callable
-        Returns the coordinates of bodies, given by their indices, at some instants, to a number of coefficients.
+        Returns the coordinates of bodies, given by their indices, to a number of coefficients.
     """
     if motion.traced:
         return
     for group, rows in zip(groups, group_rows(motion.model), strict=True):
         if not has_flanks(group):
             continue
-        poses = [coordinates(slot, np.arange(len(motion.time)), 2) for slot in group.bodies]
+        poses = [coordinates(slot, 2) for slot in group.bodies]
         names = motion.model.rows[rows]
         if isinstance(group.element, spatial.Gear):
             _check_pitch_points(motion, group.element, poses, names)

@@ -18,16 +18,16 @@ from jounce.dynamics.inverse.locked_friction import check_not_locked, friction_l
 from jounce.dynamics.inverse.meshing import check_meshing
 from jounce.dynamics.inverse.redundant_forces import OPEN, OpenMultipliers
 from jounce.dynamics.masses import check_loads, gravity_of, masses_of
-from jounce.dynamics.motion_values import LanesOf, at_instants, part_of
+from jounce.dynamics.motion_values import part_of
 from jounce.errors import MechanismError
-from jounce.execution.mapped import Mapped
+from jounce.execution.mapped import Mapped, at_lanes
 from jounce.jet.algebra import total
 from jounce.kinematics import Motion, Status
 from jounce.kinematics.continuation.change_points import spoiled
 from jounce.mechanism.building.element_indices import ElementIndex, element_indices
 from jounce.mechanism.redundant_reactions import resolved_reactions
 from jounce.mechanism.system import Group, law_left_out
-from jounce.mechanism.transmissions.axis_angles import angles_at, at_lanes
+from jounce.mechanism.transmissions.axis_angles import angles_of, of_one_lane
 
 NOTHING = 1e-9  # of the largest multiplier: what is less is rounding
 
@@ -101,7 +101,7 @@ class MotionForces:
         """Multipliers that balance the loads, followed by self-balanced ones if these are needed."""
         if not self.flanks:
             return self._balanced({})
-        check_meshing(self.motion, self.joined.groups, self.coordinates_at)
+        check_meshing(self.motion, self.joined.groups, self.coordinates_of)
         multipliers, known, self._reversals = teeth.settled(self._balanced, self.flanks, self.model, self.motion)
         if self._looks_for_open:  # what is open presses on no flank that is known: any others tell what depends on it
             multipliers = np.stack([multipliers[0], self._balanced(teeth.by_chance(known))[1]])
@@ -114,14 +114,14 @@ class MotionForces:
         choice = np.zeros(rows), np.zeros(cases), np.zeros((cases, rows))
         shared = self._balance(None if self.model.system.rank is None else choice)
         large = programs.largest_array(self.model)
-        programs.balanced.prepare(shared, self.balance_at, large=large, pose_type=self.pose_type)
+        programs.balanced.prepare(shared, self.balance, large=large, pose_type=self.pose_type)
 
     def _balanced(self, flanks: teeth.Flanks) -> Float[Numbers, "case level row time"]:
         """Return the multipliers that balance the loads, and self-balanced ones, given the loaded tooth flanks."""
         self.flanks = flanks
         shared = self._balance(None if self.model.system.rank is None else self._choice)
         large = programs.largest_array(self.model)
-        multipliers, finite = self.along(programs.balanced, shared, self.balance_at, large=large)
+        multipliers, finite = self.along(programs.balanced, shared, self.balance, large=large)
         check_finite_forces(self, finite)
         check_not_locked(self.motion, self.joined, multipliers[0])
         check_finite_values(self, multipliers[0])
@@ -129,19 +129,19 @@ class MotionForces:
 
     def _balance(self, choice: tuple[Numbers, Numbers, Numbers] | None) -> Any:
         """Return what a balance has at all instants, for a choice among the multipliers of redundant rows."""
-        free = programs.without_constraints(self.joined, at_lanes(self.forces, np.zeros(1, int)))
+        free = programs.without_constraints(self.joined, of_one_lane(self.forces))
         return self.joined, free, self.masses, self.gravity, choice
 
-    def balance_at(self, lanes: np.ndarray) -> Any:
-        """Return the arguments of a balance for some instants."""
-        bodies, angles, instants = self.acting_at(lanes)
-        pressed = tuple(flank[..., lanes] for flank in self.flanks.values())
-        return bodies, angles if self.forces else (), pressed, instants
+    @property
+    def balance(self) -> Any:
+        """The arguments of a balance that each instant has for itself."""
+        bodies, angles, instants = self.acting
+        return bodies, angles if self.forces else (), tuple(self.flanks.values()), instants
 
-    def acting_at(self, lanes: np.ndarray) -> tuple[Any, tuple[Any, ...], Any]:
-        """Return the coordinates of all bodies at some instants, the angles that forces measure, and the time."""
-        angles = angles_at(self.motion.forces, lanes)
-        return self.coordinates_at(None, lanes, self.levels + 2), angles, self.motion.time[lanes]
+    @property
+    def acting(self) -> tuple[Any, tuple[Any, ...], Any]:
+        """The coordinates of all bodies, the angles that forces measure, and the time."""
+        return self.coordinates_of(None, self.levels + 2), angles_of(self.motion.forces), self.motion.time
 
     @property
     def _choice(self) -> tuple[Numbers, Numbers, Numbers]:
@@ -204,8 +204,8 @@ class MotionForces:
     def open(self) -> OpenMultipliers:
         """Forces that redundant constraints do not determine, at the first solved instant."""
         lanes = np.array([np.argmax(self.motion.status == Status.OK)])  # 0 where none is
-        system, bodies = dataclasses.replace(self.joined, forces=()), self.coordinates_at(None, lanes, 1)
-        scaled = programs.scaled_jacobian(system, bodies, self.motion.time[lanes], self.pose_type)
+        bodies, instants = at_lanes((self.coordinates_of(None, 1), self.motion.time), lanes)
+        scaled = programs.scaled_jacobian(dataclasses.replace(self.joined, forces=()), bodies, instants, self.pose_type)
         mechanism = self.motion.mechanism
         selection = resolved_reactions(mechanism.redundant_reactions, mechanism.parameter_values)
         return OpenMultipliers(self.model, np.asarray(scaled)[..., 0], selection)
@@ -229,11 +229,8 @@ class MotionForces:
         """Return the force of a driver along its prescribed coordinate, as Taylor coefficients."""
         index = self.indices[name]
         driver = law_left_out(self.model.system.groups[index.group], only_if_evaluated=True).element
-
-        def lanes_of(lanes: np.ndarray) -> Any:
-            return self._poses(index.group, lanes), self.motion.time[lanes], self._of_group(index)[..., lanes]
-
-        forces = self._once(programs.exerted, driver, lanes_of, index.group)
+        lanes = self._poses(index.group), self.motion.time, self._of_group(index)
+        forces = self._once(programs.exerted, driver, lanes, index.group)
         return forces[:, index.instance : index.instance + 1]
 
     def reaction(self, name: str, body: int, frame: int | None, point: Numbers) -> tuple[Any, Any]:
@@ -267,12 +264,8 @@ class MotionForces:
             return self._expressed(work, body, frame, point)
         moving = {slot: its for slot, its in joined if its and slot not in getattr(element, "unfelt", ())}
         works = [self._wrench(name, slot) for slot in moving]
-
-        def lanes_of(lanes: np.ndarray) -> Any:
-            poses = [self.coordinates_at((its,), lanes, self.levels) for its in moving.values()]
-            return [work[..., lanes] for work in works], poses
-
-        work = self.along(programs.passed_on, point[:, None, None], lanes_of)
+        poses = [self.coordinates_of((its,), self.levels) for its in moving.values()]
+        work = self.along(programs.passed_on, point[:, None, None], (works, poses))
         return self._expressed(work, 0, frame, np.zeros(np.shape(point)))
 
     def point_of(self, name: str, body: int) -> Float[Numbers, " component"]:
@@ -297,26 +290,20 @@ class MotionForces:
         It consists of the force along the global axes and the moment about the origin of the body along its own axes.
         """
         if place := self.indices.get(name):
-            first, group = self.friction.first_rows.get(place.group), self.joined.groups[place.group]
-
-            def of_constraint(lanes: np.ndarray) -> Any:
-                rubbed = None
-                if first is not None:
-                    moving = [self.coordinates_at(its, lanes, self.levels + 1) for its in group.bodies]
-                    rubbed = moving, self._balancing[0][:, None, first : first + group.instances, lanes]
-                return *self.joint_at(place.group, lanes), self._of_group(place)[..., lanes], rubbed
-
-            how = {"slot": slot, "levels": self.levels}
-            wrench = self._once(programs.joint_wrench, group.element, of_constraint, place.group, **how)
+            first, group, rubbed = self.friction.first_rows.get(place.group), self.joined.groups[place.group], None
+            if first is not None:
+                moving = [self.coordinates_of(its, self.levels + 1) for its in group.bodies]
+                rubbed = moving, self._balancing[0][:, None, first : first + group.instances]
+            lanes, how = (
+                (*self.joint(place.group), self._of_group(place), rubbed),
+                {"slot": slot, "levels": self.levels},
+            )
+            wrench = self._once(programs.joint_wrench, group.element, lanes, place.group, **how)
             wrench = wrench[:, :, place.instance]
             return teeth.without_open_rates(wrench, self._reversals.get(place.group), place.instance)
         index, instance = self._force_index(name)
-
-        def of_force(lanes: np.ndarray) -> Any:
-            return *self._acting(index, lanes, self.levels), self._sizes(index)[..., lanes]
-
-        how = {"slot": slot, "levels": self.levels}
-        return self._once(programs.force_wrench, self._free(index), of_force, index, **how)[:, :, instance]
+        lanes, how = (*self._acting(index, self.levels), self._sizes(index)), {"slot": slot, "levels": self.levels}
+        return self._once(programs.force_wrench, self._free(index), lanes, index, **how)[:, :, instance]
 
     def applied_force(self, name: str) -> Numbers:
         """Return an applied force, as Taylor coefficients, (levels, components, time)."""
@@ -335,54 +322,46 @@ class MotionForces:
 
     def _sizes(self, index: int) -> Float[Numbers, "order component instance time"]:
         """Return the applied forces of a group, as Taylor coefficients."""
-
-        def lanes_of(lanes: np.ndarray) -> Any:
-            return self._acting(index, lanes, self.levels + 1)
-
-        return self._once(programs.applied, self._free(index), lanes_of, index, levels=self.levels)
+        lanes = self._acting(index, self.levels + 1)
+        return self._once(programs.applied, self._free(index), lanes, index, levels=self.levels)
 
     def _free(self, index: int) -> Group:
         """Return the forces of a group, whose angles about axes are those of one instant."""
-        return at_lanes((self.motion.forces[index],), np.zeros(1, int))[0]
+        return of_one_lane((self.motion.forces[index],))[0]
 
-    def _acting(self, index: int, lanes: np.ndarray, levels: int) -> tuple[programs.Acting, Any]:
+    def _acting(self, index: int, levels: int) -> tuple[programs.Acting, Any]:
         """Return the poses of the bodies of forces, the angles about axes between them, and the instants."""
         group = self.motion.forces[index]
-        angles = angles_at((group,), lanes)
-        poses = [self.coordinates_at(slot, lanes, levels) for slot in group.bodies]
-        return (poses, angles), self.motion.time[lanes]
+        poses = [self.coordinates_of(slot, levels) for slot in group.bodies]
+        return (poses, angles_of((group,))), self.motion.time
 
-    def _once(self, program: Mapped, shared: Any, lanes_of: LanesOf, *key: Any, **static: Any) -> Any:
+    def _once(self, program: Mapped, shared: Any, lanes: Any, *key: Any, **static: Any) -> Any:
         """Return the results of a program for all instants, cached by the program, a key and static arguments."""
         key = (program, *key, *static.items())
         if key not in self._numbers:
-            self._numbers[key] = self.along(program, shared, lanes_of, **static)
+            self._numbers[key] = self.along(program, shared, lanes, **static)
         return self._numbers[key]
 
-    def along(self, program: Mapped, shared: Any, lanes_of: LanesOf, **static: Any) -> Any:
+    def along(self, program: Mapped, shared: Any, lanes: Any, **static: Any) -> Any:
         """Return the results of a program for all instants."""
-        return at_instants(self.motion, program, shared, lanes_of, pose_type=self.pose_type, **static)
+        return program.along(shared, lanes, pose_type=self.pose_type, **static)
 
     def _expressed(self, work: Numbers, body: int, frame: int | None, point: Numbers) -> tuple[Any, Any]:
         """Return force and moment about a point of a body, as `reaction` does, from a wrench as `_wrench` has it."""
         bodies = (body,) if frame is None else (body, frame)
+        poses = [self.coordinates_of((b,), self.levels) for b in bodies]
+        return self.along(programs.expressed, point[:, None, None], (work, poses))
 
-        def lanes_of(lanes: np.ndarray) -> Any:
-            return work[:, :, lanes], [self.coordinates_at((b,), lanes, self.levels) for b in bodies]
+    def coordinates_of(self, bodies: tuple[int, ...] | None, levels: int) -> dict[str, Any]:
+        """Return coordinates of bodies, to a number of coefficients, as `part_of` has them."""
+        return part_of(self.coordinates, bodies, levels)
 
-        return self.along(programs.expressed, point[:, None, None], lanes_of)
+    def joint(self, index: int) -> tuple[Any, Any, Any]:
+        """Return the poses of the bodies of a group, the time, and the loaded tooth flanks or None."""
+        return self._poses(index), self.motion.time, self.flanks.get(index)
 
-    def coordinates_at(self, bodies: tuple[int, ...] | None, lanes: np.ndarray, levels: int) -> dict[str, Any]:
-        """Return coordinates at some instants, for the bodies and the number of coefficients of `part_of`."""
-        return {name: values[..., lanes] for name, values in part_of(self.coordinates, bodies, levels).items()}
-
-    def joint_at(self, index: int, lanes: np.ndarray) -> tuple[Any, Any, Any]:
-        """Return the poses of the bodies of a group at some instants, the time, and the loaded tooth flanks or None."""
-        flank = self.flanks[index][..., lanes] if index in self.flanks else None
-        return self._poses(index, lanes), self.motion.time[lanes], flank
-
-    def _poses(self, index: int, lanes: np.ndarray) -> tuple[dict[str, Any], ...]:
-        return tuple(self.coordinates_at(slot, lanes, self.levels) for slot in self.model.system.groups[index].bodies)
+    def _poses(self, index: int) -> tuple[dict[str, Any], ...]:
+        return tuple(self.coordinates_of(slot, self.levels) for slot in self.model.system.groups[index].bodies)
 
     def _of_group(self, index: ElementIndex) -> Float[Numbers, "order row instance time"]:
         """Return the multipliers of a group."""

@@ -24,7 +24,7 @@ from jounce.kinematics import Motion, Status
 from jounce.kinematics.assembly.assemble import freely_moving
 from jounce.mechanism import Mechanism
 from jounce.mechanism.building.preconditions import concrete
-from jounce.mechanism.transmissions.axis_angles import at_lanes
+from jounce.mechanism.transmissions.axis_angles import of_one_lane
 from jounce.robot import Robot
 
 INSTANT = 1e-9  # of the time between the ends of a motion: an instant as near to one of its own is that one
@@ -149,9 +149,9 @@ def point_along(motion: Motion, time: Real | None) -> OperatingPoint:
         )
     if motion.status[lane] != Status.OK:
         raise MechanismError("the motion was not solved at this instant", name="time", value=float(motion.time[lane]))
-    lanes, mechanism = np.array([lane]), motion.mechanism
-    at_lane = {name: np.asarray(x)[..., lanes] for name, x in cut(coordinates, 2).items()}
-    system = with_fields(motion.model.system, outputs=(), forces=at_lanes(motion.forces, lanes))
+    mechanism = motion.mechanism
+    at_lane = {name: np.asarray(x)[..., [lane]] for name, x in cut(coordinates, 2).items()}
+    system = with_fields(motion.model.system, outputs=(), forces=of_one_lane(motion.forces, lane))
     equations = Equations(system, masses_of(mechanism), gravity_of(mechanism), 1.0, pose_type)
     point = OperatingPoint(
         mechanism, motion.model, equations, at_lane, clock_at(float(motion.time[lane]), stopped=False)

@@ -203,11 +203,7 @@ class RobotSimulation(Tabulated):
 
     def _in_states(self, function: Mapped) -> Any:
         """Return what a function of the problem and of the state at an instant gives for all of them."""
-
-        def states_of(lanes: np.ndarray) -> tuple[RobotState, np.ndarray]:
-            return jax.tree.map(lambda x: x[..., lanes], self._state), self.time[lanes]
-
-        return function.at_instants(self._problem, states_of, len(self.time))[0]
+        return function.along(self._problem, (self._state, self.time))
 
     def at(self, time: ArrayLike, order: int | None = None) -> "RobotSimulation":
         """Return the same simulation at other instants, without integrating again.

@@ -8,12 +8,11 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from jounce.base.shapes import Array, ArrayLike, Numbers, seconds
-from jounce.dynamics.forward.accelerations import Equations, Instants, Lanes, State, expand
+from jounce.dynamics.forward.accelerations import Equations, Lanes, State, expand
 from jounce.dynamics.forward.initial_state import ConsistentStart
 from jounce.dynamics.motion_values import Coordinates, cut, pose_of
 from jounce.errors import JounceError, MechanismError
 from jounce.execution.backends import joined
-from jounce.execution.compilation import compiled
 from jounce.execution.mapped import mapped
 from jounce.integrate.marching.marching import DenseOutput
 from jounce.integrate.marching.robot_marching import RobotSteps
@@ -238,8 +237,8 @@ class Simulation(Motion):
     def _checked(self) -> list[np.ndarray]:
         """Energy, drift and kinetic energy."""
         pose_type, coordinates = self.poses
-        equations = self._start.equations.near(self._angles)
-        checks = _checks(equations, cut(coordinates, 1), self.time[None], pose_type)
+        lanes = self._angles, cut(coordinates, 1), self.time
+        checks = _checks.along(self._start.equations, lanes, pose_type=pose_type)
         return [np.where(self.status == Status.OK, part, np.nan) for part in checks]
 
 
@@ -323,12 +322,13 @@ def expanded(
     return series, revolution_counts.measured(there, state), outputs_found
 
 
-@compiled("pose_type", brief=True)
+@mapped(widths=(FEW_INSTANTS, *WIDTHS))
 def _checks(
-    equations: Equations, coordinates: Coordinates, time: Instants, pose_type: type
+    equations: Equations, lanes: tuple[AnglesOfForces, Coordinates, Lanes], pose_type: type
 ) -> tuple[Lanes, Lanes, Lanes]:
     """Return the energy, the largest residual and the kinetic energy."""
-    pose, clock = pose_of(coordinates, pose_type), Jet.variable(time, 1)
+    angles, coordinates, instants = lanes
+    equations, pose, clock = equations.near(angles), pose_of(coordinates, pose_type), Jet.variable(instants[None], 1)
     kinetic, potential, *_ = energies(equations, pose, clock)
     gaps = equations.system.residual(pose, clock).coefficients[0]
     return kinetic + potential, jnp.max(jnp.abs(gaps), axis=0, initial=0.0), kinetic

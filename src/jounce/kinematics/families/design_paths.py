@@ -13,6 +13,7 @@ import jax
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from jounce.execution.mapped import at_lanes
 from jounce.execution.threads import Threads
 from jounce.jet.derivatives import plain_derivatives
 from jounce.jet.turns import brought_near
@@ -156,7 +157,7 @@ class DesignPaths:
             if (left := ~(ended | unlike)).all():
                 continue
             lanes = lanes[left]
-            control, known, own = jax.tree.map(lambda x, some=left: x[..., some], (control, known, own))
+            control, known, own = at_lanes((control, known, own), left)
         self.individual[lanes] = True
         return self._sorted(steps)
 

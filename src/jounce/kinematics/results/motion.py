@@ -359,7 +359,7 @@ class Motion(Tabulated):
         coordinates = {name: part[..., [0, *moving], :] for name, part in self._coordinates.items()}
         groups = tuple(with_fields(counted, bodies=indices) for counted in self._counting((group,)))
 
-        (series,) = series_along(groups, coordinates, len(self.time), self.model.pose_type)
+        (series,) = series_along(groups, coordinates, self.model.pose_type)
         return series
 
     def _counting(self, groups: tuple[Group, ...]) -> tuple[Group, ...]:

@@ -17,7 +17,7 @@ from jounce.mechanism import AbstractOutput, AbstractQuantity, Mechanism, Model
 from jounce.mechanism.building.builder import counted_as_in
 from jounce.mechanism.mechanism import GROUND
 from jounce.mechanism.system import POSITION_COMPONENTS, Group, group_elements
-from jounce.mechanism.transmissions.axis_angles import angles_at, at_lanes, with_turns
+from jounce.mechanism.transmissions.axis_angles import angles_of, of_one_lane, with_turns
 
 
 def check_output(output: AbstractQuantity, mechanism: Mechanism, name: str = "output") -> None:
@@ -50,14 +50,11 @@ def output_series(
 
 
 def series_along(
-    groups: tuple[Group, ...], coordinates: dict[str, Any], count: int, pose_type: type
+    groups: tuple[Group, ...], coordinates: dict[str, Any], pose_type: type
 ) -> tuple[Float[Numbers, "_ _ _ batch"], ...]:
-    """Return what `output_series` does for so many instants, whose turns of angles about axes the groups hold."""
-
-    def lanes_of(lanes: np.ndarray) -> Any:
-        return {name: part[..., lanes] for name, part in coordinates.items()}, angles_at(groups, lanes)
-
-    return _of_instant.at_instants(at_lanes(groups, np.zeros(1, int)), lanes_of, count, pose_type=pose_type)[0]
+    """Return what `output_series` does for instants whose turns of angles about axes the groups hold."""
+    lanes = coordinates, angles_of(groups)
+    return _of_instant.along(of_one_lane(groups), lanes, pose_type=pose_type)
 
 
 @Mapped

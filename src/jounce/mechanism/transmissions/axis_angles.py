@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Float
 
 from jounce.base.modules import unchecked, with_fields
 from jounce.base.shapes import Numbers
@@ -169,14 +169,14 @@ def _with_data(groups: Sequence[Group], values: Sequence[Any], put: Callable[[Da
     return tuple(holding(g, "datum", put(g.element.datum, next(remaining))) if measures_angle(g) else g for g in groups)
 
 
-def angles_at(groups: Sequence[Group], lanes: Int[np.ndarray, " lane"]) -> tuple[Any, ...]:
-    """Return the angles about axes that groups measure, with their turns, for some lanes of a batch."""
-    return tuple(group.element.datum.near[..., lanes] for group in groups if measures_angle(group))
+def angles_of(groups: Sequence[Group]) -> tuple[Any, ...]:
+    """Return the angles about axes that groups measure, with their turns."""
+    return tuple(group.element.datum.near for group in groups if measures_angle(group))
 
 
-def at_lanes(groups: Sequence[Group], lanes: Int[np.ndarray, " lane"]) -> tuple[Group, ...]:
-    """Return groups whose angles about axes have the turns of a whole batch, for some of its lanes."""
-    return with_turns(groups, angles_at(groups, lanes))
+def of_one_lane(groups: Sequence[Group], lane: int = 0) -> tuple[Group, ...]:
+    """Return groups whose angles about axes have the turns of a whole batch, for one lane of it."""
+    return with_turns(groups, [angle[..., lane : lane + 1] for angle in angles_of(groups)])
 
 
 def _with_datum(group: Group, coordinates: Coordinates, prescribed: Sequence[PrescribedAngle], *, keep: bool) -> Group:
