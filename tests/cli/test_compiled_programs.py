@@ -11,22 +11,11 @@ import zlib
 import pytest
 
 from jounce.base.private_folder import PrivateFolder
-from jounce.cli.compiled_programs import JaxProgramFolder
-from jounce.execution import compilation
 from jounce.execution.store import programs as store
 from jounce.execution.store.folder import ProgramFolder
-from tests.execution.store.test_folder import DAMAGES, PROGRAM
+from tests.execution.store.test_folder import DAMAGES
 
 FOUR_BAR = pathlib.Path(__file__).resolve().parents[2] / "examples" / "four_bar.yaml"
-
-
-def test_jax_takes_nothing_from_its_own_store_where_a_program_is_to_be_kept(tmp_path):
-    entries = JaxProgramFolder(PrivateFolder(tmp_path))
-    entries.put("key", PROGRAM)
-    with compilation.compiling_anew():
-        assert entries.get("key") is None
-        entries.put("other", PROGRAM)
-    assert (entries.get("key"), entries.get("other")) == (PROGRAM, None)
 
 
 def started(cache):
@@ -50,8 +39,6 @@ def test_what_is_no_description_is_not_run(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     with pytest.raises(pickle.UnpicklingError, match="is no part of a program"):
         store.unpacked(zlib.compress(pickle.dumps((b"", Planted()))))
-    with pytest.raises(pickle.UnpicklingError, match="is no part of a program"):
-        compilation._unpacked(store.packed((pickle.dumps(Planted()), None)), None)
     assert not pathlib.Path(MARK).exists()
 
 

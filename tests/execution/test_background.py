@@ -13,7 +13,6 @@ from jounce.execution.compilation import compiled
 from jounce.execution.mapped import Mapped
 from jounce.execution.threads import VARIABLE
 from tests.problems.dynamics import double_pendulum
-from tests.problems.small import four_bar
 from tests.programs import counts, forget
 
 START = "_moved", "_with_row_rates", "_judged"  # of a simulation, made while its programs are
@@ -54,7 +53,7 @@ def made_later(monkeypatch):
 def test_the_programs_of_a_motion_are_those_that_are_made_before(name, made_later):
     motion = jn.solve(jn.load(f"examples/{name}.yaml"), order=1)
     assert all(np.isfinite(values).any() for values in motion.outputs.values())
-    assert not made_later() & {"take_steps", "advance_instant", "_balanced"}
+    assert not made_later() & {"take_steps", "advance_instant", "balanced"}
 
 
 @pytest.mark.slow
@@ -62,7 +61,7 @@ def test_the_programs_of_a_motion_are_those_that_are_made_before(name, made_late
 def test_the_programs_of_a_simulation_are_those_that_are_made_before(name, made_later):
     simulation = jn.simulate(jn.load(f"examples/{name}.yaml"), np.linspace(0.0, 0.02, 5), order=1)
     assert all(np.isfinite(values).any() for values in simulation.outputs.values())
-    assert not made_later() & {"march", "expanded", "_balanced"}
+    assert not made_later() & {"march", "expanded", "balanced"}
 
 
 @pytest.mark.slow
@@ -155,53 +154,20 @@ def test_one_thread_does_nothing_beside(monkeypatch):
     assert not called
 
 
-class Shelf(dict):
-    """A store in memory."""
-
-    put, drop = dict.__setitem__, dict.pop
-
-
-@pytest.mark.parametrize("kept", [False, True])
-def test_a_program_is_made_from_shapes_alone(monkeypatch, kept):
-    shelf = Shelf()
-    monkeypatch.setattr("jounce.execution.compilation._store_of_xla", lambda: shelf)
-    monkeypatch.setattr("jounce.execution.compilation.cache_key", lambda *given: repr(given[2]))
-
-    def new():
-        return compiled("times")(lambda x, times: {"sum": times * x[0].sum() + x[1]})
-
-    form = jax.ShapeDtypeStruct((3,), float)
-    if kept:
-        new().prepare((form, 1.0), times=2)
-        assert len(shelf) == 1
-    program = new()
-    program.prepare((form, 1.0), times=2)
-    count = len(program._programs)
-    assert (count, len(shelf)) == (1, 1)
+def test_a_program_is_made_from_shapes_alone():
+    program, form = compiled("times")(lambda x, times: {"sum": times * x[0].sum() + x[1]}), jax.ShapeDtypeStruct
+    program.prepare((form((3,), float), 1.0), times=2)
+    assert len(program.machine_code) == 1
     assert float(program((np.arange(3.0), 4.0), times=2)["sum"]) == 10.0
     assert float(program((np.arange(3.0), 5.0), times=2)["sum"]) == 11.0
-    assert (len(program._programs), len(shelf)) == (1, 1)
+    assert len(program.machine_code) == 1
 
 
 @pytest.mark.parametrize("rows", [False, True])
-@pytest.mark.parametrize("native", ["0", ""])
-def test_a_function_of_an_instant_is_made_from_shapes_alone(monkeypatch, rows, native):
-    monkeypatch.setenv("JOUNCE_NATIVE", native)
-    monkeypatch.setattr("jounce.execution.compilation._store_of_xla", Shelf)
-    monkeypatch.setattr("jounce.execution.compilation.cache_key", lambda *given: repr(given[2]))
+def test_a_function_of_an_instant_is_made_from_shapes_alone(rows):
     doubled = Mapped(lambda shared, lanes: shared * lanes, rows=rows)
-    shape = (4, 2) if rows else (2, 4)
-    program = doubled.program(np.array(2.0), jax.ShapeDtypeStruct(shape, float))
-    program.prepare(jax.ShapeDtypeStruct(shape, float), 5)
-    before = len(doubled.machine_code), len(doubled.on_xla._programs)
+    doubled.program(np.array(2.0), jax.ShapeDtypeStruct((4, 2) if rows else (2, 4), float))
+    assert len(doubled.machine_code) == 1
     lanes = np.arange(10.0).reshape((5, 2) if rows else (2, 5))
     np.testing.assert_array_equal(doubled.program(np.array(2.0), lanes)(lanes), 2 * lanes)
-    assert (len(doubled.machine_code), len(doubled.on_xla._programs)) == before
-
-
-def test_a_motion_needs_no_thread_once_its_programs_are_there(two_threads):
-    jn.solve(four_bar(), np.linspace(0, 0.1, 3), order=1)
-    finish()
-    started = threading.active_count()
-    jn.solve(four_bar(), np.linspace(0, 0.1, 4), order=1)
-    assert threading.active_count() == started
+    assert len(doubled.machine_code) == 1

@@ -102,7 +102,7 @@ def test_memory_that_jax_has_taken_over_is_not_lent_again(returned):
 
 
 def test_results_of_one_call_stay_as_they_are_in_the_next():
-    run = Compiled(lambda x: (x + 1.0, jnp.sum(x)), (), single=True)
+    run = Compiled(lambda x: (x + 1.0, jnp.sum(x)), ())
     given = [np.full(LENT[0] // 8, float(k)) for k in range(5)]
     for k, (more, total) in enumerate([run(x) for x in given]):
         np.testing.assert_array_equal(more, k + 1.0)

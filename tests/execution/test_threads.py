@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import jounce as jn
-from jounce.execution.compilation import Compiled
+from jounce.execution.compilation import ByXla
 from jounce.execution.threads import VARIABLE, Threads, thread_count
 from tests.problems.small import four_bar, slider_crank
 
@@ -48,15 +48,14 @@ def test_progress_is_reported_in_the_thread_that_asked_and_may_interrupt():
 @pytest.mark.parametrize("name", ["rssr", "four_bar"])
 def test_programs_of_long_grids_hold_no_lapack(monkeypatch, name):
     """JAX waits for batches of LAPACK in the threads that they need: two callers would wait for each other."""
-    texts, call = {}, Compiled.__call__
+    texts, call = {}, ByXla.__call__
 
     def recorded(self, *arguments, **keywords):
-        if self.__name__ not in texts:
-            plain = {name: None if name == "native" else value for name, value in keywords.items()}  # without code
-            texts[self.__name__] = self.jitted.lower(*arguments, **plain).as_text()
+        if (name := self.function.__name__) not in texts:
+            texts[name] = self.jitted.lower(*arguments, **keywords).as_text()
         return call(self, *arguments, **keywords)
 
-    monkeypatch.setattr(Compiled, "__call__", recorded)
+    monkeypatch.setattr(ByXla, "__call__", recorded)
     monkeypatch.setenv("JOUNCE_NATIVE", "0")  # machine code calls no library of the kind
     jn.solve(jn.load(f"examples/{name}.yaml"), LONG[:1100], strict=False)
     assert {"take_steps", "_in_rounds"} <= texts.keys()

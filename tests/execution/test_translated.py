@@ -38,12 +38,8 @@ def logistic(x, count, *, rate=3.5, power=1):
     return {"last": x, "history": history}, history[:, 0].sum()
 
 
-def few(x, *_, **__):
-    return x.size < 10
-
-
 def program():
-    return Compiled(logistic, ("power",), single=few)
+    return Compiled(logistic, ("power",))
 
 
 def expected(x, count, rate=3.5, power=1):
@@ -71,9 +67,9 @@ def test_results_are_those_of_the_function():
     check(run(0.5 * x, count=5), expected(0.5 * x, 5))
 
 
-@pytest.mark.parametrize("reason", ["environment", "size", "traced"])
+@pytest.mark.parametrize("reason", ["environment", "traced"])
 def test_xla_computes_the_rest(reason, monkeypatch):
-    x, run = np.linspace(0.1, 0.9, 12 if reason == "size" else 3), program()
+    x, run = np.linspace(0.1, 0.9, 3), program()
     if reason == "environment":
         monkeypatch.setenv("JOUNCE_NATIVE", "0")
     found = jax.jit(lambda x: run(x, 7))(x) if reason == "traced" else run(x, 7)
@@ -84,7 +80,7 @@ def test_xla_computes_the_rest(reason, monkeypatch):
 def test_an_operation_without_code_is_left_to_xla(monkeypatch):
     monkeypatch.setattr(backends, "_warned", set())
 
-    @compiled(single=lambda x: True)
+    @compiled()
     def transformed(x):
         return jax.lax.digamma(x)
 
@@ -97,7 +93,7 @@ def test_a_program_that_is_too_long_is_left_to_xla_with_a_warning_when_it_is_nee
     monkeypatch.setattr(backends, "_warned", set())
     monkeypatch.setattr(modules, "MOST_LINES", 20)
     x = np.linspace(0.1, 0.9, 3)
-    run = Compiled(lambda x: sum(jnp.sin(k * x) for k in range(1, 40)), (), single=True)
+    run = Compiled(lambda x: sum(jnp.sin(k * x) for k in range(1, 40)), ())
     job = threading.Thread(target=lambda: (background._queued.append(lambda: run(x)), background._took_up_next()))
     job.start()
     job.join()
@@ -109,7 +105,7 @@ def test_a_program_that_is_too_long_is_left_to_xla_with_a_warning_when_it_is_nee
 
 
 def test_arrays_may_lie_in_any_way():
-    run = Compiled(lambda x, y: (x - y, jnp.sum(x)), (), single=True)
+    run = Compiled(lambda x, y: (x - y, jnp.sum(x)), ())
     whole = np.arange(24.0).reshape(2, 3, 4)
     for x in (whole, whole[::-1], whole[:, ::2], whole.transpose(2, 0, 1), np.broadcast_to(1.5, (2, 3)), whole[:0]):
         difference, total = run(x, 2.0)
@@ -123,14 +119,12 @@ def test_a_static_argument_is_found_once_for_arguments_of_a_form():
     def times(factor):
         return lambda: found.append(factor) or factor
 
-    run = Compiled(lambda x, k, *, factor: factor * x[k], ("factor",), single=True, otherwise={"factor": 5.0})
-    for key, factor, x, k in (("a", 2.0, 3, indices), ("a", None, 3, indices), ("b", 3.0, 3, indices)):
-        x = np.arange(float(x))
-        np.testing.assert_array_equal(run(x, k, factor=WhenMade(key, times(factor))), (factor or 2.0) * x[k])
-    assert found == [2.0, 3.0]
-    np.testing.assert_array_equal(run(x, indices[::-1], factor=WhenMade("b", times(4.0))), 4.0 * x[indices[::-1]])
+    run = Compiled(lambda x, k, *, factor: factor * x[k], ("factor",), otherwise={"factor": 5.0})
+    for factor, size, k in ((2.0, 3, indices), (None, 3, indices), (3.0, 4, indices), (4.0, 4, indices[::-1])):
+        x = np.arange(float(size))
+        np.testing.assert_array_equal(run(x, k, factor=WhenMade(times(factor))), (factor or 2.0) * x[k])
     assert found == [2.0, 3.0, 4.0]  # for other whole numbers it may be another one
-    np.testing.assert_array_equal(run(np.arange(9.0), indices, factor=WhenMade("a", times(None))), [10.0, 0.0])
+    np.testing.assert_array_equal(run(np.arange(9.0), indices, factor=WhenMade(times(None))), [10.0, 0.0])
 
 
 @pytest.mark.parametrize("damage", [None, b"", b"no program"])
@@ -143,7 +137,7 @@ def test_what_is_kept_is_loaded_or_made_again(damage, monkeypatch):
     for _ in range(2):
         function = translated.Translated(logistic, (Compiled.__call__,), single=True)
         arrays, tree = [x, np.asarray(4)], jax.tree.structure(((x, 4), {}))
-        run = function.program((arrays, tree), ((), jax.tree.structure(())), {"power": 2}, large=32, hasty=True)
+        run = function.program((arrays, tree), ((), jax.tree.structure(())), {"power": 2}, large=32)
         check(run(arrays), expected(x, 4, power=2))
         if damage is not None:
             shelf |= dict.fromkeys(shelf, damage)
@@ -158,5 +152,5 @@ def test_what_is_given_much_is_compiled_well_however_seldom_it_is_called(count, 
         translated, "object_file", lambda *given, **how: asked.append(how["brief"]) or made(*given, **how)
     )
     x = np.linspace(0, 1, count)
-    np.testing.assert_array_equal(Compiled(lambda x: 2.0 * x, (), brief=True, single=True)(x), 2 * x)
+    np.testing.assert_array_equal(Compiled(lambda x: 2.0 * x, (), brief=True)(x), 2 * x)
     assert asked == [count == 10]

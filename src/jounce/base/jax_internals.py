@@ -59,41 +59,6 @@ def runs_at_once(value: Tracer) -> bool:
     return kinds[-1:] == ["EvalTrace"] and {"JVPTrace", "BatchTrace"}.issuperset(kinds[:-1])
 
 
-def without_sources(module: Any) -> None:
-    """Take the lines of Python out of a module of MLIR: a fourth of the time in which its program is read again.
-
-    Parameters
-    ----------
-    module : jaxlib.mlir.ir.Module
-        Changed in place.
-    """
-    try:
-        from jaxlib.mlir.passmanager import PassManager
-
-        with module.context:
-            PassManager.parse("builtin.module(strip-debuginfo)").run(module.operation)
-    except (ImportError, AttributeError, ValueError):
-        return
-
-
-def description_reader(reader: type) -> type:
-    """Return a class that reads what JAX writes beside the code of a program, and no code.
-
-    Parameters
-    ----------
-    reader : type
-        The subclass of `pickle.Unpickler` that says which names may be read.
-    """
-    from jax.experimental import serialize_executable
-
-    class Description(reader, serialize_executable._JaxPjrtUnpickler):
-        def persistent_load(self, pid: Any) -> Any:
-            """Return a device or a client, and nothing in the place of code."""
-            return None if pid[0] == "exec" else super().persistent_load(pid)
-
-    return Description
-
-
 def use_file_cache(make: Callable[[str], tuple[Any, str]]) -> bool:
     """Have JAX keep its own programs in what a function makes for a path; tell whether this release supports that."""
     from jax._src import compilation_cache

@@ -3,26 +3,11 @@
 from __future__ import annotations
 
 import sys
-from typing import Any
 
 from jounce.base.private_folder import PrivateFolder
 from jounce.errors import OutputError
-from jounce.execution.compilation import ask_before_jax, compiles_anew
 from jounce.execution.store import programs as store
 from jounce.execution.store.folder import ProgramFolder, chosen_folder
-
-
-class JaxProgramFolder(ProgramFolder):
-    """The programs that JAX keeps by itself: those that `jounce.execution.store.programs` does not."""
-
-    def get(self, key: str) -> bytes | None:
-        """Return the program of this key, or None, as it is where programs are to be compiled anew."""
-        return None if compiles_anew() else super().get(key)
-
-    def put(self, key: str, value: bytes) -> None:
-        """Keep a program, unless it is kept in another form."""
-        if not compiles_anew():
-            super().put(key, value)
 
 
 def keep_programs(folder: PrivateFolder) -> bool:
@@ -34,16 +19,11 @@ def keep_programs(folder: PrivateFolder) -> bool:
 
     from jounce.base.jax_internals import use_file_cache
 
-    def file_cache(path: str) -> Any:
-        return JaxProgramFolder(folder), path
-
-    if known := use_file_cache(file_cache):
-        ask_before_jax()
     jax.config.update("jax_compilation_cache_dir", str(folder.path))
     jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.01)
     jax.config.update("jax_persistent_cache_min_entry_size_bytes", 0)
     jax.config.update("jax_persistent_cache_enable_xla_caches", "none")  # those are for GPUs
-    return known
+    return use_file_cache(lambda path: (ProgramFolder(folder), path))
 
 
 def use_compilation_cache(*, quiet: bool = False) -> None:
@@ -70,6 +50,6 @@ def use_compilation_cache(*, quiet: bool = False) -> None:
     except (RuntimeError, ValueError):  # there is no home, or a name that no file can have
         return
     store.run_one_command()
-    if keep_programs(folder):
-        store.use_store(ProgramFolder(folder))
+    store.use_store(ProgramFolder(folder))
+    keep_programs(folder)
     warnings.filterwarnings("ignore", message="Error (reading|writing) persistent compilation cache")

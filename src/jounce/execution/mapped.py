@@ -20,10 +20,9 @@ from jounce.base.padding import padded
 from jounce.base.shapes import is_traced
 from jounce.execution.backends import LLVM, xla_backend
 from jounce.execution.chunks import in_chunks
-from jounce.execution.compilation import LARGE, Compiled
+from jounce.execution.compilation import LARGE, ByXla
 from jounce.execution.device import on_processor
 from jounce.execution.llvm.programs import Program
-from jounce.execution.store.programs import is_in_haste
 from jounce.execution.threads import Threads
 from jounce.execution.translated import Translated, all_shaped
 from jounce.settings import under_own_settings
@@ -58,9 +57,6 @@ class OnLlvm:
         with Threads(threads, compiled=True) as pool:
             parts = 4 * threads  # none is to wait long for another
             return self.machine_code(self.shared, leaves, parts, pool.map)
-
-    def prepare(self, lanes: Any, count: int) -> None:
-        """Do nothing: the code serves any number of instants."""
 
     def together(self, entries: int) -> tuple[int, ...]:
         """Return how many instants of so many numbers each are computed in a call where a loop gives them."""
@@ -144,19 +140,9 @@ class OnXla:
 
         def computed(indices: Int[np.ndarray, " lane"]) -> Any:
             block = jax.tree.map(lambda x: _taken(x, indices, axis), lanes)
-            return self.mapped.on_xla(self.shared, block, self.how)
+            return self.mapped.on_xla(self.shared, block, how=self.how)
 
         return in_chunks(computed, count, (self._block_width(count),), axis, threads=threads)
-
-    def prepare(self, lanes: Any, count: int) -> None:
-        """Make the program for so many instants, of which some are given, or their shapes and types."""
-
-        def block(leaf: Any) -> jax.ShapeDtypeStruct:
-            one = leaf.shape[1:] if self.mapped.rows else leaf.shape[:-1]
-            return jax.ShapeDtypeStruct((width, *one) if self.mapped.rows else (*one, width), leaf.dtype)
-
-        width = self._block_width(count)
-        self.mapped.on_xla.prepare(self.shared, jax.tree.map(block, lanes), self.how)
 
     def together(self, entries: int) -> tuple[int, ...]:  # noqa: ARG002 - see there
         """Return how many instants are computed in a call where a loop gives them: few, or many."""
@@ -192,7 +178,7 @@ class OnXla:
             given = [padded(x[..., order], total) for x in own]
             order_of_rounds = padded(source, total), np.asarray(len(targets))
             how = positions, recorded, self.width, self.form, self.how
-            result = self.mapped.in_rounds(self.shared, starts, (given, held), order_of_rounds, how)
+            result = self.mapped.in_rounds(self.shared, starts, (given, held), order_of_rounds, how=how)
             for whole, part in zip(wholes, result, strict=True):
                 if whole is not None:
                     whole[..., order] = np.asarray(part)[..., : len(order)]
@@ -234,7 +220,7 @@ class Mapped:
     widths : tuple of int, optional
         Instants that XLA's programs are for, increasing.
     narrow : bool, default False
-        Whether the arrays are short in XLA's programs, as `Compiled` has it.
+        Whether the arrays are short in XLA's programs, as `ByXla` has it.
     """
 
     def __init__(
@@ -250,10 +236,8 @@ class Mapped:
         self.function, self.rows, self.widths = function, rows, widths
         self._many, made_of = by_xla or function, made_of or (function,)
         self.machine_code = Translated(function, made_of, rows=rows)
-        of_many = made_of if by_xla is None else (*made_of, by_xla)
-        block = Mapped._block_of_rows if rows else Mapped._block
-        self.on_xla = Compiled(block.__get__(self), ("how",), (block, *of_many), narrow=narrow)
-        self.in_rounds = Compiled(self._in_rounds, ("how",), (Mapped._in_rounds, *of_many))
+        self.on_xla = ByXla(self._block_of_rows if rows else self._block, ("how",), narrow=narrow)
+        self.in_rounds = ByXla(self._in_rounds, ("how",))
         self.__wrapped__, self.__doc__ = function, function.__doc__  # by which a name in the package is known as its
 
     @under_own_settings
@@ -263,7 +247,6 @@ class Mapped:
         lanes: Any,
         *,
         large: int | None = None,
-        hasty: bool = False,
         width: Callable[[], int] | None = None,
         **static: Any,
     ) -> OnLlvm | OnXla:
@@ -275,8 +258,6 @@ class Mapped:
             Of arrays, or of their shapes and types, as the function has them.
         large : int, optional
             Arrays of more numbers are in memory in machine code, as `object_file` has it.
-        hasty : bool, default False
-            Whether machine code is to be there soon rather than fast.
         width : callable, optional
             Returns how many instants a round of XLA has.
         **static
@@ -286,7 +267,7 @@ class Mapped:
         few, form = jax.tree.flatten(lanes)
         if not is_traced([*leaves, *few]):
             arrays, parts = all_shaped(leaves), all_shaped(few)
-            code = self.machine_code.program((arrays, structure), (parts, form), static, large=large, hasty=hasty)
+            code = self.machine_code.program((arrays, structure), (parts, form), static, large=large)
             if code is not None:
                 return OnLlvm(code, arrays)
         return OnXla(self, shared, form, tuple(static.items()), 1 if width is None else width())
@@ -318,8 +299,8 @@ class Mapped:
         few = count <= FEWEST_TOGETHER
         lanes = lanes_of(np.arange(count if few else 1))
         if is_traced(jax.tree.leaves((shared, lanes))):
-            return self.on_xla(shared, lanes_of(np.arange(count)), tuple(static.items())), xla_backend()
-        program = self.program(shared, lanes, large=large, hasty=is_in_haste(), **static)
+            return self.on_xla(shared, lanes_of(np.arange(count)), how=tuple(static.items())), xla_backend()
+        program = self.program(shared, lanes, large=large, **static)
         if few:
             return program(lanes), program.backend
         widths = program.together(sum(np.size(x) for x in jax.tree.leaves(lanes)))
@@ -332,7 +313,7 @@ class Mapped:
 
     def prepare(self, shared: Any, lanes: Any, *, large: int = LARGE, **static: Any) -> None:
         """Make the machine code that `along` calls; XLA's programs depend on how many instants there are."""
-        self.program(shared, lanes, large=large, hasty=is_in_haste(), **static)
+        self.program(shared, lanes, large=large, **static)
 
     def _block(self, shared: Any, lanes: Any, how: tuple[tuple[str, Any], ...]) -> Any:
         return self._many(shared, lanes, **dict(how))

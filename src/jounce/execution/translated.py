@@ -22,7 +22,7 @@ from jounce.execution.background import ByKey
 from jounce.execution.llvm.modules import object_file
 from jounce.execution.llvm.programs import Program, Single
 from jounce.execution.llvm.text.values import UnsupportedOperationError
-from jounce.execution.store.programs import current_store, loaded_or_made
+from jounce.execution.store.programs import current_store, is_in_haste, loaded_or_made
 from jounce.execution.structure import UndescribedError, cache_key, settings
 from jounce.execution.traced_once import one_program
 
@@ -49,13 +49,11 @@ class WhenMade:
 
     Parameters
     ----------
-    key : object
-        What it depends on beside the forms of the arguments and the whole numbers in their arrays.
     find : callable
-        Returns it; None where there is to be no machine code.
+        Returns it; None where there is to be no machine code. It depends only on the other static arguments, the forms
+        of the arguments, and the whole numbers in their arrays.
     """
 
-    key: Any
     find: Callable[[], Any] = dataclasses.field(compare=False)
 
 
@@ -94,9 +92,7 @@ class Translated:
         """Return the number of programs that were requested, including those without machine code."""
         return len(self._programs)
 
-    def program(
-        self, shared: Group, lanes: Group, static: Mapping[str, Any], *, large: int | None = None, hasty: bool = False
-    ) -> Any:
+    def program(self, shared: Group, lanes: Group, static: Mapping[str, Any], *, large: int | None = None) -> Any:
         """Return the machine code, `Single` or `Program`; None where there is none: no compiler, or no code for it.
 
         Arrays of whole numbers that all instants share, which are indices, are part of the program.
@@ -109,8 +105,6 @@ class Translated:
             Further arguments of the function, which may be found when a program is made.
         large : int, optional
             Arrays of more numbers are in memory, as `object_file` has it.
-        hasty : bool, default False
-            Whether a short compilation matters more than a fast program.
         """
         if not uses_machine_code():
             return None
@@ -118,7 +112,7 @@ class Translated:
         kinds = tuple([(x.shape, x.dtype) for x in arrays])
         ones = tuple([(self._one(x.shape), x.dtype) for x in few])
         found_later = [name for name, value in static.items() if type(value) is WhenMade]
-        matters = found_later or not self._single
+        matters, hasty = found_later or not self._single, is_in_haste()
         indices: Any = {k: x for k, x in enumerate(arrays) if x.dtype.kind in "iu" and x.ndim} if matters else {}
         known = tuple([x.tobytes() for x in indices.values()])
         static_key = tuple([(name, type(value), value) for name, value in static.items()])

@@ -55,9 +55,11 @@ def test_they_are_those_of_the_run(made, monkeypatch, threads):
 def test_xla_compiles_each_once(monkeypatch):
     monkeypatch.setenv("JOUNCE_NATIVE", "0")
     monkeypatch.setenv("JOUNCE_THREADS", "2")
-    before = [program.jitted._cache_size() for program in (march, expanded.on_xla)]
+    before = [program.jitted._cache_size() for program in (march.on_xla, expanded.on_xla)]
     swing(simple_pendulum(0.3, 1.0), 7e-6)
-    assert [program.jitted._cache_size() for program in (march, expanded.on_xla)] == [count + 1 for count in before]
+    assert [program.jitted._cache_size() for program in (march.on_xla, expanded.on_xla)] == [
+        count + 1 for count in before
+    ]
 
 
 @needs_machine_code

@@ -116,7 +116,7 @@ def test_long_grid_is_the_short_one_and_progress_is_reported():
 
 
 def compilations():
-    by_xla = advance_instant.on_xla, advance_instant.in_rounds, take_steps
+    by_xla = advance_instant.on_xla, advance_instant.in_rounds, take_steps.on_xla
     return sum(one.jitted._cache_size() for one in by_xla) + len(advance_instant.machine_code)
 
 

@@ -59,7 +59,7 @@ def test_what_is_asked_later_of_another_body_and_at_more_instants_compiles_nothi
     """A program is for an output and the order, and knows the ground from bodies that move."""
 
     def count():
-        return len(output_series._programs) + output_series.jitted._cache_size()
+        return len(output_series.machine_code) + output_series.on_xla.jitted._cache_size()
 
     planar.point("crank", [0.04, 0.0])
     known, longer = count(), jn.solve(planar.mechanism, np.linspace(0.0, 1.0, 1100))

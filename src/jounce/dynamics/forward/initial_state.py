@@ -184,13 +184,13 @@ def at_rest(model: Model, coordinates: dict[str, np.ndarray]) -> State:
     return State(position, attitude, np.zeros_like(position), spin)
 
 
-@compiled(narrow=True, brief=True, single=True)
+@compiled(narrow=True, brief=True)
 def with_rates(equations: Equations, state: State, time: Instants) -> State:
     """Return the state with the least change of its velocities that fulfills the rates of all constraints."""
     return _moving(equations, state, time)
 
 
-@compiled(narrow=True, brief=True, single=True)
+@compiled(narrow=True, brief=True)
 def _with_row_rates(equations: Equations, state: State, time: Instants) -> tuple[State, Any, Any]:
     """Return the state of bodies at rest with velocities, what rates they fulfill, and how the attitude moves."""
     moving = _moving(equations, state, time)
@@ -206,7 +206,7 @@ class _Facts(NamedTuple):
     sound: Bool[Any, "force 1"]  # which applied forces are finite
 
 
-@compiled(narrow=True, brief=True, single=True)
+@compiled(narrow=True, brief=True)
 def _judged(equations: Equations, state: State, time: Instants) -> _Facts:
     """Return these facts from a program of their own: in that of the velocities they would change its last digits."""
     pose = equations.pose_at_rest(state.position, state.attitude)

@@ -196,7 +196,7 @@ def _least_multipliers(
     return in_small_chunks(of_chunk, SMALL_CHUNK, blocks, load)
 
 
-@compiled("pose_type", brief=True, single=True)
+@compiled("pose_type", brief=True)
 def scaled_jacobian(system: System, bodies: Coordinates, instants: Lanes, pose_type: type[Pose]) -> Any:
     """Return the Jacobian with scaled rows and columns."""
     return system.jacobian(pose_of(bodies, pose_type, 0), Jet([instants[None]]))

@@ -18,8 +18,7 @@ from jounce.base.private_folder import PrivateFolder
 from jounce.errors import OutputError, ProgramFolderWarning, warn_caller
 from jounce.execution.store.folder import VARIABLE, ProgramFolder, chosen_folder
 
-OURS = ("jounce",)
-LIBRARIES = ("jax", "jaxlib", "numpy")
+PACKAGES = "jounce", "jax", "jaxlib", "numpy"
 PLAIN = ("ndarray", "dtype")  # of NumPy's names
 
 
@@ -133,16 +132,11 @@ class Descriptions(pickle.Unpickler):
     """
 
     def find_class(self, module: str, name: str) -> Any:
-        """Return what a name stands for, if it is a class or what JAX itself makes its own classes with."""
+        """Return what a name stands for, if it is a class."""
         package = module.partition(".")[0]
-        if package in (*OURS, *LIBRARIES) and module in sys.modules:
+        if package in PACKAGES and module in sys.modules:
             result = super().find_class(module, name)
-            ours = package in OURS and isinstance(result, type)
-            plain = package == "numpy" and name in PLAIN
-            of_jax = package.startswith("jax") and (
-                isinstance(result, type) or name.startswith(("_unpickle_", "tracing_"))
-            )
-            if ours or plain or of_jax:
+            if isinstance(result, type) and (package != "numpy" or name in PLAIN):
                 return result
         raise pickle.UnpicklingError(f"{module}.{name} is no part of a program")
 

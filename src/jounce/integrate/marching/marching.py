@@ -129,12 +129,12 @@ def unexpanded(equations: Equations, state: State, time: Lanes, *, order: int) -
     )
 
 
-@compiled(narrow=True, single=True)
+@compiled(narrow=True)
 def _measured(equations: Equations, state: State) -> AnglesOfForces:
     return measured(equations, state)
 
 
-@compiled("count", single=True)
+@compiled("count")
 def march(
     equations: Equations, current: IntegratorState, limits: RunLimits, *, method: AbstractMethod, count: int
 ) -> tuple[IntegratorState, tuple[DenseOutput, Bool[Numbers, "steps batch"]], Int[Numbers, ""]]:

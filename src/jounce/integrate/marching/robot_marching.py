@@ -231,7 +231,7 @@ def _sizes(problem: RobotProblem, polynomial: RobotState) -> Any:
     return jnp.concatenate([jnp.maximum(sizes[:-1], jnp.maximum(moved, turned)), sizes[-1:]])
 
 
-@compiled("order", "count", "exact", single=True, otherwise={"exact": None})
+@compiled("order", "count", "exact", otherwise={"exact": None})
 def march_robot(
     problem: RobotProblem,
     current: Progress,

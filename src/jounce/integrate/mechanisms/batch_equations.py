@@ -17,7 +17,6 @@ from jounce.dynamics.masses import gravity_of, masses_of
 from jounce.errors import JounceError, MobilityError
 from jounce.execution.compilation import LARGE
 from jounce.execution.mapped import Mapped, mapped
-from jounce.execution.store.programs import is_in_haste
 from jounce.integrate.marching.marching import FEW_RUNS, MANY_RUNS
 from jounce.integrate.results.simulation import expanded
 from jounce.integrate.steps.events import pose_coordinates
@@ -108,7 +107,7 @@ def mapped_runs(
     own the first of its lane, as `of_design` takes it.
     """
     shared, lanes = (made.at(runs[:1]), *shared), (made.own(runs), *lanes)
-    program = function.program(shared, lanes, large=LARGE, hasty=is_in_haste(), **static)
+    program = function.program(shared, lanes, large=LARGE, **static)
     return program(lanes), program.backend
 
 

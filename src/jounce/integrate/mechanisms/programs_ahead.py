@@ -12,7 +12,6 @@ from jounce.dynamics.forward.initial_state import at_rest, equations_of
 from jounce.dynamics.masses import gravity_of, required_masses
 from jounce.execution.background import prepare_later
 from jounce.execution.compilation import LARGE
-from jounce.execution.store.programs import is_in_haste
 from jounce.execution.threads import thread_count
 from jounce.integrate.marching.marching import (
     IntegratorState,
@@ -96,8 +95,7 @@ def prepare_run(
             like = jax.eval_shape(partial(room_for_steps, method, count=1), current)[0]
             polynomial, now = like.polynomial.map(lambda part: one(part, 4)), jax.ShapeDtypeStruct((1,), float)
             lanes = tuple(one(part, 2) for part in like.angles), polynomial, now, now
-            how: Any = {"large": LARGE, "hasty": is_in_haste(), "order": motion_order}
-            expanded.program((equations, free().system.outputs), lanes, **how).prepare(lanes, len(instants))
+            expanded.program((equations, free().system.outputs), lanes, large=LARGE, order=motion_order)
 
     form = model.system, length, motion_order, method, watched
     prepare_later(steps, "march", *form)

@@ -108,7 +108,7 @@ def _unfit(start: ConsistentStart, state: State, instant: float) -> str:
     return unsound_forces(start, np.asarray(_finite_forces(start.equations, state, np.array([[instant]])))[:, 0])
 
 
-@compiled(narrow=True, brief=True, single=True)
+@compiled(narrow=True, brief=True)
 def _finite_forces(equations: Equations, state: State, time: Instants) -> Bool[Numbers, "force 1"]:
     return equations.system.finite_forces(equations.pose(state), Jet.variable(time, 1))
 

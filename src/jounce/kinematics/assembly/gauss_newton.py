@@ -40,7 +40,7 @@ class _NewtonState(NamedTuple):
     left: Int[Numbers, ""]  # steps that may follow; below zero none does
 
 
-@compiled("pose_type", narrow=True, brief=True, single=True)
+@compiled("pose_type", narrow=True, brief=True)
 def _moved(
     system: System,
     coordinates: dict[str, Numbers],

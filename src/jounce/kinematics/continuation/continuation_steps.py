@@ -84,7 +84,6 @@ _batch = jax.jit(advance, static_argnames=("pose_type", "order"))  # traced once
 @compiled(
     *("pose_type", "order", "batches", "native"),
     narrow=True,
-    single=True,
     otherwise={"native": None},  # where there is no code for a run, XLA has none to call
 )
 def take_steps(

@@ -49,7 +49,6 @@ class Solver:
     tolerance: float
     refine: bool = True
     finite_order: int = 0  # highest derivative that must be finite
-    hasty: bool = False  # whether machine code is to be there soon rather than fast
     own: Mapping[int, Any] | None = None  # of one of many designs, see `of_design`
 
     def __call__(
@@ -183,7 +182,7 @@ class Solver:
         small = system.shape[1] <= FEW_COLUMNS
         laws = [getattr(group.element, "motion", ()) for group in system.groups]
         tables = max(map(np.size, jax.tree.leaves(laws)), default=0) > LARGE
-        how = {"large": (LARGE_BESIDE_TABLES if tables else None) if small else LARGE, "hasty": self.hasty}
+        how: dict[str, Any] = {"large": (LARGE_BESIDE_TABLES if tables else None) if small else LARGE}
         how |= {"width": partial(round_width, system), "pose_type": self.model.pose_type, "order": self.order}
         return advance_instant.program((system, self._settings), instants, **how)
 
@@ -216,7 +215,7 @@ class Solver:
         window = np.full(length, np.inf)
         window[: len(grid)] = grid[:length]
         call = take_steps.prepare if only_made else take_steps
-        native = WhenMade(self.hasty, lambda: self.program.name if isinstance(self.program, OnLlvm) else None)
+        native = WhenMade(lambda: self.program.name if isinstance(self.program, OnLlvm) else None)
         how = {"pose_type": self.model.pose_type, "order": self.order, "batches": self._batches, "native": native}
         limits = StepLimits(np.asarray(stop), np.asarray(smallest))
         bounds = limits, self._settings, np.asarray(search), np.asarray(most)

@@ -12,7 +12,7 @@ from jounce.base.activity import Count
 from jounce.errors import AssemblyError, MechanismError, MobilityError, SolveError, UnsupportedError
 from jounce.execution.backends import joined
 from jounce.execution.background import prepare_later
-from jounce.execution.store.programs import expect, is_in_haste
+from jounce.execution.store.programs import expect
 from jounce.execution.threads import thread_count
 from jounce.kinematics.assembly.assemble import assemble
 from jounce.kinematics.continuation.path_following import FollowedPath, follow, history_of
@@ -231,7 +231,7 @@ def _followed(
     check_laws(mechanism, np.array([first, last]), order + lost, forces=of_forces)
     guessed = build(chosen(with_output_drivers(mechanism), first))
     expect(len(instants))
-    settings = max(order + lost, LOWEST_ORDER), float(tolerance), refine, order, is_in_haste()
+    settings = max(order + lost, LOWEST_ORDER), float(tolerance), refine, order
     if not guessed.system.rank_is_open:  # else its program depends on the assembled bodies
         prepare_later(Solver(guessed, *settings).prepare, "take_steps", guessed.system, settings[0])
     try:

@@ -303,7 +303,7 @@ def law_values(groups: tuple[Group, ...], instant: float) -> list[np.ndarray]:
     return list(map(np.asarray, _law_values(motions, np.full((1, 1), instant)))) if motions else []
 
 
-@compiled(narrow=True, brief=True, single=True)
+@compiled(narrow=True, brief=True)
 def _law_values(motions: list[AbstractMotion], instant: Float[Numbers, "1 1"]) -> list[Numbers]:
     return [motion(Jet([instant])).coefficients[0] for motion in motions]
 
