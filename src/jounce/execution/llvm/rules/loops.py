@@ -87,7 +87,7 @@ def _moved(rule: Rule) -> StoredRule:
 
     def moved(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Array]:
         def views(array: Stored) -> list[Stored]:
-            return views_of(code, array, lambda places: rule(code, equation, [places]))
+            return views_of(code, array, lambda whole: rule(code, equation, [whole]))
 
         (array,) = given
         if isinstance(array, Deferred) and array.size == equation.outvars[0].aval.size:

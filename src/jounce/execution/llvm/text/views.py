@@ -18,7 +18,7 @@ from jounce.execution.llvm.text.arrays import Values
 from jounce.execution.llvm.text.code import Code
 from jounce.execution.llvm.text.values import Region, Value
 
-PLACES = np.zeros(1, np.int8)  # where arrays begin whose views are asked for, of numbers that nobody reads
+ORIGIN = np.zeros(1, np.int8)  # where arrays begin whose views are asked for, of numbers that nobody reads
 
 
 class Shaped:
@@ -150,10 +150,10 @@ def _plain(value: Value) -> int | Value:
 
 def views_of(code: Code, array: Stored, views: Callable[[np.ndarray], Sequence[np.ndarray]]) -> list[Stored]:
     """Return what a function of an array of NumPy, one byte a number, gives that returns views of it."""
-    places, begin = as_strided(PLACES, array.shape, array.strides), address_of(PLACES)
+    whole, begin = as_strided(ORIGIN, array.shape, array.strides), address_of(ORIGIN)
     return [
         Stored(array.region, view.shape, view.strides, further(code, array.first, address_of(view) - begin, 1))
-        for view in views(places)
+        for view in views(whole)
     ]
 
 
