@@ -132,6 +132,40 @@ def test_set_takes_units_and_changes_the_motion(run):
     assert table_rows(out)["psi", "position"][1] == pytest.approx(expected.min(), rel=1e-5)
 
 
+def test_other_instants_than_those_of_the_file(run, tmp_path):
+    path = tmp_path / "few.csv"
+    status, _, err = run("run", FOUR_BAR, "--order", "0", "--times", "500 ms:tau/2:3", "--set", "tau=4", "--out", path)
+    assert (status, err) == (0, "")
+    table = np.genfromtxt(path, delimiter=",", names=True)
+    np.testing.assert_array_equal(table["time"], [0.5, 1.25, 2.0])
+    motion = jn.solve(jn.load(FOUR_BAR).with_parameters(tau=4.0), [0.5, 1.25, 2.0], order=0)
+    np.testing.assert_allclose(table["psi"], motion.outputs["psi"][:, 0], rtol=0, atol=1e-14)
+
+
+@pytest.mark.parametrize(
+    "times, says",
+    [
+        ("0:2s", "must be START:STOP:COUNT, such as 0:2s:201, got '0:2s'"),
+        ("0:2:1.5", "count must be a whole number of instants, at least 2 unless"),
+        ("2:0:3", "stop must not come before start (2 s), got '2:0:3'"),
+        ("0:5 mm:3", "expected a time, such as 2 s, but the unit of '5 mm' is a length"),
+        ("0:T:3", "unknown name 'T'"),
+    ],
+)
+def test_instants_that_are_none_are_refused(run, times, says):
+    status, out, err = run("run", FOUR_BAR, "--times", times)
+    assert (status, out) == (2, "")
+    assert err.startswith(f"error: --times: {says}")
+
+
+@pytest.mark.parametrize("command", ["inspect", "view", "simulate", "equations", "modes"])
+def test_instants_are_for_mechanism_files(run, command):
+    robot = ROOT / "examples" / "robots" / "scara.urdf"
+    status, _, err = run(command, robot, "--times", "0:1:3")
+    assert status == 2
+    assert "--times: is for mechanism files" in err
+
+
 @pytest.mark.parametrize(
     "assignment, part",
     [

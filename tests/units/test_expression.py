@@ -160,6 +160,13 @@ def test_names_are_checked_with_a_suggestion():
     assert Expression("2*pi*t/tau", names=["t", "tau"]).names == {"t", "tau"}
 
 
+def test_a_unit_in_an_expression_says_where_units_go():
+    with pytest.raises(ExpressionError) as caught:
+        Expression("5*mm*(1 - cos(t))", names=["t"])
+    words = "unknown name 'mm' at column 3 of '5*mm*(1 - cos(t))'; valid: deg, pi, t; "
+    assert str(caught.value).endswith(words + "for the unit mm make a parameter, such as lift: 5 mm")
+
+
 def test_expressions_are_frozen_and_equal_by_text():
     one, other = Expression(" a +\n b "), Expression("a +  b")
     assert one == other

@@ -98,6 +98,7 @@ def inspect(
 
 def _robot(file: Path, reading: MechanismReading, of_robot: RobotReading, reader: str | None) -> dict[str, Any]:
     """Return what is in a robot file, and how another program numbers its coordinates."""
+    reading.refuse_times(file)
     if reading.set_:
         raise JounceError("is for mechanism files; a robot file has no parameters", name="--set", path=file)
     if reading.units:

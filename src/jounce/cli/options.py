@@ -72,6 +72,8 @@ class MechanismReading:
         Another folder from which the file may read others; repeatable.
     redundant_reactions
         Reactions of redundant constraints: unique only, or least_norm.
+    times
+        START:STOP:COUNT instead of the time of the file: 0:2s:201.
     units
         Units of all results, such as angle=deg,length=mm; repeatable.
     """
@@ -80,7 +82,13 @@ class MechanismReading:
     import_: list[Path] | None = None
     allow: list[Path] | None = None
     redundant_reactions: Literal["unique", "least_norm"] | None = None
+    times: str | None = None
     units: list[str] | None = None
+
+    def refuse_times(self, file: Path) -> None:
+        """Refuse other instants for a file that holds no mechanism."""
+        if self.times is not None:
+            raise JounceError("is for mechanism files", name="--times", value=self.times, path=file)
 
     def mechanism(self, file: Path) -> Mechanism:
         """Return the mechanism of a file, with parameters changed, after the user's own classes were imported."""
@@ -93,11 +101,13 @@ class MechanismReading:
             mechanism = replace(mechanism, redundant_reactions=self.redundant_reactions)
         if self.units:
             mechanism = replace(mechanism, units=dict(units_chosen(mechanism.shown_units, self.units).chosen))
-        if not self.set_:
-            return mechanism
-        from jounce.io.mechanisms.overrides import override
+        if self.set_ or self.times is not None:
+            from jounce.io.mechanisms.overrides import override, times_chosen
 
-        return override(mechanism, self.set_)
+            mechanism = override(mechanism, self.set_ or ())
+            if self.times is not None:
+                mechanism = replace(mechanism, time=times_chosen(mechanism, self.times))
+        return mechanism
 
 
 @AMONG_THE_OTHERS

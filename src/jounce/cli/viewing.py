@@ -74,6 +74,8 @@ def view(
         elif reading.set_ or reading.import_:
             option = "--set" if reading.set_ else "--import"
             raise JounceError("is for mechanism files; a robot has no parameters", name=option)
+        if file.suffix.lower() not in DATA_FILES:
+            reading.refuse_times(file)
         with expecting(file, "mechanism", "robot", "cam"):
             check_ending(file, (*DATA_FILES, *ROBOT_FILES))
             folders = allowed(reading.allow)
@@ -95,4 +97,5 @@ def _cam(file: Path, reading: MechanismReading) -> object:
 
     if reading.import_ or reading.units:
         raise JounceError("is for mechanism files", name="--import" if reading.import_ else "--units")
+    reading.refuse_times(file)
     return load_cam(file, allow=allowed(reading.allow), set_=reading.set_ or ())

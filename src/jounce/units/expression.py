@@ -20,6 +20,7 @@ from jounce.errors import ExpressionError, JounceError, did_you_mean, show_value
 CONSTANTS: dict[str, float] = {"pi": math.pi, "deg": math.pi / 180.0}
 """Constants that every expression knows."""
 
+_UNITS = "mm cm m um km inch s ms min rad mrad rev rpm Hz kHz N kN Nm kg g J W kW MPa bar".split()  # likely meant
 _NAMES = "sin cos tan asin acos atan atan2 sinh cosh tanh exp log sqrt".split()
 FUNCTIONS: dict[str, tuple[int, Callable[..., float]]] = {
     **{name: (2 if name == "atan2" else 1, getattr(math, name)) for name in _NAMES},
@@ -265,7 +266,8 @@ def _refuse_name(name: str, column: int, text: str, known: Iterable[str]) -> NoR
     if name in FUNCTIONS:
         _fail(f"the function '{name}' stands without its arguments", column, text, f"write {name}(...)")
     candidates = {*known, *CONSTANTS}
-    _fail(f"unknown name '{name}'", column, text, did_you_mean(name, candidates))
+    unit = f"; for the unit {name} make a parameter, such as lift: 5 {name}" if name in _UNITS else ""
+    _fail(f"unknown name '{name}'", column, text, did_you_mean(name, candidates) + unit)
 
 
 @lru_cache(maxsize=4096)  # a file of many bodies says the same again and again

@@ -96,6 +96,15 @@ def test_drives_of_a_mechanism_are_by_its_drivers(read):
         read("joints: {leg1: {stiffness: 1}}", platform)
 
 
+def test_a_rotor_that_is_likely_in_kg_cm2_is_reported(read):
+    """A servo motor of 0.6 kg cm^2, given as 0.6, has ten thousand times its inertia."""
+    says = r"line 2, joints.pin.rotor_inertia: a rotor of 0.6 kg\*m\^2 is 6e\+03 kg\*m\^2 .* of 100: 0.6 kg\*cm\^2\?"
+    with pytest.warns(jn.errors.UnitWarning, match=says):
+        read("joints:\n  pin: {stiffness: 2 kN*m/rad, rotor_inertia: 0.6, gear_ratio: 100}\n")
+    for rotor in ("0.6 kg*m^2, gear_ratio: 100", "0.6", "6e-5, gear_ratio: 100"):  # warnings are errors here
+        read(f"joints:\n  pin: {{stiffness: 2 kN*m/rad, rotor_inertia: {rotor}}}\n")
+
+
 def test_a_lead_that_is_likely_in_millimeters_is_reported(read):
     """A ball screw of 20 mm, given as 20: the motor would turn a thousandth of what it does."""
     with pytest.warns(jn.errors.UnitWarning, match=r"line 2, joints.slide.lead: a lead of 20 m .*: 20 mm\?"):

@@ -216,6 +216,14 @@ def test_a_file_beside_it_closes_loops_and_gives_springs_and_rotors(tmp_path):
     np.testing.assert_allclose(tips[0], tips[1], atol=1e-9)
 
 
+def test_a_rotor_beside_it_that_is_likely_in_kg_cm2_is_reported(tmp_path):
+    beside = tmp_path / "more.yaml"
+    beside.write_text("joints:\n  j: {rotor_inertia: 0.6, gear_ratio: 100}\n")
+    with pytest.warns(jn.errors.UnitWarning, match=r"line 2, joints.j.rotor_inertia: a rotor of 0.6 .*0.6 kg\*cm\^2\?"):
+        robot = read(tmp_path, five_bar(""), closures=beside)
+    assert robot.joints["j"].armature == pytest.approx(6000.0)
+
+
 WRONG = {
     "no joint": ("  j: {stiff", "  jj: {stiff", "no moving joint has this name", 3, "joints.jj"),
     "unit": ("2 N*m/rad", "2 N/m", "the unit is that of", 3, "joints.j.stiffness"),

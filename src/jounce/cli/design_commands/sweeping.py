@@ -156,6 +156,7 @@ def _problem(
     if not simulate and (method is not None or longest_step != math.inf):
         raise JounceError("goes with a simulation: give --simulate", name="--method" if method else "--longest-step")
     if file.suffix.lower() in ROBOT_FILES:
+        reading.refuse_times(file)
         if simulate or reading.set_ or given:
             raise JounceError(
                 "a sweep of a robot computes torques; --simulate, --set and --tolerance are for mechanisms", path=file

@@ -67,6 +67,7 @@ def run(
       jounce run examples/four_bar.yaml
       jounce run examples/rsur.yaml --order 8 --out motion.nc
       jounce run examples/four_bar.yaml --set "BC=15 cm" --set tau=3
+      jounce run examples/four_bar.yaml --times 0:tau:1001 --out fine.csv
       jounce run examples/four_bar.yaml --units angle=deg,length=mm
       jounce run examples/screw_jack.yaml --holding
       jounce run examples/worm_gearhead.yaml --holding-out torque.csv
@@ -142,7 +143,10 @@ def simulate(
         return simulate_robot_file(file, order, robot, reading.allow, output, **control)
     for name in robot.given():
         option = f"--{name.replace('_', '-')}"
-        raise JounceError("is for robot files; a mechanism file has its own time and forces", name=option, path=file)
+        message = (
+            "is for robot files; a mechanism file has its own forces, and its own time unless --times gives another"
+        )
+        raise JounceError(message, name=option, path=file)
     units = heading.units
     mechanism = reading.mechanism(file)
     chosen = method_of(method, step)  # a file of --import may have registered it
@@ -153,7 +157,7 @@ def simulate(
 
 def _refuse_options(file: Path, reading: MechanismReading) -> None:
     """Refuse options of mechanism files for a robot file."""
-    given = {"--set": reading.set_, "--import": reading.import_, "--units": reading.units}
+    given = {"--set": reading.set_, "--import": reading.import_, "--times": reading.times, "--units": reading.units}
     given["--redundant-reactions"] = reading.redundant_reactions
     for name, value in given.items():
         if value:

@@ -162,6 +162,7 @@ def _subject(file: Path, reading: MechanismReading, without: Sequence[str], hold
         if hold:
             raise JounceError("is for robot files; drivers hold a mechanism", name="--hold")
         return reading.mechanism(file), {"without": without}
+    reading.refuse_times(file)
     if without or reading.set_:
         raise JounceError("is for mechanism files; a robot file has none", name="--without" if without else "--set")
     robot = RobotReading(allow=reading.allow).robot(file)

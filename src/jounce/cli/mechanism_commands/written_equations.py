@@ -110,7 +110,7 @@ def equations(
 
 def _robot(reading: MechanismReading, file: Path) -> Robot:
     """Return the robot of a file."""
-    for name in ("set_", "import_"):
+    for name in ("set_", "import_", "times"):
         if getattr(reading, name):
             raise JounceError("is for mechanism files", name=f"--{name.rstrip('_')}", value=getattr(reading, name))
     return RobotReading(allow=reading.allow).robot(file)

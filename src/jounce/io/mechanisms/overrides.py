@@ -7,7 +7,35 @@ from collections.abc import Iterable
 from jounce.errors import JounceError, MechanismError, check_name
 from jounce.io.files.assignments import assignments
 from jounce.io.mechanisms.schema.unit_hints import is_plain, warn_of_values
-from jounce.mechanism import Mechanism
+from jounce.mechanism import Mechanism, TimeGrid
+from jounce.mechanism.time import instants_of
+from jounce.units.values import parse_value
+
+
+def times_chosen(mechanism: Mechanism, text: str) -> TimeGrid:
+    """Return the instants that ``START:STOP:COUNT`` names: times as a file would have them, and how many.
+
+    Raises
+    ------
+    MechanismError, UnitError, ExpressionError
+        It has another form, or there are no such instants.
+
+    Examples
+    --------
+    >>> import jounce as jn
+    >>> times_chosen(jn.load("examples/four_bar.yaml"), "0:tau:201")  # a parameter of the file
+    TimeGrid(start=0.0, stop=Expression('tau'), step=None, count=201.0)
+    """
+    parts = text.split(":")
+    if len(parts) != 3:
+        raise MechanismError("must be START:STOP:COUNT, such as 0:2s:201", name="--times", value=text)
+    try:
+        start, stop = (parse_value(part, "time", mechanism.parameters).value for part in parts[:2])
+        grid = TimeGrid(start, stop, count=parse_value(parts[2], "ratio", mechanism.parameters).value)
+        instants_of(grid, mechanism.parameter_values)
+    except JounceError as error:
+        raise type(error)(error.message, name="--times", value=text) from None
+    return grid
 
 
 def override(mechanism: Mechanism, texts: Iterable[str]) -> Mechanism:

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from jounce.errors import RobotError, no_such
+from jounce.errors import RobotError, UnitWarning, no_such, warn_caller
 from jounce.io.files.located_data import Location, Source
 from jounce.io.files.source import read_source
 from jounce.robot.closed_loops.closures import Loops, given_coordinates
@@ -19,6 +19,8 @@ from jounce.robot.robot import Robot
 from jounce.units.dimensions import Dimension, describe_dimension, dimension_of
 
 CLOSED_BY = {"fixed": "weld", "revolute": "pin", "continuous": "pin", "prismatic": "slider"}
+HEAVY = 0.05  # kg m^2, more than which no rotor of a motor behind gears has: a number without a unit may be in kg cm^2
+GEARED = 5.0  # a ratio from which on a motor counts as one behind gears
 CLOSED_BY |= {"ball": "connect", "spherical": "connect"}
 TYPES = {**{name: name for name in CLOSURES}, **CLOSED_BY}
 OF_CLOSURE = ("type", "frames", "axis")
@@ -147,6 +149,8 @@ class _ClosureFile:
             kinds = _dimensions("rotor_inertia", joint.turning)
             inertia = self._number((*at, "rotor_inertia"), entry["rotor_inertia"], kinds)
             ratio = self._number((*at, "gear_ratio"), entry.get("gear_ratio", 1.0), ())
+            if joint.turning and (hint := rotor_doubt(inertia, ratio, entry)):
+                warn_caller(UnitWarning(str(self.source.error(hint, (*at, "rotor_inertia")))))
             changes["armature"] = inertia * ratio**2
         try:
             return dataclasses.replace(joint, **changes)
@@ -202,6 +206,14 @@ class _ClosureFile:
         if not isinstance(parsed.value, float) or not math.isfinite(parsed.value):
             raise self.source.error("must be a finite number", at, value=raw)
         return parsed.value
+
+
+def rotor_doubt(inertia: float, ratio: float, values: Mapping[str, Any]) -> str:
+    """Return what is doubted of a rotor without a unit that is too heavy for a motor behind gears, or nothing."""
+    if not isinstance(values.get("rotor_inertia"), int | float) or inertia < HEAVY or abs(ratio) < GEARED:
+        return ""
+    seen = f"a rotor of {inertia:g} kg*m^2 is {inertia * ratio**2:.3g} kg*m^2 behind a gear ratio of {ratio:g}"
+    return f"{seen}: {inertia:g} kg*cm^2? A number without a unit is in SI"
 
 
 def _dimensions(key: str, turning: bool) -> tuple[Dimension, ...]:

@@ -11,6 +11,7 @@ from typing import Any
 from jounce.errors import RobotError, UnitWarning, no_such, warn_caller
 from jounce.io.files.located_data import Location, Source
 from jounce.io.files.source import read_source
+from jounce.io.robots.closure_files import rotor_doubt
 from jounce.mechanism import Mechanism
 from jounce.mechanism.laws.driver_outputs import is_turning
 from jounce.planning.elastic.drives import Drive
@@ -136,6 +137,10 @@ class _DrivesFile:
             lead = values["lead"]
             hint = f"a lead of {lead:g} m in each turn: {lead:g} mm? A number without a unit is in SI"
             warn_caller(UnitWarning(str(self.source.error(hint, (*locations["lead"], "lead")))))
+        hint = motor and rotor_doubt(numbers.get("rotor_inertia", 0.0), numbers.get("gear_ratio", 1.0), values)
+        if hint:
+            location = (*locations["rotor_inertia"], "rotor_inertia")
+            warn_caller(UnitWarning(str(self.source.error(hint, location))))
         try:
             return Drive(**numbers)
         except RobotError as error:
