@@ -282,8 +282,13 @@ def test_joints_that_follow_or_are_fixed_are_no_part_of_a_trajectory():
         jn.Joint("three", "c", "d", "fixed"),
     ]
     robot = jn.Robot("fingers", links, joints)
-    for name, message in [("two", "this joint follows one"), ("three", "this joint is fixed")]:
-        with pytest.raises(jn.errors.TrajectoryError, match=message):
+    for name, message in [
+        ("two", "this joint follows one"),
+        ("three", "this joint is fixed"),
+    ]:
+        with pytest.raises(
+            jn.errors.TrajectoryError, match=rf"{message}.*leave it out, of a file by joints \(--joints\)"
+        ):
             check_limits(robot, JointTrajectory({"one": "t", name: "t"}, start=0.0, stop=1.0))
         with pytest.raises(jn.errors.RobotError, match=message):
             check_limits(robot, JointTrajectory({"one": "t"}, start=0.0, stop=1.0), {name: jn.Limits(velocity=1.0)})

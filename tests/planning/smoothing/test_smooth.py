@@ -54,6 +54,26 @@ def derivative(law, times, order):
     return np.array(polynomial)
 
 
+@pytest.mark.parametrize(
+    "spoil, says",
+    [
+        (
+            lambda t, noise: np.sin(2 * t) + noise + np.where(t == 2.0, 0.5, 0.0),
+            r"a: the sample at t = 2 s is 0\.5 from those beside it:",
+        ),
+        (
+            lambda t, _noise: np.angle(np.exp(3j * t)),
+            r"a: goes by -6\.2.* about t = 1\.0\d s; if it is an angle, count its turns",
+        ),
+    ],
+)
+def test_what_no_motion_does_is_reported(spoil, says):
+    times = np.linspace(0.0, 4.0, 401)
+    values = spoil(times, 1e-4 * np.random.default_rng(2).normal(size=times.size))
+    with pytest.warns(jn.errors.RecordingWarning, match=says):
+        jn.smooth(jn.JointTrajectory.from_samples(times, values[:, None], ["a"]), 5e-4)
+
+
 @pytest.mark.parametrize("rate", [100, 500])
 @pytest.mark.parametrize("noise", [("gaussian", 1e-5), ("gaussian", 1e-4), ("steps", 1e-4), ("both", 2e-5)])
 @pytest.mark.parametrize("name", MOTIONS)

@@ -63,7 +63,8 @@ class FollowedTrajectory:
             raise RobotError("the robot has no moving joint; nothing can follow the trajectory", name="joints")
         for name in trajectory.names:
             if name not in robot.joint_names:
-                raise TrajectoryError(why_not(robot, name), name="joint", value=name)
+                others = "" if name not in robot.joints else ", of a file by joints (--joints) that name the others"
+                raise TrajectoryError(why_not(robot, name) + others, name="joint", value=name)
         check_measures(robot, trajectory)
         self.robot, self.trajectory = robot, trajectory
         self.loaded = LoadedRobot(robot, in_time(loads), trajectory.start, trajectory.stop)

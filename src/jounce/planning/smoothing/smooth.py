@@ -8,7 +8,8 @@ from collections.abc import Mapping
 import numpy as np
 from jaxtyping import Float
 
-from jounce.errors import SolveError, TrajectoryError
+from jounce.errors import RecordingWarning, SolveError, TrajectoryError, warn_caller
+from jounce.jet.turns import WHOLE_TURN
 from jounce.planning.pieces import SmoothPieces
 from jounce.planning.smoothing.bases import DEGREE, whole
 from jounce.planning.smoothing.curves import smoothed_curve
@@ -20,6 +21,9 @@ from jounce.trajectory.sampled.deferred import SampledLaw
 from jounce.trajectory.splines import local_powers
 
 FEWEST = 12  # samples
+NEIGHBORS = 4  # samples on either side with which one is compared
+OUTLYING = 20.0  # times as far as any of those from what is beside it: it is an outlier
+OUTSIDE = 5.0  # deviations, less than which no sample is doubted
 UNSEEN = 3.0  # over the cutoff frequency: for so long a motion may begin or end unseen
 
 
@@ -102,6 +106,11 @@ def smooth(trajectory: JointTrajectory, deviation: float) -> SmoothedTrajectory:
     TrajectoryError
         If no joint has samples, too few, or no motion is within the deviation: the message names joint and instant.
 
+    Warns
+    -----
+    RecordingWarning
+        A sample is far from those beside it, so that the motion goes there and back; or an angle goes by a whole turn.
+
     Examples
     --------
     >>> import numpy as np
@@ -121,12 +130,37 @@ def smooth(trajectory: JointTrajectory, deviation: float) -> SmoothedTrajectory:
         raise TrajectoryError(message, name="trajectory", value=list(trajectory.names))
     laws, joints = trajectory.laws.given(), {}
     for name, (times, values) in samples.items():
+        if doubt := _outlier(times, np.asarray(values), deviation):
+            warn_caller(RecordingWarning(f"{name}: {doubt}"))
         try:
             laws[name], joints[name] = smoothed_samples(times, np.ascontiguousarray(values), deviation)
         except (SolveError, TrajectoryError) as error:
             raise TrajectoryError(error.message, name=name, value=error.value) from None
     return SmoothedTrajectory(
         laws, trajectory.start, trajectory.stop, trajectory.times, trajectory.measures, deviation, joints
+    )
+
+
+def _outlier(times: Float[np.ndarray, " sample"], values: Float[np.ndarray, " sample"], deviation: float) -> str:
+    """Return which sample is far from those beside it, as others near it are not, and what to do; or nothing."""
+    if len(times) < FEWEST:
+        return ""
+    steps = np.diff(times)
+    between = (values[:-2] * steps[1:] + values[2:] * steps[:-1]) / (steps[1:] + steps[:-1])
+    off = np.abs(values[1:-1] - between)
+    padded = np.pad(off, NEIGHBORS)
+    near = [padded[NEIGHBORS + k : len(off) + NEIGHBORS + k] for k in range(-NEIGHBORS, NEIGHBORS + 1) if abs(k) > 1]
+    far = np.flatnonzero((off > OUTLYING * np.max(near, axis=0)) & (off > OUTSIDE * deviation))
+    if not len(far):
+        return ""
+    first = int(far[0]) + 1
+    jump = float(max(np.diff(values[first - 1 : first + 2]), key=abs))
+    if abs(abs(jump) - WHOLE_TURN) < 0.1 * WHOLE_TURN:
+        return f"goes by {jump:.6g} about t = {times[first]:.6g} s; if it is an angle, count its turns (numpy.unwrap)"
+    count = f"; {len(far)} samples are such" if len(far) > 1 else ""
+    return (
+        f"the sample at t = {times[first]:.6g} s is {off[first - 1]:.3g} from those beside it{count}: the motion goes "
+        "there and back, within the deviation; leave out what is an outlier"
     )
 
 
