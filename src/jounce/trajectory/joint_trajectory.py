@@ -5,7 +5,6 @@ from collections.abc import Iterable, Mapping, Sequence
 from types import MappingProxyType
 from typing import Any
 
-import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
@@ -289,8 +288,8 @@ class JointTrajectory(Displayed):
         order = whole_number("order", order, 0, MAX_ORDER)
         instants = self._inside(finite_row("times", times, seconds))
         self._warn(order, chosen)
-        derivatives = law_derivatives([self.laws[name] for name in chosen], jnp.asarray(instants), order)
-        result = np.ascontiguousarray(np.moveaxis(np.asarray(derivatives), -1, 0))
+        derivatives = law_derivatives([self.laws[name] for name in chosen], instants, order)
+        result = np.ascontiguousarray(np.moveaxis(derivatives, -1, 0))
         if len(bad := np.argwhere(~np.isfinite(result))):
             at, derivative, joint = bad[0]
             where = f"at {instants[at]:.9g} s: derivative {derivative} is no number"

@@ -2,12 +2,10 @@
 
 import dataclasses
 
-import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
-from jounce.dynamics.limits.trajectories import BLOCK, FollowedTrajectory
-from jounce.execution.chunks import in_chunks
+from jounce.dynamics.limits.trajectories import FollowedTrajectory
 from jounce.trajectory.law_checks.seen_jumps import level_sizes, seen_jumps
 from jounce.trajectory.law_checks.smoothness import SeenLeaders, known_jumps
 from jounce.trajectory.laws.stacking import law_derivatives
@@ -95,13 +93,9 @@ def jumps_of(
 
     def evaluate(times: np.ndarray) -> np.ndarray:
         """Return coordinates as `followed` does, not finite where a law is not."""
-        laws = list(trajectory.laws.values())
-
-        def block(some: np.ndarray) -> np.ndarray:
-            return np.moveaxis(np.asarray(law_derivatives(laws, jnp.asarray(times[some]), order)), -1, 0)
-
+        derivatives = law_derivatives(list(trajectory.laws.values()), times, order)
         q = np.repeat(values[:1], len(times), axis=0)
-        q[:, :, followed.columns] = in_chunks(block, len(times), (BLOCK,), axis=0)
+        q[:, :, followed.columns] = np.moveaxis(derivatives, -1, 0)
         return q
 
     if unknown:

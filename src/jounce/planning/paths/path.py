@@ -4,15 +4,11 @@ import dataclasses
 from collections.abc import Mapping
 from typing import Any
 
-import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
-from jounce.execution.chunks import in_chunks
 from jounce.trajectory import AbstractMotion
 from jounce.trajectory.laws.stacking import law_derivatives
-
-BLOCK = 2048  # places evaluated at once
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -65,9 +61,4 @@ class Path:
 
     def derivatives(self, s: Float[np.ndarray, " point"], order: int) -> Float[np.ndarray, "point derivative joint"]:
         """Return positions and derivatives by s."""
-        laws = list(self.laws.values())
-
-        def block(some: np.ndarray) -> np.ndarray:
-            return np.moveaxis(np.asarray(law_derivatives(laws, jnp.asarray(s[some]), order)), -1, 0)
-
-        return in_chunks(block, len(s), (BLOCK,), axis=0)  # always as many at once, so that all is compiled once
+        return np.moveaxis(law_derivatives(list(self.laws.values()), s, order), -1, 0)

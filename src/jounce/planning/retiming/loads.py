@@ -3,7 +3,6 @@
 import dataclasses
 from collections.abc import Sequence
 
-import jax.numpy as jnp
 import numpy as np
 
 from jounce.errors import TrajectoryError
@@ -106,7 +105,7 @@ def instant_at(progress: FollowingMotion, duration: float, s: float) -> float:
     low, high = 0.0, duration
     while True:
         looks = np.linspace(low, high, LOOKS)
-        after = int(np.searchsorted(np.asarray(law_derivatives([progress], jnp.asarray(looks), 0))[0, 0], s))
+        after = int(np.searchsorted(law_derivatives([progress], looks, 0)[0, 0], s))
         near = float(looks[max(after - 1, 0)]), float(looks[min(after, LOOKS - 1)])
         if near == (low, high) or near[1] - near[0] <= np.spacing(duration):
             return near[1]

@@ -3,11 +3,9 @@
 from collections.abc import Iterable, Iterator
 from typing import Any
 
-import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float, Int
 
-from jounce.base.padding import padded, power_of_two
 from jounce.settings import under_own_settings
 from jounce.trajectory.law_checks.seen_jumps import seen_jumps
 from jounce.trajectory.law_checks.smoothness import HIGHEST, SeenLeaders, known_jumps
@@ -145,9 +143,7 @@ def _seen(law: AbstractMotion, first: float, last: float, order: int) -> Times:
     level = min(order + 2, HIGHEST + 1)
 
     def evaluate(times: Times) -> Any:
-        wide = jnp.asarray(padded(times, power_of_two(len(times), 16)))
-        derivatives = np.asarray(law_derivatives([law], wide, level))[..., : len(times)]
-        return np.nan_to_num(np.moveaxis(derivatives, -1, 0))
+        return np.nan_to_num(np.moveaxis(law_derivatives([law], times, level), -1, 0))
 
     looks = np.linspace(first, last, LOOKS)
     with np.errstate(over="ignore", invalid="ignore"):  # next to what grows without bound

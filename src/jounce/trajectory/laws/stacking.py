@@ -8,45 +8,58 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
-from jounce.base.modules import jit_over_arrays
+from jounce.base.shapes import Numbers, is_traced
+from jounce.execution.mapped import Mapped
 from jounce.jet import Jet
 from jounce.trajectory.laws.user_laws import read_laws
 from jounce.trajectory.motion import AbstractMotion
 
+Members = tuple[tuple[int, ...], ...]
+"""The places of the laws that each law with an axis of joints stands for."""
+
 
 def evaluate_laws(laws: Sequence[AbstractMotion], time: Jet) -> Jet:
     """Evaluate laws of the same structure as one, stacked along the axis of joints; put all in order."""
-    groups: dict[Any, list[int]] = {}
-    for index, law in enumerate(laws):
-        leaves, structure = jax.tree.flatten(law)
-        groups.setdefault((structure, tuple(jnp.shape(leaf) for leaf in leaves)), []).append(index)
-    batch = time.shape
-    flat = time.map(lambda c: jnp.reshape(c, (1, -1)))
-    evaluated: list[tuple[Any, ...]] = []
-    for members in groups.values():
-        stacked = jax.tree.map(_along_joints, *(laws[index] for index in members))
-        jet = stacked(flat).dense()
-        shape = (len(members), *flat.shape[1:])
-        evaluated.append(tuple(jnp.broadcast_to(c, shape) for c in jet.coefficients))
-    positions = np.argsort([index for members in groups.values() for index in members])
-    return Jet(
-        jnp.reshape(jnp.concatenate(levels)[positions], (len(laws), *batch)) for levels in zip(*evaluated, strict=True)
-    )
-
-
-def _along_joints(*leaves: Any) -> Any:
-    return jnp.stack([jnp.asarray(leaf, float) for leaf in leaves], axis=-1)[..., None]
+    return _evaluated(*_stacked(laws), time)
 
 
 def law_derivatives(
-    laws: list[AbstractMotion], times: Float[jax.Array, " time"], order: int
-) -> Float[jax.Array, "order joint time"]:
+    laws: list[AbstractMotion], times: Float[np.ndarray, " time"], order: int
+) -> Float[Numbers, "order joint time"]:
     """Return the plain derivatives of laws at instants."""
-    return _derivatives(read_laws(laws), times, order)
+    stacked, members = _stacked(read_laws(laws))
+    return _derivatives.at_instants(stacked, lambda some: times[some], len(times), members=members, order=order)[0]
 
 
-@jit_over_arrays
-def _derivatives(
-    laws: list[AbstractMotion], times: Float[jax.Array, " time"], order: int
-) -> Float[jax.Array, "order joint time"]:
-    return evaluate_laws(laws, Jet.variable(times, order)).derivatives()
+@Mapped
+def _derivatives(laws: list[AbstractMotion], times: Any, *, members: Members, order: int) -> Any:
+    return _evaluated(laws, members, Jet.variable(times, order)).derivatives()
+
+
+def _stacked(laws: Sequence[AbstractMotion]) -> tuple[list[AbstractMotion], Members]:
+    """Return one law for all of the same structure, with the joints along an axis before that of the instants."""
+    groups: dict[Any, list[int]] = {}
+    for index, law in enumerate(laws):
+        leaves, structure = jax.tree.flatten(law)
+        groups.setdefault((structure, tuple(map(np.shape, leaves))), []).append(index)
+    members = tuple(map(tuple, groups.values()))
+    return [jax.tree.map(_along_joints, *(laws[index] for index in its)) for its in members], members
+
+
+def _along_joints(*leaves: Any) -> Any:
+    if is_traced(leaves):
+        return jnp.stack([jnp.asarray(leaf, float) for leaf in leaves], axis=-1)[..., None]
+    return np.stack([np.asarray(leaf, float) for leaf in leaves], axis=-1)[..., None]
+
+
+def _evaluated(laws: Sequence[AbstractMotion], members: Members, time: Jet) -> Jet:
+    flat = time.map(lambda c: jnp.reshape(c, (1, -1)))
+    evaluated: list[tuple[Any, ...]] = []
+    for law, its in zip(laws, members, strict=True):
+        shape = (len(its), *flat.shape[1:])
+        evaluated.append(tuple(jnp.broadcast_to(c, shape) for c in law(flat).dense().coefficients))
+    order = np.argsort([index for its in members for index in its])
+    return Jet(
+        jnp.reshape(jnp.concatenate(levels)[order], (len(order), *time.shape))
+        for levels in zip(*evaluated, strict=True)
+    )
