@@ -8,7 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
-from jounce.base.shapes import Numbers, is_traced
+from jounce.base.shapes import is_traced
 from jounce.execution.mapped import Mapped
 from jounce.jet import Jet
 from jounce.trajectory.laws.user_laws import read_laws
@@ -25,10 +25,11 @@ def evaluate_laws(laws: Sequence[AbstractMotion], time: Jet) -> Jet:
 
 def law_derivatives(
     laws: list[AbstractMotion], times: Float[np.ndarray, " time"], order: int
-) -> Float[Numbers, "order joint time"]:
+) -> Float[np.ndarray, "order joint time"]:
     """Return the plain derivatives of laws at instants."""
     stacked, members = _stacked(read_laws(laws))
-    return _derivatives.at_instants(stacked, lambda some: times[some], len(times), members=members, order=order)[0]
+    how: Any = {"members": members, "order": order}
+    return np.asarray(_derivatives.at_instants(stacked, lambda some: times[some], len(times), **how)[0])
 
 
 @Mapped
