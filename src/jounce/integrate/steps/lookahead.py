@@ -23,7 +23,7 @@ from jounce.integrate.steps.methods import MARGIN, Number, evaluated
 from jounce.integrate.steps.revolution_counts import Angles
 from jounce.jet import Jet
 from jounce.mechanism import Model
-from jounce.mechanism.building.builder import group_rows
+from jounce.mechanism.building.builder import group_rows, named_groups
 from jounce.mechanism.building.element_indices import force_names
 from jounce.mechanism.laws.driver_outputs import is_turning
 from jounce.mechanism.system import Group, law_left_out
@@ -77,8 +77,7 @@ def mobility_of(equations: Equations, inverse: Inverse) -> BodyMobility:
 
 def watched_names(model: Model) -> list[str]:
     """Return the names of the forces, drivers and constraints of a model, in the order in which they are looked at."""
-    pairs = zip(model.system.groups, group_rows(model), strict=True)
-    constraints = [name for group, rows in pairs for name in model.rows[rows][: group.instances]]
+    constraints = [name for _, members in named_groups(model) for name in members]
     return [f"forces.{name}" for name in force_names(model)] + list(model.drivers) + constraints
 
 

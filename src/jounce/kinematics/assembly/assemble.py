@@ -34,7 +34,7 @@ from jounce.kinematics.assembly.loose_bodies import missing_joint_words
 from jounce.kinematics.assembly.redundancy import Redundancy, redundancy
 from jounce.kinematics.status import Status
 from jounce.mechanism import Model
-from jounce.mechanism.building.builder import group_rows, law_values, with_reference
+from jounce.mechanism.building.builder import group_rows, law_values, named_groups, with_reference
 from jounce.mechanism.carriages import ENDING
 from jounce.mechanism.transmissions.axis_angles import measures_angle, with_angles, with_datums
 from jounce.mechanism.transmissions.gear_checks import check_gears, check_wheels
@@ -300,14 +300,14 @@ def _widths(model: Model, attempt: AssemblyAttempt, instant: float) -> dict[str,
 def _squared_lengths(model: Model, instant: float) -> dict[str, float]:
     """Return the squares of the distances that joints and drivers keep between two points, by name, m^2."""
     squares, clock = {}, Jet([np.full((1, 1), instant)])
-    for group, rows in zip(model.system.groups, group_rows(model), strict=True):
+    for group, members in named_groups(model):
         field = facts_of(type(group.element)).squared_distance
         if not field:
             continue
         lengths = getattr(group.element, field)
         lengths = lengths(clock).coefficients[0] if isinstance(lengths, AbstractMotion) else lengths
         lengths = np.broadcast_to(lengths, (group.instances, 1))[:, 0]
-        squares |= {name: float(length) ** 2 for name, length in zip(model.rows[rows], lengths, strict=False)}
+        squares |= {name: float(length) ** 2 for name, length in zip(members, lengths, strict=False)}
     return squares
 
 

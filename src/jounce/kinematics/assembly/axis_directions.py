@@ -20,7 +20,7 @@ from jounce.jet import Jet
 from jounce.kinematics.assembly.gauss_newton import AssemblyAttempt, assemble_from_guess
 from jounce.kinematics.assembly.initial_revolutions import Coordinates
 from jounce.mechanism import Model
-from jounce.mechanism.building.builder import group_rows, model_of
+from jounce.mechanism.building.builder import model_of, named_groups
 from jounce.mechanism.system import Group, System
 from jounce.mechanism.transmissions.axis_angles import turned, unit
 from jounce.rigid.pose import Pose
@@ -77,8 +77,8 @@ def drawn_axis_signs(model: Model) -> AxisSigns:
 
 def pair_names(model: Model) -> list[str]:
     """Return the name of the joint of each pair of directions."""
-    groups = zip(model.system.groups, group_rows(model), strict=True)
-    names = [model.rows[rows][: g.instances] for g, rows in groups for _ in facts_of(type(g.element)).held_parallel]
+    named = named_groups(model)
+    names = [members for group, members in named for _ in facts_of(type(group.element)).held_parallel]
     return list(itertools.chain(*names))
 
 
@@ -192,7 +192,7 @@ def mirrored_discs(model: Model, coordinates: Coordinates) -> list[str]:
     """
     names: list[str] = []
     position = np.asarray(coordinates["position"])
-    for group, its_rows in zip(model.system.groups, group_rows(model), strict=True):
+    for group, members in named_groups(model):
         rolling = group.element
         if not (along := facts_of(type(rolling)).rolls_along):
             continue
@@ -204,7 +204,7 @@ def mirrored_discs(model: Model, coordinates: Coordinates) -> list[str]:
         side = in_global_axes(_right_of(*(_unit(group, name) for name in along)), coordinates, slots[0])
         radius = np.asarray(rolling.radius)[..., 0]
         off = np.abs(np.sum(side * (center - line), axis=0) + radius)
-        names += [name for name, x in zip(model.rows[its_rows], off <= MIRRORED * radius, strict=False) if x]
+        names += [name for name, x in zip(members, off <= MIRRORED * radius, strict=False) if x]
     return names
 
 

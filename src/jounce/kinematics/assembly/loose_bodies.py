@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 from jounce.mechanism import Model
-from jounce.mechanism.building.builder import group_rows
+from jounce.mechanism.building.builder import named_groups
 from jounce.mechanism.mechanism import GROUND
 
 OF_A_HINGE = {2: 2, 3: 5}  # equations, by the components of positions
@@ -14,8 +14,8 @@ def joints_of(model: Model) -> dict[str, list[str]]:
     """Return the names of the joints that hold each body, drivers left out."""
     names = (GROUND, *model.bodies)
     joints: dict[str, list[str]] = {name: [] for name in names}
-    for group, rows in zip(model.system.groups, group_rows(model), strict=True):
-        for k, row in enumerate(model.rows[rows][: group.instances]):
+    for group, members in named_groups(model):
+        for k, row in enumerate(members):
             kind, _, name = row.partition(".")
             if kind == "joints":
                 for slot in group.bodies:

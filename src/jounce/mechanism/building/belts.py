@@ -8,7 +8,7 @@ from jaxtyping import Float
 
 from jounce.constraints.planar import Belt
 from jounce.errors import MechanismError
-from jounce.mechanism.building.builder import group_rows
+from jounce.mechanism.building.builder import named_groups
 
 Points = Float[np.ndarray, "2 *batch"]
 
@@ -85,9 +85,9 @@ def belt_outline(course: BeltCourse, centers: Sequence[Points], radii: Sequence[
 def check_room(motion: Any) -> None:
     """Raise MechanismError where pulleys that no body carries at one distance overlap in a motion, with the instant."""
     model = motion.model
-    for group, rows in zip(model.system.groups, group_rows(model), strict=True):
+    for group, members in named_groups(model):
         if isinstance(group.element, Belt) and group.element.arm is None:
-            _check_belts(group, model.rows[rows], motion.poses[1], motion.time)
+            _check_belts(group, members, motion.poses[1], motion.time)
 
 
 def _check_belts(group: Any, names: Sequence[str], coordinates: Mapping[str, Any], time: np.ndarray) -> None:

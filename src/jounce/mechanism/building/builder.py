@@ -99,6 +99,12 @@ class Model:
         return _released(self)
 
 
+def named_groups(model: Model) -> list[tuple[Group, tuple[str, ...]]]:
+    """Return the groups of joints and drivers, with the names of their instances, as those of rows."""
+    pairs = zip(model.system.groups, group_rows(model), strict=True)
+    return [(group, model.rows[rows][: group.instances]) for group, rows in pairs]
+
+
 def group_rows(model: Model) -> list[slice]:
     """Return where the rows of each group stand: those of all its instances in turn, once for each row of the joint."""
     return list(_group_rows(model.rows, tuple([group.instances for group in model.system.groups])))
@@ -175,8 +181,7 @@ def _built(mechanism: Mechanism, like: Model | None, *, initial: bool) -> Model:
 
 def _released(model: Model) -> Model:
     system, groups, names = model.system, [], []
-    for group, rows in zip(model.system.groups, group_rows(model), strict=True):
-        its = model.rows[rows][: group.instances]
+    for group, its in named_groups(model):
         stay = [k for k, name in enumerate(its) if not name.startswith("initial.")]
         if len(stay) < len(its):  # drivers of the same kind may be among them
             element = jax.tree.map(lambda values, stay=stay: values[..., stay, :], group.element)

@@ -11,7 +11,7 @@ from jounce.constraints.cams import Cam, coordinate_of_element
 from jounce.errors import JounceError, MechanismError
 from jounce.jet import Jet
 from jounce.jet.turns import WHOLE_TURN
-from jounce.mechanism.building.builder import Model, group_rows
+from jounce.mechanism.building.builder import Model, named_groups
 from jounce.mechanism.carriages import carriage_of
 from jounce.mechanism.laws.output_drivers import driver_of_output
 from jounce.mechanism.mechanism import Mechanism
@@ -100,8 +100,7 @@ def check_turns(mechanism: Mechanism, model: Model, coordinates: Mapping[str, An
 
 def _law_value(model: Model, driver: str, instant: float) -> float:
     """Return the value of the law of a driver by its dotted name at an instant, s."""
-    for group, rows in zip(model.system.groups, group_rows(model), strict=True):
-        names = model.rows[rows][: group.instances]
+    for group, names in named_groups(model):
         if driver in names:
             values = np.asarray(group.element.motion(Jet([np.full((1, 1), instant)])).coefficients[0])
             return float(np.broadcast_to(values, (group.instances, 1))[names.index(driver), 0])

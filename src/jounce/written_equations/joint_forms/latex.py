@@ -11,7 +11,7 @@ from jounce.constraints.facts import value_fields
 from jounce.errors import MechanismError, check_name
 from jounce.kinematics import Motion
 from jounce.mechanism import Mechanism, Model
-from jounce.mechanism.building.builder import group_rows
+from jounce.mechanism.building.builder import named_groups
 from jounce.mechanism.system import Group
 from jounce.version import __version__
 from jounce.written_equations.joint_forms.axial_forms import PREMISE, axial_equations, is_axial
@@ -84,8 +84,8 @@ _SPACE = [
 
 
 def _groups(model: Model) -> Iterator[tuple[Group, list[str]]]:
-    for group, rows in zip(model.system.groups, group_rows(model), strict=True):
-        yield group, [name.partition(".")[2] for name in model.rows[rows][: group.instances]]
+    for group, members in named_groups(model):
+        yield group, [name.partition(".")[2] for name in members]
 
 
 def _section(

@@ -10,7 +10,7 @@ from typing_extensions import TypedDict
 from jounce.constraints import spatial
 from jounce.constraints.facts import facts_of
 from jounce.constraints.friction import GearFriction
-from jounce.mechanism.building.builder import group_rows
+from jounce.mechanism.building.builder import named_groups
 from jounce.mechanism.laws.driver_outputs import is_turning
 from jounce.mechanism.resolve import resolve
 from jounce.mechanism.transmissions.axis_angles import turned
@@ -60,12 +60,12 @@ def efficiency_facts(state: StartingState) -> list[dict[str, Any]]:
     ('mesh', 0.422, True)
     """
     records: list[dict[str, Any]] = []
-    for group, rows in zip(state.model.system.groups, group_rows(state.model), strict=True):
+    for group, members in named_groups(state.model):
         if not isinstance(friction := getattr(group.element, "friction", None), GearFriction):
             continue
         shape = (group.instances, 1)
         forward, backward = (np.broadcast_to(np.asarray(x), shape)[:, 0] for x in friction.efficiencies)
-        for k, row in enumerate(state.model.rows[rows][: group.instances]):
+        for k, row in enumerate(members):
             name = row.partition(".")[2]
             bodies = list(state.mechanism.joints[name].bodies[:2])
             if facts_of(type(group.element)).rolls_along:  # the disc is the second body

@@ -9,7 +9,7 @@ from typing_extensions import TypedDict
 from jounce.constraints import Rope
 from jounce.constraints.planar import Belt
 from jounce.mechanism.building.belts import belt_course, centers_of
-from jounce.mechanism.building.builder import group_rows
+from jounce.mechanism.building.builder import named_groups
 from jounce.mechanism.building.starting_guess import pose_at
 from jounce.mechanism.mechanism import GROUND
 from jounce.reporting.facts.mechanism.freedom_facts import StartingState
@@ -50,8 +50,8 @@ def line_facts(state: StartingState) -> list[dict[str, Any]]:
         return records
     coordinates = {name: np.asarray(value)[None] for name, value in state.coordinates.items()}
     names = [GROUND, *state.mechanism.bodies]
-    for group, rows in zip(state.model.system.groups, group_rows(state.model), strict=True):
-        for k, row in enumerate(state.model.rows[rows][: group.instances]):
+    for group, members in named_groups(state.model):
+        for k, row in enumerate(members):
             name = row.partition(".")[2]
             if isinstance(group.element, Belt):
                 facts = _belt(group, k, coordinates)

@@ -6,7 +6,7 @@ import numpy as np
 from typing_extensions import TypedDict
 
 from jounce.constraints import spatial
-from jounce.mechanism.building.builder import group_rows
+from jounce.mechanism.building.builder import named_groups
 from jounce.reporting.facts.mechanism.freedom_facts import StartingState
 
 
@@ -35,13 +35,13 @@ def screw_facts(state: StartingState) -> list[dict[str, Any]]:
         Of a mechanism.
     """
     records: list[dict[str, Any]] = []
-    for group, rows in zip(state.model.system.groups, group_rows(state.model), strict=True):
+    for group, members in named_groups(state.model):
         screw = group.element
         if not isinstance(screw, spatial.Screw) or screw.friction is None:
             continue
         values = (screw.lead, screw.friction.radius, screw.friction.coefficient)
         leads, radii, coefficients = (np.broadcast_to(np.ravel(value), group.instances) for value in values)
-        names = [row.partition(".")[2] for row in state.model.rows[rows][: group.instances]]
+        names = [row.partition(".")[2] for row in members]
         for name, lead, radius, mu in zip(names, leads, radii, coefficients, strict=True):
             rise = abs(float(lead)) / (2 * np.pi * float(radius))
             records.append({"joint": name, **_efficiencies(rise, float(mu))})
