@@ -71,3 +71,70 @@ def test_labels_that_do_not_fit_are_refused(arm, q, says):
     with pytest.raises(JounceError) as caught:
         jn.inverse_dynamics(arm, q)
     assert says in str(caught.value)
+
+
+def _labeled(values, kind):
+    """Return values of the joints A, B and C along the last axis with labels, in another order."""
+    values = np.asarray(values, float)
+    if kind == "array":
+        dims = ("row", "joint")[-values.ndim :]
+        return xarray.DataArray(values, dims=dims, coords={"joint": [*NAMES]}).sel(joint=["C", "A", "B"])
+    if values.ndim == 1:
+        return pandas.Series(values, index=NAMES)[["C", "A", "B"]]
+    return pandas.DataFrame(values, columns=NAMES)[["C", "A", "B"]]
+
+
+@pytest.mark.parametrize("kind", ["array", "table"])
+def test_starts_ends_limits_and_torques_are_told_by_name(arm, kind):
+    start, end, limits = [0.1, 0.2, 0.3], [0.5, 1.2, 0.4], [[1.0, 2.0, 3.0], [4.0, 5.0, 6.0], [70.0, 80.0, 90.0]]
+    found = jn.JointTrajectory.point_to_point(
+        NAMES, _labeled(start, kind), _labeled(end, kind), profile="trapezoidal", limits=_labeled(limits, kind)
+    )
+    plain = jn.JointTrajectory.point_to_point(NAMES, start, end, profile="trapezoidal", limits=limits)
+    assert found.stop == plain.stop
+    np.testing.assert_array_equal(found.derivatives([0.3], 2), plain.derivatives([0.3], 2))
+    one, two = (jn.simulate(arm, [0.0, 0.1], torque=x) for x in ([1.0, 2.0, 3.0], _labeled([1.0, 2.0, 3.0], kind)))
+    np.testing.assert_array_equal(one.q, two.q)
+
+
+@pytest.mark.parametrize("kind", ["array", "table"])
+def test_the_start_of_a_tool_path_is_told_by_name(arm, kind):
+    place = jn.forward_kinematics(arm, [[0.1, 0.2, -0.3]], "c", [0.4, 0, 0]).position[0]
+    line = jn.planning.ToolPath([f"{x!r} - 0.05*sin(t)" for x in place.tolist()], start=0.0, stop=1.0)
+    options = {"point": [0.4, 0, 0], "time": [0.0, 0.5]}
+    given, plain = (
+        jn.planning.follow_tool_path(arm, "c", line, start=x, **options)
+        for x in ([0.1, 0.2, -0.3], _labeled([0.1, 0.2, -0.3], kind))
+    )
+    np.testing.assert_array_equal(given.q, plain.q)
+
+
+def test_components_of_a_goal_are_told_by_name(arm):
+    goal = pandas.Series({"z": 0.05, "y": 0.1, "x": 1.1})
+    found, plain = (
+        jn.inverse_kinematics(arm, "c", x, point=[0.4, 0, 0], start=[0.1, 0.2, -0.3]) for x in (goal, [1.1, 0.1, 0.05])
+    )
+    np.testing.assert_array_equal(found.q, plain.q)
+
+
+@pytest.mark.parametrize(
+    "dims, orders, says",
+    [
+        (("derivative", "time", "joint"), None, "q: the derivatives must be along the last axis but one: transpose it"),
+        (
+            ("time", "derivative", "joint"),
+            [2, 1, 0],
+            "its derivatives must be those of order 0, 1, 2 and so on",
+        ),
+        (
+            ("time", "derivative", "joint"),
+            [1, 2, 3],
+            "its derivatives must be those of order 0, 1, 2 and so on",
+        ),
+    ],
+)
+def test_derivatives_that_lie_otherwise_are_refused(arm, dims, orders, says):
+    q = xarray.DataArray(np.stack([Q] * 3), dims=dims, coords={"joint": [*NAMES]})
+    with pytest.raises(JounceError) as caught:
+        jn.inverse_dynamics(arm, q if orders is None else q.assign_coords(derivative=orders))
+    assert says in str(caught.value)

@@ -207,8 +207,11 @@ class JointTrajectory(Displayed):
         [[0.5, 0.75], [0.9375, -0.46875]]
         """
         names = names_of_joints(names)
-        begins, ends = (finite_numbers(key, x, (len(names),)) for key, x in (("start", start), ("end", end)))
-        bounds = [None] * len(names) if limits is None else _limits(limits, len(names))
+        begins, ends = (
+            finite_numbers(key, in_order(key, x, names, TrajectoryError), (len(names),))
+            for key, x in (("start", start), ("end", end))
+        )
+        bounds = [None] * len(names) if limits is None else _limits(limits, names)
         start_time = finite("start_time", start_time, seconds)
         duration = None if duration is None else positive("duration", duration, seconds)
 
@@ -381,8 +384,9 @@ class JointTrajectory(Displayed):
         return np.clip(times, self.start, self.stop)
 
 
-def _limits(limits: ArrayLike, count: int) -> list[Any]:
+def _limits(limits: ArrayLike, names: Sequence[str]) -> list[Any]:
     """Return the three limits of each joint."""
+    count = len(names)
     shape = (len(LIMITS), count) if np.ndim(limits) == 2 else (len(LIMITS),)
-    given = finite_numbers("limits", limits, shape).reshape(len(LIMITS), -1)
-    return np.broadcast_to(given, (len(LIMITS), count)).T.tolist()
+    given = finite_numbers("limits", in_order("limits", limits, names, TrajectoryError), shape)
+    return np.broadcast_to(given.reshape(len(LIMITS), -1), (len(LIMITS), count)).T.tolist()

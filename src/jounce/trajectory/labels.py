@@ -6,13 +6,16 @@ from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
 
-def in_order(name: str, values: Any, labels: Sequence[str], error: Callable[..., Exception]) -> Any:
+def in_order(
+    name: str, values: Any, labels: Sequence[str], error: Callable[..., Exception], what: str = "joints"
+) -> Any:
     """Return values with the labels of their last axis in the order given; as they are where they have no such labels.
 
     Raises
     ------
     Exception
-        That given, if some of their labels are among those given and others are not, or another axis has them.
+        That given, if some of their labels are among those given and others are not, or another axis has them; or if
+        derivatives that are labeled are along another axis than the last but one, or are not all from order zero on.
 
     Examples
     --------
@@ -30,14 +33,26 @@ def in_order(name: str, values: Any, labels: Sequence[str], error: Callable[...,
         return values
     last, expected = (axes[-1] if axes else []), set(labels)
     if expected.isdisjoint(last) and (moved or any(expected <= set(axis) for axis in axes)):
-        raise error("the joints must be along the last axis: transpose it", name=name)
+        raise error(f"the {what} must be along the last axis: transpose it", name=name)
+    _check_derivatives(name, values, error)
     if expected.isdisjoint(last) or last == list(labels):
         return values
     if len(last) != len(expected) or set(last) != expected:
-        message = f"its last axis must have each of the joints {', '.join(labels)} once, and nothing else"
+        message = f"its last axis must have each of the {what} {', '.join(labels)} once, and nothing else"
         raise error(message, name=name, value=", ".join(last))
     order = [last.index(label) for label in labels]
     return values.isel({values.dims[-1]: order}) if hasattr(values, "isel") else values.iloc[..., order]
+
+
+def _check_derivatives(name: str, values: Any, error: Callable[..., Exception]) -> None:
+    dims = getattr(values, "dims", ())
+    if "derivative" not in dims:
+        return
+    if dims[-2 if len(dims) > 1 else -1] != "derivative":
+        raise error("the derivatives must be along the last axis but one: transpose it", name=name, value=str(dims))
+    orders = list(values.indexes.get("derivative", ()))
+    if orders and orders != list(range(len(orders))):
+        raise error("its derivatives must be those of order 0, 1, 2 and so on", name=name, value=orders)
 
 
 def _texts(index: Iterable[object] | None) -> list[str]:

@@ -27,6 +27,7 @@ from jounce.planning.elastic.driven_systems import DrivenMechanism
 from jounce.planning.elastic.drives import Drive, DriveArrays
 from jounce.planning.elastic.motor_torques import MOTOR, torques_of
 from jounce.trajectory import AbstractMotion
+from jounce.trajectory.labels import in_order
 
 
 class _DriveSpring(AbstractForce):
@@ -111,7 +112,8 @@ def _start(mechanism: Mechanism, arrays: DriveArrays, state: object, instant: fl
         motion = solve(mechanism, [instant], order=1)
         own = np.stack([motion.driver(name).values[0] for name in arrays.names], axis=-1)
         return np.stack([own, own])
-    given_state = real_numbers("state", state, MechanismError)
+    labels = in_order("state", state, arrays.names, MechanismError, "drivers")
+    given_state = real_numbers("state", labels, MechanismError)
     if given_state.shape != (2, 2, n) or not np.isfinite(given_state).all():
         message = f"must hold finite coordinates and rates of drivers and of motors, the shape (2, 2, {n})"
         raise MechanismError(message, name="state", value=given_state.tolist())

@@ -25,6 +25,7 @@ from jounce.planning.elastic.motor_torques import MOTOR, torques_of
 from jounce.robot import Joint, Link, Robot
 from jounce.robot.model.joint_laws import AbstractJointLaws, read_forces
 from jounce.trajectory import AbstractMotion
+from jounce.trajectory.labels import in_order
 
 
 def elastic_robot(robot: Robot, drives: Mapping[str, Drive], *, losses: bool = True, friction: bool = True) -> Robot:
@@ -159,7 +160,8 @@ def _start(
 ) -> np.ndarray:
     """Return q and q' of links and rotors; springs are relaxed, and rotors move with the links, unless given."""
     n = len(arrays.names)
-    given = np.zeros((2, n)) if state is None else real_numbers("state", state, RobotError)
+    levels = np.zeros((2, n)) if state is None else in_order("state", state, arrays.names, RobotError)
+    given = real_numbers("state", levels, RobotError)
     if given.shape not in ((2, n), (2, 2, n)) or not np.isfinite(given).all():
         message = f"must hold finite q and q' of the links, the shape (2, {n}), or of links and motors, (2, 2, {n})"
         raise RobotError(message, name="state", value=given.tolist())

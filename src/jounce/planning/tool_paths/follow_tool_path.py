@@ -19,6 +19,7 @@ from jounce.planning.tool_paths.tool_tasks import tool_of
 from jounce.robot.model.arguments import floats
 from jounce.robot.robot import Robot
 from jounce.trajectory.joint_trajectory import JointTrajectory
+from jounce.trajectory.labels import in_order
 
 REACHED = 1e-10  # rad, or sizes of the robot
 
@@ -107,9 +108,9 @@ def follow_tool_path(
     ranges = joint_ranges(robot)
     laws = _fixed_joint_laws(robot, hold, path)
     fixed_joints = tuple(robot.joint_names.index(name) for name in laws.names) if laws else ()
-    given = _numbers("posture", posture, n)
+    given = _numbers(robot, "posture", posture)
     rest = middle(*ranges) if given is None else given
-    weight = _numbers("weights", weights, n)
+    weight = _numbers(robot, "weights", weights)
     weight = np.ones(n) if weight is None else weight
     if (weight <= 0).any():
         raise RobotError("must be greater than zero", name="weights", value=weight.tolist())
@@ -156,7 +157,7 @@ def _start(
         for name, value in zip(laws.names, laws.derivatives([path.start], 0)[0, 0], strict=True):
             k = robot.joint_names.index(name)
             lower[k] = upper[k] = value
-    near = _numbers("start", start, n)
+    near = _numbers(robot, "start", start)
     goal = {kind: np.moveaxis(x[0], -1, 0) for kind, x in path.series(np.array([path.start]), 0).items()}
     guess = middle(*joint_ranges(robot)) if near is None else near
     result = poses_within(
@@ -220,10 +221,11 @@ def _fixed_joint_laws(robot: Robot, hold: Any, path: ToolPath) -> JointTrajector
         raise RobotError(error.message, name=(error.name or "").replace("laws", "hold"), value=error.value) from None
 
 
-def _numbers(name: str, value: Any, n: int) -> np.ndarray | None:
+def _numbers(robot: Robot, name: str, value: Any) -> np.ndarray | None:
     if value is None:
         return None
-    array = np.asarray(floats(name, value))
+    n = len(robot.joint_names)
+    array = np.asarray(floats(name, in_order(name, value, robot.joint_names, RobotError)))
     if array.shape != (n,) or not np.isfinite(array).all():
         raise RobotError(f"must hold {n} finite numbers, one for each joint", name=name, value=array.tolist())
     return array

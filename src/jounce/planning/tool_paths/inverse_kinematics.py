@@ -22,6 +22,7 @@ from jounce.robot.model.abstract_robot import AbstractRobot
 from jounce.robot.model.arguments import checked_position, floats, whole_number
 from jounce.robot.recursions.kinematics import forward_kinematics
 from jounce.robot.robot import Robot
+from jounce.trajectory.labels import in_order
 
 if TYPE_CHECKING:
     from scipy.spatial.transform import Rotation
@@ -231,7 +232,9 @@ def _checked_goal(position: Any, orientation: Any, direction: Any) -> tuple[dict
         raise RobotError("give an orientation or a direction, not both", name="direction")
     goal: dict[str, Any] = {}
     if position is not None:
-        goal["position"] = np.asarray(floats("position", position))
+        goal["position"] = np.asarray(
+            floats("position", in_order("position", position, "xyz", RobotError, "components"))
+        )
         if goal["position"].ndim < 1 or goal["position"].shape[-1] != 3:
             raise RobotError(f"must have the shape (..., 3), not {goal['position'].shape}", name="position")
         if not np.isfinite(goal["position"]).all():

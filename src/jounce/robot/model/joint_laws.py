@@ -15,6 +15,7 @@ from jounce.jet import Jet
 from jounce.jet.programs.composition import OfSample
 from jounce.robot.model.arguments import floats
 from jounce.trajectory.joint_trajectory import JointTrajectory
+from jounce.trajectory.labels import in_order
 from jounce.trajectory.laws.user_laws import read_laws
 from jounce.trajectory.motion import AbstractMotion
 from jounce.units.expression import Expression
@@ -130,7 +131,7 @@ def joint_laws(names: Sequence[str], given: GivenLaws | None, what: str = "torqu
     if callable(given):
         return JointLaws(nothing, _read(given, count, (count,), what), (), ())
     if not isinstance(given, Mapping):
-        constant = np.asarray(floats(what, given))
+        constant = np.asarray(floats(what, in_order(what, given, names, RobotError)))
         if constant.shape != (count,) or not np.isfinite(constant).all():
             message = f"must hold {count} finite numbers, one for each joint, or be a function, or a mapping of names"
             raise RobotError(message, name=what, value=constant.tolist())
