@@ -10,9 +10,11 @@ from collections.abc import Sequence
 from typing import Any
 
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Float
 
 from jounce.base.modules import Module, field, is_ours
+from jounce.base.shapes import is_traced
 from jounce.constraints.base import Scalar
 from jounce.errors import MechanismError, UnsupportedError
 from jounce.jet import Jet, cross, exp, sqrt
@@ -165,8 +167,9 @@ class GearFriction(Module):
         """Efficiency where gear i drives gear j, and where gear j drives gear i."""
         if self.coefficient is None:
             return self.efficiency, self.efficiency if self.backward is None else self.backward
-        slope = self.coefficient if self.pressure_angle is None else self.coefficient / jnp.cos(self.pressure_angle)
-        rise = jnp.tan(self.lead_angle)
+        of = jnp if is_traced((self.coefficient, self.pressure_angle, self.lead_angle)) else np
+        slope = self.coefficient if self.pressure_angle is None else self.coefficient / of.cos(self.pressure_angle)
+        rise = of.tan(self.lead_angle)
         return rise * (1.0 - slope * rise) / (rise + slope), (rise - slope) / (rise * (1.0 + slope * rise))
 
     def resisting(self, slip: Float[Jet, "direction *batch"]) -> Float[Jet, "direction *batch"]:

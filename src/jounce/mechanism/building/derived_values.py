@@ -1,6 +1,5 @@
 """Values of joints that follow from the starting guess: offsets, signs of attitudes, and units of turns."""
 
-from functools import partial
 from typing import Any
 
 import jax
@@ -12,6 +11,7 @@ from jaxtyping import Float
 from jounce.base.shapes import Numbers
 from jounce.constraints.cams import Cam
 from jounce.constraints.facts import value_fields
+from jounce.execution.compilation import compiled
 from jounce.jet import Jet
 from jounce.mechanism.building.starting_guess import pose_at
 from jounce.mechanism.system import Group, holding
@@ -28,7 +28,7 @@ def with_offsets(group: Group, pose_type: type[Pose], guess: dict[str, Any]) -> 
     return holding(group, "offset", offset if isinstance(offset, Tracer) else np.asarray(offset))
 
 
-@partial(jax.jit, static_argnames="pose_type")
+@compiled("pose_type", brief=True)
 def _fulfilling_offset(group: Group, guess: dict[str, Any], pose_type: type[Pose]) -> Float[Numbers, "instance 1"]:
     def residual(offset: Any) -> Any:
         trial = holding(group, "offset", offset)

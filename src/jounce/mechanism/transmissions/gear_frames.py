@@ -22,6 +22,7 @@ from jounce.constraints.cams import Cam, turns_in_space
 from jounce.constraints.facts import facts_of, value_fields
 from jounce.constraints.ropes import Rope, distinct, shares_points
 from jounce.errors import JounceError, MechanismError
+from jounce.execution.compilation import compiled
 from jounce.mechanism.mechanism import GROUND, Mechanism
 from jounce.mechanism.resolve import along_instances, resolve
 from jounce.mechanism.system import POSITION_COMPONENTS, Group, group_elements, holding
@@ -357,8 +358,11 @@ def _across(vector: Any, axis: Any) -> Any:
     return vector - (vector * unit).sum(axis=0) * unit
 
 
+_coaxial_of = compiled(brief=True)(coaxial)
+
+
 def _coaxial(axis: Any, there: Any) -> Datum:
-    datum = coaxial(axis, there)
+    datum = _coaxial_of(axis, there)
     if isinstance(datum.attitude, Tracer):  # all is within what JAX compiles
         return datum
     return Datum(*(np.asarray(x) for x in (datum.attitude, datum.angle, datum.near)))
