@@ -164,6 +164,33 @@ def test_what_no_force_resists_is_indifferent_and_what_flies_off_has_no_equilibr
         jn.equilibrium(falling)
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("half, free, stiffness", [slow(1.0, 1.2, 1e3), (0.7, 0.9, 3e5)])
+def test_at_its_limit_load_a_shallow_truss_has_no_stiffness(half, free, stiffness):
+    # two springs of length l and free length f, feet 2 a apart: 2 k y (f/l - 1) is largest where l^3 = f a^2
+    length = (free * half**2) ** (1 / 3)
+    height = np.sqrt(length**2 - half**2)
+
+    def stability(place, load):
+        feet = {f"{side:+}": [side * half, 0] for side in (-1, 1)}
+        truss = jn.Mechanism(
+            space="planar",
+            bodies={"pin": jn.Body([0, place], mass=1.0, inertia=0.1)},
+            joints={"guide": planar.Prismatic(("ground", "pin"), [0, 0], [0, 0], [0, 1], [0, 1])},
+            forces={
+                **{n: forces.Spring(("ground", "pin"), x, [0, 0], stiffness, free) for n, x in feet.items()},
+                "load": forces.PointForce("pin", [0, 0], law=[0.0, -load]),
+            },
+        )
+        return jn.equilibrium(truss, method="newton").stability
+
+    def carried(y):
+        return float(2 * stiffness * y * (free / np.hypot(half, y) - 1))
+
+    words = [stability(y, carried(y)) for y in (height, height + 1e-3, height - 1e-3)]
+    assert words == ["indifferent", "stable", "unstable"]
+
+
 def test_bad_input_is_named_before_anything_is_computed():
     pendulum = jn.load(example("simple_pendulum"))
     for call, place in (

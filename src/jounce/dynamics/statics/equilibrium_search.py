@@ -10,7 +10,7 @@ from jounce.base.modules import with_fields
 from jounce.dynamics.forward.accelerations import Equations
 from jounce.dynamics.masses import gravity_of, masses_of
 from jounce.dynamics.statics.operating_point import OperatingPoint, of_place
-from jounce.dynamics.statics.variations import at_rest, clock_at, residuals_at, sizes_of_forces
+from jounce.dynamics.statics.variations import at_rest, clock_at, residuals_at
 from jounce.errors import SolveError
 from jounce.jet import Jet
 from jounce.kinematics import Status
@@ -131,14 +131,7 @@ def _stiffness(point: OperatingPoint) -> Float[np.ndarray, "direction direction"
 def _largest_load(point: OperatingPoint) -> float:
     """Return the size of the largest load: of weight, of any applied force, or of what the constraints bear, N m."""
     borne = point.jacobian.T @ point.multipliers
-    largest = [np.abs([*point.loads, borne]).max(initial=0.0)]
-    if point.equations.system.forces:
-        unchanged = point.changes(of_place(np.zeros((len(point.scale), 1))))
-        sizes = sizes_of_forces(point.equations, point.coordinates, point.clock, unchanged)
-        for group, size in zip(point.equations.system.forces, sizes, strict=True):
-            lever = point.model.length if group.element.unit == "N" else 1.0
-            largest.append(np.abs(size).max(initial=0.0) * lever)
-    return float(max(largest))
+    return float(max(np.abs([*point.loads, borne]).max(initial=0.0), point.pushed.max(initial=0.0)))
 
 
 def _step(

@@ -167,10 +167,13 @@ def _check_nowhere(
 
 
 def _magnitudes(point: OperatingPoint, basis: Float[np.ndarray, "column coordinate"]) -> list[np.ndarray]:
-    """Return what stiffness and damping by all loads and velocities would be if they did not cancel within a body."""
+    """Return what stiffness and damping by all loads and velocities would be if they did not cancel within a body.
+
+    Applied forces count one by one: the stiffness by the force of a spring may cancel that of another, and its own.
+    """
     bodies = len(point.model.bodies)
     borne = np.abs(point.jacobian).T @ np.abs(point.multipliers)
-    load = np.stack([*np.abs(point.loads), borne]).sum(axis=0).reshape(bodies, -1).max(axis=1)
+    load = np.stack([*np.abs(point.loads), borne]).sum(axis=0).reshape(bodies, -1).max(axis=1) + point.pushed
     rate = [point.coordinates[name][1 if name in ("position", "angle") else 0, ..., 1:, 0]
             for name in ("position", "angle" if point.model.pose_type.turns == 1 else "angular_velocity")]  # fmt: skip
     speed = np.abs(rate[0]).max(axis=0) / point.model.length + np.abs(np.atleast_2d(rate[1])).max(axis=0)

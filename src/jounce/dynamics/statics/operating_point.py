@@ -17,6 +17,7 @@ from jounce.dynamics.statics.variations import (
     loads_at,
     masses_at,
     output_variations,
+    sizes_of_forces,
     variations,
 )
 from jounce.kinematics.assembly.gauss_newton import assemble_from_guess
@@ -103,6 +104,21 @@ class OperatingPoint:
             return first
         borne = np.asarray(borne_at(self.equations, self.coordinates, self.clock, first[:, None]))
         return first + self._balancing(load + self.as_columns(borne[..., None])[:, 0])  # those of teeth are the same
+
+    @cached_property
+    def pushed(self) -> Float[np.ndarray, " body"]:
+        """Sizes of the applied forces on each moving body, added up as if none canceled another, N m."""
+        sums = np.zeros(1 + len(self.model.bodies))
+        groups = self.equations.system.forces
+        if groups:
+            unchanged = self.changes(of_place(np.zeros((len(self.scale), 1))))
+            sizes = sizes_of_forces(self.equations, self.coordinates, self.clock, unchanged)
+            for group, size in zip(groups, sizes, strict=True):
+                lever = self.model.length if group.element.unit == "N" else 1.0
+                own = np.abs(np.asarray(size)).max(axis=(0, 2)) * lever
+                for bodies in group.bodies:
+                    np.add.at(sums, list(bodies), own)
+        return sums[1:]
 
     def _balancing(self, load: Float[np.ndarray, " column"]) -> Float[np.ndarray, " row"]:
         return -np.linalg.lstsq(self.jacobian.T, load, rcond=RANK_TOLERANCE)[0]
