@@ -1,6 +1,7 @@
 """Noisy samples of motions that are known: jerk, deviation, dwells, uneven stamps, and what is refused."""
 
 import pickle
+import warnings
 
 import numpy as np
 import pytest
@@ -62,8 +63,12 @@ def derivative(law, times, order):
             r"a: the sample at t = 2 s is 0\.5 from those beside it:",
         ),
         (
-            lambda t, _noise: np.angle(np.exp(3j * t)),
-            r"a: goes by -6\.2.* about t = 1\.0\d s; if it is an angle, count its turns",
+            lambda t, noise: (np.sin(2 * t) + noise)[np.arange(len(t)) // 4 * 4],
+            r"a: 2\d\d of 401 samples repeat the one before while the joint moves, the first at t = 0\.",
+        ),
+        (
+            lambda t, noise: (np.sin(2 * t) + noise)[np.where(abs(t - 1.6) < 0.095, 151, np.arange(len(t)))],
+            r"a: 1\d of 401 samples repeat the one before while the joint moves, the first at t = 1\.\d* s:",
         ),
     ],
 )
@@ -72,6 +77,32 @@ def test_what_no_motion_does_is_reported(spoil, says):
     values = spoil(times, 1e-4 * np.random.default_rng(2).normal(size=times.size))
     with pytest.warns(jn.errors.RecordingWarning, match=says):
         jn.smooth(jn.JointTrajectory.from_samples(times, values[:, None], ["a"]), 5e-4)
+
+
+@pytest.mark.parametrize(
+    "angle",
+    [
+        lambda t, noise: 3 * t + noise,
+        lambda t, noise: np.pi - 1e-4 * (1 - np.minimum(t, 1)) + noise,  # at rest where angles are wrapped
+    ],
+)
+def test_an_angle_within_one_turn_is_refused(angle):
+    times = np.linspace(0.0, 4.0, 401)
+    wrapped = np.angle(np.exp(1j * angle(times, 1e-3 * np.random.default_rng(2).normal(size=times.size))))
+    log = jn.JointTrajectory.from_samples(times, wrapped[:, None], ["a"])
+    with pytest.raises(jn.errors.TrajectoryError, match=r"a: goes by a whole turn, -?6\.2.*numpy\.unwrap"):
+        jn.smooth(log, 5e-3)
+
+
+@pytest.mark.parametrize("name", MOTIONS)
+def test_samples_that_steps_of_an_encoder_or_a_rest_make_equal_are_not_called_old(name):
+    clean, _, stop = MOTIONS[name]
+    times = np.arange(0, stop + 1e-9, 0.01)
+    for step in (1e-6, 1e-4, 1e-3):
+        values = step * np.round(clean(times) / step)
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            jn.smooth(jn.JointTrajectory.from_samples(times, values[:, None], ["a"]), step)
 
 
 @pytest.mark.parametrize("rate", [100, 500])

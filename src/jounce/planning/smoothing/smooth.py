@@ -24,6 +24,11 @@ FEWEST = 12  # samples
 NEIGHBORS = 4  # samples on either side with which one is compared
 OUTLYING = 20.0  # times as far as any of those from what is beside it: it is an outlier
 OUTSIDE = 5.0  # deviations, less than which no sample is doubted
+WRITTEN = 20.0  # times the step in which samples are written: a step after samples that repeat
+CATCHES_UP = 0.6  # of the step after it
+SAME = 1e-9  # of the range of the samples: what differs by less was the same before an angle was converted
+REPEATED = 0.05  # of the samples: fewer may be chance
+LONG = 5  # samples that repeat one, which is no chance where the step after them is long
 UNSEEN = 3.0  # over the cutoff frequency: for so long a motion may begin or end unseen
 
 
@@ -104,12 +109,14 @@ def smooth(trajectory: JointTrajectory, deviation: float) -> SmoothedTrajectory:
     Raises
     ------
     TrajectoryError
-        If no joint has samples, too few, or no motion is within the deviation: the message names joint and instant.
+        If no joint has samples, too few, an angle goes by a whole turn from one to the next, or no motion is within the
+        deviation: the message names joint and instant.
 
     Warns
     -----
     RecordingWarning
-        A sample is far from those beside it, so that the motion goes there and back; or an angle goes by a whole turn.
+        A sample is far from those beside it, so that the motion goes there and back; or samples repeat the one before
+        while the joint moves.
 
     Examples
     --------
@@ -130,9 +137,9 @@ def smooth(trajectory: JointTrajectory, deviation: float) -> SmoothedTrajectory:
         raise TrajectoryError(message, name="trajectory", value=list(trajectory.names))
     laws, joints = trajectory.laws.given(), {}
     for name, (times, values) in samples.items():
-        if doubt := _outlier(times, np.asarray(values), deviation):
-            warn_caller(RecordingWarning(f"{name}: {doubt}"))
         try:
+            if doubt := _doubt(times, np.asarray(values), deviation):
+                warn_caller(RecordingWarning(f"{name}: {doubt}"))
             laws[name], joints[name] = smoothed_samples(times, np.ascontiguousarray(values), deviation)
         except (SolveError, TrajectoryError) as error:
             raise TrajectoryError(error.message, name=name, value=error.value) from None
@@ -141,10 +148,64 @@ def smooth(trajectory: JointTrajectory, deviation: float) -> SmoothedTrajectory:
     )
 
 
-def _outlier(times: Float[np.ndarray, " sample"], values: Float[np.ndarray, " sample"], deviation: float) -> str:
-    """Return which sample is far from those beside it, as others near it are not, and what to do; or nothing."""
+def _doubt(times: Float[np.ndarray, " sample"], values: Float[np.ndarray, " sample"], deviation: float) -> str:
+    """Return what the samples have that no motion does, and what to do; or nothing.
+
+    Raises
+    ------
+    TrajectoryError
+        If they go by a whole turn from one sample to the next.
+    """
     if len(times) < FEWEST:
         return ""
+    _check_turns(times, values)
+    return _repeated(times, values) or _outlier(times, values, deviation)
+
+
+def _check_turns(times: Float[np.ndarray, " sample"], values: Float[np.ndarray, " sample"]) -> None:
+    steps = np.diff(values)
+    sizes = np.abs(steps)
+    turned = np.abs(sizes - WHOLE_TURN) < 0.1 * WHOLE_TURN
+    if turned.any() and np.all(sizes[~turned] < 0.1 * WHOLE_TURN):
+        first = int(np.argmax(turned))
+        count = f"; {np.sum(turned)} steps are such" if np.sum(turned) > 1 else ""
+        message = (
+            f"goes by a whole turn, {steps[first]:.6g}, at t = {times[first + 1]:.6g} s{count}: count the turns of "
+            "an angle (numpy.unwrap)"
+        )
+        raise TrajectoryError(message)
+
+
+def _repeated(times: Float[np.ndarray, " sample"], values: Float[np.ndarray, " sample"]) -> str:
+    """Return where samples stay behind and catch up in one step, as those that are written again before new ones come.
+
+    Neither do so where the motion rests, whose first steps are short, nor where the steps of an encoder are seen.
+    """
+    steps = np.abs(np.diff(values))
+    moving = np.flatnonzero(steps)
+    if len(moving) < FEWEST:
+        return ""
+    stays = np.diff(moving) - 1  # samples that repeat one, before each step but the first
+    jumps, after, before = steps[moving[1:-1]], steps[moving[2:]], steps[moving[:-2]]
+    gaps = np.diff(np.unique(values))
+    seen = gaps[gaps > SAME * np.ptp(values)].min()  # the step in which they are written, if any
+    late = (stays[:-1] > 0) & (jumps > WRITTEN * seen) & (jumps > CATCHES_UP * after)
+    long = late & (stays[:-1] >= LONG) & (jumps > LONG / 2 * np.maximum(after, before))
+    count = int(stays[:-1][late].sum())
+    if count < REPEATED * len(values) and not long.any():
+        return ""
+    chosen = long if count < REPEATED * len(values) else late
+    first = int(np.argmax(chosen))
+    at = int(moving[first]) + 2
+    return (
+        f"{int(stays[:-1][chosen].sum())} of {len(values)} samples repeat the one before while the joint moves, the "
+        f"first at t = {times[at]:.6g} s: they are old, and the motion follows them within the deviation; leave out "
+        "what repeats"
+    )
+
+
+def _outlier(times: Float[np.ndarray, " sample"], values: Float[np.ndarray, " sample"], deviation: float) -> str:
+    """Return which sample is far from those beside it, as others near it are not, and what to do; or nothing."""
     steps = np.diff(times)
     between = (values[:-2] * steps[1:] + values[2:] * steps[:-1]) / (steps[1:] + steps[:-1])
     off = np.abs(values[1:-1] - between)
@@ -154,9 +215,6 @@ def _outlier(times: Float[np.ndarray, " sample"], values: Float[np.ndarray, " sa
     if not len(far):
         return ""
     first = int(far[0]) + 1
-    jump = float(max(np.diff(values[first - 1 : first + 2]), key=abs))
-    if abs(abs(jump) - WHOLE_TURN) < 0.1 * WHOLE_TURN:
-        return f"goes by {jump:.6g} about t = {times[first]:.6g} s; if it is an angle, count its turns (numpy.unwrap)"
     count = f"; {len(far)} samples are such" if len(far) > 1 else ""
     return (
         f"the sample at t = {times[first]:.6g} s is {off[first - 1]:.3g} from those beside it{count}: the motion goes "
