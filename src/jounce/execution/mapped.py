@@ -14,7 +14,7 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Int
+from jaxtyping import Bool, Int
 
 from jounce.base.padding import padded
 from jounce.base.shapes import is_traced
@@ -198,7 +198,7 @@ def _taken(array: np.ndarray, indices: Int[np.ndarray, " lane"], axis: int) -> n
     return np.zeros((len(indices), *array.shape[1:]) if axis == 0 else (*array.shape[:-1], len(indices)), array.dtype)
 
 
-def at_lanes(arrays: Any, lanes: Int[np.ndarray, " lane"]) -> Any:
+def at_lanes(arrays: Any, lanes: Int[np.ndarray, " lane"] | Bool[np.ndarray, " lane"]) -> Any:
     """Return arrays at some instants, which are along their last axis."""
     return jax.tree.map(lambda x: x[..., lanes], arrays)
 
