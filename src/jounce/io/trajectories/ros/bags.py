@@ -111,6 +111,9 @@ def _states(reader: Any, connections: list[Any], path: str) -> Recording:
         if not names or len(levels[0]) != len(names) or not np.isfinite(levels[0]).all():
             fault = f"message {number} of {connection.topic} must have one finite position for each joint"
             raise TrajectoryError(fault, path=path, name="position", value=levels[0].tolist()[:10])
+        if len(set(names)) < len(names):
+            fault = f"message {number} of {connection.topic} names a joint twice"
+            raise TrajectoryError(fault, path=path, name="name", value=names[:10])
         known = len(levels[1]) == len(names) and bool(np.isfinite(levels[1]).all())
         states.append(State(Decimal(own.sec) + Decimal(int(own.nanosec)) / NANO, names, levels[: 1 + known], 0))
         received.append(Decimal(stamp) / NANO)

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from jounce.errors import TrajectoryError
 from jounce.io.trajectories.recordings import Recording
 from jounce.io.trajectories.stamps import epoch
 
@@ -36,7 +37,20 @@ class State:
 
 
 def recorded_states(path: str, states: Sequence[State]) -> Recording:
-    """Return the recording of states, of which some may be of other joints than others."""
+    """Return the recording of states, of which some may be of other joints than others.
+
+    Raises
+    ------
+    TrajectoryError
+        If some have no stamp, zero, and others one that counts from an epoch.
+    """
+    unstamped = [k for k, state in enumerate(states) if not state.stamp]
+    if unstamped and epoch(max(state.stamp for state in states)) is not None:
+        at = unstamped[0]
+        message = (
+            f"{len(unstamped)} of {len(states)} messages have no stamp, the first is message {at + 1}; leave them out"
+        )
+        raise TrajectoryError(message, path=path, line=states[at].line or None, name="stamp", value=0)
     names = list(dict.fromkeys(name for state in states for name in state.names))
     columns = {name: k for k, name in enumerate(names)}
     values = np.full((len(states), 2, len(names)), np.nan)
