@@ -55,6 +55,13 @@ def _check_derivatives(name: str, values: Any, error: Callable[..., Exception]) 
         raise error("its derivatives must be those of order 0, 1, 2 and so on", name=name, value=orders)
 
 
+def labels_of_rows(values: Any) -> list[object]:
+    """Return the labels along the first axis; none where it has no labels."""
+    if hasattr(values, "isel") and hasattr(values, "indexes"):
+        return list(values.indexes.get(values.dims[0], ())) if values.dims else []
+    return list(values.index) if hasattr(values, "iloc") else []
+
+
 def _texts(index: Iterable[object] | None) -> list[str]:
     """Return the labels of an axis, none unless all are text."""
     labels = [] if index is None else list(index)

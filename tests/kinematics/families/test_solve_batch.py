@@ -3,6 +3,7 @@
 import dataclasses
 
 import numpy as np
+import pandas
 import pytest
 
 import jounce as jn
@@ -40,7 +41,7 @@ def test_designs_are_those_solved_alone():
 def test_no_array_takes_the_name_of_another():
     parameters = {**FOUR_BAR.parameters, "psi": 1.0, "time": 2.0}
     named = dataclasses.replace(FOUR_BAR, parameters=parameters)
-    family = jn.solve_batch(named, {"psi": [1.0, 3.0], "time": [2.0, 4.0], "BC": [0.14, 0.15]}, [0.0], order=0)
+    family = jn.solve_batch(named, {"psi": [1.0, 3.0], "time": [2.0, 4.0], "BC": [0.14, 0.15]}, [0.0, 0.5], order=1)
     assert family["psi"].dims == ("design", "time", "derivative")
     np.testing.assert_array_equal(family["parameter_psi"], [1.0, 3.0])
     np.testing.assert_array_equal(family["parameter_time"], [2.0, 4.0])
@@ -48,7 +49,7 @@ def test_no_array_takes_the_name_of_another():
     for name in ("status", "design"):
         other = dataclasses.replace(FOUR_BAR, outputs={name: FOUR_BAR.outputs["psi"]})
         with pytest.raises(jn.errors.MechanismError, match=f"name '{name}' is that of an array of a family"):
-            jn.solve_batch(other, {"BC": [0.14, 0.15]}, [0.0], order=0)
+            jn.solve_batch(other, {"BC": [0.14, 0.15]}, [0.0, 0.5], order=1)
 
 
 @pytest.mark.slow
@@ -74,6 +75,18 @@ def test_bad_designs_are_reported():
         jn.solve_batch(FOUR_BAR, {"BCD": [0.14]}, TIME)
     with pytest.raises(jn.errors.MechanismError, match="one value for each design, 2 as"):
         jn.solve_batch(FOUR_BAR, {"BC": [0.14, 0.15], "AB": [0.04]}, TIME)
+
+
+def test_labels_of_values_in_another_order_are_refused():
+    mechanism = jn.load(example("four_bar"))
+    lengths = pandas.Series([0.2031, 0.21], index=["one", "two"])
+    coupler = pandas.Series([0.15, 0.1423], index=["two", "one"])
+    for values in (coupler, coupler.to_xarray()):
+        with pytest.raises(jn.errors.MechanismError, match=r"parameters\.BC: has the labels .* in another order"):
+            jn.solve_batch(mechanism, {"CD": lengths, "BC": values}, [0.0, 0.5], order=1)
+    found = jn.solve_batch(mechanism, {"CD": lengths, "BC": coupler[["one", "two"]]}, [0.0, 0.5], order=1)
+    plain = jn.solve_batch(mechanism, {"CD": [0.2031, 0.21], "BC": [0.1423, 0.15]}, [0.0, 0.5], order=1)
+    np.testing.assert_array_equal(found["psi"], plain["psi"])
 
 
 @pytest.mark.slow

@@ -9,6 +9,7 @@ import numpy as np
 from jounce.base.shapes import is_traced, real_numbers
 from jounce.errors import JounceError, MechanismError, check_name
 from jounce.mechanism import Mechanism
+from jounce.trajectory.labels import labels_of_rows
 
 
 def checked_values(
@@ -28,11 +29,11 @@ def checked_values(
     check : callable
         Raises for a name that is none of a parameter.
     error : type
-        To raise if values are not finite or of unequal number.
+        To raise if values are not finite or of unequal number, or have labels in another order.
     """
     if not parameters:
         raise error("a batch differs in at least one parameter", name="parameters", value=dict(parameters))
-    values, count = {}, None
+    values, count, known = {}, None, []
     for name, given in parameters.items():
         check(name)
         expected, traced = f"a list of finite numbers, one for each {each}", is_traced(given)
@@ -42,7 +43,11 @@ def checked_values(
         if count is not None and len(array) != count:
             message = f"must have one value for each {each}, {count} as those before"
             raise error(message, name=f"parameters.{name}", value=len(array))
-        values[name], count = array, len(array)
+        labels = labels_of_rows(given)
+        if known and labels != known and set(labels) == set(known):
+            message = f"has the labels of the parameter before it in another order: give each {each} the same place"
+            raise error(message, name=f"parameters.{name}", value=labels[:10])
+        values[name], count, known = array, len(array), labels or known
     return values
 
 
