@@ -13,6 +13,7 @@ from jounce.execution.compilation import compiled
 from jounce.execution.mapped import Mapped
 from jounce.execution.threads import VARIABLE
 from tests.problems.dynamics import double_pendulum
+from tests.problems.small import four_bar
 from tests.programs import counts, forget
 
 START = "_moved", "_with_row_rates", "_judged"  # of a simulation, made while its programs are
@@ -171,3 +172,11 @@ def test_a_function_of_an_instant_is_made_from_shapes_alone(rows):
     lanes = np.arange(10.0).reshape((5, 2) if rows else (2, 5))
     np.testing.assert_array_equal(doubled.program(np.array(2.0), lanes)(lanes), 2 * lanes)
     assert len(doubled.machine_code) == 1
+
+
+def test_a_motion_needs_no_thread_once_its_programs_are_there(two_threads):
+    jn.solve(four_bar(), np.linspace(0, 0.1, 3), order=1)
+    finish()
+    started = threading.active_count()
+    jn.solve(four_bar(), np.linspace(0, 0.1, 4), order=1)
+    assert threading.active_count() == started
