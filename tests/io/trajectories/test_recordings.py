@@ -442,32 +442,39 @@ def test_bags_of_ros_2(tmp_path, version):
         jn.load_trajectory(folder, topic="/plan")
 
 
+def bag_of_states(folder, stamps, names):
+    """Write a bag of joint states that are received once a second, with these stamps, s."""
+    rosbags = pytest.importorskip("rosbags.rosbag2")
+    typesys = pytest.importorskip("rosbags.typesys")
+    store = typesys.get_typestore(typesys.Stores.ROS2_HUMBLE)
+    state, head = store.types["sensor_msgs/msg/JointState"], store.types["std_msgs/msg/Header"]
+    time = store.types["builtin_interfaces/msg/Time"]
+    with rosbags.Writer(folder, version=9) as writer:
+        connection = writer.add_connection("/joint_states", state.__msgtype__, typestore=store)
+        for k, stamp in enumerate(stamps):
+            sent = state(head(time(stamp, 0), ""), names, 0.1 * k * np.ones(2), np.zeros(0), np.zeros(0))
+            writer.write(connection, (1732686000 + k) * 10**9, store.serialize_cdr(sent, state.__msgtype__))
+    return folder
+
+
 @pytest.mark.parametrize(
     "stamps, names, says",
     [
         ([0, 1732686000, 1732686001], ["a", "b"], "stamp: 1 of 3 messages have no stamp, the first is message 1"),
         ([1732686000, 0, 0], ["a", "b"], "stamp: 2 of 3 messages have no stamp, the first is message 2"),
         ([0, 1, 2], ["a", "a"], "name: message 1 of /joint_states names a joint twice, got ['a', 'a']"),
-        ([*range(9)], ["a", "b"], None),  # of a simulated clock
     ],
 )
 def test_messages_without_a_stamp_or_with_a_name_twice_are_refused(tmp_path, stamps, names, says):
-    rosbags = pytest.importorskip("rosbags.rosbag2")
-    typesys = pytest.importorskip("rosbags.typesys")
-    store = typesys.get_typestore(typesys.Stores.ROS2_HUMBLE)
-    state, head = store.types["sensor_msgs/msg/JointState"], store.types["std_msgs/msg/Header"]
-    time = store.types["builtin_interfaces/msg/Time"]
-    with rosbags.Writer(tmp_path / "bag", version=9) as writer:
-        connection = writer.add_connection("/joint_states", state.__msgtype__, typestore=store)
-        for k, stamp in enumerate(stamps):
-            sent = state(head(time(stamp, 0), ""), names, 0.1 * k * np.ones(2), np.zeros(0), np.zeros(0))
-            writer.write(connection, (1732686000 + k) * 10**9, store.serialize_cdr(sent, state.__msgtype__))
-    if says is None:
-        assert jn.load_trajectory(tmp_path / "bag").stop == 8.0
-        return
     with pytest.raises(TrajectoryError) as caught:
-        jn.load_trajectory(tmp_path / "bag")
+        jn.load_trajectory(bag_of_states(tmp_path / "bag", stamps, names))
     assert says in str(caught.value)
+
+
+def test_a_simulated_clock_may_begin_at_zero(tmp_path):
+    log = jn.load_trajectory(bag_of_states(tmp_path / "bag", range(9), ["a", "b"]))
+    assert (log.start, log.stop) == (0.0, 8.0)
+    np.testing.assert_allclose(log.derivatives([8.0], 0), [[[0.8, 0.8]]], rtol=1e-12)
 
 
 def test_a_bag_that_was_cut_short_says_how_it_is_mended(tmp_path):

@@ -294,10 +294,8 @@ class MotionForces:
             if first is not None:
                 moving = [self.coordinates_of(its, self.levels + 1) for its in group.bodies]
                 rubbed = moving, self._balancing[0][:, None, first : first + group.instances]
-            lanes, how = (
-                (*self.joint(place.group), self._of_group(place), rubbed),
-                {"slot": slot, "levels": self.levels},
-            )
+            lanes = *self.joint(place.group), self._of_group(place), rubbed
+            how = {"slot": slot, "levels": self.levels}
             wrench = self._once(programs.joint_wrench, group.element, lanes, place.group, **how)
             wrench = wrench[:, :, place.instance]
             return teeth.without_open_rates(wrench, self._reversals.get(place.group), place.instance)
