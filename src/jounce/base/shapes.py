@@ -202,3 +202,46 @@ def no_numbers(message: str, name: str, value: object) -> ValueError:
 def is_real(x: Any) -> TypeGuard[jax.Array]:
     """Tell whether a value is an array of JAX, traced or not, of real numbers."""
     return isinstance(x, jax.Array) and x.dtype.kind in "fiu"
+
+
+def by_component(name: str | None, values: Any, error: Callable[..., Exception]) -> Any:
+    """Return values with their components in the order x, y, z where they have such labels, in any order.
+
+    Arrays of xarray and pandas have; quaternions are ``w, x, y, z``. Of a tensor both axes may have labels.
+
+    Raises
+    ------
+    Exception
+        That given, if some of the labels are others, or the components lie along another axis than the last.
+
+    Examples
+    --------
+    >>> import pandas as pd
+    >>> by_component("gravity", pd.Series([-9.81, 0.0, 1.0], index=["z", "y", "x"]), ValueError).tolist()
+    [1.0, 0.0, -9.81]
+    """
+    if hasattr(values, "isel") and hasattr(values, "indexes"):
+        axes = [list(values.indexes.get(axis, ())) for axis in values.dims]
+    elif hasattr(values, "iloc") and hasattr(values, "axes"):
+        axes = [list(axis) for axis in values.axes]
+    else:
+        return values
+    texts = [[label.lower() if isinstance(label, str) else "" for label in axis] for axis in axes]
+    named = [axis for axis, labels in enumerate(texts) if not _COMPONENTS[-1].isdisjoint(labels)]
+    if named and named[-1] != len(axes) - 1:
+        raise error("the components must be along the last axis: transpose it", name=name)
+    for axis in named:
+        labels = texts[axis]
+        if set(labels) not in _COMPONENTS or len(set(labels)) < len(labels):
+            message = "its labels must be x, y and z, in the plane x and y, of a quaternion w, x, y and z, each once"
+            raise error(message, name=name, value=", ".join(map(str, axes[axis])))
+        order = sorted(range(len(labels)), key=lambda k: "wxyz".index(labels[k]))
+        values = (
+            values.isel({values.dims[axis]: order})
+            if hasattr(values, "isel")
+            else values.iloc[(slice(None),) * axis + (order,)]
+        )
+    return values
+
+
+_COMPONENTS = [set("xy"), set("xyz"), set("wxyz")]

@@ -18,7 +18,7 @@ from jounce.integrate.results.robot_simulation import RobotSimulation
 from jounce.integrate.simulate_robot import simulate_robot
 from jounce.integrate.steps.methods import AbstractMethod
 from jounce.integrate.steps.options import checked_options, instants_of
-from jounce.kinematics.families.parameter_values import checked_values
+from jounce.kinematics.families.parameter_values import by_parameter, checked_values
 from jounce.mechanism import TimeGrid
 from jounce.robot.robot import Robot
 
@@ -32,7 +32,7 @@ def traced_robot_batch(guarded: Callable[..., Any], robot: Robot, *arguments: An
 
 def simulate_robots(
     robot: Robot,
-    parameters: Mapping[str, Any],
+    parameters: Any,
     time: ArrayLike | TimeGrid | None,
     order: int,
     *,
@@ -57,7 +57,8 @@ def simulate_robots(
         message = "a batch has no free base by quaternions; give the robot one by robot.with_floating_base()"
         raise RobotError(message, name="base")
     state = options.pop("state", None)
-    traced = is_traced((dict(parameters), robot.tree, state))
+    parameters = by_parameter(parameters, "run", RobotError)
+    traced = is_traced((parameters, robot.tree, state))
     values = _checked(robot, parameters)
     start = start_levels(robot, state)
 

@@ -8,7 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
-from jounce.base.shapes import ArrayLike, Numbers, Real, Refused, real_numbers
+from jounce.base.shapes import ArrayLike, Numbers, Real, Refused, by_component, real_numbers
 from jounce.errors import JounceError, RobotError, check_choice, did_you_mean
 from jounce.rigid.solids import SOLIDS, pseudo_parts, solid_moments
 
@@ -65,7 +65,7 @@ class Inertia:
 
     def __post_init__(self, strict: bool) -> None:
         for name, shapes in (("mass", ((),)), ("center_of_mass", ((3,),)), ("tensor", ((3, 3), (3,)))):
-            object.__setattr__(self, name, finite_numbers(name, getattr(self, name), *shapes))
+            object.__setattr__(self, name, vector_numbers(name, getattr(self, name), *shapes))
         object.__setattr__(self, "mass", float(self.mass))
         if self.tensor.shape == (3,):
             object.__setattr__(self, "tensor", unchanging(np.diag(self.tensor)))
@@ -163,6 +163,7 @@ class Inertia:
         >>> round(shaft.mass, 6)
         2.95938
         """
+        sizes = {name: by_component(name, value, RobotError) for name, value in sizes.items()}
         axis = check_solid(kind, axis, {**sizes, "mass": mass, "density": density})
         volume, moments = solid_moments(kind, axis, sizes)
         mass = float(density * volume if mass is None else mass)
@@ -312,6 +313,13 @@ def finite_numbers(
     if bad.size:  # of many numbers the first that is not
         raise error("must be finite", name=name, value=array.tolist() if array.size <= MOST_SHOWN else bad[0].item())
     return unchanging(array)
+
+
+def vector_numbers(
+    name: str, value: ArrayLike | Refused, *shapes: tuple[int, ...], error: type[JounceError] = RobotError
+) -> np.ndarray:
+    """Return the components of a vector or tensor as `finite_numbers` does, by their labels where they have some."""
+    return finite_numbers(name, by_component(name, value, error), *shapes, error=error)
 
 
 def unchanging(array: np.ndarray) -> np.ndarray:

@@ -8,7 +8,7 @@ import numpy as np
 
 from jounce.base.shapes import ArrayLike
 from jounce.errors import RobotError, check_choice
-from jounce.rigid.inertia import Inertia, finite_numbers
+from jounce.rigid.inertia import Inertia, finite_numbers, vector_numbers
 from jounce.robot.model.links_and_joints import UNLIMITED, Joint, Limits, Link
 from jounce.robot.model.tree import turn_about
 from jounce.robot.robot import Robot
@@ -165,7 +165,7 @@ def from_screws(screws: Sequence[JointAxis], tool: ArrayLike | None = None, name
     """
     links, joints, parent = [Link("base")], [], "base"
     for k, screw in enumerate(screws, 1):
-        point = finite_numbers(f"screw {k}.point", screw.point, (3,))
+        point = vector_numbers(f"screw {k}.point", screw.point, (3,))
         moved = {"type": screw.type, "axis": screw.axis, "limits": screw.limits}
         joints.append(Joint(f"joint_{k}", parent, f"axis_{k}", position=point, **moved))
         joints.append(Joint(f"fixed_{k}", f"axis_{k}", f"link_{k}", "fixed", position=-point))

@@ -89,6 +89,18 @@ def test_labels_of_values_in_another_order_are_refused():
     np.testing.assert_array_equal(found["psi"], plain["psi"])
 
 
+def test_the_columns_of_a_table_are_parameters():
+    mechanism = jn.load(example("four_bar"))
+    table = pandas.DataFrame({"CD": [0.2031, 0.21], "BC": [0.1423, 0.15]}, index=["one", "two"])
+    found, plain = (jn.solve_batch(mechanism, x, [0.0, 0.5], order=1) for x in (table, table.to_dict("list")))
+    np.testing.assert_array_equal(found["psi"], plain["psi"])
+    for given in ([{"BC": 0.14}], table.to_numpy(), None):
+        with pytest.raises(jn.errors.MechanismError, match="parameters: must be a dict of lists by the name"):
+            jn.solve_batch(mechanism, given, [0.0, 0.5])
+    with pytest.raises(jn.errors.MechanismError, match=r"parameters: the table has a column twice, got 'BC, BC'"):
+        jn.solve_batch(mechanism, table[["BC", "BC"]], [0.0, 0.5])
+
+
 @pytest.mark.slow
 def test_one_instant_and_one_design():
     family = jn.solve_batch(FOUR_BAR, {"BC": [0.14]}, [0.3], order=2)

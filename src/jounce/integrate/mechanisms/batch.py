@@ -8,7 +8,7 @@ import jax
 import numpy as np
 
 from jounce.base.padding import power_of_two
-from jounce.base.shapes import ArrayLike
+from jounce.base.shapes import ArrayLike, Labeled, Refused
 from jounce.dynamics.forward.accelerations import State
 from jounce.dynamics.forward.initial_state import consistent_start, initial_as_drivers
 from jounce.execution.backends import joined
@@ -61,7 +61,7 @@ STEPS = 16  # tried before runs that have ended make room for others
 @concrete
 def simulate_batch(
     mechanism: Mechanism | Robot,
-    parameters: Mapping[str, ArrayLike],
+    parameters: Mapping[str, ArrayLike] | Labeled | Refused,
     time: ArrayLike | TimeGrid | None = None,
     order: int = 4,
     *,
@@ -78,10 +78,10 @@ def simulate_batch(
     ----------
     mechanism : Mechanism or Robot
         As for `simulate`.
-    parameters : dict of str to array_like of shape (runs,)
-        Values of some parameters in each run, SI. Runs of a robot differ in coordinates at the start, by the name of
-        the joint, in velocities there, ``JOINT.rate``, and in masses, ``LINK.mass``, which leave the moments about the
-        center of mass as they are.
+    parameters : dict of str to array_like of shape (runs,), or pandas.DataFrame
+        Values of some parameters in each run, SI; of a table, by the names of its columns. Runs of a robot differ in
+        coordinates at the start, by the name of the joint, in velocities there, ``JOINT.rate``, and in masses,
+        ``LINK.mass``, which leave the moments about the center of mass as they are.
     time, order, method, tolerance, longest_step
         As for `simulate`; each run has steps of its own.
     **robot

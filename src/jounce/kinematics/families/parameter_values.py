@@ -13,7 +13,7 @@ from jounce.trajectory.labels import labels_of_rows
 
 
 def checked_values(
-    parameters: Mapping[str, Any],
+    parameters: Any,
     each: str,
     check: Callable[[str], None],
     error: type[JounceError] = MechanismError,
@@ -22,7 +22,7 @@ def checked_values(
 
     Parameters
     ----------
-    parameters : mapping
+    parameters : mapping or table of pandas
         By name.
     each : str
         What they differ in: designs or runs.
@@ -31,6 +31,7 @@ def checked_values(
     error : type
         To raise if values are not finite or of unequal number, or have labels in another order.
     """
+    parameters = by_parameter(parameters, each, error)
     if not parameters:
         raise error("a batch differs in at least one parameter", name="parameters", value=dict(parameters))
     values, count, known = {}, None, []
@@ -49,6 +50,25 @@ def checked_values(
             raise error(message, name=f"parameters.{name}", value=labels[:10])
         values[name], count, known = array, len(array), labels or known
     return values
+
+
+def by_parameter(parameters: Any, each: str, error: type[JounceError]) -> dict[Any, Any]:
+    """Return values of parameters by name: of a mapping, or of the columns of a table of pandas.
+
+    Raises
+    ------
+    JounceError
+        That given, if they are neither, or a column is there twice.
+    """
+    if isinstance(parameters, Mapping):
+        return dict(parameters)
+    if not (hasattr(parameters, "columns") and hasattr(parameters, "iloc")):
+        message = f"must be a dict of lists by the name of a parameter, one value for each {each}, or a table of pandas"
+        raise error(message, name="parameters", value=parameters)
+    names = list(parameters.columns)
+    if len(set(names)) < len(names):
+        raise error("the table has a column twice", name="parameters", value=", ".join(map(str, names)))
+    return {name: parameters[name] for name in names}
 
 
 def check_parameter(mechanism: Mechanism, name: str) -> None:

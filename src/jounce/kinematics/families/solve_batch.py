@@ -11,7 +11,7 @@ from jax.core import Tracer
 from jaxtyping import Bool, Float, Int
 
 from jounce.base.activity import Count
-from jounce.base.shapes import ArrayLike
+from jounce.base.shapes import ArrayLike, Labeled, Refused
 from jounce.errors import AssemblyError, JounceError, MechanismError, MobilityError, SolveError
 from jounce.execution.backends import joined
 from jounce.execution.threads import thread_count
@@ -56,7 +56,7 @@ SPOILED = (AssemblyError, MobilityError, SolveError)  # a design, not the family
 @concrete
 def solve_batch(
     mechanism: Mechanism,
-    parameters: Mapping[str, ArrayLike],
+    parameters: Mapping[str, ArrayLike] | Labeled | Refused,
     time: TimeLike | None = None,
     order: int = 4,
     *,
@@ -76,8 +76,8 @@ def solve_batch(
     ----------
     mechanism : Mechanism
         As for `jounce.solve`.
-    parameters : dict of str to array_like of shape (designs,)
-        Values of some parameters in each design, SI.
+    parameters : dict of str to array_like of shape (designs,), or pandas.DataFrame
+        Values of some parameters in each design, SI; of a table, by the names of its columns.
     time : array_like of shape (time,), optional
         Strictly increasing instants, s, the same for all; those of the mechanism unless given.
     order, tolerance
@@ -150,7 +150,7 @@ class _Family:
     def __init__(
         self,
         mechanism: Mechanism,
-        parameters: Mapping[str, ArrayLike],
+        parameters: Mapping[str, ArrayLike] | Labeled | Refused,
         time: TimeLike | None,
         order: int,
         tolerance: float,

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from jaxtyping import Float
 
-from jounce.base.shapes import ArrayLike
+from jounce.base.shapes import ArrayLike, by_component
 from jounce.errors import RobotError
 from jounce.kinematics import Status
 from jounce.planning.tool_paths.joint_poses import JointPoses
@@ -22,7 +22,6 @@ from jounce.robot.model.abstract_robot import AbstractRobot
 from jounce.robot.model.arguments import checked_position, floats, whole_number
 from jounce.robot.recursions.kinematics import forward_kinematics
 from jounce.robot.robot import Robot
-from jounce.trajectory.labels import in_order
 
 if TYPE_CHECKING:
     from scipy.spatial.transform import Rotation
@@ -232,9 +231,7 @@ def _checked_goal(position: Any, orientation: Any, direction: Any) -> tuple[dict
         raise RobotError("give an orientation or a direction, not both", name="direction")
     goal: dict[str, Any] = {}
     if position is not None:
-        goal["position"] = np.asarray(
-            floats("position", in_order("position", position, "xyz", RobotError, "components"))
-        )
+        goal["position"] = np.asarray(floats("position", by_component("position", position, RobotError)))
         if goal["position"].ndim < 1 or goal["position"].shape[-1] != 3:
             raise RobotError(f"must have the shape (..., 3), not {goal['position'].shape}", name="position")
         if not np.isfinite(goal["position"]).all():

@@ -7,11 +7,11 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
-from jounce.base.shapes import ArrayLike, Numbers
+from jounce.base.shapes import ArrayLike, Numbers, by_component
 from jounce.errors import RobotError, check_name
 from jounce.jet import Jet, concatenate, cross, dot
 from jounce.jet.algebra import stacked, total
-from jounce.rigid.inertia import finite_numbers
+from jounce.rigid.inertia import vector_numbers
 from jounce.rigid.orientation import check_rotation
 from jounce.robot.model.abstract_robot import AbstractRobot
 from jounce.robot.model.arguments import floats, joints_of
@@ -58,7 +58,7 @@ def tool_of(robot: AbstractRobot, link: str, point: ArrayLike, axis: ArrayLike) 
     check_name("link", link, robot.frames, RobotError, name="link")
     if robot.frames[link].body < 0:
         raise RobotError("this link is fixed to the base: no joint moves it", name="link", value=link)
-    axis = finite_numbers("axis", axis, (3,))
+    axis = vector_numbers("axis", axis, (3,))
     norm = float(np.linalg.norm(axis))
     if not norm:
         raise RobotError("must not be zero", name="axis", value=axis.tolist())
@@ -121,7 +121,7 @@ def rotation_matrices(name: str, value: "ArrayLike | Rotation") -> Float[np.ndar
 
     if (matrices := getattr(value, "as_matrix", None)) is not None:
         return np.asarray(matrices(), float)
-    array = np.asarray(floats(name, value))
+    array = np.asarray(floats(name, by_component(name, value, RobotError)))
     if array.ndim >= 2 and array.shape[-2:] == (3, 3):
         flat = array.reshape(-1, 3, 3)
         check_rotation(np.moveaxis(flat, 0, -1), name)
@@ -141,7 +141,7 @@ def unit_vectors(name: str, value: ArrayLike) -> Float[np.ndarray, "*batch 3"]:
     RobotError
         If they are not vectors, or have no length.
     """
-    array = np.asarray(floats(name, value))
+    array = np.asarray(floats(name, by_component(name, value, RobotError)))
     if array.ndim < 1 or array.shape[-1] != 3:
         raise RobotError(f"must have the shape (..., 3), not {array.shape}", name=name)
     norm = np.linalg.norm(array, axis=-1, keepdims=True)

@@ -9,7 +9,7 @@ import numpy as np
 from jax.core import Tracer
 from jaxtyping import Float
 
-from jounce.base.shapes import Numbers
+from jounce.base.shapes import Numbers, by_component
 from jounce.errors import RobotError
 from jounce.jet import Jet, cross
 from jounce.jet.algebra import stacked
@@ -62,7 +62,7 @@ def base_arrays(base: BaseMotion, lead: tuple[int, ...], levels: int) -> tuple[A
         raise RobotError("must be a jn.robot.BaseMotion", name="base", value=type(base).__name__)
     parts = []
     for name, shape in (("position", (3,)), ("quaternion", (4,)), ("twist", (levels, 6))):
-        array = floats(f"base.{name}", getattr(base, name))
+        array = floats(f"base.{name}", by_component(f"base.{name}", getattr(base, name), RobotError))
         if name == "twist" and array.ndim == len(lead) + 2 and array.shape[-2] > levels:
             array = array[..., :levels, :]
         if array.shape != (*lead, *shape):

@@ -9,10 +9,10 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from jounce.base.shapes import ArrayLike, Refused, is_traced, seconds
+from jounce.base.shapes import ArrayLike, Refused, by_component, is_traced, seconds
 from jounce.errors import MechanismError, RobotError, check_choice, check_name
 from jounce.jet import Jet, compose
-from jounce.rigid.inertia import finite_numbers
+from jounce.rigid.inertia import vector_numbers
 from jounce.robot.model.arguments import floats
 from jounce.robot.robot import Robot
 from jounce.trajectory.laws.user_laws import tried
@@ -51,7 +51,7 @@ class Wrench:
 
     def __post_init__(self) -> None:
         check_choice("frame", self.frame, FRAMES, RobotError, name="wrench.frame")
-        object.__setattr__(self, "point", finite_numbers("wrench.point", self.point, (3,)))
+        object.__setattr__(self, "point", vector_numbers("wrench.point", self.point, (3,)))
 
 
 def wrench_arrays(
@@ -118,7 +118,7 @@ def _derivatives(where: str, value: Any, lead: tuple[int, ...], levels: int, tim
         jet = Jet.variable(instants, levels - 1)
         parts = [compose(partial(_component, value, i), jet).derivatives() for i in range(3)]
         return jnp.moveaxis(jnp.stack(parts, axis=1), (0, 1), (-2, -1))
-    array = floats(where, value)
+    array = floats(where, by_component(where, value, RobotError))
     if array.shape == (3,):
         level = np.zeros((levels, 1))
         level[0] = 1.0

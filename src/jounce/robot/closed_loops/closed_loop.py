@@ -14,7 +14,7 @@ from jounce.mechanism.mechanism import names_column
 from jounce.mechanism.redundant_reactions import RedundantReactions
 from jounce.mechanism.resolve import resolve_motion
 from jounce.mechanism.time import TimeLike
-from jounce.rigid.inertia import finite_numbers
+from jounce.rigid.inertia import vector_numbers
 from jounce.robot.closed_loops.closures import GivenCoordinates, Loops, given_coordinates
 from jounce.robot.closed_loops.mechanism_parts import RobotParts, on_body
 from jounce.robot.model.abstract_robot import AbstractRobot
@@ -197,4 +197,4 @@ def body_point(robot: AbstractRobot, link: str, point: ArrayLike = (0.0, 0.0, 0.
     """
     check_name("link", link, robot.links, RobotError, name="link")
     body, position, rotation = on_body(robot, link)
-    return body, position + rotation @ finite_numbers("point", point, (3,))
+    return body, position + rotation @ vector_numbers("point", point, (3,))

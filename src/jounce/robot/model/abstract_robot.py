@@ -11,7 +11,7 @@ import numpy as np
 from jounce.base.display import Displayed
 from jounce.base.shapes import ArrayLike, Real, is_traced
 from jounce.errors import RobotError, check_name, did_you_mean
-from jounce.rigid.inertia import Inertia, TracedInertia, finite_numbers
+from jounce.rigid.inertia import Inertia, TracedInertia, finite_numbers, vector_numbers
 from jounce.robot.model.couplings import BallDrive, Coupling, Tendon, check_coupling
 from jounce.robot.model.floating_base import floating_joints
 from jounce.robot.model.links_and_joints import Closure, Joint, Limits, Link, limits_with_followers
@@ -36,7 +36,7 @@ class AbstractRobot(Displayed, abc.ABC):
         couplings: Sequence[Coupling] = (),
     ):
         self.name, self.strict = name, strict
-        self.gravity = finite_numbers("gravity", gravity, (3,))
+        self.gravity = vector_numbers("gravity", gravity, (3,))
         self.links: Mapping[str, Link] = MappingProxyType(_by_name("links", links, Link))
         in_order = ordered(self.links, _by_name("joints", joints, Joint))
         self.joints: Mapping[str, Joint] = MappingProxyType({joint.name: joint for joint in in_order})

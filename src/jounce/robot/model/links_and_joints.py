@@ -9,7 +9,7 @@ import numpy as np
 
 from jounce.base.shapes import ArrayLike, real_numbers
 from jounce.errors import RobotError, check_name
-from jounce.rigid.inertia import Inertia, finite_numbers, unchanging
+from jounce.rigid.inertia import Inertia, finite_numbers, unchanging, vector_numbers
 
 MOVING = ("revolute", "continuous", "prismatic")
 TYPES = (*MOVING, "fixed")
@@ -223,7 +223,7 @@ class Joint:
         where = f"joints.{self.name}"
         check_name("joint", self.type, TYPES, RobotError, "type", name=f"{where}.type")
         for field, shape in (("position", (3,)), ("rotation", (3, 3)), ("axis", (3,))):
-            object.__setattr__(self, field, finite_numbers(f"{where}.{field}", getattr(self, field), shape))
+            object.__setattr__(self, field, vector_numbers(f"{where}.{field}", getattr(self, field), shape))
         rotation_matrix(f"{where}.rotation", self.rotation)
         length = math.hypot(*self.axis)
         if self.type != "fixed":
@@ -374,9 +374,9 @@ class Closure:
         if len(links) != 2 or links[0] == links[1]:
             raise RobotError("must be two different links", name=f"{where}.links", value=self.links)
         object.__setattr__(self, "links", links)
-        object.__setattr__(self, "points", finite_numbers(f"{where}.points", self.points, (3,), (2, 3)))
+        object.__setattr__(self, "points", vector_numbers(f"{where}.points", self.points, (3,), (2, 3)))
         if self.type in ("pin", "slider"):
-            axis = finite_numbers(f"{where}.axis", self.axis, (3,)) if self.axis is not None else np.zeros(3)
+            axis = vector_numbers(f"{where}.axis", self.axis, (3,)) if self.axis is not None else np.zeros(3)
             length = float(np.linalg.norm(axis))
             if length < 1e-9:
                 given = None if self.axis is None else axis.tolist()
@@ -394,7 +394,7 @@ def rotation_matrix(name: str, value: ArrayLike) -> np.ndarray:
     RobotError
         If it is none.
     """
-    matrix = finite_numbers(name, value, (3, 3))
+    matrix = vector_numbers(name, value, (3, 3))
     if not np.allclose(matrix @ matrix.T, np.eye(3), rtol=0, atol=1e-6) or np.linalg.det(matrix) < 0:
         raise RobotError("must be a rotation matrix", name=name, value=matrix.tolist())
     return matrix

@@ -13,7 +13,7 @@ from jounce.errors import RobotError, check_name
 from jounce.jet import Jet, sine_cosine
 from jounce.jet.algebra import stacked, total
 from jounce.rigid.frames import Frames
-from jounce.rigid.inertia import Inertia, TracedInertia, finite_numbers
+from jounce.rigid.inertia import Inertia, TracedInertia, vector_numbers
 from jounce.robot.model.abstract_robot import AbstractRobot
 from jounce.robot.model.arguments import checked_coordinates
 from jounce.robot.model.tree import Frame, Tree
@@ -83,7 +83,7 @@ def frame_at(robot: AbstractRobot, link: str, point: ArrayLike) -> Frame:
         If there is no such link, or the point is not made of three finite numbers.
     """
     check_name("link", link, robot.frames, RobotError, name="link")
-    point = finite_numbers("point", point, (3,))
+    point = vector_numbers("point", point, (3,))
     frame = robot.frames[link]
     body = frame.body if frame.body >= 0 else len(robot.moving_links)
     return Frame(body, frame.position + frame.rotation @ point, frame.rotation)

@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Float
 
 from jounce.errors import RobotError, check_name
-from jounce.rigid.inertia import finite_numbers
+from jounce.rigid.inertia import vector_numbers
 from jounce.robot.model.links_and_joints import Limits
 from jounce.robot.robot import Robot
 
@@ -43,7 +43,7 @@ class PointLimits:
     def __post_init__(self) -> None:
         for field in ("speed", "acceleration"):
             _check_positive(field, getattr(self, field))
-        object.__setattr__(self, "point", tuple(finite_numbers("point", self.point, (3,)).tolist()))
+        object.__setattr__(self, "point", tuple(vector_numbers("point", self.point, (3,)).tolist()))
 
 
 @dataclasses.dataclass(frozen=True)
