@@ -47,7 +47,7 @@ def __getattr__(name: str) -> Any:
     if room is None and (name.startswith("_") or importlib.util.find_spec(f"{__name__}.{name}") is None):
         message = f"module {__name__!r} has no attribute {name!r}"
         raise AttributeError(message, name=name, obj=sys.modules[__name__])  # by which Python finds what is meant
-    with _importing.lock, _importing.uncollected():
+    with _importing.lock, _importing.without_garbage_collection():
         if room in (None, __name__):
             value = importlib.import_module(f"{__name__}.{name}")
         else:

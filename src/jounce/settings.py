@@ -21,7 +21,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from jounce.base import alterations
-from jounce.base.interrupts import left_behind
+from jounce.base.interrupts import is_forked_after_jax
 from jounce.base.jax_internals import config, core
 from jounce.base.jax_options import OPTIONS
 from jounce.errors import UnsupportedError
@@ -93,7 +93,7 @@ def check_process() -> None:
 
     XLA computes in threads, and a fork has none of them, only the locks that they held.
     """
-    if left_behind():
+    if is_forked_after_jax():
         raise UnsupportedError(
             "this process was forked after JAX had already computed, and would wait forever for threads that a fork "
             "does not have; start processes by 'spawn' or 'forkserver' (multiprocessing.get_context), or fork "
@@ -159,14 +159,14 @@ def under_own_settings(function: Callable[P, R]) -> Callable[P, R]:
         return steps  # pyright: ignore[reportReturnType]
 
     @functools.wraps(function)
-    def door(*arguments: P.args, **keywords: P.kwargs) -> R:
+    def wrapper(*arguments: P.args, **keywords: P.kwargs) -> R:
         if _thread.computing and _double.value:
             return function(*arguments, **keywords)
         with _OwnSettings():
             return function(*arguments, **keywords)
 
-    door.own_settings = True  # pyright: ignore[reportAttributeAccessIssue]
-    return door
+    wrapper.own_settings = True  # pyright: ignore[reportAttributeAccessIssue]
+    return wrapper
 
 
 def in_full(value: Any) -> jax.Array:
@@ -207,7 +207,7 @@ def called_back(function: Callable[[Any], Any], shapes: Any, values: Any, *, vma
     @under_own_settings
     def of_words(words: Any) -> Any:
         result = function(jax.tree.map(lambda x: np.ascontiguousarray(x).view(np.float64)[..., 0], words))
-        return jax.tree.map(lambda x, shape: _words(np.asarray(x, shape.dtype)), result, shapes)
+        return jax.tree.map(lambda x, shape: _as_words_of_32_bits(np.asarray(x, shape.dtype)), result, shapes)
 
     def as_words(shape: Any) -> jax.ShapeDtypeStruct:
         return jax.ShapeDtypeStruct((*shape.shape, 2), np.uint32) if _is_wide(shape) else shape
@@ -223,7 +223,7 @@ def _is_wide(array: Any) -> bool:
     return array.dtype.itemsize == 8
 
 
-def _words(array: np.ndarray) -> np.ndarray:
+def _as_words_of_32_bits(array: np.ndarray) -> np.ndarray:
     """Return an array whose numbers of 64 bits are two words each, along a new last axis; others as they are."""
     return np.array(array[..., None], order="C").view(np.uint32) if _is_wide(array) else array
 
@@ -240,9 +240,9 @@ def compute_under_own_settings(room: str) -> None:
     for name, value in list(offered.items()):
         if _is_open(value, room) and not name.startswith("_"):
             home = vars(sys.modules[value.__module__])
-            offered[name] = door = under_own_settings(value)
+            offered[name] = wrapper = under_own_settings(value)
             if home.get(value.__name__) is value:
-                home[value.__name__] = door  # by which pickle finds it
+                home[value.__name__] = wrapper  # by which pickle finds it
     cover_new_modules()
 
 
@@ -261,7 +261,7 @@ def cover_new_modules() -> None:
 
 
 def _is_open(value: Any, room: str) -> bool:
-    """Tell whether a value is a function of a room that has no door yet."""
+    """Tell whether a value is a function of a room that has no wrapper yet."""
     inside = inspect.isfunction(value) and f"{value.__module__}.".startswith(f"{room}.")
     return inside and not hasattr(value, "own_settings")
 
@@ -271,23 +271,23 @@ def _compute_under_own_settings(kind: type[Any]) -> None:
     for name, member in list(vars(kind).items()):
         if name in LEFT_ALONE or (name.startswith("_") and name not in OPERATORS and not name.startswith("_repr_")):
             continue
-        if (door := _with_door(member)) is not None:
-            setattr(kind, name, door)
+        if (wrapper := _decorated_member(member)) is not None:
+            setattr(kind, name, wrapper)
 
 
-def _with_door(member: Any) -> Any:
-    """Return a method or property that computes in double precision; None for what is none, or has a door."""
+def _decorated_member(member: Any) -> Any:
+    """Return a method or property that computes in double precision; None for what is none, or has a wrapper."""
     if isinstance(member, types.FunctionType):
         generated = member.__code__.co_filename == "<string>"  # by dataclasses: it stores values, or shows them
         return None if generated or hasattr(member, "own_settings") else under_own_settings(member)
     if isinstance(member, staticmethod | classmethod):
-        inner = _with_door(member.__func__)
+        inner = _decorated_member(member.__func__)
         return None if inner is None else type(member)(inner)
     if isinstance(member, property):
-        inner = _with_door(member.fget)
+        inner = _decorated_member(member.fget)
         return None if inner is None else member.getter(inner)
     if isinstance(member, functools.cached_property):
-        inner = _with_door(member.func)
+        inner = _decorated_member(member.func)
         if inner is not None:
             member.func = inner
     return None

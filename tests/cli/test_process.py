@@ -102,10 +102,10 @@ DEAF = {
 @pytest.mark.parametrize("where", DEAF)
 def test_a_signal_is_heard_where_an_exception_is_not(where, tmp_path):
     program = (
-        "import hashlib, pathlib, time; from jounce.base.interrupts import end_on_signals, undoing\n"
+        "import hashlib, pathlib, time; from jounce.base.interrupts import end_on_signals, cleanup_on_signal\n"
         "class Deaf:\n def __del__(self):\n  while True: pass\n"
         "begun = pathlib.Path('begun'); begun.touch()\n"
-        "with undoing(begun.unlink):\n end_on_signals()\n " + DEAF[where].replace("\n", "\n ")
+        "with cleanup_on_signal(begun.unlink):\n end_on_signals()\n " + DEAF[where].replace("\n", "\n ")
     )
     status, out, err = stopped(signal.SIGINT, 0.3, sys.executable, "-c", program, cwd=tmp_path)
     assert (status, out, err) == (130, "", "")

@@ -12,7 +12,7 @@ import pytest
 import jounce as jn
 from jounce import drivers, forces, planar, spatial
 from jounce.constraints.base import ROLES, catalogue
-from jounce.testing.reactions import acting, convolved, cross, resultant, spins_of, worked
+from jounce.testing.reactions import acting, convolved, cross, power_of_element, resultant, spins_of
 from jounce.testing.samples import BODIES
 from tests.constraints.test_wheels import sleigh
 from tests.contracts.test_frames import MECHANISMS, TURNED
@@ -110,7 +110,7 @@ def test_what_is_exerted_has_no_resultant_and_the_power_of_what_it_works_on(spac
         if element.role != "force" or len(element.bodies) > 1:
             assert np.abs(exerted.force).max() <= 1e-13 * size, name
             assert np.abs(exerted.moment).max() <= 1e-12 * size, name
-        expected, bound = worked(found, name, element, pose), 1e-12 * size * np.abs(spins).max()
+        expected, bound = power_of_element(found, name, element, pose), 1e-12 * size * np.abs(spins).max()
         np.testing.assert_allclose(exerted.power, expected, rtol=0, atol=bound, err_msg=name)
         missing.discard(type(element))
     assert not missing

@@ -16,7 +16,7 @@ from tests.problems.dynamics import double_pendulum
 from tests.problems.small import four_bar
 from tests.programs import counts, forget
 
-START = "_moved", "_with_row_rates", "_judged"  # of a simulation, made while its programs are
+START = "_moved", "_with_row_rates", "_computed_facts"  # of a simulation, made while its programs are
 
 
 @pytest.fixture

@@ -6,7 +6,7 @@ import pytest
 
 import jounce as jn
 from jounce import jet
-from jounce.jet.turns import WHOLE_TURN, brought_near, counted_by_rates, counted_on, principal
+from jounce.jet.turns import WHOLE_TURN, counted_by_rates, counted_on, principal, shifted_by_turns
 
 
 def jet_of(coefficients):
@@ -31,7 +31,7 @@ def test_wrap_is_to_the_nearest_multiple(value, rest):
 
 @pytest.mark.parametrize("of", [np.asarray, jnp.asarray, lambda angle: jn.Jet([jnp.asarray(angle), jnp.ones(3)])])
 def test_an_angle_is_brought_near_to_what_is_expected(of):
-    near = brought_near(of(np.array([0.1, 3.0, -3.0])), np.array([0.2 + 5 * WHOLE_TURN, -3.0, 3.0]))
+    near = shifted_by_turns(of(np.array([0.1, 3.0, -3.0])), np.array([0.2 + 5 * WHOLE_TURN, -3.0, 3.0]))
     value = near.coefficients[0] if isinstance(near, jn.Jet) else near
     expected = np.array([0.1 + 5 * WHOLE_TURN, 3.0 - WHOLE_TURN, -3.0 + WHOLE_TURN])
     np.testing.assert_allclose(value, expected, atol=1e-13)

@@ -242,7 +242,7 @@ def test_pictures_say_which_data_are_stand_ins(tmp_path, samples, masses, said, 
     measured.write_text("time,slow\n" + "".join(f"{0.1 * k},1\n" for k in range(9)))
     link.write_text(LINK)
     cases = given_cases(measured if samples else None, link if masses else None)
-    for note in map(figures.stand_in_note, cases.values()):
+    for note in map(figures.note_on_substitutes, cases.values()):
         assert all(word in note for word in said)
         assert not any(word in note for word in unsaid)
 

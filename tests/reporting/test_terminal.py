@@ -11,7 +11,7 @@ import jounce as jn
 from jounce.base.activity import Activity, Count, compiling, now
 from jounce.reporting.peaks import Peak, peaks
 from jounce.reporting.progress import Display
-from jounce.reporting.terminal import say, show_peaks
+from jounce.reporting.terminal import print_text, show_peaks
 
 RSUR = pathlib.Path(__file__).resolve().parents[2] / "examples" / "rsur.yaml"
 
@@ -62,7 +62,7 @@ def test_a_line_of_progress_is_shown_on_a_terminal_and_for_long_work_only(capsys
         shown._look()
         assert "solving" in (err := capsys.readouterr().err)
         assert "60 %" in err
-        say("words")  # take the line away
+        print_text("words")  # take the line away
         assert shown._line is None
     assert capsys.readouterr().out == "words\n"
     assert reports == [(3, 5)]

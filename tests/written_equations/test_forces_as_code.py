@@ -51,7 +51,7 @@ def test_friction_is_refused_by_name(name, monkeypatch):
     """It follows from the multipliers of the same instant; the constraints do not depend on it."""
     mechanism = MECHANISMS[name]()
     with monkeypatch.context() as before_computing:
-        before_computing.setattr(mechanism_equations, "put_together", None)
+        before_computing.setattr(mechanism_equations, "model_of_equations", None)
         with pytest.raises(UnsupportedError, match=r"^joints\.\w+\.friction: forces as code of a mechanism whose"):
             jn.equations(mechanism, order=2, quantities=("constraints", "forces"))
     assert "def residual" in jn.equations(mechanism, order=1)

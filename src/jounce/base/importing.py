@@ -13,7 +13,7 @@ frozen = threading.Event()
 
 
 @contextlib.contextmanager
-def uncollected() -> Iterator[None]:
+def without_garbage_collection() -> Iterator[None]:
     """Leave the search for garbage until later.
 
     Imports, and programs that are traced and written, leave little, and each search looks through all of JAX again: a

@@ -95,7 +95,7 @@ def _end(number: int, _frame: object = None) -> None:
 
 
 @contextmanager
-def undoing(undo: Callable[[], object]) -> Iterator[None]:
+def cleanup_on_signal(undo: Callable[[], object]) -> Iterator[None]:
     """Call a function if a signal ends the process meanwhile, such as one that removes an unfinished file.
 
     It may run in any thread while another stands still anywhere, so it must need no lock.
@@ -122,7 +122,7 @@ def raising() -> Iterator[None]:
 
 
 @contextmanager
-def shielding() -> Iterator[None]:
+def interrupts_shielded() -> Iterator[None]:
     """Keep Ctrl-C from the processes that threads started meanwhile will start: they end with the command, silently.
 
     It goes to all processes of a terminal, and each would print where it was. The mask of a thread goes over to the
@@ -144,7 +144,7 @@ def mark_forks() -> None:
         os.register_at_fork(after_in_child=_after_fork)
 
 
-def left_behind() -> bool:
+def is_forked_after_jax() -> bool:
     """Tell whether this process was forked from one in which JAX had started: XLA's threads are not in it."""
     return _left_behind
 

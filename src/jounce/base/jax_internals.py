@@ -19,7 +19,7 @@ CERTAIN = "by_certain_entries"  # a name of operations
 OWN = "subroutine_"  # how the names of functions begin that are not written in the place of their calls
 
 
-def is_tried() -> bool:
+def is_tested_release() -> bool:
     """Tell whether this release of JAX was tried: another one may say otherwise what an operation is to do."""
     return jax.__version_info__[:2] in TRIED
 

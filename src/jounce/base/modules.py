@@ -303,13 +303,13 @@ def read_only(entries: Mapping[str, Any], instead: str) -> ReadOnlyDict:
     return entries if isinstance(entries, ReadOnlyDict) else ReadOnlyDict(entries, instead)
 
 
-def is_ours(thing: Any) -> bool:
+def belongs_to_package(thing: Any) -> bool:
     """Tell whether a class or a function is one of this package, by the name of its module.
 
     Examples
     --------
-    >>> from jounce.base.modules import Module, is_ours
-    >>> is_ours(Module), is_ours(print)
+    >>> from jounce.base.modules import Module, belongs_to_package
+    >>> belongs_to_package(Module), belongs_to_package(print)
     (True, False)
     """
     module = getattr(thing, "__module__", None)
@@ -328,8 +328,10 @@ def changes_parts(kind: type, general: tuple[type, ...], known: Iterable[str] = 
     known : iterable of str, optional
         Names that do not count.
     """
-    if is_ours(kind):
+    if belongs_to_package(kind):
         return False
-    ours = [base for base in kind.__mro__ if is_ours(base) and base not in (*general, Module)]
+    ours = [base for base in kind.__mro__ if belongs_to_package(base) and base not in (*general, Module)]
     named = {name for base in ours for name in vars(base) if name[:2] != "__" and name[:4] != "_abc"}
-    return any(name in named.difference(known) for base in kind.__mro__ if not is_ours(base) for name in vars(base))
+    return any(
+        name in named.difference(known) for base in kind.__mro__ if not belongs_to_package(base) for name in vars(base)
+    )

@@ -64,7 +64,7 @@ class PrivateFolder:
         try:
             with open(self._opened(name, _READ), "rb") as stream:  # noqa: PTH123 - of a descriptor
                 status = os.fstat(stream.fileno())
-                if not stat.S_ISREG(status.st_mode) or _fault(status):
+                if not stat.S_ISREG(status.st_mode) or _unsafe_reason(status):
                     return None
                 with contextlib.suppress(OSError):
                     os.utime(stream.fileno() if os.utime in os.supports_fd else self.path / name)
@@ -112,7 +112,7 @@ class PrivateFolder:
         return {} if self._descriptor is None else {"dir_fd": self._descriptor}
 
     def _check(self, status: os.stat_result) -> None:
-        if fault := _fault(status):
+        if fault := _unsafe_reason(status):
             message = f"{fault}: somebody else may have written its contents; use a folder that only you can write to"
             raise OutputError(message, path=self.path)
 
@@ -127,7 +127,7 @@ class PrivateFolder:
                 raise OutputError(f"is in the folder {folder}, in which others may write", path=self.path)
 
 
-def _fault(status: os.stat_result) -> str:
+def _unsafe_reason(status: os.stat_result) -> str:
     """Say why a folder or a file may hold what another has put there; nothing where it does not."""
     if not _POSIX:
         return ""

@@ -51,7 +51,7 @@ from jounce.cli.standard_streams import failsafe_streams
 from jounce.cli.viewing import view
 from jounce.errors import JounceError, SolveError
 from jounce.reporting.progress import Display
-from jounce.reporting.terminal import cautions, complain, detail, unexpected
+from jounce.reporting.terminal import cautions, detail, print_error, unexpected
 
 
 def completion(shell: Literal["bash", "zsh", "fish"], /, *, install: bool = False, out: Path | None = None) -> int:
@@ -131,7 +131,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             return status
         from jounce.io.files.reading import reason_of
 
-        complain(f"standard output cannot be written: {reason_of(output.failure)}", json=as_json)
+        print_error(f"standard output cannot be written: {reason_of(output.failure)}", json=as_json)
     return status or 1
 
 
@@ -164,20 +164,20 @@ def _status(given: list[str], as_json: bool, verbose: bool) -> int:
     except KeyboardInterrupt:
         return 130
     except SolveError as error:
-        complain(error, json=as_json)
+        print_error(error, json=as_json)
         if details := getattr(error, "details", ""):
             detail(details if verbose else "--verbose adds details", json=as_json)
         return 2 if error.motion is None else 1
     except JounceError as error:
-        complain(error, json=as_json)
+        print_error(error, json=as_json)
         return 1 if getattr(error, "while_writing", False) else 2
     except WritingError as error:
-        complain(error, json=as_json)
+        print_error(error, json=as_json)
         return 1
     except Exception as error:  # the last resort: a message, not a traceback
         if os.environ.get("JOUNCE_DEBUG"):
             raise
-        complain(f"{unexpected(error)}; set JOUNCE_DEBUG=1 for the traceback", json=as_json)
+        print_error(f"{unexpected(error)}; set JOUNCE_DEBUG=1 for the traceback", json=as_json)
         return 1
 
 

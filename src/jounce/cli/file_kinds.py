@@ -82,7 +82,7 @@ def _kind_of_data(data: Any) -> str | None:
 
 
 @contextmanager
-def expecting(path: str | PathLike[str], *kinds: str) -> Iterator[None]:
+def explaining_other_kinds(path: str | PathLike[str], *kinds: str) -> Iterator[None]:
     """Where a file of a kind cannot be read, say which kind it is instead, and what takes it.
 
     Raises

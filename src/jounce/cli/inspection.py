@@ -8,11 +8,11 @@ from typing import Annotated, Any
 from cyclopts import Parameter
 
 from jounce.cli.arguments import check_ending
-from jounce.cli.file_kinds import expecting
+from jounce.cli.file_kinds import explaining_other_kinds
 from jounce.cli.options import PLAIN_MECHANISM, MechanismReading, RobotReading, errors_about, options_named
 from jounce.errors import JounceError
 from jounce.io.files import DATA_FILES, ROBOT_FILES
-from jounce.reporting.terminal import say, say_json, show_table
+from jounce.reporting.terminal import print_text, say_json, show_table
 
 
 def inspect(
@@ -68,7 +68,7 @@ def inspect(
     from jounce.reporting.text.summaries import start_heading, start_summary
     from jounce.reporting.text.tables import bodies_table, mechanism_tables, robot_tables
 
-    with expecting(file, "mechanism", "robot"):
+    with explaining_other_kinds(file, "mechanism", "robot"):
         check_ending(file, (*DATA_FILES, *ROBOT_FILES))
     if file.suffix.lower() in ROBOT_FILES:
         robot = RobotReading(strict=strict, allow=reading.allow, model=model, closures=closures)
@@ -82,17 +82,17 @@ def inspect(
     if json:
         say_json("inspect", facts)
     else:
-        say(start_heading(facts))
+        print_text(start_heading(facts))
         of_robot = facts["kind"] == "robot"
         for table in robot_tables(facts) if of_robot else mechanism_tables(facts, bodies_table(facts)):
             show_table(table)
         if "other_reader" in facts:
             _show_other_reader(facts["other_reader"])
-        say(f"\n{start_summary(facts)}")
+        print_text(f"\n{start_summary(facts)}")
         if range_found := facts.get("range"):
             from jounce.reporting.facts.mechanism.range_facts import range_words
 
-            say(f"\n{range_words(dict(range_found))}")
+            print_text(f"\n{range_words(dict(range_found))}")
     return 0 if facts["ok"] else 1
 
 
@@ -138,6 +138,6 @@ def _show_other_reader(facts: dict[str, Any]) -> None:
     if facts["indices"] is not None:
         plain = all(factor == 1 for factor in facts["factors"])
         times = "" if plain else f"{[round(x, 12) for x in facts['factors']]} * "
-        say(f"\n  velocities of {facts['name']} = {times}ours[{facts['indices']}]")
+        print_text(f"\n  velocities of {facts['name']} = {times}ours[{facts['indices']}]")
     if facts["note"]:
-        say(f"\n  {facts['note']}")
+        print_text(f"\n  {facts['note']}")

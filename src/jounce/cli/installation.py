@@ -10,7 +10,7 @@ import re
 import warnings
 from typing import Any
 
-from jounce.reporting.terminal import say, say_json, show_columns
+from jounce.reporting.terminal import print_text, say_json, show_columns
 
 PACKAGES = ("jax", "jaxlib", "numpy", "scipy", "xarray", "llvmlite", "pydantic", "pint", "matplotlib")
 FOR_DEVELOPERS = ("test", "bench", "docs", "all")
@@ -44,7 +44,7 @@ def doctor(*, json: bool = False) -> int:
         say_json("doctor", {"facts": facts, "errors": tests, "passed": not failed})
         return 1 if failed else 0
     show_columns(list(facts.items()))
-    say("")
+    print_text("")
     show_columns(
         [
             (name, f"{'FAILED' if name in failed else 'passed'}: error {error:.1e} of the peak")

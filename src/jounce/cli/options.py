@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from cyclopts import Parameter
 
-from jounce.cli.file_kinds import expecting
+from jounce.cli.file_kinds import explaining_other_kinds
 from jounce.errors import JounceError, OutputError, RobotError, UnitError
-from jounce.reporting.terminal import say, say_json
+from jounce.reporting.terminal import print_text, say_json
 
 if TYPE_CHECKING:
     from jounce.mechanism import Mechanism
@@ -95,7 +95,7 @@ class MechanismReading:
         from jounce.io import load
 
         import_files(self.import_)
-        with expecting(file, "mechanism"):
+        with explaining_other_kinds(file, "mechanism"):
             mechanism = load(file, allow=allowed(self.allow))
         if self.redundant_reactions is not None:
             mechanism = replace(mechanism, redundant_reactions=self.redundant_reactions)
@@ -156,7 +156,7 @@ class RobotReading:
         from jounce.io import load_robot
         from jounce.io.robots.payloads import with_payloads
 
-        with expecting(file, "robot"):
+        with explaining_other_kinds(file, "robot"):
             robot = load_robot(
                 file, strict=self.strict, model=self.model, closures=self.closures, allow=allowed(self.allow)
             )
@@ -175,7 +175,7 @@ class RobotReading:
         """
         from jounce.io import load_trajectory
 
-        with expecting(file, "trajectory"):
+        with explaining_other_kinds(file, "trajectory"):
             return load_trajectory(
                 file,
                 self.degree,
@@ -240,7 +240,7 @@ class TableOutput:
 
     def tell(self, command: str, result: Callable[[], Mapping[str, Any]]) -> None:
         """Print the result as JSON, or where it was written."""
-        tell(command, result, self.out, json=self.json)
+        print_result(command, result, self.out, json=self.json)
 
 
 @AMONG_THE_OTHERS
@@ -288,12 +288,12 @@ def units_chosen(known: ShownUnits, texts: Sequence[str] | None) -> ShownUnits:
 PLAIN_MECHANISM, PLAIN_ROBOT, NO_TABLE, PLAIN = MechanismReading(), RobotReading(), TableOutput(), Heading()
 
 
-def tell(command: str, result: Callable[[], Mapping[str, Any]], out: Path | None, *, json: bool) -> None:
+def print_result(command: str, result: Callable[[], Mapping[str, Any]], out: Path | None, *, json: bool) -> None:
     """Print the result of a command as JSON, or where it was written."""
     if json:
         say_json(command, result())
     elif out is not None:
-        say(f"\nWritten to {out}")
+        print_text(f"\nWritten to {out}")
 
 
 def import_files(paths: Sequence[Path] | None) -> None:

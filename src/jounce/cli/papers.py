@@ -7,7 +7,7 @@ from typing import Any
 
 from jounce.base.activity import Count
 from jounce.errors import JounceError, check_name
-from jounce.reporting.terminal import say
+from jounce.reporting.terminal import print_text
 
 PAPERS = ("sommer-2024", "negrean-2025")
 
@@ -68,6 +68,6 @@ def reproduce(
         from jounce.papers import sommer_2024 as home
     with Count("reproducing") as bar:
         paths = home.reproduce(out, progress=bar, **given)
-    say(paths[0].read_text(encoding="utf-8"))
-    say(f"Written to {out}: {count(len(paths), 'file')}")
+    print_text(paths[0].read_text(encoding="utf-8"))
+    print_text(f"Written to {out}: {count(len(paths), 'file')}")
     return 0

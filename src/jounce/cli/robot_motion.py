@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from jounce.base.activity import Count
 from jounce.cli.options import AMONG_THE_OTHERS, RobotReading, TableOutput, errors_about, spare_inputs
 from jounce.errors import JounceError, RobotError
-from jounce.reporting.terminal import say, show_peaks
+from jounce.reporting.terminal import print_text, show_peaks
 
 if TYPE_CHECKING:
     from jounce.integrate import AbstractMethod
@@ -135,7 +135,7 @@ def simulate_robot_file(
         motion = simulate(robot, times, order, strict=False, drives=not settings.no_drives, progress=bar, **options)
     peaks = table_peaks(motion.dataset)
     if not output.json:
-        say(robot_motion_summary(motion, file))
+        print_text(robot_motion_summary(motion, file))
         show_peaks(peaks)
     output.write(lambda: motion.dataset)
     output.tell("simulate", lambda: robot_motion_result(motion, peaks, file, output.out))

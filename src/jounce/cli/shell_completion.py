@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from jounce.errors import JounceError, OutputError
-from jounce.reporting.terminal import say
+from jounce.reporting.terminal import print_text
 
 
 def complete(app: Any, shell: str, install: bool, out: Path | None) -> int:
@@ -20,15 +20,15 @@ def complete(app: Any, shell: str, install: bool, out: Path | None) -> int:
         check_target(out)
         with replacing(out) as scratch:
             scratch.write_text(app.generate_completion(shell=shell), encoding="utf-8")
-        say(f"Written to {out}")
+        print_text(f"Written to {out}")
         return 0
     if not install:
-        say(app.generate_completion(shell=shell))
+        print_text(app.generate_completion(shell=shell))
         return 0
     try:
         path = app.install_completion(shell=shell)
     except OSError as error:
         message = f"cannot be written: {reason_of(error)}"
         raise OutputError(message, while_writing=True, path=error.filename) from None
-    say(f"Written to {path}\nIt works in every {shell} that you start from now on.")
+    print_text(f"Written to {path}\nIt works in every {shell} that you start from now on.")
     return 0

@@ -6,11 +6,11 @@ from pathlib import Path
 
 from jounce.base.interrupts import raising
 from jounce.cli.arguments import check_ending
-from jounce.cli.file_kinds import expecting, kind_of
+from jounce.cli.file_kinds import explaining_other_kinds, kind_of
 from jounce.cli.options import PLAIN_MECHANISM, MechanismReading, allowed, errors_about
 from jounce.errors import JounceError
 from jounce.io.files import DATA_FILES, ROBOT_FILES
-from jounce.reporting.terminal import say
+from jounce.reporting.terminal import print_text
 
 
 def view(
@@ -76,7 +76,7 @@ def view(
             raise JounceError("is for mechanism files; a robot has no parameters", name=option)
         if file.suffix.lower() not in DATA_FILES:
             reading.refuse_times(file)
-        with expecting(file, "mechanism", "robot", "cam"):
+        with explaining_other_kinds(file, "mechanism", "robot", "cam"):
             check_ending(file, (*DATA_FILES, *ROBOT_FILES))
             folders = allowed(reading.allow)
             for name, given in (("--without", without), ("--hold", hold)):
@@ -85,7 +85,7 @@ def view(
             opened = {"port": port, "order": order, "open_page": not no_open, "allow": folders}
             held_joints = "all" if hold == ["all"] else hold or ()
             page = show(subject, trajectory, modes=modes, without=without or (), hold=held_joints, **opened)
-    say(f"{page.page.recording.title or file.name}: {page.url} (Ctrl-C ends)")
+    print_text(f"{page.page.recording.title or file.name}: {page.url} (Ctrl-C ends)")
     with raising():
         page.wait()
     return 0

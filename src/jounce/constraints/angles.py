@@ -21,7 +21,7 @@ from jounce.errors import MechanismError
 from jounce.execution.traced_once import traced_once
 from jounce.jet import Jet, components, cross, dot, stack, wrap
 from jounce.jet.algebra import total
-from jounce.jet.turns import brought_near, principal
+from jounce.jet.turns import principal, shifted_by_turns
 from jounce.rigid.spatial import SpatialPose, body_axes
 
 SMALLEST_COSINE = 1e-6  # of half the tilt of the axis: below it the tilt is half a turn, and the angle is undefined
@@ -91,9 +91,9 @@ def relative_angle(
     if vector_i is not None and vector_j is not None:
         second = vector_j if datum is None or datum.across is None else datum.across
         angle = _between(body_i, body_j, axis, vector_i, second)
-        return angle if datum is None else brought_near(angle, datum.near)
+        return angle if datum is None else shifted_by_turns(angle, datum.near)
     turn = _turn(body_i, body_j, axis, datum)
-    return wrap(turn) if datum is None else brought_near(turn, datum.near - datum.angle) + datum.angle
+    return wrap(turn) if datum is None else shifted_by_turns(turn, datum.near - datum.angle) + datum.angle
 
 
 # The rate of the angle is the angular velocity along the axis, but for terms that vanish while the bodies turn about

@@ -62,7 +62,7 @@ def register(kind: type[Any], type: str, space: str, role: str) -> None:  # noqa
     catalogues = [_REGISTRY.setdefault((each, role), {}) for each in ((space,) if space else SPACES)]
     for taken in catalogues:
         other = _last_whole(taken.get(type, ()))
-        if other is not None and (_is_ours(other) or _full_name(other) != _full_name(kind)):
+        if other is not None and (_belongs_to_package(other) or _full_name(other) != _full_name(kind)):
             message = (
                 f"the {role} type of {kind.__qualname__} is that of {other.__module__}.{other.__qualname__} already"
             )
@@ -234,7 +234,7 @@ def _full_name(kind: type[Any]) -> tuple[str, str]:
     return kind.__module__, kind.__qualname__
 
 
-def _is_ours(kind: type[Any]) -> bool:
+def _belongs_to_package(kind: type[Any]) -> bool:
     """Tell whether a class is one of this package, for which another only passes itself off, by its module's name."""
     return kind.__module__.partition(".")[0] == __name__.partition(".")[0]
 
@@ -263,7 +263,7 @@ def check_bodies(element: Any, counts: Sequence[int], does: str = "joins", must:
     name = getattr(element, "type_name", "") or type(element).__name__
     if len(element.bodies) not in counts:
         message = f"{name} {does} {counted(counts)} {'body' if counts == (1,) else 'bodies'}"
-        if not _is_ours(type(element)):
+        if not _belongs_to_package(type(element)):
             message += ", as its class says by body_count"
         raise MechanismError(message, name="bodies", value=list(element.bodies))
     if len(set(element.bodies)) != len(element.bodies) and not getattr(element, "may_repeat", False):

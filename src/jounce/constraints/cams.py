@@ -4,7 +4,7 @@ import dataclasses
 from collections.abc import Sequence
 from typing import Any
 
-from jounce.base.modules import field, is_ours
+from jounce.base.modules import belongs_to_package, field
 from jounce.constraints.angles import upright
 from jounce.constraints.base import AbstractConstraint, MotionLaw, Part, rows
 from jounce.constraints.drivers import CoordinateDriver, RotationDriver, SlideDriver, SpatialSlideDriver
@@ -133,7 +133,7 @@ def coordinate_of_element(element: Any, name: str = "leader") -> Any:
     if isinstance(element, Cam):
         element = element.follower
     kind, bodies = type(element), getattr(element, "bodies", ())
-    if not isinstance(element, AbstractConstraint) or not is_ours(kind.residual):
+    if not isinstance(element, AbstractConstraint) or not belongs_to_package(kind.residual):
         message = "must be a driver, or a joint that turns or slides, of this package"
         raise MechanismError(f"{message}; for any other law, write a joint of your own", name=name, value=element)
     if element.role == "driver" and hasattr(element, "evaluate"):

@@ -13,7 +13,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
-from jounce.base.modules import Module, field, is_ours
+from jounce.base.modules import Module, belongs_to_package, field
 from jounce.base.shapes import is_traced
 from jounce.constraints.base import Scalar
 from jounce.errors import MechanismError, UnsupportedError
@@ -254,11 +254,11 @@ def check_no_own_code(joint: Any) -> None:
     friction = getattr(joint, "friction", None)
     if friction is None or not (hasattr(joint, "slip") or hasattr(joint, "passed_on")):
         return
-    if not is_ours(type(friction)):
+    if not belongs_to_package(type(friction)):
         message = "a law of friction of your own is not supported: give a jn.joints.Friction, or apply a force"
         raise UnsupportedError(message, name="friction", value=type(friction).__name__)
     for name in ("slip", "pressing", "passed_on"):
-        if not is_ours(getattr(type(joint), name, check_no_own_code)):
+        if not belongs_to_package(getattr(type(joint), name, check_no_own_code)):
             message = f"a joint of your own cannot have friction, as its `{name}` is yours: apply a force instead"
             raise UnsupportedError(message, name="friction")
 

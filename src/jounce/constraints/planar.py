@@ -16,7 +16,7 @@ from jounce.constraints.base import AbstractConstraint, Curve, Flag, Nested, Sca
 from jounce.constraints.friction import Velocities, check_friction, line_turn, relative_turn, relative_velocity
 from jounce.errors import MechanismError
 from jounce.jet import Jet, atan2, cross, dot, sqrt, wrap
-from jounce.jet.turns import brought_near
+from jounce.jet.turns import shifted_by_turns
 from jounce.rigid import PlanarPose
 from jounce.rigid.pose import Pose
 
@@ -260,7 +260,7 @@ class Gear(AbstractConstraint, type="gear", space="planar"):
             return _turned(self, body_i, body_j, others[0].angle, self.ratio)
         d = body_j.point(self.point_j) - body_i.point(self.point_i)
         ratio, center_distance = -self.radius_i / self.radius_j, self.radius_i + self.radius_j
-        d = d + _aside(d, center_distance)
+        d = d + _center_offset(d, center_distance)
         excess = _turned_on_line(self, body_i, body_j, others, d, ratio)
         if self.flank is None or self.pressure_angle is None:
             return excess
@@ -289,7 +289,7 @@ def _turned_on_line(
         period = 2 * jnp.pi * (1.0 - ratio)
         period = jnp.where(period == 0, FAR, period)  # then the line does not count
         return wrap(_turned(joint, body_i, body_j, line, ratio), period)
-    line = brought_near(line, others[0].angle.coefficients[0] + joint.arm)
+    line = shifted_by_turns(line, others[0].angle.coefficients[0] + joint.arm)
     return _turned(joint, body_i, body_j, line, ratio)
 
 
@@ -297,7 +297,7 @@ def _turned(joint: Any, body_i: PlanarPose, body_j: PlanarPose, line: Jet, ratio
     return (body_j.angle - line) - ratio * (body_i.angle - line) - joint.offset
 
 
-def _aside(d: Jet, distance: Any) -> Any:
+def _center_offset(d: Jet, distance: Any) -> Any:
     """Return an offset of centers of gears that coincide in a guess, where the line of centers is undefined."""
     value = d.coefficients[0]
     together = (value == 0).all(axis=0)
@@ -336,7 +336,7 @@ class Belt(AbstractConstraint, type="belt", space="planar"):
     def residual(self, body_i: PlanarPose, body_j: PlanarPose, *others: Any) -> Jet:
         """Return what body j lacks of turning as body i says; others are as those of a gear with teeth."""
         d = body_j.point(self.point_j) - body_i.point(self.point_i)
-        d = d + _aside(d, self.radius_i + self.radius_j)
+        d = d + _center_offset(d, self.radius_i + self.radius_j)
         return _turned_on_line(self, body_i, body_j, others, d, self.ratio)
 
     def slip(self, bodies: tuple[Any, ...], moving: Velocities) -> Jet:

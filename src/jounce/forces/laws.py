@@ -7,7 +7,7 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 
-from jounce.base.modules import Module, changes_parts, field, is_ours
+from jounce.base.modules import Module, belongs_to_package, changes_parts, field
 from jounce.jet import Jet, stack
 from jounce.jet.algebra import Quantity
 from jounce.jet.programs.read_methods import ReadObject
@@ -24,7 +24,7 @@ class AbstractLaw(Module):
 
     def __call__(self, displacement: Jet, velocity: Jet, time: Jet) -> Jet:
         """Return the jet of the force, of the shape of the displacement."""
-        return _spread(self.value(displacement, velocity, time), displacement, time)
+        return _broadcast_to_jet(self.value(displacement, velocity, time), displacement, time)
 
 
 class ExpressionLaw(AbstractLaw):
@@ -139,7 +139,7 @@ class VectorLaw(AbstractLaw):
     def value(self, displacement: Jet, velocity: Jet, time: Jet) -> Jet:
         """Return the jet of the force, a vector."""
         parts = [part.value(displacement, velocity, time) for part in self.parts]
-        return stack([_spread(part, displacement[0], time) for part in parts])
+        return stack([_broadcast_to_jet(part, displacement[0], time) for part in parts])
 
 
 class ReadLaw(AbstractLaw):
@@ -177,7 +177,7 @@ def is_users_law(law: Any) -> bool:
     if not isinstance(law, AbstractLaw):
         return is_users(law)
     kind = type(law)
-    return isinstance(law, FunctionLaw) or not is_ours(kind.value) or changes_parts(kind, (AbstractLaw,))
+    return isinstance(law, FunctionLaw) or not belongs_to_package(kind.value) or changes_parts(kind, (AbstractLaw,))
 
 
 def _named(names: tuple[str, ...], jet: Jet) -> dict[str, Jet]:
@@ -186,7 +186,7 @@ def _named(names: tuple[str, ...], jet: Jet) -> dict[str, Jet]:
     return {name: jet[k] for k, name in enumerate(names)}
 
 
-def _spread(value: Quantity, like: Jet, time: Jet) -> Jet:
+def _broadcast_to_jet(value: Quantity, like: Jet, time: Jet) -> Jet:
     """Return a value as a jet of the shape of another: a law of time alone is the same for all instances."""
     shape = jnp.shape(like.coefficients[0])
     if not isinstance(value, Jet):

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, TextIO
 import numpy as np
 
 from jounce.errors import OutputError
-from jounce.io.files.column_units import heading, is_si, says_a_unit
+from jounce.io.files.column_units import heading, is_si, names_a_unit
 from jounce.io.files.netcdf_parts import NetcdfParts
 from jounce.io.files.reading import written_name
 from jounce.io.files.writing import check_target, replacing
@@ -207,7 +207,7 @@ def _write_rows(dataset: xarray.Dataset, stream: TextIO, header_units: bool | No
         units = column_units(dataset, table)
         chosen_units = header_units
         if chosen_units is None:
-            chosen_units = not all(map(is_si, units)) or any(map(says_a_unit, table))
+            chosen_units = not all(map(is_si, units)) or any(map(names_a_unit, table))
         names = [
             heading(name, unit) if chosen_units and unit else name for name, unit in zip(table, units, strict=True)
         ]

@@ -25,11 +25,11 @@ from jounce.jet.coefficients import (
     plus,
     quotient,
     raised,
-    ranked,
     self_convolution,
     square_root,
     total as total,
     turned_back,
+    with_rank,
 )
 from jounce.settings import in_full
 
@@ -198,7 +198,7 @@ class Jet:
         shape = self.shape
         if all(c is None or jnp.shape(c) == shape for c in self.coefficients):
             return self
-        return self.map(lambda c: jnp.broadcast_to(ranked(c, len(shape)), shape))
+        return self.map(lambda c: jnp.broadcast_to(with_rank(c, len(shape)), shape))
 
     def __mul__(self, other: "Quantity") -> "Jet":
         return self.square() if other is self else bilinear(multiplied, self, other)

@@ -42,7 +42,7 @@ def _elementwise(operation: Product, promoting: Product) -> Product:
         x, y = _plain(a), _plain(b)
         if x is None or y is None or (type(x) is type(y) is float):
             rank = max(jnp.ndim(a), jnp.ndim(b))
-            return promoting(ranked(a, rank), ranked(b, rank))
+            return promoting(with_rank(a, rank), with_rank(b, rank))
         if type(x) is not float and type(y) is not float and x.ndim != y.ndim:
             rank = max(x.ndim, y.ndim)
             x, y = (jax.lax.reshape(z, (1,) * (rank - z.ndim) + z.shape) for z in (x, y))
@@ -187,7 +187,7 @@ def raised(x: Coefficients, exponent: Real) -> list[Any]:
     return y
 
 
-def ranked(a: Real, rank: int) -> Any:
+def with_rank(a: Real, rank: int) -> Any:
     """Put axes of length one before those of an array; a number stays a number."""
     missing = rank - jnp.ndim(a)
     return jnp.reshape(a, (1,) * missing + jnp.shape(a)) if missing and jnp.ndim(a) else a

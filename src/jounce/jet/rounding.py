@@ -5,7 +5,7 @@ from jaxtyping import Bool, Float
 
 from jounce.base.shapes import Numbers, Real
 from jounce.jet.algebra import Jet
-from jounce.jet.coefficients import ranked
+from jounce.jet.coefficients import with_rank
 
 ROUNDING = 1e-15  # of a coefficient, relative
 LARGEST_ERROR = 1e-2  # of a coefficient that is returned, in its natural size
@@ -50,7 +50,7 @@ def nan_where_rounding(
     for k, c in enumerate(result.dense().coefficients):
         largest = (LARGEST_ERROR / ROUNDING) ** (1.0 / max(k + lost, 1))
         known = nearness <= largest * rate  # false where a growth is no number
-        coefficients.append(jnp.where(ranked(known if also is None else known & also, jnp.ndim(c)), c, jnp.nan))
+        coefficients.append(jnp.where(with_rank(known if also is None else known & also, jnp.ndim(c)), c, jnp.nan))
     return Jet(coefficients)
 
 

@@ -34,7 +34,7 @@ def wrap(x: Quantity, period: Real = WHOLE_TURN) -> Any:
     return x - whole_periods(x.coefficients[0] if isinstance(x, Jet) else x, period)
 
 
-def brought_near(angle: Quantity, expected: Real) -> Any:
+def shifted_by_turns(angle: Quantity, expected: Real) -> Any:
     """Return an angle shifted by the whole turns that bring it nearest to the one expected."""
     return angle - whole_periods((angle.coefficients[0] if isinstance(angle, Jet) else angle) - expected)
 

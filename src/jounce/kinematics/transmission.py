@@ -8,7 +8,7 @@ import numpy as np
 
 from jounce.constraints.drivers import CoordinateDriver
 from jounce.constraints.facts import facts_of
-from jounce.jet.turns import WHOLE_TURN, brought_near
+from jounce.jet.turns import WHOLE_TURN, shifted_by_turns
 from jounce.mechanism import Mechanism, build
 from jounce.mechanism.mechanism import GROUND
 from jounce.mechanism.system import Group
@@ -122,7 +122,7 @@ def extremes(linkage: Linkage, low: float, high: float) -> tuple[tuple[float, fl
         low, high = linkage.offset - math.pi, linkage.offset + math.pi
     values = [low, high]
     for value in linkage.turning_values:
-        values += list(np.arange(brought_near(value, low + math.pi), high, WHOLE_TURN))
+        values += list(np.arange(shifted_by_turns(value, low + math.pi), high, WHOLE_TURN))
     angles = [(linkage.transmission(value), value) for value in values]
     return min(angles), max(angles)
 

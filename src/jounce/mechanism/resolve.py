@@ -12,7 +12,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax.core import Tracer
 
-from jounce.base.modules import Module, is_ours, unchecked
+from jounce.base.modules import Module, belongs_to_package, unchecked
 from jounce.base.shapes import by_component, real_numbers
 from jounce.constraints.facts import SIGNS, facts_of, field_kinds, has_other_sign, stem_of, value_fields
 from jounce.errors import JounceError, MechanismError
@@ -21,7 +21,7 @@ from jounce.forces.laws import read_law
 from jounce.jet import Jet
 from jounce.trajectory import AbstractMotion, Expression, ExpressionMotion, SplineMotion
 from jounce.trajectory.curves import resolve_curve
-from jounce.trajectory.laws.user_laws import read_laws, tried, tried_law
+from jounce.trajectory.laws.user_laws import read_laws, shape_of_result, tried_law
 from jounce.units.values import expression_in_si
 
 _ROWS, _REAL = frozenset((list, tuple)), frozenset((int, float))  # read first: to ask for what is abstract takes long
@@ -104,7 +104,7 @@ def _check_names(expression: Expression, own: set[str], parameters: Mapping[str,
 
 def _traceable(motion: AbstractMotion) -> AbstractMotion:
     """Return a law after trying it once, on shapes only: Python functions can fail in ways that need words."""
-    if type(motion).__call__ is SplineMotion.__call__ and is_ours(type(motion)):
+    if type(motion).__call__ is SplineMotion.__call__ and belongs_to_package(type(motion)):
         return motion  # numbers that were checked; to trace it takes longer than to solve a short grid
     return read_laws(tried_law(motion))
 
@@ -137,7 +137,7 @@ def resolve_law(law: Any, force: AbstractForce, parameters: Mapping[str, Any], c
     def evaluated(x: Any, v: Any, t: Any) -> Any:
         return force_law(Jet([x, v, v]), Jet([v, v]), Jet.variable(t, 2)).coefficients[0]
 
-    force_shape = tried("law", advice, evaluated, np.zeros(shape), np.zeros(shape), np.zeros((1, 1)))
+    force_shape = shape_of_result("law", advice, evaluated, np.zeros(shape), np.zeros(shape), np.zeros((1, 1)))
     if force_shape != shape:
         raise MechanismError(f"the law cannot be used: its value has the shape {force_shape}, not {shape}; {advice}")
     return read_law(force_law, shape[:-2])

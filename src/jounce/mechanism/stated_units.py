@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from jounce.base.modules import Module, is_ours
+from jounce.base.modules import Module, belongs_to_package
 from jounce.constraints.facts import at_coordinate, facts_of, field_kinds, value_fields
 from jounce.errors import JounceError
 from jounce.forces import AbstractForce
@@ -56,6 +56,6 @@ def _uses_of(element: Module, where: str, clock: Dimension | None = TIME) -> Ite
         elif kind in ("law", "laws") and isinstance(element, AbstractForce):
             yield place, value, expected, variables_of(type(element))
         elif kind == "motion":
-            yield place, value, expected, {"t": clock if is_ours(type(element)) else None}
+            yield place, value, expected, {"t": clock if belongs_to_package(type(element)) else None}
         elif kind in ("scalar", "vector", "points"):
             yield place, value, "any" if expected == "direction" else expected, {}

@@ -145,7 +145,7 @@ def _derivative_blocks(
     return blocks
 
 
-def holding(group: Group, name: str, value: Any) -> Group:
+def with_field(group: Group, name: str, value: Any) -> Group:
     """Return a group with another value in a field of its elements.
 
     It is no method, as Equinox makes an object of each method that is looked up, which takes longer than the rest.
@@ -153,7 +153,7 @@ def holding(group: Group, name: str, value: Any) -> Group:
     return with_fields(group, element=with_fields(group.element, **{name: value}))
 
 
-class LeftOut(AbstractMotion):
+class OmittedLaw(AbstractMotion):
     """No motion, in the place of a law on which nothing depends."""
 
     def __call__(self, time: Jet) -> Jet:
@@ -176,7 +176,7 @@ def law_left_out(group: Group, *, only_if_evaluated: bool = False) -> Group:
     is_separable = vars(kind).get("separable", False)
     if is_separable and only_if_evaluated:  # `evaluate` may have been changed by a class that keeps the residual
         is_separable = getattr(kind, "evaluate", None) is getattr(element, "evaluate", object)
-    return holding(group, "motion", LeftOut()) if is_separable else group
+    return with_field(group, "motion", OmittedLaw()) if is_separable else group
 
 
 def with_rows(jet: Jet) -> Jet:

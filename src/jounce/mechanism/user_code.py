@@ -17,7 +17,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax.core import Tracer
 
-from jounce.base.modules import changes_parts, field, is_ours, unchecked, with_fields
+from jounce.base.modules import belongs_to_package, changes_parts, field, unchecked, with_fields
 from jounce.constraints import AbstractConstraint
 from jounce.constraints.base import field_kinds, value_fields
 from jounce.errors import JounceError, MechanismError, UnsupportedError
@@ -63,7 +63,7 @@ def readings_of(element: Any, values: Mapping[str, Any], components: int) -> dic
         reader.check_forces()
     if "residual" in names and not kind.nonholonomic:
         reader.check_positions()
-    return {name: reader.reading(name) for name in names} | {"": Verbatim(_words(kind), old=False)}
+    return {name: reader.reading(name) for name in names} | {"": Verbatim(_class_description(kind), old=False)}
 
 
 def has_own_methods(kind: type) -> bool:
@@ -116,9 +116,13 @@ def users_class(kind: type) -> type:
 def _read_methods(kind: type) -> tuple[str, ...]:
     """Return the names of the methods of a class that a user may have written, or that call such."""
     known = [(name, method) for name in _methods_of(kind) if (method := getattr(kind, name, None)) is not None]
-    if known and not is_ours(kind) and changes_parts(kind, tuple(_METHODS), names := [name for name, _ in known]):
+    if (
+        known
+        and not belongs_to_package(kind)
+        and changes_parts(kind, tuple(_METHODS), names := [name for name, _ in known])
+    ):
         return tuple(names)
-    return tuple([name for name, method in known if not is_ours(method)])
+    return tuple([name for name, method in known if not belongs_to_package(method)])
 
 
 @lru_cache(maxsize=1000)
@@ -127,9 +131,9 @@ def _methods_of(kind: type) -> tuple[str, ...]:
     return next((names for role, names in _METHODS.items() if issubclass(kind, role)), ())
 
 
-def _words(kind: type) -> tuple[str, ...]:
+def _class_description(kind: type) -> tuple[str, ...]:
     """Return what a class says of its elements beside its methods."""
-    ours = [base for base in kind.__mro__ if is_ours(base)]
+    ours = [base for base in kind.__mro__ if belongs_to_package(base)]
     named = {name for base in ours for name, value in vars(base).items() if name[0] != "_" and not callable(value)}
     fields = {field.name for field in dataclasses.fields(kind)}
     return tuple(f"{name}={getattr(kind, name, None)!r}" for name in sorted(named - fields))

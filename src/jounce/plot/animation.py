@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
-from jounce.base.interrupts import undoing
+from jounce.base.interrupts import cleanup_on_signal
 from jounce.errors import MechanismError, OutputError
 from jounce.io.files.writing import check_target, replacing
 from jounce.kinematics import Motion
@@ -180,7 +180,7 @@ def animate(
         clock = drawing.axes.text(0.99, 0.01, _clock_text(motion.time, float(motion.time[0])), **at_the_corner)
         drawing.figure.set_layout_engine("none")
         _even_pixels(drawing.figure)
-        with writer.saving(drawing.figure, str(temporary), dpi=RESOLUTION), undoing(lambda: _stop(writer)):
+        with writer.saving(drawing.figure, str(temporary), dpi=RESOLUTION), cleanup_on_signal(lambda: _stop(writer)):
             for done, frame in enumerate(frames.tolist(), 1):
                 drawing.show(frame)
                 drawing.move_names(frame)

@@ -80,7 +80,7 @@ def between_facts(trajectory: JointTrajectory) -> Mapping[str, Any] | None:
         return None
     away, joint, at = 0.0, None, None
     if all(sampled(law) is not None for law in trajectory.laws.values()):
-        away, joint, at = _farthest(trajectory)
+        away, joint, at = _largest_deviation(trajectory)
     return {"words": "; ".join(by_words), "deviation": away, "joint": joint, "at": at}
 
 
@@ -96,7 +96,7 @@ def _words(law: object) -> str | None:
     return None
 
 
-def _farthest(trajectory: JointTrajectory) -> tuple[float, str | None, float | None]:
+def _largest_deviation(trajectory: JointTrajectory) -> tuple[float, str | None, float | None]:
     """Return how far laws are from straight lines between their samples, which one, and where."""
     lines = lines_of(trajectory)
     assert lines is not None

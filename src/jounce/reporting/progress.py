@@ -11,7 +11,7 @@ from contextlib import ExitStack
 from typing import Any
 
 from jounce.base.activity import Activity, now
-from jounce.base.interrupts import undoing
+from jounce.base.interrupts import cleanup_on_signal
 
 PATIENCE = 2.0  # s, before anything is shown
 PACE = 0.2  # s between two looks
@@ -107,7 +107,7 @@ class _TerminalLine:
         quiet: Any = {"auto_refresh": False, "transient": True, "redirect_stdout": False, "redirect_stderr": False}
         self._bar = Progress(*columns, console=Console(stderr=True), **quiet)
         self._shown = ExitStack()
-        self._shown.enter_context(undoing(lambda: os.write(2, SHOW_CURSOR)))
+        self._shown.enter_context(cleanup_on_signal(lambda: os.write(2, SHOW_CURSOR)))
         self._shown.enter_context(self._bar)
         self._started = time.monotonic()
         self._id = self._bar.add_task("", total=None, counts="")

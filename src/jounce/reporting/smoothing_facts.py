@@ -12,7 +12,7 @@ FOLLOWED = 3.0  # times the noise: within less, the motion follows noise
 SHOWN = 3  # dwells in the table
 
 
-def loud_joints(motion: SmoothedTrajectory) -> list[str]:
+def noisy_joints(motion: SmoothedTrajectory) -> list[str]:
     """Return the joints whose noise is so large beside the deviation that the motion follows it."""
     return [name for name, own in motion.joints.items() if motion.deviation < FOLLOWED * own.noise]
 
@@ -35,7 +35,7 @@ def smoothing_table(motion: SmoothedTrajectory) -> Table:
 
 def smoothing_words(motion: SmoothedTrajectory) -> str:
     """Word that the motion follows noise, where it does."""
-    loud = loud_joints(motion)
+    loud = noisy_joints(motion)
     if not loud:
         return ""
     return f"\nThe deviation is below three times the noise of {', '.join(loud)}: the motion follows noise there."
@@ -60,7 +60,7 @@ def smoothing_result(
             }
             for name, own in motion.joints.items()
         ],
-        "follows_noise": loud_joints(motion),
+        "follows_noise": noisy_joints(motion),
         "written": written[0],
         "figure": written[1],
     }

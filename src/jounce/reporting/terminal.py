@@ -51,14 +51,14 @@ def show_peaks(given: Sequence[Peak]) -> None:
 
         show_table(peaks_table(given))
     else:
-        say("\nNo outputs are defined, so there is nothing to tabulate.")
+        print_text("\nNo outputs are defined, so there is nothing to tabulate.")
 
 
 def show_table(table: Table, style: str = "bold") -> None:
     """Print a table, in color on a terminal that is wide enough for its numbers; marked cells have a style there."""
     pause()
     if not (sys.stdout.isatty() and _show_colored(table, style)):
-        say("\n" + "\n".join(_plain_lines(table)))
+        print_text("\n" + "\n".join(_plain_lines(table)))
 
 
 def _plain_lines(table: Table) -> list[str]:
@@ -132,7 +132,7 @@ def show_columns(pairs: Sequence[tuple[str, str]]) -> None:
         for name, meaning in pairs:
             Console(soft_wrap=True).print(Text.assemble((name.ljust(width), "cyan"), f"  {meaning}"))
         return
-    say("\n".join(f"{name:{width}}  {meaning}" for name, meaning in pairs))
+    print_text("\n".join(f"{name:{width}}  {meaning}" for name, meaning in pairs))
 
 
 def _clean(text: str) -> str:
@@ -140,7 +140,7 @@ def _clean(text: str) -> str:
     return "".join(c if c.isprintable() or c == "\n" else "?" for c in text)
 
 
-def say(text: str) -> None:
+def print_text(text: str) -> None:
     """Print text on standard output."""
     pause()
     sys.stdout.write(_clean(text) + "\n")
@@ -156,7 +156,7 @@ def say_json(command: str, data: Mapping[str, Any]) -> None:
     sys.stdout.flush()
 
 
-def complain(error: object, *, json: bool = False) -> None:
+def print_error(error: object, *, json: bool = False) -> None:
     """Print an error on standard error, in one line: of words, or of JSON."""
     _write_message("error", "bold red", error, json)
 
@@ -167,7 +167,7 @@ def detail(words: str, *, json: bool = False) -> None:
         _write_message("note", "bold", words, json)
 
 
-def caution(warning: object, *, json: bool = False) -> None:
+def print_warning(warning: object, *, json: bool = False) -> None:
     """Print a warning on standard error, in one line: of words, or of JSON."""
     _write_message("warning", "bold yellow", warning, json)
 
@@ -175,7 +175,7 @@ def caution(warning: object, *, json: bool = False) -> None:
 def recorded_cautions(caught: Sequence[warnings.WarningMessage], *, json: bool = False) -> None:
     """Print warnings that were recorded, each once."""
     for message in {str(warning.message): warning.message for warning in caught}.values():
-        caution(message, json=json)
+        print_warning(message, json=json)
 
 
 @contextmanager
@@ -186,7 +186,7 @@ def cautions(*, json: bool = False) -> Iterator[None]:
     def show(message: Any, *_: Any, **__: Any) -> None:
         if str(message) not in shown:
             shown.add(str(message))
-            caution(message, json=json)
+            print_warning(message, json=json)
 
     with warnings.catch_warnings():
         for category in OURS:
@@ -198,9 +198,9 @@ def cautions(*, json: bool = False) -> Iterator[None]:
 def _write_message(kind: str, style: str, message: object, json: bool) -> None:
     pause()
     if json:
-        from jounce.reporting.json.results import complaint
+        from jounce.reporting.json.results import error_as_json
 
-        sys.stderr.write(complaint(kind, message) + "\n")
+        sys.stderr.write(error_as_json(kind, message) + "\n")
         return
     text = _clean(" ".join(str(message).split()))
     if sys.stderr.isatty():

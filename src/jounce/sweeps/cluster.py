@@ -10,7 +10,7 @@ from itertools import islice
 from pathlib import Path
 from typing import Any
 
-from jounce.base.interrupts import shielding
+from jounce.base.interrupts import interrupts_shielded
 from jounce.errors import JounceError, UnsupportedError
 from jounce.execution.threads import thread_count
 from jounce.sweeps.chunks import Plan, compute_on_worker
@@ -165,7 +165,7 @@ def _client(scheduler: str | None, workers: int | None, timeout: float, scratch:
     """Give a client of a cluster, which is started on this machine unless it has an address."""
     from distributed import Client
 
-    with _quiet(), ExitStack() as closing:
+    with _dask_silenced(), ExitStack() as closing:
         if scheduler is None:
             closing.enter_context(_environment())
             cluster = closing.enter_context(_local(thread_count(workers), scratch))
@@ -219,7 +219,7 @@ def _local(count: int, scratch: Path) -> Any:
     }
     try:
         _track_quietly()
-        with dask.config.set(lean), shielding():
+        with dask.config.set(lean), interrupts_shielded():
             return LocalCluster(n_workers=count, threads_per_worker=1, processes=True, **settings)
     except (OSError, RuntimeError) as error:
         raise ClusterError(f"the workers did not start ({error}); if this is a script: {GUARD}") from None
@@ -241,7 +241,7 @@ def _track_quietly() -> None:
 
 
 @contextmanager
-def _quiet() -> Iterator[None]:
+def _dask_silenced() -> Iterator[None]:
     """Leave what Dask tells of lost connections to this package."""
     names = [name for name in logging.root.manager.loggerDict if name.partition(".")[0] == "distributed"]
     before = {name: logging.getLogger(name).level for name in names}

@@ -32,7 +32,7 @@ def sweep_facts(plan: Plan, checksum: str) -> dict[str, Any]:
                 for order, row in enumerate(values):
                     extremes_of = extremes.setdefault(f"{name}/{order}", [None, None])
                     for side, sign in enumerate((1, -1)):
-                        extremes_of[side] = _better(extremes_of[side], sign * row, some.start)
+                        extremes_of[side] = _running_best(extremes_of[side], sign * row, some.start)
     rows = []
     for name, order, units in columns:
         low, high = extremes[f"{name}/{order}"]
@@ -87,7 +87,7 @@ def _columns(quantity: Any, levels: int) -> list[tuple[str, int, str]]:
     return [(name, order, quantity.units) for name in _names(quantity) for order in range(levels)]
 
 
-def _better(before: tuple[float, int] | None, values: np.ndarray, start: int) -> tuple[float, int] | None:
+def _running_best(before: tuple[float, int] | None, values: np.ndarray, start: int) -> tuple[float, int] | None:
     """Return the least value so far and its design; of equal ones the first."""
     known = np.where(np.isnan(values), np.inf, values)
     index = int(np.argmin(known))

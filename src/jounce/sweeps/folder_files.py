@@ -8,7 +8,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
-from jounce.base.interrupts import undoing
+from jounce.base.interrupts import cleanup_on_signal
 from jounce.errors import JounceError, OutputError
 from jounce.io.files.reading import read_file, reason_of
 
@@ -64,7 +64,7 @@ def is_blank(folder: Path) -> bool:
 
 
 @contextmanager
-def worded(path: Path) -> Iterator[None]:
+def naming_path(path: Path) -> Iterator[None]:
     """Name the file in what the system says, or a folder where it names none."""
     try:
         yield
@@ -81,7 +81,7 @@ def put(path: Path, content: bytes) -> None:
     """Put a whole file in its place, of which no link is followed; a folder there stays, and is an error."""
     scratch = path.with_name(f"{path.name}.{secrets.token_hex(6)}.partial")
     try:
-        with undoing(lambda: scratch.unlink(missing_ok=True)):
+        with cleanup_on_signal(lambda: scratch.unlink(missing_ok=True)):
             scratch.write_bytes(content)
             sync(scratch)
             scratch.replace(path)

@@ -54,7 +54,7 @@ def manifest_of(
         "title": title,
         "files": _named(files),
         "model": fingerprint(model),
-        "vary": {name: _words(variation) for name, variation in space.variations.items()},
+        "vary": {name: _exact_description(variation) for name, variation in space.variations.items()},
         "sample": None if isinstance(space, Grid) else f"sobol:{space.count}",
         "designs": space.count,
         "time": f"{len(instants)} instants from {float(instants[0])!r} to {float(instants[-1])!r} s, "
@@ -180,7 +180,7 @@ def _shown(value: Any) -> str:
     return "not given" if value is None else shortened(str(value), MOST_SHOWN)
 
 
-def _words(variation: Any) -> str:
+def _exact_description(variation: Any) -> str:
     """Return a variation in words that tell every bit of it."""
     if isinstance(variation, Values):
         return f"{variation.count} values, digest {fingerprint(variation.values)[:16]}"

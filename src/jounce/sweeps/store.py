@@ -24,7 +24,7 @@ from typing import Any
 
 import numpy as np
 
-from jounce.base.interrupts import undoing
+from jounce.base.interrupts import cleanup_on_signal
 from jounce.errors import OutputError
 from jounce.io.files.reading import read_file, reason_of
 from jounce.sweeps.folder_files import (
@@ -34,10 +34,10 @@ from jounce.sweeps.folder_files import (
     attributes_in,
     is_blank,
     is_sweep,
+    naming_path,
     parsed,
     put,
     sync as _sync,
-    worded,
 )
 from jounce.sweeps.layout import DIGEST
 from jounce.sweeps.manifest import intact
@@ -95,7 +95,7 @@ class Store:
         OutputError
             The disk is full, or what else the system says.
         """
-        with worded(self.folder):
+        with naming_path(self.folder):
             with ThreadPoolExecutor(1) as pool:  # whose thread has no event loop yet, as that of a notebook has
                 pool.submit(asyncio.run, self._put(start, arrays)).result()
             for name in arrays:
@@ -138,7 +138,7 @@ class Store:
             Something else has the place of a file or a folder, and would have to be removed.
         """
         mended = []
-        with worded(self.folder):
+        with naming_path(self.folder):
             for folder in sorted({*self._folders(files)}):
                 if folder.is_symlink() or (os.path.lexists(folder) and not folder.is_dir()):
                     raise OutputError(f"takes the place of a folder of the sweep; {REMOVE}", path=str(folder))
@@ -186,7 +186,7 @@ class Store:
         OutputError
             Its digest cannot be removed.
         """
-        with worded(self._mark(chunk)):
+        with naming_path(self._mark(chunk)):
             self._mark(chunk).unlink(missing_ok=True)
 
     def done(self, count: int) -> np.ndarray:
@@ -199,14 +199,14 @@ class Store:
         """Tell whether there is nothing but what was there before any chunk."""
         if next(self._marked(), None) is not None:
             return False
-        with worded(self.folder):
+        with naming_path(self.folder):
             entries = [entry for entry in self.folder.iterdir() if not entry.name.startswith(SCRATCH)]
             own = {ROOT: True} | {x.name: is_blank(x) for x in entries if x.is_dir() and not x.is_symlink()}
         return all(own.get(entry.name, False) for entry in entries)
 
     def remove(self) -> None:
         """Remove the folder, which no other process may be writing to."""
-        with self.locked(), worded(self.folder):
+        with self.locked(), naming_path(self.folder):
             shutil.rmtree(self.folder)
 
     def finish(self, count: int) -> str:
@@ -227,7 +227,7 @@ class Store:
         attributes = {"manifest": json.dumps(manifest, indent=1), "checksum": checksum}
         if content["attributes"] != content["attributes"] | attributes:
             content["attributes"] |= attributes
-            with worded(self.folder):
+            with naming_path(self.folder):
                 put(path, json.dumps(content, indent=1).encode())
         self.__dict__["manifest"] = manifest
         with suppress(OSError):
@@ -241,10 +241,10 @@ class Store:
 
         Only what kills the process at once leaves it behind, for the next one to remove.
         """
-        with worded(self.folder):
+        with naming_path(self.folder):
             path = Path(tempfile.mkdtemp(prefix=SCRATCH, dir=self.folder))
         try:
-            with undoing(lambda: shutil.rmtree(path, ignore_errors=True)):
+            with cleanup_on_signal(lambda: shutil.rmtree(path, ignore_errors=True)):
                 yield path
         finally:
             shutil.rmtree(path, ignore_errors=True)
@@ -268,7 +268,7 @@ class Store:
         except ImportError:  # there is none on Windows
             yield
             return
-        with worded(self.folder):
+        with naming_path(self.folder):
             descriptor = os.open(self.folder, os.O_RDONLY)
         try:
             try:
@@ -364,7 +364,7 @@ def create(folder: Path, files: Mapping[str, bytes]) -> Store:
     real = Path(os.path.realpath(folder))
     scratch = real.with_name(f".jounce-{secrets.token_hex(6)}")
     try:
-        with worded(folder), undoing(lambda: shutil.rmtree(scratch, ignore_errors=True)):
+        with naming_path(folder), cleanup_on_signal(lambda: shutil.rmtree(scratch, ignore_errors=True)):
             for name, content in files.items():
                 path = scratch / name
                 path.parent.mkdir(parents=True, exist_ok=True)

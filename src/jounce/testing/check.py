@@ -15,7 +15,7 @@ from jounce.testing.positions import facts, rank
 from jounce.testing.reactions import equilibrium
 from jounce.testing.residuals import derivatives, expressions, frames, instances, jacobian, one_program
 from jounce.testing.samples import Samples
-from jounce.testing.subject import Broken, LeftOut, Subject
+from jounce.testing.subject import Broken, SkippedContract, Subject
 
 CONTRACTS: Mapping[str, Callable[[Subject], None]] = MappingProxyType(
     {
@@ -168,7 +168,7 @@ def check_joint(
             CONTRACTS[name](subject)
         except Broken as wrong:
             raise ContractError(f"{kind.__module__}.{kind.__qualname__}: {name}: {wrong}") from None
-        except LeftOut as reason:
+        except SkippedContract as reason:
             left_out[name] = str(reason)
         else:
             held.append(name)

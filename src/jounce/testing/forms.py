@@ -22,7 +22,7 @@ from jounce.jet import Jet
 from jounce.mechanism import Body, Mechanism
 from jounce.rigid import PlanarPose, SpatialPose
 from jounce.testing.samples import BODIES, INSTANT, group_of, pose_of, random_motion
-from jounce.testing.subject import Broken, LeftOut, Subject, residual
+from jounce.testing.subject import Broken, SkippedContract, Subject, residual
 
 LANES = 9  # instants: more than one vector of the processor, and a remainder
 
@@ -43,7 +43,9 @@ def copies(subject: Subject) -> None:
         if type(other) is not kind or not bool(other == element) or hash(other) != hash(element):
             raise Broken(f"a joint from {method} is not equal to the original, or has another hash")
     if "pickle" not in copies_made:
-        raise LeftOut(f"copies are equal; pickle finds no class {kind.__qualname__} in the module {kind.__module__}")
+        raise SkippedContract(
+            f"copies are equal; pickle finds no class {kind.__qualname__} in the module {kind.__module__}"
+        )
 
 
 def _by_name(kind: type[Any]) -> Any:
@@ -58,7 +60,7 @@ def files(subject: Subject) -> None:
     kind, space = subject.samples.kind, subject.space
     role = kind.role or "joint"
     if catalogue(space, role).get(kind.type_name) is not kind:
-        raise LeftOut("it has no type name for files")
+        raise SkippedContract("it has no type name for files")
     element = subject.samples.element(subject.random())
     mechanism = Mechanism(
         space=space,
@@ -95,5 +97,7 @@ def back_ends(subject: Subject) -> None:
     subject.same(jax.jit(run)(group, lanes), expected, 1e-13, "XLA's program gives another residual")
     program = Mapped(run).program(group, lanes)
     if program.backend != LLVM:
-        raise LeftOut("XLA agrees; there is no machine code for an operation of the residual, or none is made here")
+        raise SkippedContract(
+            "XLA agrees; there is no machine code for an operation of the residual, or none is made here"
+        )
     subject.same(program(lanes), expected, 1e-13, "machine code gives another residual")

@@ -29,7 +29,7 @@ def equilibrium(subject: Subject) -> None:
     size = max(exerted.size, 1e-300)
     subject.same(exerted.force / size, 0 * exerted.force, 1e-13, "the reactions have a resultant force")
     subject.same(exerted.moment / size, 0 * exerted.moment, 1e-12, "the reactions have a resultant moment")
-    power, scale = worked(forces, "joint", element, pose), size * np.abs(spins).max()
+    power, scale = power_of_element(forces, "joint", element, pose), size * np.abs(spins).max()
     words = "the power of the reactions is not that of the multipliers on the residual"
     subject.same(exerted.power / scale, power / scale, 1e-12, words)
 
@@ -113,7 +113,7 @@ def resultant(
     return Resultant(force, moment, power, size)
 
 
-def worked(forces: MotionForces, name: str, element: Any, pose: Any) -> np.ndarray:
+def power_of_element(forces: MotionForces, name: str, element: Any, pose: Any) -> np.ndarray:
     """Return Taylor coefficients of the power that a joint, driver or force puts into all bodies, (levels, time)."""
     clock = Jet.variable(np.full((1, 1), INSTANT), pose.order)
     if element.role == "force":

@@ -18,14 +18,14 @@ from jounce.testing.samples import (
     displaced,
     group_of,
     lanes_of,
-    moved_together,
     pose_of,
     random_motion,
+    seen_from_moving_frame,
     time_jet,
     widened,
     with_unknowns,
 )
-from jounce.testing.subject import Broken, LeftOut, Subject, evaluated, residual
+from jounce.testing.subject import Broken, SkippedContract, Subject, evaluated, residual
 from jounce.trajectory import Expression
 
 NODES = 40  # of an interpolating polynomial
@@ -140,11 +140,11 @@ def frames(subject: Subject) -> None:
     A joint between moving bodies depends on their relative motion only; vectors of residuals turn with the bodies.
     """
     if not subject.relative:
-        raise LeftOut("it is said to depend on the global frame")
+        raise SkippedContract("it is said to depend on the global frame")
     random = subject.random()
     group = group_of([subject.samples.element(random)], subject.space)
     motion = random_motion(random, subject.space, 2)
-    moved = moved_together(motion, random, 2)
+    moved = seen_from_moving_frame(motion, random, 2)
     if subject.samples.kind.hidden:  # its coordinates, those of the last body, are not a position in space
         for name, series in moved.items():
             series[..., -1, :] = motion[name][..., -1, :]
@@ -200,7 +200,7 @@ def expressions(subject: Subject) -> None:
         elif kind == "motion" and isinstance(value, str):
             replaced[name] = value.replace("0.9", "law")
     if not replaced:
-        raise LeftOut("it has no numbers")
+        raise SkippedContract("it has no numbers")
     motion = random_motion(random, subject.space, 1)
     written = subject.samples.element(subject.random(), values={**_values(plain), **replaced})
     values = residual(group_of([written], subject.space, parameters), motion)

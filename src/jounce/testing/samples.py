@@ -232,7 +232,7 @@ def quaternion_product(p: np.ndarray, q: np.ndarray) -> np.ndarray:
     return np.concatenate([(p[0] * q[0] - (p[1:] * q[1:]).sum(axis=0))[None], v])
 
 
-def moved_together(motion: Motion, random: np.random.Generator, order: int) -> dict[str, np.ndarray]:
+def seen_from_moving_frame(motion: Motion, random: np.random.Generator, order: int) -> dict[str, np.ndarray]:
     """Return the motion as seen after a common rigid motion of all bodies, itself a random function of time."""
     turned = {name: series.copy() for name, series in motion.items()}
     common = random_motion(random, "planar" if "angle" in motion else "spatial", order)

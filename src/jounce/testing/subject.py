@@ -12,7 +12,7 @@ from jounce.mechanism.system import Group
 from jounce.testing.samples import Motion, Samples, group_of, lanes_of, pose_of, random_motion, time_jet, widened
 
 
-class LeftOut(Exception):  # noqa: N818 - it is no error
+class SkippedContract(Exception):  # noqa: N818 - it is no error
     """A contract that does not apply to a joint, and why."""
 
 

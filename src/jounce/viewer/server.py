@@ -12,7 +12,7 @@ from jounce.errors import JounceError
 from jounce.kinematics import PlateCam
 from jounce.mechanism import Mechanism
 from jounce.robot import Robot
-from jounce.viewer.page.local_server import AccessControl, check_installed, check_port, quiet_server, quiet_stop
+from jounce.viewer.page.local_server import AccessControl, check_installed, check_port, quiet_server, stop_silently
 
 MECHANISM_FILES = (".yaml", ".yml", ".toml", ".json")
 
@@ -51,7 +51,7 @@ class View:
             self.page = Page(server, subject, order)
             self._lay_out(subject, playing)
         except BaseException:
-            quiet_stop(server)
+            stop_silently(server)
             raise
         self.url = f"http://127.0.0.1:{server.get_port()}/?token={access.token}"
 

@@ -43,10 +43,10 @@ SLOW = [pytest.param(name, marks=pytest.mark.slow) for name in (*STARTS[2:], "sp
 @pytest.mark.parametrize("name", [*STARTS[:2], *SLOW])
 def test_where_conditions_let_go_the_rest_is_together(name, monkeypatch):
     mechanism = jn.load(f"examples/{name}.yaml")
-    used, let_go = [], start._let_go
-    monkeypatch.setattr(start, "_let_go", lambda *given: used.append(let_go(*given)) or used[-1])
+    used, let_go = [], start._without_initial_conditions
+    monkeypatch.setattr(start, "_without_initial_conditions", lambda *given: used.append(let_go(*given)) or used[-1])
     found = consistent_start(mechanism, 0.0)
-    monkeypatch.setattr(start, "_let_go", lambda *_: None)
+    monkeypatch.setattr(start, "_without_initial_conditions", lambda *_: None)
     assembled = consistent_start(mechanism, 0.0)
     assert all(model is not None for model in used)
     assert len(used) == bool(mechanism.initial)
@@ -69,8 +69,8 @@ UNLIKE = {
 
 @pytest.mark.parametrize("unlike", UNLIKE)
 def test_the_rest_is_assembled_where_conditions_repeat_each_other_or_give_the_size(unlike, monkeypatch):
-    used, let_go = [], start._let_go
-    monkeypatch.setattr(start, "_let_go", lambda *given: used.append(let_go(*given)) or used[-1])
+    used, let_go = [], start._without_initial_conditions
+    monkeypatch.setattr(start, "_without_initial_conditions", lambda *given: used.append(let_go(*given)) or used[-1])
     found = consistent_start(with_initial(**UNLIKE[unlike]), 0.0).state
     assert used == [None]
     assert found.attitude[0, 0, 0] == pytest.approx(0.3, abs=1e-10)

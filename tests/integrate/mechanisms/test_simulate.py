@@ -36,7 +36,7 @@ def test_a_short_run_calls_few_programs(monkeypatch):
     jn.simulate(pendulum, [0.0, 1e-3], tolerance=1e-10)  # `expanded` is traced here, with `output_series` in it
     monkeypatch.setattr(Compiled, "__call__", recorded)
     jn.simulate(pendulum, [0.0, 1e-3], tolerance=1e-10)
-    assert called == ["_moved", "_with_row_rates", "_judged", "march"]
+    assert called == ["_moved", "_with_row_rates", "_computed_facts", "march"]
 
 
 @pytest.mark.parametrize("time", [[], [[0.0, 1.0]]])

@@ -170,7 +170,7 @@ def test_the_owner_is_kept_where_files_cannot_be_given_away(monkeypatch):
     path.write_text("old and longer than what comes" * 10)
     path.chmod(0o664)
     number = path.stat().st_ino
-    monkeypatch.setattr("jounce.io.files.writing._take_over", lambda *_: False)  # what it says to others than root
+    monkeypatch.setattr("jounce.io.files.writing._copy_ownership", lambda *_: False)  # what it says to others than root
     write(results(), path)
     assert path.stat().st_ino == number
     assert path.read_text() == "time,x\n0,0\n1,0\n"

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 import jounce as jn
-from jounce.jet.programs.captured import read_off
+from jounce.jet.programs.captured import captured_function
 
 TIME = jnp.zeros(())
 
@@ -14,7 +14,7 @@ TIME = jnp.zeros(())
 def test_arguments_that_a_function_does_not_read_are_arguments(others):
     functions = {"alone": lambda t: 2.75 * t, "among": lambda t, *_: 2.75 * t, "last": lambda *x: 2.75 * x[-1]}
     examples = {"alone": (TIME,), "among": (TIME, *others), "last": (*others, TIME)}
-    read = {name: read_off(function, *examples[name]) for name, function in functions.items()}
+    read = {name: captured_function(function, *examples[name]) for name, function in functions.items()}
     assert len({its.program for its in read.values()}) == 3
     for name, its in read.items():
         arguments = [jnp.full(x.shape, 2.0) for x in examples[name]]
@@ -22,6 +22,6 @@ def test_arguments_that_a_function_does_not_read_are_arguments(others):
 
 
 def test_a_law_follows_a_feedback_that_reads_time_alone():
-    read_off(lambda t, q, rate: t * t - 4.0 * t, TIME, jnp.zeros(2), jnp.zeros(2))
+    captured_function(lambda t, q, rate: t * t - 4.0 * t, TIME, jnp.zeros(2), jnp.zeros(2))
     law = jn.laws.FunctionMotion(lambda t: t * t - 4.0 * t)
     assert [float(x) for x in law(jn.Jet.variable(3.0, 2)).derivatives()] == [-3.0, 2.0, 2.0]

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import jounce as jn
-from jounce.planning.paths.joining import gone_on, joined_from_rest
+from jounce.planning.paths.joining import extended_path, joined_from_rest
 from jounce.planning.paths.paths import path_of
 from jounce.planning.pieces import SmoothPieces
 
@@ -21,7 +21,7 @@ def steady(power):
 def test_what_follows_is_the_other_path_at_a_steady_rate(given, share):
     path = path_of(given, ("x", "y"), 2)
     at, rate = path.start + share * (path.stop - path.start), 0.7
-    whole = gone_on(path, at, rate, steady(2.0), 0.5)
+    whole = extended_path(path, at, rate, steady(2.0), 0.5)
     assert whole.stop == pytest.approx(0.5 + (path.stop - at) / rate)
     s = np.linspace(0.5, whole.stop, 61)
     here = whole.derivatives(s, 4)
@@ -39,7 +39,7 @@ def test_a_law_that_repeats_beyond_its_samples_goes_on_so():
     times = np.linspace(0.0, 0.5, 21)
     law = jn.laws.SplineMotion(times, np.sin(4 * np.pi * times), 5, beyond="repeat")
     path = path_of({"x": law, "y": "s"}, None, 2)
-    whole = gone_on(path, 0.2, 1.0, steady(0.0), 0.5)
+    whole = extended_path(path, 0.2, 1.0, steady(0.0), 0.5)
     np.testing.assert_allclose(whole.derivatives(np.array([1.2]), 0)[0, 0, 0], np.sin(4 * np.pi * 0.9), atol=1e-4)
 
 

@@ -9,7 +9,7 @@ import jounce as jn
 from jounce.errors import TrajectoryError
 from jounce.planning.paths.paths import Between, cells_needed, checked, path_of
 from jounce.planning.paths.sampled_paths import path_of_samples
-from jounce.planning.paths.straight_lines import taken_together
+from jounce.planning.paths.straight_lines import simplified_polyline
 
 pytestmark = pytest.mark.long
 
@@ -171,12 +171,12 @@ def test_what_would_bend_too_sharply_is_refused_by_joint_and_instant():
 
 def test_points_are_taken_together_in_their_sequence():
     back = np.array([[0.0], [0.5], [1.0], [0.5], [0.0], [0.0], [1.0]])
-    chosen, off = taken_together(back, 1e-3)
+    chosen, off = simplified_polyline(back, 1e-3)
     assert back[chosen, 0].tolist() == [0.0, 1.0, 0.0, 1.0]
     assert off == 0.0
     rng = np.random.default_rng(3)
     walk = np.cumsum(rng.normal(size=(400, 3)), axis=0)
-    chosen, off = taken_together(walk, 1.5)
+    chosen, off = simplified_polyline(walk, 1.5)
     assert off <= 1.5
     assert (np.diff(chosen) > 0).all()
     for a, b in itertools.pairwise(chosen):

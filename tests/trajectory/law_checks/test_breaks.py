@@ -45,8 +45,8 @@ def test_those_of_several_laws_are_reported_once():
 
 
 def test_a_leader_of_several_laws_is_looked_at_once(monkeypatch):
-    looked, seen = [], breaks._seen
-    monkeypatch.setattr(breaks, "_seen", lambda law, *x: looked.append(law) or seen(law, *x))
+    looked, seen = [], breaks._observed_breaks
+    monkeypatch.setattr(breaks, "_observed_breaks", lambda law, *x: looked.append(law) or seen(law, *x))
     leader = jn.laws.FunctionMotion(lambda t: abs(t - 0.7))
     laws = [jn.laws.FollowingMotion(own, leader) for own in (expression("sin(t)"), jn.laws.CycloidalMotion(0.0, 1.0))]
     assert law_breaks(laws, 0.0, 0.9, 2).tolist() == pytest.approx([0.7], abs=1e-11)

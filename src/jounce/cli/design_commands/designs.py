@@ -15,12 +15,12 @@ from jounce.cli.options import (
     MechanismReading,
     Overwrite,
     allowed,
+    print_result,
     spare_inputs,
-    tell,
     written,
 )
 from jounce.errors import DesignError, JounceError
-from jounce.reporting.terminal import say, show_table
+from jounce.reporting.terminal import print_text, show_table
 
 OPTIONS = tuple("minimize subject_to vary curves starts samples assemblies seed clearance iterations".split())
 SPELT = {"minimize": "minimize", "subject_to": "subject-to", "curves": "curve"}
@@ -123,7 +123,7 @@ def optimize(
         )
     facts = design_facts(design, file)
     if not json:
-        say(design_words(facts))
+        print_text(design_words(facts))
         show_table(design_table(facts))
     if out is not None:
         from jounce.io.mechanisms.revision import write_revised
@@ -131,7 +131,7 @@ def optimize(
         changed = {*bounds, *assignments(reading.set_ or (), "--set", "as NAME=VALUE")}
         arguments: Any = (design.mechanism, sorted(changed), file, out)
         written(lambda: write_revised(*arguments, allow=allowed(reading.allow), overwrite=overwrite))
-    tell("optimize", lambda: {**facts, "written": out}, out, json=json)
+    print_result("optimize", lambda: {**facts, "written": out}, out, json=json)
     return 0 if design.success else 1
 
 

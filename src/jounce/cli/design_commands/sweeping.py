@@ -14,7 +14,7 @@ from jounce.base.activity import Count
 from jounce.cli.mechanism_commands.mechanisms import method_of
 from jounce.cli.options import PLAIN_MECHANISM, MechanismReading, RobotReading, errors_about
 from jounce.errors import JounceError
-from jounce.reporting.terminal import say, say_json, show_table
+from jounce.reporting.terminal import print_text, say_json, show_table
 
 if TYPE_CHECKING:
     from jounce.sweeps.problems import Problem
@@ -131,9 +131,9 @@ def sweep(
     if json:
         say_json("sweep", {"file": file, **facts, "written": out})
         return 0
-    say(sweep_summary(facts, file.name))
+    print_text(sweep_summary(facts, file.name))
     show_table(sweep_table(facts))
-    say(f"\nWritten to {out}")
+    print_text(f"\nWritten to {out}")
     return 0
 
 

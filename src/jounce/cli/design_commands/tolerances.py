@@ -17,7 +17,7 @@ from jounce.cli.options import (
     spare_inputs,
     written,
 )
-from jounce.reporting.terminal import say, show_table
+from jounce.reporting.terminal import print_text, show_table
 
 
 def tolerance(
@@ -90,7 +90,7 @@ def tolerance(
     columns = columns_of(spread, selection)
     facts = spread_facts(spread, columns)
     if not output.json:
-        say(spread_summary(facts, file.name, samples))
+        print_text(spread_summary(facts, file.name, samples))
         show_table(spread_table(facts))
         if indices:
             show_table(index_table(facts))
@@ -101,5 +101,5 @@ def tolerance(
         written(lambda: save(draw_bands(spread, columns), figure, overwrite=output.overwrite))
     output.tell("tolerance", lambda: {"file": file, "samples": samples, **facts, "written": output.out})
     if figure is not None and not output.json:
-        say(f"\nWritten to {figure}")
+        print_text(f"\nWritten to {figure}")
     return 0

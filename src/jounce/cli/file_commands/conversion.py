@@ -7,11 +7,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from jounce.cli.arguments import check_ending
-from jounce.cli.file_kinds import expecting
+from jounce.cli.file_kinds import explaining_other_kinds
 from jounce.cli.options import Overwrite, RobotReading, allowed, errors_about, import_files
 from jounce.errors import JounceError
 from jounce.io.files import DATA_FILES, ROBOT_FILES
-from jounce.reporting.terminal import caution, say
+from jounce.reporting.terminal import print_text, print_warning
 
 if TYPE_CHECKING:
     from jounce.robot import Robot
@@ -79,7 +79,7 @@ def convert(
     from jounce.io.mechanisms.starters import refuse_existing
 
     suffix = source.suffix.lower()
-    with expecting(source, "mechanism", "robot"):
+    with explaining_other_kinds(source, "mechanism", "robot"):
         check_ending(source, (*DATA_FILES, *ROBOT_FILES))
     check_target(target, DATA_FILES, "mechanism file", overwrite=overwrite)
     refuse_existing(target, overwrite=overwrite)
@@ -101,7 +101,7 @@ def _mechanism(source: Path, target: Path, imports: list[Path] | None, allow: Se
     from jounce.io.mechanisms.starters import refuse_existing
 
     import_files(imports)
-    with expecting(source, "mechanism"):
+    with explaining_other_kinds(source, "mechanism"):
         data, samples = converted(source, target, allow)
     text = dumped(data, target.suffix.lower(), str(target))
     for table_file in samples:  # all, before the first is written
@@ -111,9 +111,9 @@ def _mechanism(source: Path, target: Path, imports: list[Path] | None, allow: Se
         with replacing(table_file, overwrite=overwrite) as scratch:
             scratch.write_bytes(read_file(path, MAX_SAMPLES, what="the samples"))
     _put(text, target, allow, overwrite)
-    say(f"Written to {', '.join(str(path) for path in (target, *samples))}")
+    print_text(f"Written to {', '.join(str(path) for path in (target, *samples))}")
     if source.suffix.lower() != ".json" and "#" in source.read_text(encoding="utf-8-sig"):
-        caution(f"the comments of {source} are not in {target}")
+        print_warning(f"the comments of {source} are not in {target}")
     return 0
 
 
@@ -136,9 +136,9 @@ def _robot(
     _put(dumped(data, target.suffix.lower(), str(target)), target, (), True)
     driven = hold or len(laws) == len(robot.joint_names)
     following = [] if robot.closures else [f"jounce {'run' if driven else 'simulate'} {target}"]
-    say(f"Written to {target}\n\nTry now:\n  " + "\n  ".join([f"jounce inspect {target}", *following]))
+    print_text(f"Written to {target}\n\nTry now:\n  " + "\n  ".join([f"jounce inspect {target}", *following]))
     for old, new in renamed.items():
-        caution(f"'{old}' is called '{new}' in {target}, where names have letters, digits, _ and -")
+        print_warning(f"'{old}' is called '{new}' in {target}, where names have letters, digits, _ and -")
     return 0
 
 

@@ -6,7 +6,7 @@ import shlex
 from pathlib import Path
 
 from jounce.cli.options import Overwrite
-from jounce.reporting.terminal import say, say_json, show_columns
+from jounce.reporting.terminal import print_text, say_json, show_columns
 
 NO_MODELS = ("cams/", "drives/", "limits/", "trajectories/")  # examples that `jounce inspect` does not read
 
@@ -41,14 +41,14 @@ def example(
             say_json("example", {"examples": [{"name": name, "about": about} for name, about in known.items()]})
             return 0
         show_columns(list(known.items()))
-        say("\nCopy one with: jounce example NAME [FILE]")
+        print_text("\nCopy one with: jounce example NAME [FILE]")
         return 0
     written = [str(path) for path in copy_example(name, file, overwrite=overwrite)]
     if json:
         say_json("example", {"name": name, "written": written})
         return 0
     for path in written:
-        say(f"Written to {path}")
+        print_text(f"Written to {path}")
     if not name.startswith(NO_MODELS) and written[0].endswith((".yaml", ".urdf", ".xml", ".sdf")):
-        say(f"\nTry now:\n  jounce inspect {shlex.quote(written[0])}")
+        print_text(f"\nTry now:\n  jounce inspect {shlex.quote(written[0])}")
     return 0

@@ -10,7 +10,7 @@ from typing import Literal
 from jounce.cli.options import PLAIN_ROBOT, RobotReading, errors_about, spare_inputs
 from jounce.cli.robot_commands.servo import frequency_of
 from jounce.errors import SampleWarning
-from jounce.reporting.terminal import recorded_cautions, say
+from jounce.reporting.terminal import print_text, recorded_cautions
 
 
 def export(
@@ -89,8 +89,8 @@ def export(
             ends = trajectory_ends(model, motion)
     recorded_cautions(caught)
     first, last = float(times[0]), float(times[-1])
-    say(f"{len(times)} rows from {first:g} s to {last:g} s written to {out}")
-    say(
+    print_text(f"{len(times)} rows from {first:g} s to {last:g} s written to {out}")
+    print_text(
         "\n".join(
             wrapped(line) for line in [*between_words(motion), *ends_words(ends), *(load.words for load in loads)]
         )

@@ -11,7 +11,7 @@ from cyclopts import Parameter
 from jounce.cli.file_commands.example_files import example
 from jounce.cli.options import Overwrite
 from jounce.errors import JounceError
-from jounce.reporting.terminal import say, say_json, show_columns
+from jounce.reporting.terminal import print_text, say_json, show_columns
 
 
 def new(
@@ -59,7 +59,7 @@ def new(
             say_json("new", {"starters": listed})
             return 0
         show_columns([(starter.name, starter.about) for starter in STARTERS.values()])
-        say("\nWrite one with: jounce new NAME [FILE]; complete machines: jounce example")
+        print_text("\nWrite one with: jounce new NAME [FILE]; complete machines: jounce example")
         return 0
     target = Path(f"{name}.yaml") if file is None else file
     starter = write_starter(name, target, overwrite=overwrite)
@@ -69,5 +69,5 @@ def new(
     if json:
         say_json("new", {"name": starter.name, "written": str(target), "next": following})
         return 0
-    say(f"{starter.about}\nWritten to {target}\n\nTry now:\n  " + "\n  ".join(following))
+    print_text(f"{starter.about}\nWritten to {target}\n\nTry now:\n  " + "\n  ".join(following))
     return 0

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from jounce.cli.file_kinds import expecting
+from jounce.cli.file_kinds import explaining_other_kinds
 from jounce.cli.options import (
     NO_TABLE,
     PLAIN,
@@ -16,7 +16,7 @@ from jounce.cli.options import (
     units_chosen,
     written,
 )
-from jounce.reporting.terminal import say
+from jounce.reporting.terminal import print_text
 
 
 def cam(
@@ -69,7 +69,7 @@ def cam(
         from jounce.plot import check_figure
 
         check_figure(figure, overwrite=output.overwrite)
-    with expecting(file, "cam"):
+    with explaining_other_kinds(file, "cam"):
         profile = load_cam(file, allow=allowed(allow), set_=set_ or (), count=count)
     for target in (output.out, figure):
         spare_inputs(target, overwrite=output.overwrite)
@@ -77,7 +77,7 @@ def cam(
     with errors_about(file):
         facts = cam_facts(profile)
     if not output.json:
-        say(cam_words(facts, shown))
+        print_text(cam_words(facts, shown))
     output.write(lambda: in_units(profile.dataset, shown), header_units=unit_choice)
     if figure is not None:
         from jounce.plot import draw_cam, save
@@ -86,5 +86,5 @@ def cam(
         written(lambda: save(drawn, figure, overwrite=output.overwrite))
     output.tell("cam", lambda: {"file": file, **facts, "written": output.out})
     if figure is not None and not output.json:
-        say(f"\nWritten to {figure}")
+        print_text(f"\nWritten to {figure}")
     return 1 if facts["undercut"] else 0

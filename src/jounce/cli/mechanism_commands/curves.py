@@ -17,7 +17,7 @@ from jounce.cli.options import (
     spare_inputs,
     written,
 )
-from jounce.reporting.terminal import say, show_table
+from jounce.reporting.terminal import print_text, show_table
 
 if TYPE_CHECKING:
     from jounce.kinematics import Curve
@@ -101,7 +101,7 @@ def write_curves(
     facts = [curve_facts(curve) for curve in curves]
     if not output.json:
         for each in facts:
-            say(curve_summary(each, file.name))
+            print_text(curve_summary(each, file.name))
             for table in curve_tables(each):
                 show_table(table)
     output.write(lambda: curves[0].dataset)
@@ -109,7 +109,7 @@ def write_curves(
         _draw(curves, figure, show, file, overwrite=output.overwrite)
     output.tell("trace", lambda: {"file": file, "curves": facts, "written": output.out})
     if figure is not None and not output.json:
-        say(f"\nWritten to {figure}")
+        print_text(f"\nWritten to {figure}")
     return 0
 
 

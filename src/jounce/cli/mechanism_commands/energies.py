@@ -6,11 +6,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from jounce.cli.arguments import check_ending
-from jounce.cli.file_kinds import expecting
-from jounce.cli.options import MechanismReading, RobotReading, errors_about, spare_inputs, tell, written
+from jounce.cli.file_kinds import explaining_other_kinds
+from jounce.cli.options import MechanismReading, RobotReading, errors_about, print_result, spare_inputs, written
 from jounce.errors import JounceError
 from jounce.io.files import DATA_FILES, ROBOT_FILES
-from jounce.reporting.terminal import say
+from jounce.reporting.terminal import print_text
 
 if TYPE_CHECKING:
     import xarray
@@ -77,7 +77,7 @@ def energies(
         if not 0 <= value <= MOST - (order if name == "--rates" else 0):
             most = MOST - (order if name == "--rates" else 0)
             raise JounceError(f"must be a whole number from 0 to {most}", name=name, value=value)
-    with expecting(file, "mechanism", "robot"):
+    with explaining_other_kinds(file, "mechanism", "robot"):
         check_ending(file, (*DATA_FILES, *ROBOT_FILES))
     if out is not None:
         check_writable(out, overwrite=overwrite)
@@ -94,13 +94,13 @@ def energies(
     if not json:
         times = dataset["time"].values
         what = "Kinetic energy" if order == 0 else f"Acceleration energy of order {order}"
-        say(f"{what}, t = {times[0]:g} to {times[-1]:g} s")
+        print_text(f"{what}, t = {times[0]:g} to {times[-1]:g} s")
         for k, values in enumerate(dataset["energy"].values.T):
             unit = derivative_unit("J", 2 * order + k)
-            say(f"  {'energy' if k == 0 else f'rate {k}'}: from {values.min():.9g} to {values.max():.9g} {unit}")
+            print_text(f"  {'energy' if k == 0 else f'rate {k}'}: from {values.min():.9g} to {values.max():.9g} {unit}")
     facts = {"file": str(file), "trajectory": None if trajectory is None else str(trajectory)}
     facts |= {"order": order, "rates": rates, "time": grid_facts(dataset["time"].values)}
-    tell("energies", lambda: {**facts, "peaks": _peaks(dataset, order), "written": out}, out, json=json)
+    print_result("energies", lambda: {**facts, "peaks": _peaks(dataset, order), "written": out}, out, json=json)
     return 0
 
 
@@ -138,11 +138,11 @@ def _of_robot(
 
 
 def _of_mechanism(reading: MechanismReading, file: Path, order: int, rates: int) -> xarray.Dataset:
-    from jounce.cli.mechanism_commands.mechanisms import moved
+    from jounce.cli.mechanism_commands.mechanisms import solve_or_simulate
     from jounce.dynamics.energy.energies import acceleration_energy
     from jounce.kinematics import raise_for_status
 
-    motion = moved(reading.mechanism(file), file, order + 1 + rates)
+    motion = solve_or_simulate(reading.mechanism(file), file, order + 1 + rates)
     with errors_about(file):
         raise_for_status(motion)
         energy = acceleration_energy(motion, order=order)

@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 from cyclopts import Parameter
 
 from jounce.base.activity import Count
-from jounce.cli.mechanism_commands.mechanisms import moved, outcome
+from jounce.cli.mechanism_commands.mechanisms import outcome, solve_or_simulate
 from jounce.cli.options import PLAIN_MECHANISM, MechanismReading, errors_about, spare_inputs, written
 from jounce.errors import JounceError, MechanismError, check_name
-from jounce.reporting.terminal import say
+from jounce.reporting.terminal import print_text
 
 if TYPE_CHECKING:
     from jounce.kinematics import Motion
@@ -91,7 +91,7 @@ def plot(
     spare_inputs(out, overwrite=overwrite)
     _check_names(mechanism, chosen, output or (), file)
     least = max(derivative or 0, ORDERS.get(chosen, 0) if order is None or chosen in PORTRAITS else 0)
-    motion = moved(mechanism, file, least if order is None else max(order, derivative or 0))
+    motion = solve_or_simulate(mechanism, file, least if order is None else max(order, derivative or 0))
     look: dict[str, Any] = {"paths": output, "order": derivative or 0, "view": (azimuth, elevation)}
     if names is not None:
         look["names"] = names
@@ -106,7 +106,7 @@ def plot(
 
             figure = _drawn(motion, chosen, output, derivative, {"instant": instant, **look})
             written(lambda: save(figure, out, overwrite=overwrite))
-    say(f"Written to {out}")
+    print_text(f"Written to {out}")
     return outcome(motion, file)
 
 
@@ -145,7 +145,7 @@ def _check_names(mechanism: Mechanism, kind: str, names: Sequence[str], file: Pa
 def _drawn(motion: Motion, kind: str, output: list[str] | None, derivative: int | None, look: dict[str, Any]) -> Any:
     import jounce.plot as figures
 
-    one = _portrayed(motion, kind, output)
+    one = _portrait_output(motion, kind, output)
     upper = 1 if derivative is None else max(derivative, 1)
     kinds: dict[str, Callable[[], Any]] = {
         "outputs": lambda: figures.draw(motion, output),
@@ -159,7 +159,7 @@ def _drawn(motion: Motion, kind: str, output: list[str] | None, derivative: int 
     return kinds[kind]()
 
 
-def _portrayed(motion: Motion, kind: str, output: list[str] | None) -> str:
+def _portrait_output(motion: Motion, kind: str, output: list[str] | None) -> str:
     """Return the output of a portrait: the first that fits unless one is named."""
     if output or kind not in PORTRAITS:
         return output[0] if output else ""
@@ -221,10 +221,10 @@ def report(
     check_report(out, overwrite=overwrite)
     mechanism = reading.mechanism(file)
     spare_inputs(out, overwrite=overwrite)
-    motion = moved(mechanism, file, order)
+    motion = solve_or_simulate(mechanism, file, order)
     look: dict[str, Any] = {"view": (azimuth, elevation), "source": file, "overwrite": overwrite}
     look |= {"equations": equations, "at": at}
     with errors_about(file):
         written(lambda: write_report(motion, out, **look))
-    say(f"Written to {out}")
+    print_text(f"Written to {out}")
     return outcome(motion, file)

@@ -22,7 +22,7 @@ from jounce.cli.options import (
 from jounce.cli.robot_motion import RobotRun, simulate_robot_file
 from jounce.errors import JounceError
 from jounce.io.files import ROBOT_FILES
-from jounce.reporting.terminal import say, show_peaks, show_table
+from jounce.reporting.terminal import print_text, show_peaks, show_table
 
 if TYPE_CHECKING:
     from jounce.integrate import AbstractMethod
@@ -243,7 +243,7 @@ def _write_result(
     from jounce.reporting.text.summaries import motion_summary
 
     if not output.json:
-        say(motion_summary(motion_facts(motion), file.name))
+        print_text(motion_summary(motion_facts(motion), file.name))
         show_peaks(shown_peaks(peaks(motion, refine=refine), motion.mechanism.shown_units))
         if held is not None:
             from jounce.reporting.facts.holding_facts import holding_table
@@ -288,7 +288,7 @@ def schema(of: Literal["mechanism", "results"] = "mechanism", /) -> int:
     else:
         from jounce.io import json_schema as schema_function
 
-    say(json.dumps(schema_function(), indent=1))
+    print_text(json.dumps(schema_function(), indent=1))
     return 0
 
 
@@ -308,7 +308,7 @@ def simulated(mechanism: Mechanism, file: Path, order: int, **options: Any) -> M
         return integrate(mechanism, order=order, strict=False, progress=bar, **options)
 
 
-def moved(mechanism: Mechanism, file: Path, order: int) -> Motion:
+def solve_or_simulate(mechanism: Mechanism, file: Path, order: int) -> Motion:
     """Solve a mechanism that is driven; simulate one that has initial conditions."""
     return simulated(mechanism, file, order) if mechanism.initial else solved(mechanism, file, order)
 

@@ -9,19 +9,19 @@ from typing import Any, Literal
 
 from jounce.base.activity import Count
 from jounce.cli.arguments import check_ending
-from jounce.cli.file_kinds import expecting
+from jounce.cli.file_kinds import explaining_other_kinds
 from jounce.cli.options import (
     PLAIN_MECHANISM,
     MechanismReading,
     Overwrite,
     RobotReading,
     errors_about,
+    print_result,
     spare_inputs,
-    tell,
     written,
 )
 from jounce.errors import JounceError
-from jounce.reporting.terminal import say, show_table
+from jounce.reporting.terminal import print_text, show_table
 
 OPTIONS = ("time", "without", "hold", "release", "coordinates", "method", "mode", "amplitude")
 
@@ -119,7 +119,7 @@ def modes(
     if not json:
         resting = facts["equilibrium"]
         words = f"in motion at t = {small.time:g} s" if resting is None else equilibrium_words(resting)
-        say(f"{small.mechanism.title or file.name}\n{words}\n")
+        print_text(f"{small.mechanism.title or file.name}\n{words}\n")
         for table in (*(() if rest is None else equilibrium_tables(rest)), modes_table(modes_found)):
             show_table(table)
     if out is not None:
@@ -133,8 +133,8 @@ def modes(
             duration = float(moved.time[-1])
             written(lambda: animate(moved, animation, speed=duration / 2, progress=bar, overwrite=overwrite))
         if not json:
-            say(f"\nMode {mode} is in {animation}, {_slowly(duration)}")
-    tell("modes", lambda: {**facts, "written": out}, out, json=json)
+            print_text(f"\nMode {mode} is in {animation}, {_slowly(duration)}")
+    print_result("modes", lambda: {**facts, "written": out}, out, json=json)
     return 0
 
 
@@ -156,7 +156,7 @@ def _subject(file: Path, reading: MechanismReading, without: Sequence[str], hold
     """Return the mechanism or the robot of a file, and what is left out or held of it."""
     from jounce.io.files import DATA_FILES, ROBOT_FILES
 
-    with expecting(file, "mechanism", "robot"):
+    with explaining_other_kinds(file, "mechanism", "robot"):
         check_ending(file, (*DATA_FILES, *ROBOT_FILES))
     if file.suffix.lower() not in ROBOT_FILES:
         if hold:

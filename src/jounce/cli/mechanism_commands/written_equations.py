@@ -8,11 +8,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 from jounce.cli.arguments import check_ending
-from jounce.cli.file_kinds import expecting
+from jounce.cli.file_kinds import explaining_other_kinds
 from jounce.cli.options import MechanismReading, RobotReading, errors_about, written
 from jounce.errors import JounceError
 from jounce.io.files import DATA_FILES, ROBOT_FILES
-from jounce.reporting.terminal import say
+from jounce.reporting.terminal import print_text
 
 if TYPE_CHECKING:
     from jounce.mechanism import Mechanism
@@ -80,7 +80,7 @@ def equations(
     from jounce.written_equations import equations as equations_as_text
     from jounce.written_equations.write import DEFAULT_NAME, ending_of
 
-    with expecting(file, "mechanism", "robot"):
+    with explaining_other_kinds(file, "mechanism", "robot"):
         check_ending(file, (*DATA_FILES, *ROBOT_FILES))
     model = _robot(reading, file) if file.suffix.lower() in ROBOT_FILES else reading.mechanism(file)
     if no_drives and isinstance(model, Mechanism):
@@ -98,7 +98,7 @@ def equations(
     with errors_about(file):
         text = equations_as_text(model, joint, **chosen, quantities=quantity or (), drives=not no_drives)
     if out is None:
-        say(text.rstrip("\n"))
+        print_text(text.rstrip("\n"))
         return 0
 
     def write() -> None:
@@ -120,7 +120,7 @@ def _table(
     mechanism: Mechanism, file: Path, joint: str | None, order: int, out: Path | None, *, overwrite: bool
 ) -> int:
     """Write the values of the equations along the motion of a file."""
-    from jounce.cli.mechanism_commands.mechanisms import moved, outcome
+    from jounce.cli.mechanism_commands.mechanisms import outcome, solve_or_simulate
     from jounce.dynamics import constraint_equations
     from jounce.errors import MechanismError, check_name
     from jounce.io import write
@@ -133,7 +133,7 @@ def _table(
     if joint is not None:
         with errors_about(file):
             check_name("joint or driver", joint, (*mechanism.joints, *mechanism.drivers), MechanismError, name="joint")
-    motion = moved(mechanism, file, order)
+    motion = solve_or_simulate(mechanism, file, order)
     with errors_about(file):
         dataset = constraint_equations(motion)
     if joint is not None:
@@ -152,5 +152,5 @@ def _table(
 
 def _written(write: Callable[[], object], out: Path) -> int:
     written(write)
-    say(f"Equations written to {out}")
+    print_text(f"Equations written to {out}")
     return 0

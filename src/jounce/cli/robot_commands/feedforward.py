@@ -8,7 +8,7 @@ from typing import Annotated, Any
 
 from cyclopts import Parameter
 
-from jounce.cli.file_kinds import expecting, kind_of
+from jounce.cli.file_kinds import explaining_other_kinds, kind_of
 from jounce.cli.options import (
     NO_TABLE,
     PLAIN_ROBOT,
@@ -20,7 +20,7 @@ from jounce.cli.options import (
     written,
 )
 from jounce.errors import JounceError, SampleWarning
-from jounce.reporting.terminal import recorded_cautions, say, show_table
+from jounce.reporting.terminal import print_text, recorded_cautions, show_table
 
 MOST_RATES = 24  # of torques of motors
 ROBOTS = (".urdf", ".xml", ".sdf")
@@ -95,15 +95,15 @@ def feedforward(
             report = result.report
             errors = link_errors(result) if simulate or figure is not None else None
     if not output.json:
-        say(facts.feedforward_words(result, getattr(result.system, "resting_joints", {})))
+        print_text(facts.feedforward_words(result, getattr(result.system, "resting_joints", {})))
         show_table(facts.drives_table(report), "bold red")
         if (table := facts.expansion_table(result)) is not None:
             show_table(table)
     recorded_cautions(caught, json=output.json)
     if not output.json:
-        say(f"\n{facts.drives_verdict(report)}")
+        print_text(f"\n{facts.drives_verdict(report)}")
         if errors is not None:
-            say(f"\n{facts.link_error_words(errors)}")
+            print_text(f"\n{facts.link_error_words(errors)}")
     if figure is not None and errors is not None:
         from jounce.plot import draw_feedforward, save
 
@@ -128,7 +128,7 @@ def _driven(file: Path, trajectory: Path | None, changes: list[str] | None, read
     if trajectory is not None:
         if kind_of(file) == "mechanism":
             raise JounceError("is a mechanism, which its own drivers move; leave the trajectory out", path=file)
-        with expecting(file, "robot"):
+        with explaining_other_kinds(file, "robot"):
             reading.robot(file)  # says what the file is
     if reading.payload:
         raise JounceError("belongs to robots; a mechanism has its masses in its file", name="--payload")

@@ -7,7 +7,7 @@ import warnings
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from jounce.cli.file_kinds import expecting
+from jounce.cli.file_kinds import explaining_other_kinds
 from jounce.cli.options import (
     NO_TABLE,
     PLAIN_ROBOT,
@@ -23,7 +23,7 @@ from jounce.cli.robot_commands.joint_tables import joint_table
 from jounce.cli.robot_commands.servo import frequency_of
 from jounce.errors import JounceError, SampleWarning
 from jounce.io.files import DATA_FILES
-from jounce.reporting.terminal import say, show_table
+from jounce.reporting.terminal import print_text, show_table
 
 if TYPE_CHECKING:
     from jounce.mechanism import Mechanism
@@ -208,7 +208,7 @@ def _of_mechanism(file: Path, limits: Path | None, rate: float, settings: Any, r
     from jounce.io import load, load_drive_limits
     from jounce.planning import retime as find
 
-    with expecting(file, "mechanism"):
+    with explaining_other_kinds(file, "mechanism"):
         mechanism = load(file, allow=allowed(reading.allow))
     if limits is None:
         raise JounceError("a mechanism has no limits of its own; give a file of limits with --limits", path=file)
@@ -249,9 +249,9 @@ def _of_robot(
         )
     bounds = limits_of(model, None)
     if limits is not None:
-        with expecting(limits, "limits"):
+        with explaining_other_kinds(limits, "limits"):
             bounds = load_motion_limits(limits, model)
-    with expecting(path, "trajectory"):
+    with explaining_other_kinds(path, "trajectory"):
         given = load_path(
             path, reading.degree, allowed(reading.allow), topic=reading.topic, robot=model, only=reading.chosen
         )
@@ -276,12 +276,12 @@ def _write_result(result: _Result, files: tuple[Path, Path | None], figure: Path
         spare_inputs(file, overwrite=output.overwrite)
     if not output.json:
         names = [file.name for file in files if file is not None]
-        say(retimed_words(retimed, result.before, result.free, names, result.read))
+        print_text(retimed_words(retimed, result.before, result.free, names, result.read))
         table = binding_table(retimed)
         if table.rows:
             show_table(table)
         else:
-            say("\nno limit binds")
+            print_text("\nno limit binds")
     output.write(lambda: joint_table(result.system, retimed, retimed.times, retimed.report.robot))
     if figure is not None:
         from jounce.plot import save

@@ -6,19 +6,19 @@ import warnings
 from pathlib import Path
 from typing import Any
 
-from jounce.cli.file_kinds import expecting
+from jounce.cli.file_kinds import explaining_other_kinds
 from jounce.cli.options import (
     NO_TABLE,
     PLAIN_ROBOT,
     RobotReading,
     TableOutput,
     errors_about,
+    print_result,
     spare_inputs,
-    tell,
     written,
 )
 from jounce.errors import JounceError, SampleWarning
-from jounce.reporting.terminal import recorded_cautions, say, show_peaks, show_table
+from jounce.reporting.terminal import print_text, recorded_cautions, show_peaks, show_table
 
 MOST_RATES = 28  # of torques: the highest derivative of a law is 30
 
@@ -84,7 +84,7 @@ def check(
     loads = reading.loads(model)
     bounds = limits_of(model, None)
     if limits is not None:
-        with expecting(limits, "limits"):
+        with explaining_other_kinds(limits, "limits"):
             bounds = load_motion_limits(limits, model)
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always", SampleWarning)
@@ -95,16 +95,16 @@ def check(
     if report.worst is None:
         raise JounceError("there are no limits to compare with; give a file of limits with --limits", path=robot)
     if not json:
-        say(limits_summary(report, motion, robot, trajectory))
+        print_text(limits_summary(report, motion, robot, trajectory))
         show_table(limits_table(report), "bold red")
     recorded_cautions(caught, json=json)
     if not json:
-        say(f"\n{verdict(report)}")
+        print_text(f"\n{verdict(report)}")
     if out is not None:
         from jounce.plot import draw_limits, save
 
         written(lambda: save(draw_limits(report, f"{report.robot}: {trajectory.name}"), out, overwrite=overwrite))
-    tell("check", lambda: limits_result(report, robot, trajectory, out, motion), out, json=json)
+    print_result("check", lambda: limits_result(report, robot, trajectory, out, motion), out, json=json)
     return 0 if report.kept else 1
 
 
@@ -163,7 +163,9 @@ def torques(
         one_sided = _torques_at_breaks(model, motion, rates, loads, drives=not no_drives)
     largest = table_peaks(dataset, one_sided)
     if not output.json:
-        say("\n".join([torques_summary(dataset, motion, ends, robot, trajectory), *(load.words for load in loads)]))
+        print_text(
+            "\n".join([torques_summary(dataset, motion, ends, robot, trajectory), *(load.words for load in loads)])
+        )
         show_peaks(largest)
     output.write(lambda: dataset)
     output.tell("torques", lambda: torques_result(dataset, largest, motion, ends, (robot, trajectory), output.out))

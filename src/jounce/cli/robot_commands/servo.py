@@ -19,7 +19,7 @@ from jounce.cli.options import (
     spare_inputs,
 )
 from jounce.errors import JounceError, check_name
-from jounce.reporting.terminal import say, show_peaks
+from jounce.reporting.terminal import print_text, show_peaks
 
 if TYPE_CHECKING:
     from jounce.kinematics import Motion
@@ -87,7 +87,7 @@ def servo(
     if not output.json:
         count = f"{len(motion.time)} rows from {first:g} s to {last:g} s, {frequency:g} a second"
         shorter = filter(None, [last_step_words(motion.time)])
-        say("\n".join([mechanism.title or file.name, count, *shorter, *law_words(laws)]))
+        print_text("\n".join([mechanism.title or file.name, count, *shorter, *law_words(laws)]))
         show_peaks(shown_peaks(peaks, shown))
     output.write(lambda: in_units(dataset, shown), header_units=units)
     output.tell("servo", lambda: _result(file, frequency, names, laws, peaks, output.out))

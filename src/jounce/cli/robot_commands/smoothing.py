@@ -12,7 +12,7 @@ from jounce.cli.robot_commands.joint_tables import joint_table
 from jounce.cli.robot_commands.retiming import deviation_of
 from jounce.cli.robot_commands.servo import frequency_of
 from jounce.errors import SampleWarning
-from jounce.reporting.terminal import say, show_table
+from jounce.reporting.terminal import print_text, show_table
 
 if TYPE_CHECKING:
     from jounce.robot import Robot
@@ -80,10 +80,10 @@ def smooth(
     times = time_grid(TimeGrid(motion.start, motion.stop, 1 / frequency), {})
     if not output.json:
         rows = "" if output.out is None else f"{len(times)} rows "
-        say(f"{rows}from {motion.start:g} s to {motion.stop:g} s, within {allowed:.3g} rad or m of each sample")
+        print_text(f"{rows}from {motion.start:g} s to {motion.stop:g} s, within {allowed:.3g} rad or m of each sample")
         show_table(smoothing_table(motion))
         if words := smoothing_words(motion):
-            say(words)
+            print_text(words)
     if output.out is not None:
         output.write_parts(_parts(model, motion, times), len(times))
     if figure is not None:

@@ -68,7 +68,7 @@ class SearchResult:
         )
 
 
-class _Enough(Exception):  # noqa: N818 - not an error of the user
+class _EvaluationLimitError(Exception):
     """A run has evaluated its largest number of designs."""
 
 
@@ -255,7 +255,7 @@ class _Run:
             )
         except Locked as locked:
             return locked, False
-        except _Enough:
+        except _EvaluationLimitError:
             return None, True
         free = (self.best > self.low + ACTIVE * self.radius) | (self.low <= 0.0)
         free &= (self.best < self.high - ACTIVE * self.radius) | (self.high >= 1.0)
@@ -289,7 +289,7 @@ class _Run:
         if self.problem.evaluations != before:
             self.evaluations += 1
             if self.evaluations > EACH * self.search.iterations:
-                raise _Enough
+                raise _EvaluationLimitError
             merit = self.merit_of(point)
             if merit < self._best_merit:
                 self.best, self._best_merit = np.array(point), merit

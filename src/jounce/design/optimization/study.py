@@ -96,7 +96,7 @@ class Study:
             self.notes += taken.notes(self.request.bounds)
             points += taken.best(starts - len(points))
             if not points:
-                raise _nothing_moves(lock, taken)
+                raise _infeasible_error(lock, taken)
         if lock is not None:
             self.notes.append(f"the mechanism as it is cannot be moved: {lock}")
         self.total = len(points)
@@ -308,7 +308,7 @@ class Study:
         raise DesignError(message, name="assemblies", value=assembly)
 
 
-def _nothing_moves(lock: Locked | None, taken: Samples) -> DesignError:
+def _infeasible_error(lock: Locked | None, taken: Samples) -> DesignError:
     """Return the error where no design can be assembled and moved."""
     why = "" if lock is None else f"; the mechanism as it is: {lock}"
     if (taken.status == Status.LOCKED).all():

@@ -33,7 +33,7 @@ from jounce.dynamics.forward.saddle_point import (
     in_basis,
     saddle_point,
 )
-from jounce.dynamics.friction.coupling import rubs
+from jounce.dynamics.friction.coupling import has_friction
 from jounce.dynamics.friction.free_motion import FreeFriction, with_friction
 from jounce.dynamics.masses import Gravity, Masses
 from jounce.jet import Jet
@@ -269,7 +269,7 @@ class Equations(Module):
         """
         solved = partial(self.unknowns, solve)
         frictionless = solved(forces, second)
-        if not any(map(rubs, self.system.groups)):
+        if not any(map(has_friction, self.system.groups)):
             return *frictionless, solved
         friction = FreeFriction(self.system, self.pose(state), Jet([time]))
 

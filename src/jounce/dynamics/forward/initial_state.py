@@ -112,7 +112,7 @@ def consistent_start(
         model = dataclasses.replace(
             model, guess=coordinates, system=system, prescribed=whole.prescribed, history=whole.history
         )
-        together = _let_go(model, whole, instant)
+        together = _without_initial_conditions(model, whole, instant)
     model, coordinates = together or assemble(model, instant, TOLERANCE, free=True)
     equations = resident(equations_of(model, masses, gravity))
     if state is None:
@@ -153,7 +153,9 @@ def _assembled(model: Model, instant: float) -> tuple[Model, dict[str, np.ndarra
         raise MobilityError(message, status=error.status) from None
 
 
-def _let_go(model: Model, whole: Model, instant: float) -> tuple[Model, dict[str, np.ndarray]] | None:
+def _without_initial_conditions(
+    model: Model, whole: Model, instant: float
+) -> tuple[Model, dict[str, np.ndarray]] | None:
     """Return the model without initial conditions as `assemble` does, where they were assembled; None if it is unlike.
 
     The rows that are left are fulfilled there, and independent if all were.
@@ -207,7 +209,7 @@ class _Facts(NamedTuple):
 
 
 @compiled(narrow=True, brief=True)
-def _judged(equations: Equations, state: State, time: Instants) -> _Facts:
+def _computed_facts(equations: Equations, state: State, time: Instants) -> _Facts:
     """Return these facts from a program of their own: in that of the velocities they would change its last digits."""
     pose = equations.pose_at_rest(state.position, state.attitude)
     matrix, entries = equations.matrix(state, time)[..., 0], equations.system.entries(pose, Jet([time]))[..., 0]
@@ -216,7 +218,7 @@ def _judged(equations: Equations, state: State, time: Instants) -> _Facts:
 
 
 def _facts(equations: Equations, state: State, instant: float) -> _Facts:
-    return jax.tree.map(np.asarray, _judged(equations, state, np.array([[instant]])))
+    return jax.tree.map(np.asarray, _computed_facts(equations, state, np.array([[instant]])))
 
 
 def _moving(equations: Equations, state: State, time: Instants) -> State:
@@ -270,7 +272,7 @@ def _checked_jacobian(equations: Equations, model: Model, facts: _Facts, instant
     whole, system = facts.matrix, model.system
     jacobian = HostJacobian.of(system.pattern, facts.entries).scaled(np.asarray(system.row_scale)[:, 0])
     columns = jacobian.shape[1]
-    loose = _loose(whole, columns)
+    loose = _undetermined_motions(whole, columns)
     if len(loose):
         mass, _, moments = map(np.asarray, equations.masses)
         by_body = np.linalg.norm(loose[:, :columns].reshape(len(loose), len(model.bodies), -1), axis=(0, 2))
@@ -289,7 +291,7 @@ def _checked_jacobian(equations: Equations, model: Model, facts: _Facts, instant
     return jacobian
 
 
-def _loose(whole: Float[np.ndarray, "size size"], columns: int) -> Float[np.ndarray, "direction size"]:
+def _undetermined_motions(whole: Float[np.ndarray, "size size"], columns: int) -> Float[np.ndarray, "direction size"]:
     """Return the null space of the matrix of the equations; the first entries of its vectors belong to columns."""
     scale, tolerance = even_scale(whole, columns), 1e-3 * RANK_TOLERANCE
     even = whole * scale * scale[:, None]

@@ -41,7 +41,7 @@ ROUNDING = 1e-14  # of the largest multiplier, which normal forces of gears with
 NormalForces = Float[Numbers, "joint batch"]
 
 
-def rubs(group: Group) -> bool:
+def has_friction(group: Group) -> bool:
     """Return whether joints of a group have friction."""
     return getattr(group.element, "friction", None) is not None
 
@@ -53,7 +53,7 @@ def has_flanks(group: Group) -> bool:
 
 def pressing_teeth(system: System) -> list[Group]:
     """Return the groups of teeth with a pressure angle where joints have friction, which tooth forces press."""
-    return [group for group in system.groups if has_flanks(group)] if any(map(rubs, system.groups)) else []
+    return [group for group in system.groups if has_flanks(group)] if any(map(has_friction, system.groups)) else []
 
 
 def loses_torque(element: Any) -> bool:
@@ -64,7 +64,7 @@ def loses_torque(element: Any) -> bool:
 def joints_with_friction(model: Model, system: System) -> list[str]:
     """Return the names of the joints with friction."""
     pairs = zip(system.groups, group_rows(model), strict=True)
-    return [name for group, rows in pairs if rubs(group) for name in model.rows[rows][: group.instances]]
+    return [name for group, rows in pairs if has_friction(group) for name in model.rows[rows][: group.instances]]
 
 
 def check_unique_pressing(model: Model, system: System) -> None:

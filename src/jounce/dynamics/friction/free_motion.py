@@ -18,15 +18,15 @@ from jounce.constraints.friction import displacements
 from jounce.dynamics.friction.coupling import (
     Coupling,
     has_flanks,
+    has_friction,
     loses_torque,
     pressed,
     pressing_teeth,
     resisting,
-    rubs,
     torque_lost,
 )
 from jounce.jet import Jet
-from jounce.mechanism.system import Group, System, holding, movable, with_rows
+from jounce.mechanism.system import Group, System, movable, with_field, with_rows
 from jounce.rigid.pose import Pose
 
 Rows = Float[Numbers, "row batch"]
@@ -47,7 +47,7 @@ class FreeFriction:
 
     def __init__(self, system: System, pose: Pose, time: Jet):
         self.system, self.pose, self.time = system, pose, time
-        self.groups = [group for group in system.groups if rubs(group)]
+        self.groups = [group for group in system.groups if has_friction(group)]
         self.meshes = pressing_teeth(system)
 
     @property
@@ -71,7 +71,7 @@ class FreeFriction:
             own = unscaled[first : first + count].reshape(shape[0], shape[1], -1)
             if self.meshes and has_flanks(group):
                 teeth += [own[0], jnp.abs(own[0])]
-            if rubs(group):
+            if has_friction(group):
                 normals.append(
                     self._lost(group, own) if loses_torque(group.element) else self._pressed(group, bodies, own)
                 )
@@ -110,7 +110,7 @@ class FreeFriction:
         """Return what a tooth force acts along besides the residual of gears, as the multiplier and as its size."""
         of_residual, one, other = (
             each.variation(self._at_rest, change, self.time).coefficients[0]
-            for each in (group, holding(group, "flank", 1.0), holding(group, "flank", -1.0))
+            for each in (group, with_field(group, "flank", 1.0), with_field(group, "flank", -1.0))
         )
         return jnp.concatenate([(one + other) / 2.0 - of_residual, (one - other) / 2.0])
 

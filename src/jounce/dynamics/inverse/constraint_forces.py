@@ -31,7 +31,7 @@ from jounce.jet.algebra import stacked, total
 from jounce.kinematics.sensitivity.jacobian_series import Slope, solver
 from jounce.linear_algebra.frontal import FrontalFactor
 from jounce.linear_algebra.linear import DenseFactor
-from jounce.mechanism.system import LeftOut, System, with_rows
+from jounce.mechanism.system import OmittedLaw, System, with_rows
 from jounce.rigid.pose import Pose
 from jounce.trajectory import AbstractMotion
 
@@ -212,7 +212,7 @@ def exerted(
         Coefficients of the multipliers; the order of the poses is one less than the levels.
     """
     law = driver.motion
-    if isinstance(law, LeftOut):
+    if isinstance(law, OmittedLaw):
         law = partial(_as_measured, driver.evaluate(*poses))
 
     def residual(shift: Any) -> Any:

@@ -14,10 +14,10 @@ from jounce.base.shapes import Numbers
 from jounce.constraints.friction import pressing_force, slip_velocity
 from jounce.dynamics.forward.accelerations import Lanes
 from jounce.dynamics.forward.loads import loads, mass_matrices
-from jounce.dynamics.friction.coupling import friction_slope, loses_torque, resisting, rubs
+from jounce.dynamics.friction.coupling import friction_slope, has_friction, loses_torque, resisting
 from jounce.dynamics.inverse import constraint_forces, redundant_forces
 from jounce.dynamics.inverse.constraint_forces import Multipliers, Slope, Slopes
-from jounce.dynamics.inverse.friction_of_motion import Rubbed, rubbing_of, with_friction
+from jounce.dynamics.inverse.friction_of_motion import Rubbed, friction_groups, with_friction
 from jounce.dynamics.inverse.tooth_flanks import with_flanks
 from jounce.dynamics.motion_values import Coordinates, cut, in_small_chunks, pose_of
 from jounce.execution.compilation import compiled
@@ -162,9 +162,9 @@ def balanced(shared: Any, lanes: Any, *, pose_type: type[Pose]) -> tuple[Any, An
     def of_chunk(blocks: Slopes, load: Numbers, mass: Any, rubbed: Sequence[Rubbed]) -> Any:
         if not rubbed:
             return constraint_forces.multipliers(system, blocks, load, mass)
-        return with_friction(system, blocks, load, mass, rubbing_of(system, blocks, rubbed))
+        return with_friction(system, blocks, load, mass, friction_groups(system, blocks, rubbed))
 
-    given = blocks, load, mass, [rubbed(group) for group in system.groups if rubs(group)]
+    given = blocks, load, mass, [rubbed(group) for group in system.groups if has_friction(group)]
     is_dense = mass is not None or system.fronts is None
     multipliers = in_small_chunks(of_chunk, SMALL_CHUNK, *given) if is_dense else of_chunk(*given)
     return multipliers[None], finite
@@ -281,7 +281,7 @@ def force_wrench(
 
 
 @Mapped
-def passed_on(
+def transmitted_wrench(
     point: Float[Numbers, "component 1 1"],
     lanes: tuple[Sequence[Float[Numbers, "levels coordinate batch"]], Sequence[Coordinates]],
     *,

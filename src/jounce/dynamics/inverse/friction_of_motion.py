@@ -10,7 +10,7 @@ from jaxtyping import Float
 
 from jounce.base.modules import Module, field
 from jounce.base.shapes import Numbers
-from jounce.dynamics.friction.coupling import Coupling, pressed, rubs, torque_lost
+from jounce.dynamics.friction.coupling import Coupling, has_friction, pressed, torque_lost
 from jounce.dynamics.inverse.constraint_forces import BodyMatrices, Slopes, load_solver, onto_bodies
 from jounce.jet import Jet
 from jounce.jet.algebra import stacked, total
@@ -24,7 +24,7 @@ part of the torque lost resists, (levels, 1, instances, batch); None of others.
 """
 
 
-class Rubbing(Module):
+class FrictionGroup(Module):
     """A group of joints with friction, in a motion.
 
     Parameters
@@ -64,13 +64,13 @@ class Rubbing(Module):
         return stacked(pressed(self.group.element, self.poses, Jet(tuple(force))))
 
 
-def rubbing_of(system: System, blocks: Slopes, rubbed: Sequence[Rubbed]) -> list[Rubbing]:
+def friction_groups(system: System, blocks: Slopes, rubbed: Sequence[Rubbed]) -> list[FrictionGroup]:
     """Return the groups of joints with friction; `rubbed` is in the order of the groups."""
     rubbing, first, left = [], 0, iter(rubbed)
     for group, slopes in zip(system.groups, blocks, strict=True):
-        if rubs(group):
+        if has_friction(group):
             friction, poses, resisting = next(left)
-            rubbing.append(Rubbing(group, poses, slopes, friction, resisting, first))
+            rubbing.append(FrictionGroup(group, poses, slopes, friction, resisting, first))
         first += slopes[0].shape[2] * group.instances
     return rubbing
 
@@ -80,7 +80,7 @@ def with_friction(
     blocks: Slopes,
     load: Float[Numbers, "levels coordinate body batch"],
     mass: BodyMatrices | None,
-    rubbing: Sequence[Rubbing],
+    rubbing: Sequence[FrictionGroup],
 ) -> Float[Numbers, "levels row batch"]:
     """Return the multipliers of all rows, not scaled, and below them the normal forces, as Taylor coefficients.
 
@@ -88,7 +88,7 @@ def with_friction(
     ----------
     system, blocks, load, mass
         As `constraint_forces.multipliers` takes them.
-    rubbing : sequence of Rubbing
+    rubbing : sequence of FrictionGroup
         All joints with friction.
     """
     solve, rows, levels = load_solver(system, blocks, mass), system.shape[0], len(load)

@@ -8,11 +8,11 @@ from jaxtyping import Float
 
 from jounce.base.shapes import Numbers
 from jounce.constraints.friction import UnitFriction
-from jounce.dynamics.friction.coupling import loses_torque, rubs
+from jounce.dynamics.friction.coupling import has_friction, loses_torque
 from jounce.dynamics.inverse import force_programs as programs
 from jounce.dynamics.motion_values import cut
 from jounce.execution.mapped import at_lanes
-from jounce.mechanism.system import holding
+from jounce.mechanism.system import with_field
 
 
 class JointFriction:
@@ -30,7 +30,7 @@ class JointFriction:
     @property
     def first_rows(self) -> dict[int, int]:
         """First rows of the normal forces of groups with friction, below the multipliers, by the index of the group."""
-        rubbing = [k for k, group in enumerate(self.forces.joined.groups) if rubs(group)]
+        rubbing = [k for k, group in enumerate(self.forces.joined.groups) if has_friction(group)]
         counts = [self.forces.joined.groups[k].instances for k in rubbing]
         return {k: len(self.forces.model.rows) + sum(counts[:n]) for n, k in enumerate(rubbing)}
 
@@ -114,7 +114,7 @@ class JointFriction:
         loads = np.zeros((group.instances, count, components, bodies + 1, len(lanes)))
         for direction in range(count):
             radius = None if loses_torque(group.element) else group.element.friction.radius
-            unit = holding(group, "friction", UnitFriction(radius, direction)).element
+            unit = with_field(group, "friction", UnitFriction(radius, direction)).element
             for slot in group.moving_slots:
                 how = {"pose_type": forces.pose_type, "slot": slot, "levels": 1}
                 slope = programs.friction_slopes.program(unit, moving, **how)(moving)[0, :, 0]

@@ -7,18 +7,18 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from jounce.base.shapes import Numbers
-from jounce.dynamics.friction.coupling import joints_with_friction, rubs
+from jounce.dynamics.friction.coupling import has_friction, joints_with_friction
 from jounce.dynamics.inverse.tooth_flanks import listed
 from jounce.errors import SolveError
 from jounce.kinematics import Motion, Status
-from jounce.mechanism.system import Group, System, holding
+from jounce.mechanism.system import Group, System, with_field
 
 NONE = 1e-12  # of the largest normal force: less is rounding
 
 
 def friction_left_out(group: Group) -> Group:
     """Return a group without friction."""
-    return holding(group, "friction", None) if rubs(group) else group
+    return with_field(group, "friction", None) if has_friction(group) else group
 
 
 def check_not_locked(motion: Motion, system: System, multipliers: Float[Numbers, "order row time"]) -> None:
@@ -47,7 +47,7 @@ def _locked_at(motion: Motion, locked: Bool[np.ndarray, " time"]) -> Motion:
     return twin
 
 
-def without_open_rates(forces: Any, multipliers: Float[Numbers, "case order row time"]) -> Numbers:
+def without_undetermined_rates(forces: Any, multipliers: Float[Numbers, "case order row time"]) -> Numbers:
     """Return multipliers and normal forces with rates NaN where the force that presses a joint passes zero.
 
     Its magnitude has no derivative there. Where it is zero with all its rates, there is no friction, and its rates are
@@ -81,7 +81,7 @@ def without_open_rates(forces: Any, multipliers: Float[Numbers, "case order row 
 
 
 def passing_words(forces: Any) -> str:
-    """Return words for the instants at which `without_open_rates` leaves rates of friction open; empty if none."""
+    """Return words for instants where `without_undetermined_rates` leaves rates of friction open; empty if none."""
     phrases = [
         f"what presses {name} passes zero at t = {listed(times)}: rates of its friction are not determined"
         for name, times in forces.passing.items()

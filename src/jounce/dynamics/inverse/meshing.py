@@ -18,7 +18,7 @@ from jounce.jet import Jet, cross
 from jounce.jet.algebra import stacked
 from jounce.kinematics import Motion, Status
 from jounce.mechanism.building.builder import group_rows
-from jounce.mechanism.system import Group, holding, movable
+from jounce.mechanism.system import Group, movable, with_field
 
 FAR = 300.0  # times the distance of crossed axes: no gears have such radii, but numbers in mm without their unit do
 LEAD = math.radians(0.5)  # by which a lead angle that is given to friction may be rounded
@@ -168,6 +168,6 @@ def _parted(element: Any, poses: Any, instants: Any, pose_type: Any) -> Any:
     time = Jet([instants[None]])
 
     def residual(flank: float) -> Any:
-        return stacked(holding(group, "flank", flank).element.residual(*built, time))[0]
+        return stacked(with_field(group, "flank", flank).element.residual(*built, time))[0]
 
     return residual(1.0) - residual(0.0)

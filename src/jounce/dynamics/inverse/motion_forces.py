@@ -14,7 +14,7 @@ from jounce.dynamics.friction.coupling import check_unique_pressing
 from jounce.dynamics.inverse import force_programs as programs, idle_torques, tooth_flanks as teeth
 from jounce.dynamics.inverse.finite_forces import check_finite_forces, check_finite_values
 from jounce.dynamics.inverse.joint_friction import JointFriction
-from jounce.dynamics.inverse.locked_friction import check_not_locked, friction_left_out, without_open_rates
+from jounce.dynamics.inverse.locked_friction import check_not_locked, friction_left_out, without_undetermined_rates
 from jounce.dynamics.inverse.meshing import check_meshing
 from jounce.dynamics.inverse.redundant_forces import OPEN, OpenMultipliers
 from jounce.dynamics.masses import check_loads, gravity_of, masses_of
@@ -102,9 +102,11 @@ class MotionForces:
         if not self.flanks:
             return self._balanced({})
         check_meshing(self.motion, self.joined.groups, self.coordinates_of)
-        multipliers, known, self._reversals = teeth.settled(self._balanced, self.flanks, self.model, self.motion)
+        multipliers, known, self._reversals = teeth.multipliers_on_flanks(
+            self._balanced, self.flanks, self.model, self.motion
+        )
         if self._looks_for_open:  # what is open presses on no flank that is known: any others tell what depends on it
-            multipliers = np.stack([multipliers[0], self._balanced(teeth.by_chance(known))[1]])
+            multipliers = np.stack([multipliers[0], self._balanced(teeth.random_for_flanks(known))[1]])
         self.flanks = known
         return multipliers
 
@@ -125,7 +127,7 @@ class MotionForces:
         check_finite_forces(self, finite)
         check_not_locked(self.motion, self.joined, multipliers[0])
         check_finite_values(self, multipliers[0])
-        return without_open_rates(self, multipliers)
+        return without_undetermined_rates(self, multipliers)
 
     def _balance(self, choice: tuple[Numbers, Numbers, Numbers] | None) -> Any:
         """Return what a balance has at all instants, for a choice among the multipliers of redundant rows."""
@@ -193,7 +195,7 @@ class MotionForces:
         solved = self.motion.status == Status.OK
         size = np.abs(multipliers[0][:, solved] * self.open.weights[:, None]).max(initial=0.0)
         twin.__dict__["multipliers"] = multipliers / (size or 1.0)
-        twin.flanks = teeth.by_chance(self.flanks)
+        twin.flanks = teeth.random_for_flanks(self.flanks)
         return twin
 
     @property
@@ -265,7 +267,7 @@ class MotionForces:
         moving = {slot: its for slot, its in joined if its and slot not in getattr(element, "unfelt", ())}
         works = [self._wrench(name, slot) for slot in moving]
         poses = [self.coordinates_of((its,), self.levels) for its in moving.values()]
-        work = self.along(programs.passed_on, point[:, None, None], (works, poses))
+        work = self.along(programs.transmitted_wrench, point[:, None, None], (works, poses))
         return self._expressed(work, 0, frame, np.zeros(np.shape(point)))
 
     def point_of(self, name: str, body: int) -> Float[Numbers, " component"]:
@@ -298,7 +300,7 @@ class MotionForces:
             how = {"slot": slot, "levels": self.levels}
             wrench = self._once(programs.joint_wrench, group.element, lanes, place.group, **how)
             wrench = wrench[:, :, place.instance]
-            return teeth.without_open_rates(wrench, self._reversals.get(place.group), place.instance)
+            return teeth.without_undetermined_rates(wrench, self._reversals.get(place.group), place.instance)
         index, instance = self._force_index(name)
         lanes, how = (*self._acting(index, self.levels), self._sizes(index)), {"slot": slot, "levels": self.levels}
         return self._once(programs.force_wrench, self._free(index), lanes, index, **how)[:, :, instance]

@@ -69,7 +69,7 @@ def least_multipliers(
         for group, parts, forces in by_group(system, blocks, solved):
             for slot, slope in zip(group.moving_slots, parts, strict=True):
                 missing -= onto_bodies(work_along(slope, forces, k, 1), group.bodies[slot], system.body_count)
-        rest = -_strained(system, blocks, strains, k) * system.row_scale
+        rest = -_jacobian_times_displacements(system, blocks, strains, k) * system.row_scale
         rest = rest + (bent[:, None] if k == 0 else 0.0)
         right = jnp.sum(basis * as_column(missing, scale)[:, None], axis=0)
         solution = factor.solve(jnp.concatenate([jnp.broadcast_to(rest, (rows, right.shape[-1])), right]))
@@ -78,7 +78,9 @@ def least_multipliers(
     return jnp.stack(solved)
 
 
-def _strained(system: System, blocks: Slopes, strains: Sequence[Any], level: int) -> Float[Numbers, "row batch"]:
+def _jacobian_times_displacements(
+    system: System, blocks: Slopes, strains: Sequence[Any], level: int
+) -> Float[Numbers, "row batch"]:
     """Return the Taylor coefficient of Jacobian times displacements, without that of the Jacobian of order zero."""
     parts = []
     for group, slopes in zip(system.groups, blocks, strict=True):

@@ -19,7 +19,7 @@ from jounce.dynamics.friction.coupling import has_flanks
 from jounce.kinematics import Motion, Status
 from jounce.mechanism import Model
 from jounce.mechanism.building.builder import group_rows
-from jounce.mechanism.system import Group, holding
+from jounce.mechanism.system import Group, with_field
 
 Flanks = Mapping[int, Float[Numbers, "instance time"]]
 """1 or -1 for each pair of teeth, by the index of its group."""
@@ -38,16 +38,16 @@ def either_flank(groups: Sequence[Group], count: int) -> dict[int, Any]:
 def with_flanks(groups: Sequence[Group], flanks: Sequence[Numbers]) -> tuple[Group, ...]:
     """Return groups with flanks of teeth, (instances, batch) for each group that has some."""
     left = iter(flanks)
-    return tuple(holding(group, "flank", next(left)) if flanks and has_flanks(group) else group for group in groups)
+    return tuple(with_field(group, "flank", next(left)) if flanks and has_flanks(group) else group for group in groups)
 
 
-def by_chance(flanks: Flanks) -> dict[int, Any]:
+def random_for_flanks(flanks: Flanks) -> dict[int, Any]:
     """Return random numbers for flanks: forces that change with them depend on the distribution of loads."""
     random = np.random.default_rng(1)
     return {k: random.uniform(0.3, 0.7, flank.shape[:1])[:, None] * flank for k, flank in flanks.items()}
 
 
-def settled(
+def multipliers_on_flanks(
     solve: Callable[[Flanks], Numbers], flanks: Flanks, model: Model, motion: Motion
 ) -> tuple[Numbers, Flanks, dict[int, Any]]:
     """Return multipliers with the flanks that they press on, and the first rates that are not determined.
@@ -98,7 +98,7 @@ def settled(
     return multipliers, flanks, reversals
 
 
-def without_open_rates(work: Numbers, first: Numbers | None, instance: int) -> Numbers:
+def without_undetermined_rates(work: Numbers, first: Numbers | None, instance: int) -> Numbers:
     """Return the force of teeth on a body, (levels, coordinates, time), NaN for rates that a reversal leaves open."""
     return work if first is None else np.where(np.arange(len(work))[:, None, None] >= first[instance], np.nan, work)
 

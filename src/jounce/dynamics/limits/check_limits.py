@@ -13,7 +13,7 @@ from jounce.dynamics.limits.limit_jumps import Infinite, infinite_quantities, ju
 from jounce.dynamics.limits.limit_report import LimitReport, LimitRow
 from jounce.dynamics.limits.local_maxima import local_maxima
 from jounce.dynamics.limits.motion_ends import TrajectoryEnd, end_jumps, ends_of_jumps
-from jounce.dynamics.limits.trajectories import FollowedTrajectory, why_not
+from jounce.dynamics.limits.trajectories import FollowedTrajectory, reason_not_movable
 from jounce.errors import RobotError, SampleWarning, TrajectoryError, flag
 from jounce.robot.algorithms.carried_loads import CarriedLoad
 from jounce.robot.model.links_and_joints import Limits
@@ -319,7 +319,7 @@ def _merged(robot: Robot, limits: Mapping[str, Limits] | None) -> dict[str, Limi
     given = dict(limits or {})
     for name, entry in given.items():
         if name not in robot.joint_names:
-            raise RobotError(why_not(robot, name), name="limits", value=name)
+            raise RobotError(reason_not_movable(robot, name), name="limits", value=name)
         if not isinstance(entry, Limits):
             raise RobotError("must be Limits", name=f"limits.{name}", value=entry)
     return robot.limits_with(given)

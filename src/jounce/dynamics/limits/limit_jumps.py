@@ -7,7 +7,7 @@ from jaxtyping import Float
 
 from jounce.dynamics.limits.trajectories import FollowedTrajectory
 from jounce.trajectory.law_checks.seen_jumps import level_sizes, seen_jumps
-from jounce.trajectory.law_checks.smoothness import SeenLeaders, known_jumps
+from jounce.trajectory.law_checks.smoothness import LeaderValues, known_jumps
 from jounce.trajectory.laws.stacking import law_derivatives
 
 SMALL = 1e-9  # of the largest value of a derivative: a smaller jump is rounding
@@ -81,7 +81,7 @@ def jumps_of(
         nothing = np.zeros((0, order + 1, joints))
         return Jumps(np.zeros(0), nothing, nothing)
     instants, sizes, unknown = [np.zeros(0)], [np.zeros((0, order, joints))], []
-    leaders = SeenLeaders()
+    leaders = LeaderValues()
     for column, law in zip(followed.columns, trajectory.laws.values(), strict=True):
         own, jumps, everything = known_jumps(law, first, last, order - 1, leaders)
         spread = np.zeros((len(own), order, joints))

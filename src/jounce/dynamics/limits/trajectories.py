@@ -64,7 +64,7 @@ class FollowedTrajectory:
         for name in trajectory.names:
             if name not in robot.joint_names:
                 others = "" if name not in robot.joints else ", of a file by joints (--joints) that name the others"
-                raise TrajectoryError(why_not(robot, name) + others, name="joint", value=name)
+                raise TrajectoryError(reason_not_movable(robot, name) + others, name="joint", value=name)
         check_measures(robot, trajectory)
         self.robot, self.trajectory = robot, trajectory
         self.loaded = LoadedRobot(robot, in_time(loads), trajectory.start, trajectory.stop)
@@ -232,7 +232,7 @@ def _in_blocks(function: Callable[[np.ndarray], Any], values: np.ndarray) -> np.
     return in_chunks(lambda some: function(values[some]), len(values), (BLOCK,), axis=0)
 
 
-def why_not(robot: Robot, name: str) -> str:
+def reason_not_movable(robot: Robot, name: str) -> str:
     """Say why a name is not that of a joint that can be moved."""
     joint = robot.joints.get(name)
     if joint is None:

@@ -22,7 +22,7 @@ def kinked(reduction: Reduction) -> list[str]:
     columns = reduction.changes[:2, :, : 2 * count]  # of positions and velocities
     sizes = np.abs(columns).max(axis=(0, 1), initial=1e-300)
     columns = columns / sizes
-    counts = _that_count(reduction, sizes)
+    counts = _significant_difference(reduction, sizes)
 
     def forces(step: float) -> list[np.ndarray]:
         changes = point.changes(columns * step)
@@ -46,7 +46,7 @@ def kinked(reduction: Reduction) -> list[str]:
     return names
 
 
-def _that_count(reduction: Reduction, sizes: np.ndarray) -> np.ndarray:
+def _significant_difference(reduction: Reduction, sizes: np.ndarray) -> np.ndarray:
     """Return the least difference of slopes that matters among stiffness and damping, N m and N m s, for each lane."""
     count = len(reduction.names)
     stiffness, mass = (

@@ -12,7 +12,7 @@ from jounce.dynamics.forward.initial_state import TOLERANCE
 from jounce.dynamics.friction.coupling import pressing_teeth
 from jounce.dynamics.statics.variations import (
     LEVELS,
-    borne_at,
+    constraint_forces_at,
     displaced,
     loads_at,
     masses_at,
@@ -102,7 +102,7 @@ class OperatingPoint:
         first = self._balancing(load)
         if not pressing_teeth(self.equations.system):
             return first
-        borne = np.asarray(borne_at(self.equations, self.coordinates, self.clock, first[:, None]))
+        borne = np.asarray(constraint_forces_at(self.equations, self.coordinates, self.clock, first[:, None]))
         return first + self._balancing(load + self.as_columns(borne[..., None])[:, 0])  # those of teeth are the same
 
     @cached_property

@@ -29,7 +29,7 @@ GivenState = TypeAliasType("GivenState", Mapping[str, float] | ArrayLike | None)
 """Coordinates, with or without their rates and second derivatives, or by name of the joint; others are zero."""
 
 
-def standing(
+def as_held_mechanism(
     robot: Robot, q: GivenCoordinates, hold: str | Sequence[str], torques: Mapping[str, float] | None, drives: bool
 ) -> Mechanism:
     """Return a robot as a mechanism, joints held at their coordinates, constant torques or forces in others.

@@ -27,7 +27,7 @@ class Verdict(NamedTuple):
     direction: np.ndarray | None = None
 
 
-def judged(stiffness: Square, noise: Square, damping: Square, damping_noise: Square, mass: Square) -> Verdict:
+def stability_of(stiffness: Square, noise: Square, damping: Square, damping_noise: Square, mass: Square) -> Verdict:
     """Return whether an equilibrium is stable.
 
     Where the forces have an energy, by the sign of the stiffness (Lagrange and Dirichlet; Kelvin and Tait with
@@ -35,7 +35,7 @@ def judged(stiffness: Square, noise: Square, damping: Square, damping_noise: Squ
     """
     if not len(stiffness):
         return Verdict("held", "nothing can move")
-    even = _evened(noise)
+    even = _equilibration_factors(noise)
     stiffness, noise, damping, damping_noise = (x * even for x in (stiffness, noise, damping, damping_noise))
     mass = mass * even
     conservative = is_symmetric(stiffness, noise)
@@ -53,7 +53,7 @@ def judged(stiffness: Square, noise: Square, damping: Square, damping_noise: Squ
     return _by_eigenvalues(stiffness, noise, damping, damping_noise, mass)
 
 
-def _evened(noise: Square) -> Square:
+def _equilibration_factors(noise: Square) -> Square:
     """Return factors of the entries by which those of all coordinates come near to one: m and rad count alike.
 
     They follow from what the entries are sums of, as a stiffness may be zero but for rounding.

@@ -17,8 +17,8 @@ from jounce.dynamics.statics.equilibrium_search import SearchResult, check_force
 from jounce.dynamics.statics.independent_coordinates import Reduction, reduced
 from jounce.dynamics.statics.kinks import kinked
 from jounce.dynamics.statics.operating_point import OperatingPoint
-from jounce.dynamics.statics.robot_states import standing
-from jounce.dynamics.statics.stability import Verdict, judged
+from jounce.dynamics.statics.robot_states import as_held_mechanism
+from jounce.dynamics.statics.stability import Verdict, stability_of
 from jounce.errors import MechanismError, RobotError, SolveError, check_choice, check_name, flag
 from jounce.kinematics import Motion, Status
 from jounce.kinematics.assembly.assemble import assemble, freely_moving
@@ -152,7 +152,7 @@ class Equilibrium(Displayed):
         if not self.degrees_of_freedom:
             return Verdict("held", "nothing can move")
         r = self._reduction
-        return judged(r.part(0), r.noise(0), r.part(1), r.noise(1), r.part(2))
+        return stability_of(r.part(0), r.noise(0), r.part(1), r.noise(1), r.part(2))
 
     @cached_property
     def motion(self) -> Motion:
@@ -298,7 +298,7 @@ def as_mechanism(
         If a name or a value does not fit the robot, or is given for a mechanism.
     """
     if isinstance(subject, Robot):
-        return standing(subject, q, hold, torques, flag("drives", drives, error=RobotError))
+        return as_held_mechanism(subject, q, hold, torques, flag("drives", drives, error=RobotError))
     given = {"q": q, "hold": hold or None, "torques": torques}
     if unfit := [k for k, v in given.items() if v is not None]:
         raise MechanismError("is for robots; a mechanism has its own guess, drivers and forces", name=unfit[0])

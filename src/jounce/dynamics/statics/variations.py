@@ -87,18 +87,18 @@ def variations(
     pose, time = _moving(equations, coordinates), Jet(tuple(clock))
 
     def evaluated(moved: Pose) -> tuple[Any, Any]:
-        forces = jnp.stack([*_loads(equations, moved, time), _borne(equations, moved, time, multipliers)])
+        forces = jnp.stack([*_loads(equations, moved, time), _constraint_wrenches(equations, moved, time, multipliers)])
         return forces[:, :, 1:, 0], stacked(equations.system.residual(moved, time))[..., 0]
 
     return jax.vmap(lambda change: jax.jvp(evaluated, (pose,), (_tangent(pose, change),))[1], -1, -1)(changes)
 
 
 @compiled()
-def borne_at(
+def constraint_forces_at(
     equations: Equations, coordinates: Coordinates, clock: Clock, multipliers: Float[Numbers, "row 1"]
 ) -> Float[Numbers, "coordinate moving"]:
     """Return ``Phi_q^T lambda`` with the friction of joints and the tooth forces that press them, of moving bodies."""
-    return _borne(equations, _moving(equations, coordinates), Jet(tuple(clock)), multipliers)[:, 1:, 0]
+    return _constraint_wrenches(equations, _moving(equations, coordinates), Jet(tuple(clock)), multipliers)[:, 1:, 0]
 
 
 @compiled("pose_type")
@@ -219,7 +219,7 @@ def _loads(equations: Equations, pose: Pose, time: Jet) -> tuple[Any, Any]:
     return inertia, -applied
 
 
-def _borne(equations: Equations, pose: Pose, time: Jet, multipliers: Float[Numbers, "row 1"]) -> Any:
+def _constraint_wrenches(equations: Equations, pose: Pose, time: Jet, multipliers: Float[Numbers, "row 1"]) -> Any:
     """Return what joints exert on all bodies, with the minus sign of forces."""
     system, now = equations.system, time.truncate(0)
     friction = FreeFriction(system, pose.truncate(1), now)

@@ -6,8 +6,8 @@ from typing import Any
 import jax
 import numpy as np
 
-from jounce.base.importing import uncollected
-from jounce.base.jax_internals import in_plain_operations, is_tried
+from jounce.base.importing import without_garbage_collection
+from jounce.base.jax_internals import in_plain_operations, is_tested_release
 from jounce.execution.llvm import rows as rows_
 from jounce.execution.llvm.machine import compiled, vector_width
 from jounce.execution.llvm.rounds import rounds_text
@@ -68,13 +68,13 @@ def object_file(
         Where there is no code for it, or too much; or a release of JAX that was not tried writes it otherwise.
     """
     count = len(jax.tree.leaves(shared))
-    with uncollected():
+    with without_garbage_collection():
         traced, results = jax.make_jaxpr(function, return_shape=True)(shared, lanes)
         closed = in_plain_operations(traced)
         try:
             text = _written(closed, count, known, vector_width(), rows=rows, large=large, single=single)
         except (AttributeError, KeyError, TypeError) as failure:  # of what JAX says of an operation, under another name
-            if is_tried():
+            if is_tested_release():
                 raise
             raise UnsupportedOperationError(f"JAX {jax.__version__}, which was not tried: {failure!r}") from failure
     return compiled(text, hasty=hasty, brief=brief), results

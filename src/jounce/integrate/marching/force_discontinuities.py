@@ -44,7 +44,7 @@ def shifted(series: State, step: Any = 0.0) -> State:
     return series.map(part)
 
 
-def met(state: State, series: State, length: Any, kinked: Kinked, over: Kinks) -> tuple[State, Any]:
+def refined_kink_state(state: State, series: State, length: Any, kinked: Kinked, over: Kinks) -> tuple[State, Any]:
     """Return the state behind a kink, and how much the instant of the kink changes, better than they are.
 
     The series through the state goes back to the kink and meets that from before there.

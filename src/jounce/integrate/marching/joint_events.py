@@ -13,7 +13,7 @@ from jounce.errors import RobotError, check_name
 from jounce.execution.chunks import in_chunks
 from jounce.integrate.marching.robot_marching import RobotSteps
 from jounce.integrate.steps.events import NODES, WIDTHS, AbstractDetector, check_crossing
-from jounce.jet.programs.composition import OfSample
+from jounce.jet.programs.composition import SampleFunction
 from jounce.robot.robot import Robot
 
 
@@ -66,12 +66,12 @@ class JointEventDetector(AbstractDetector):
 
     def __init__(self, event: JointEvent, robot: Robot):
         super().__init__(event)
-        self._function: OfSample | None = None
+        self._function: SampleFunction | None = None
         if isinstance(event.of, str):
             check_name("moving joint", event.of, robot.joint_names, RobotError, name="events.of")
         else:
             n, function = len(robot.joint_names), event.of
-            self._function = OfSample.of(function, jnp.zeros(()), jnp.zeros(n), jnp.zeros(n))
+            self._function = SampleFunction.of(function, jnp.zeros(()), jnp.zeros(n), jnp.zeros(n))
             if self._function.shape != ():
                 message = f"the function must return one number, not the shape {self._function.shape}"
                 raise RobotError(message, name="events.of")
@@ -102,7 +102,7 @@ class JointEventDetector(AbstractDetector):
 
 
 @jax.jit
-def _at_samples(function: OfSample | None, time: Any, q: Any, rates: Any) -> Any:
+def _at_samples(function: SampleFunction | None, time: Any, q: Any, rates: Any) -> Any:
     """Return the values of a function of the state at samples, which stand last."""
     assert function is not None
     return function(time, q, rates)

@@ -277,7 +277,7 @@ def _attempt(
         if method.controlled:
             suspect = (look.kink >= 0) & (size < tried) | (current.refused >= STUBBORN)
             kick = 0.5 * order * (order + 1) * error
-            good = good & ~(suspect & _lasting(kick, step, duration, MARGIN * allowed, current))
+            good = good & ~(suspect & _kick_matters(kick, step, duration, MARGIN * allowed, current))
         balanced, balance = jnp.ones(step.shape, bool), current.balance
         if checked:
             energies_there = energy_balance.energies(there, there.pose(state), Jet.variable(time[None], 1))
@@ -349,7 +349,7 @@ def room_for_steps(
     return jax.tree.map(lambda part: jnp.zeros((count, *part.shape), part.dtype), room)
 
 
-def _lasting(kick: Lanes, step: Lanes, duration: Number, bound: Lanes, current: IntegratorState) -> Flags:
+def _kick_matters(kick: Lanes, step: Lanes, duration: Number, bound: Lanes, current: IntegratorState) -> Flags:
     """Tell where a kink at the beginning of a step kicks bodies so that they move by more than is harmless in the run.
 
     What is left of it in the accelerations at the end is no next term of a series there: `kick` is the displacement

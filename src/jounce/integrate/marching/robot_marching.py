@@ -21,8 +21,8 @@ from jounce.integrate.marching.robot_state import RobotState, at, polynomial_of,
 from jounce.integrate.steps.lookahead import HARMLESS, NEAR, POINTS, RUN_POINTS, SHORTEST, finest, steps_counted
 from jounce.integrate.steps.methods import MARGIN, NEEDED, ROUNDING, Lanes, furthest
 from jounce.jet.programs.series import Recursion
-from jounce.jet.programs.still_entries import Still
-from jounce.robot.algorithms.motion_series import MotionSeries, motion_series, still_motion
+from jounce.jet.programs.still_entries import ConstantEntries
+from jounce.robot.algorithms.motion_series import MotionSeries, constant_motion, motion_series
 from jounce.robot.algorithms.wrench_laws import WrenchLaws
 from jounce.robot.model.joint_laws import AbstractJointLaws
 from jounce.robot.recursions.tree_equations import TreeEquations, TreeState, Unknowns, free_base
@@ -94,7 +94,7 @@ class RobotProblem(Module):
         order: int,
         *,
         reversible: bool = False,
-        still: Still | None = None,
+        still: ConstantEntries | None = None,
     ) -> MotionSeries:
         """Return the series of the motion; the order is that of the accelerations."""
         ticking = jnp.concatenate([time[None], jnp.ones((1, *time.shape)), jnp.zeros((max(order - 1, 0), *time.shape))])
@@ -107,7 +107,7 @@ class RobotProblem(Module):
         """Return it with constants of a program in the place of some numbers."""
         return with_fields(self, equations=exact.put(self.equations))
 
-    def still(self, exact: ExactNumbers) -> Still | None:
+    def still(self, exact: ExactNumbers) -> ConstantEntries | None:
         """Return what does not change in its motion if only some of its numbers are known; None where that fails."""
         from jounce.execution.llvm.certain_numbers import certain_numbers
 
@@ -118,7 +118,7 @@ class RobotProblem(Module):
             now = certain_numbers(program, jax.tree.leaves((known, state)))
             motion = jax.tree.unflatten(jax.tree.structure(form), now)
             trial = Unknowns(state.rates, None)
-            return still_motion(lambda problem: (problem.equations, problem.applied), known, motion, trial, time)
+            return constant_motion(lambda problem: (problem.equations, problem.applied), known, motion, trial, time)
         except UnsupportedOperationError:
             return None
 

@@ -66,7 +66,7 @@ def breaks(dense: DenseOutput, length: float) -> list[Break]:
     if series.shape[1] <= LAST:
         return []
     largest = [float(np.nanmax(np.abs(series[:, k]), initial=0.0)) for k in range(3)]
-    for step in np.flatnonzero((dense.kink[:-1] >= 0) | _bent(series, dense.length, largest[2])).tolist():
+    for step in np.flatnonzero((dense.kink[:-1] >= 0) | _jerk_jumps(series, dense.length, largest[2])).tolist():
         over, noted = float(dense.length[step]), bool(dense.kink[step] >= 0)
         order, since, weight = _between(series[step], series[step + 1], over, noted, largest)
         if order:
@@ -76,7 +76,7 @@ def breaks(dense: DenseOutput, length: float) -> list[Break]:
     return breaks_found
 
 
-def _bent(
+def _jerk_jumps(
     series: Float[np.ndarray, "step order part"], length: Float[np.ndarray, " step"], largest: float
 ) -> Bool[np.ndarray, " step-1"]:
     """Tell of all steps but the last whether the jerk at their end is plainly another than that of the next."""

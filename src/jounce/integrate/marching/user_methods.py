@@ -6,11 +6,11 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 
-from jounce.base.modules import changes_parts, field, is_ours
+from jounce.base.modules import belongs_to_package, changes_parts, field
 from jounce.dynamics.forward.accelerations import Equations
 from jounce.integrate.marching.marching import IntegratorState
 from jounce.integrate.steps.methods import AbstractMethod
-from jounce.jet.programs.captured import Same, read_off, value_key
+from jounce.jet.programs.captured import OpaqueObject, captured_function, value_key
 
 METHODS = ("prepared", "longest_step", "arrive", "polynomial", "error", "expansion_order")
 
@@ -45,7 +45,7 @@ class ReadIntegrator(AbstractMethod):
 def integrator(method: AbstractMethod, equations: Equations, current: IntegratorState) -> AbstractMethod:
     """Return a method for a run that begins in a state: one of a user as what it computes now."""
     kind = type(method)
-    if all(is_ours(getattr(kind, name)) for name in METHODS) and not changes_parts(kind, (AbstractMethod,)):
+    if all(belongs_to_package(getattr(kind, name)) for name in METHODS) and not changes_parts(kind, (AbstractMethod,)):
         return method
     leaves, tree = jax.tree.flatten((method, equations, current))
 
@@ -58,7 +58,7 @@ def integrator(method: AbstractMethod, equations: Equations, current: Integrator
         return jax.tree.leaves((start, prepared, arrived, ends))
 
     try:
-        key = value_key(read_off(whole, *leaves).traced)
+        key = value_key(captured_function(whole, *leaves).traced)
     except Exception:  # noqa: BLE001 - the call raises the error again
-        key = (Same(object()),)
+        key = (OpaqueObject(object()),)
     return ReadIntegrator(method, (*key, method.controlled))

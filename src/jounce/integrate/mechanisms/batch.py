@@ -40,7 +40,7 @@ from jounce.integrate.steps.methods import AbstractMethod
 from jounce.integrate.steps.options import checked_options, instants_of
 from jounce.integrate.steps.revolution_counts import POINTS_IN_STEP, attitudes_at
 from jounce.jet.derivatives import plain_derivatives
-from jounce.jet.turns import brought_near, whole_periods
+from jounce.jet.turns import shifted_by_turns, whole_periods
 from jounce.kinematics import Status
 from jounce.kinematics.families.parameter_values import check_parameter, checked_values
 from jounce.kinematics.results.pose_outputs import output_series
@@ -336,7 +336,7 @@ class _Runs:
             self.backends.add(backend)
             for which, series in enumerate(map(np.array, noted)):
                 if which in self._turns:
-                    series[0, 0] = brought_near(series[0, 0], before[which][:, lanes])
+                    series[0, 0] = shifted_by_turns(series[0, 0], before[which][:, lanes])
                 elif which in before:
                     series[0] -= turned(before[which][..., lanes], series, since)
                 values = np.moveaxis(series[: self.order + 1], -1, 0)

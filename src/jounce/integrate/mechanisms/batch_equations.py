@@ -22,7 +22,7 @@ from jounce.integrate.results.simulation import expanded
 from jounce.integrate.steps.events import pose_coordinates
 from jounce.integrate.steps.projection import projected
 from jounce.jet import Jet
-from jounce.jet.turns import brought_near
+from jounce.jet.turns import shifted_by_turns
 from jounce.kinematics.continuation.instant_program import of_design
 from jounce.kinematics.families.varied_tree import VariedTree
 from jounce.kinematics.status import Status
@@ -173,7 +173,7 @@ class BatchStart:
             if measuring:
                 coordinates = pose_coordinates(state.map(lambda part: np.asarray(part)[None]))
                 raw = raw_angles(measuring, {"quaternion": coordinates["quaternion"][0]})
-                angles = [brought_near(angle, near) for near, angle in zip(angles, raw, strict=True)]
+                angles = [shifted_by_turns(angle, near) for near, angle in zip(angles, raw, strict=True)]
         count = len([group for group in equations.system.forces if measures_angle(group)])
         start = jax.tree.map(np.array, (state, tuple(angles[:count]), tuple(angles[count:])))
         for run in np.unique(runs[~together]).tolist():

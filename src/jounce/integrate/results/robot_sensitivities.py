@@ -79,14 +79,14 @@ def of_traced_robots(traced: Callable[..., Any]) -> Callable[[Callable[P, R]], C
 
     def guarded(function: Callable[P, R]) -> Callable[P, R]:
         @functools.wraps(function)
-        def door(*arguments: P.args, **keywords: P.kwargs) -> R:
+        def wrapper(*arguments: P.args, **keywords: P.kwargs) -> R:
             others = dict(keywords)
             robot, *positional = arguments or (others.pop("mechanism", None),)
             if isinstance(robot, Robot) and not robot.closures and is_traced((robot.tree, positional, others)):
                 return traced(function, robot, *positional, **others)
             return function(*arguments, **keywords)
 
-        return door
+        return wrapper
 
     return guarded
 

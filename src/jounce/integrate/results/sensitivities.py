@@ -28,7 +28,7 @@ from jounce.dynamics.masses import gravity_of, masses_of
 from jounce.errors import AssemblyError, MobilityError, SolveError, UnsupportedError
 from jounce.execution.compilation import compiled
 from jounce.integrate.marching.divided_steps import Pieces, divided_steps, series_through
-from jounce.integrate.marching.force_discontinuities import Kinked, met, shifted, with_value
+from jounce.integrate.marching.force_discontinuities import Kinked, refined_kink_state, shifted, with_value
 from jounce.integrate.marching.smoothness_breaks import Break, breaks
 from jounce.integrate.results.simulation import Simulation
 from jounce.integrate.steps.events import pose_coordinates
@@ -292,7 +292,7 @@ def _marched(
         expanded = series(state, used[:, None], time)
         arrived, end = evaluated(expanded, length), time + length
         if over is not None:
-            behind, late = met(state, expanded, length, kinked, over)
+            behind, late = refined_kink_state(state, expanded, length, kinked, over)
             left = Kinked(shifted(expanded, length), jnp.zeros_like(length))
             back = (behind, time, kinked._replace(late=late))
             arrived, end, kinked = jax.tree.map(lambda a, b: jnp.where(over.back, a, b), back, (arrived, end, left))

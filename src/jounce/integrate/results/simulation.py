@@ -26,7 +26,7 @@ from jounce.integrate.steps.projection import projected
 from jounce.integrate.steps.revolution_counts import POINTS_IN_STEP, AnglesOfForces
 from jounce.jet import Jet
 from jounce.jet.derivatives import plain_derivatives
-from jounce.jet.turns import brought_near, counted_by_rates
+from jounce.jet.turns import counted_by_rates, shifted_by_turns
 from jounce.kinematics import Motion, Status
 from jounce.kinematics.results.pose_outputs import output_series
 from jounce.mechanism import Mechanism
@@ -221,7 +221,7 @@ class Simulation(Motion):
             return series
         if measures_angle(group):
             (counted,) = self._attitudes.counting((group,), instants)
-            series[0, 0] = brought_near(series[0, 0], counted.element.datum.near)
+            series[0, 0] = shifted_by_turns(series[0, 0], counted.element.datum.near)
             return series
         kind = self._start.model.pose_type
         pieces = in_pieces(group, dense.polynomial, dense.length, 1, kind, lambda x: x[1:2])
@@ -230,7 +230,7 @@ class Simulation(Motion):
         counted = counted_by_rates(known[0], known[1], nodes)
         near = np.abs(nodes[None] - instants[:, None]).argmin(axis=1)
         expected = counted[..., near] + (instants - nodes[near]) * 0.5 * (known[1][..., near] + series[1])
-        series[0] = brought_near(series[0], expected)
+        series[0] = shifted_by_turns(series[0], expected)
         return series
 
     @cached_property

@@ -14,10 +14,10 @@ import numpy as np
 from jounce.base.shapes import Numbers
 from jounce.dynamics.energy.energies import body_energy
 from jounce.dynamics.forward.accelerations import Equations, Flags, Instants, Lanes, State
-from jounce.dynamics.friction.coupling import rubs
+from jounce.dynamics.friction.coupling import has_friction
 from jounce.forces.base import AbstractForce
 from jounce.integrate.steps.exact_programs import uses
-from jounce.integrate.steps.lookahead import hiding
+from jounce.integrate.steps.lookahead import constraints_to_watch
 from jounce.jet import Jet, dot
 from jounce.mechanism.system import Group
 from jounce.rigid.pose import Pose
@@ -79,8 +79,8 @@ def is_balanced(equations: Equations, state: State, time: Instants) -> bool:
     at_rest, pose = equations.pose_at_rest(state.position, state.attitude), equations.pose(state)
     groups, forces = equations.system.groups, equations.system.forces
     if (
-        any(map(rubs, groups))
-        or not hiding(equations, state, time)
+        any(map(has_friction, groups))
+        or not constraints_to_watch(equations, state, time)
         or any(_is_moved(group, at_rest, time) for group in groups)
     ):
         return False

@@ -81,7 +81,9 @@ def watched_names(model: Model) -> list[str]:
     return [f"forces.{name}" for name in force_names(model)] + list(model.drivers) + constraints
 
 
-def hiding(equations: Equations, state: State, time: Instants) -> dict[int, Float[Numbers, "row instance 1"]]:
+def constraints_to_watch(
+    equations: Equations, state: State, time: Instants
+) -> dict[int, Float[Numbers, "row instance 1"]]:
     """Return which groups of constraints have residuals that a series could overlook, and the scales of their rows.
 
     The law of a driver is looked at by itself.
@@ -100,7 +102,7 @@ def hiding(equations: Equations, state: State, time: Instants) -> dict[int, Floa
 
 def hiding_names(model: Model, equations: Equations, state: State, time: Instants) -> list[str]:
     """Return the names of the constraints that a series could overlook."""
-    rows, hidden = group_rows(model), hiding(equations, state, time)
+    rows, hidden = group_rows(model), constraints_to_watch(equations, state, time)
     return [name for k in hidden for name in model.rows[rows[k]][: model.system.groups[k].instances]]
 
 
@@ -200,7 +202,7 @@ class _Signals:
         forces, groups = equations.system.forces, equations.system.groups
         drivers = tuple(group for group in groups if group.is_driver)
         counts = [group.instances for group in (*forces, *drivers, *groups)]
-        watched = hiding(equations, path.map(lambda part: part[0]), time[None])
+        watched = constraints_to_watch(equations, path.map(lambda part: part[0]), time[None])
         joints = [groups[k] for k in watched]
         bodies = sorted({body for group in (*forces, *joints) for slot in group.bodies for body in slot} - {0})
         columns = {body: k for k, body in enumerate([0, *bodies])}

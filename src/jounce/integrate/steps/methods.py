@@ -125,7 +125,7 @@ def near_singular(equations: Equations, inverse: Inverse) -> Flags:
     return inverse.responses(equations.system.shape[1])[1] > BRACED
 
 
-def _drowned(sizes: Sizes) -> Flags:
+def _is_growing_rounding(sizes: Sizes) -> Flags:
     """Tell where the upper coefficients may be rounding that grows geometrically.
 
     A force of which only the foot has been met grows so too: near a singular position alone is it rounding.
@@ -258,7 +258,7 @@ class Taylor(AbstractMethod):
         if self.step is not None:
             return super().prepared(expansion, length, tolerance, singular, usual)
         sizes = coefficient_sizes(expansion, length)
-        allowed = jnp.where(singular & _drowned(sizes), jnp.maximum(tolerance, ROUGH), tolerance)
+        allowed = jnp.where(singular & _is_growing_rounding(sizes), jnp.maximum(tolerance, ROUGH), tolerance)
         used, step = furthest(sizes, allowed, usual)
 
         def cut(part: Any) -> Any:

@@ -94,12 +94,12 @@ class Obreshkov(AbstractMethod):
 
         def unfinished(carry: Any) -> Any:
             _, change, before, count = carry
-            return jnp.any(~_settled(change, before)) & (count < MOST_ITERATIONS)
+            return jnp.any(~_has_converged(change, before)) & (count < MOST_ITERATIONS)
 
         start = evaluated(expansion.state, step)
         infinite = jnp.full(step.shape, jnp.inf)
         end, change, before, _ = jax.lax.while_loop(unfinished, iterate, (start, infinite, infinite, 0))
-        good = _settled(change, before) & jnp.isfinite(change)
+        good = _has_converged(change, before) & jnp.isfinite(change)
         return end.map(lambda x: jnp.where(good, x, jnp.nan))
 
     def polynomial(self, start: Expansion, end: Expansion, step: Lanes) -> State:
@@ -170,7 +170,7 @@ def _size(change: State, measure: tuple[Any, ...]) -> Lanes:
     return jnp.max(jnp.stack(sizes), axis=0)
 
 
-def _settled(change: Lanes, before: Lanes) -> Flags:
+def _has_converged(change: Lanes, before: Lanes) -> Flags:
     """Tell where an iteration has come to its end, or can come to none."""
     return (
         (change <= CONVERGED) | ((change <= STALLED) & (change >= before)) | ~jnp.isfinite(change) & (change != jnp.inf)

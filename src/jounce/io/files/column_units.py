@@ -156,12 +156,12 @@ def unit_unread(name: str, dimensions: Iterable[Dimension]) -> str | None:
     return None if match is None else "deg" if match[0][0] in "dD" else match[0].lower()
 
 
-def says_a_unit(name: str) -> bool:
+def names_a_unit(name: str) -> bool:
     """Tell whether a name, as the heading of a column, says a unit; a unit in brackets after it counts instead.
 
     Examples
     --------
-    >>> says_a_unit("elbow_deg"), says_a_unit("elbow_deg_d1"), says_a_unit("q [1]"), says_a_unit("elbow")
+    >>> names_a_unit("elbow_deg"), names_a_unit("elbow_deg_d1"), names_a_unit("q [1]"), names_a_unit("elbow")
     (True, True, True, False)
     """
     read = name_and_unit(name)[1] or name_and_last_word(name)[1] or unit_unread(name, (ANGLE, LENGTH, TIME))

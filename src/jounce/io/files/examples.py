@@ -42,7 +42,7 @@ def example_names() -> dict[str, str]:
     folder = examples_folder()
     files = [path for path in sorted(folder.rglob("*")) if path.suffix in _KINDS and "broken" not in path.parts]
     files.sort(key=lambda path: len(path.relative_to(folder).parts))
-    return {_name(path, folder): _about(path) for path in files}
+    return {_name(path, folder): _example_title(path) for path in files}
 
 
 def copy_example(name: str, path: str | PathLike[str] | None = None, *, overwrite: bool = False) -> list[Path]:
@@ -104,7 +104,7 @@ def _name(path: Path, folder: Path) -> str:
     return relative.rpartition(".")[0] if path.suffix == ".yaml" or "/" not in relative else relative
 
 
-def _about(path: Path) -> str:
+def _example_title(path: Path) -> str:
     """Return the title of a file, or what its first comment says."""
     if path.suffix not in (".yaml", ".py"):
         return {".csv": "trajectory", ".ipynb": "notebook"}.get(path.suffix, "robot")

@@ -81,7 +81,7 @@ def _layout(example: Any, count: int) -> _Layout:
             along = "time" in given.dimensions
             attributes = dict(given.attrs)
             missing = attributes.pop("_FillValue", None)
-            settings = {"dcpl": _left_empty()} if along else {}
+            settings = {"dcpl": _preallocated_properties()} if along else {}
             made = large.create_variable(name, given.dimensions, given.dtype, fillvalue=missing, **settings)
             made.attrs.update(attributes)
             if not along:
@@ -92,7 +92,7 @@ def _layout(example: Any, count: int) -> _Layout:
     return _Layout(file.size, file.blocks, offsets)
 
 
-def _left_empty() -> Any:
+def _preallocated_properties() -> Any:
     """Return the properties of a variable that has its place in a file from the start, and nothing written there."""
     import h5py
 

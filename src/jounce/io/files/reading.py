@@ -75,7 +75,7 @@ def read_file(
             content = stream.read(-1 if limit is None else limit + 1) or b""
     except FileNotFoundError:
         word = what.removeprefix("the ")
-        message = f"{word if word == 'file' else f'file of {word}'} not found{_nearby(name)}"
+        message = f"{word if word == 'file' else f'file of {word}'} not found{_similar_file(name)}"
         raise error(message, path=name) from None
     except (OSError, ValueError) as reason:
         subject = "" if what == "the file" else f"{what} "
@@ -119,7 +119,7 @@ def reason_of(error: Exception) -> str:
     return getattr(error, "strerror", None) or str(error)
 
 
-def _nearby(path: str) -> str:
+def _similar_file(path: str) -> str:
     """Suggest a file of nearly the same name in the same folder."""
     requested = Path(path)
     try:

@@ -15,7 +15,7 @@ from os import PathLike, fspath
 from pathlib import Path
 from typing import Any
 
-from jounce.base.interrupts import undoing
+from jounce.base.interrupts import cleanup_on_signal
 from jounce.errors import OutputError
 from jounce.io.files.reading import is_input, note_result, reason_of
 
@@ -100,7 +100,7 @@ def replacing(path: str | PathLike[str], *, overwrite: bool = False) -> Iterator
         _check_replaceable(target, overwrite)
         # a name that starts with a dot is in nobody's way, and the ending tells programs what to write
         scratch = target.with_name(f".jounce-{secrets.token_hex(6)}{target.suffix}")
-        with undoing(lambda: scratch.unlink(missing_ok=True)), _removed(scratch):
+        with cleanup_on_signal(lambda: scratch.unlink(missing_ok=True)), _removed(scratch):
             before = target.stat() if target.exists() else None
             os.close(os.open(scratch, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o666 if before is None else 0o600))
             yield scratch
@@ -116,7 +116,7 @@ def replacing(path: str | PathLike[str], *, overwrite: bool = False) -> Iterator
 def _replace_target(scratch: Path, target: Path, before: os.stat_result | None) -> None:
     """Put a whole file in the place of the target, with the owner and permissions of the one there."""
     _sync(scratch)
-    if before is not None and not _take_over(scratch, before):
+    if before is not None and not _copy_ownership(scratch, before):
         shutil.copyfile(scratch, target)  # only the file itself keeps an owner who is another
         _sync(target)
         return
@@ -125,7 +125,7 @@ def _replace_target(scratch: Path, target: Path, before: os.stat_result | None) 
         _sync(target.parent)
 
 
-def _take_over(scratch: Path, before: os.stat_result) -> bool:
+def _copy_ownership(scratch: Path, before: os.stat_result) -> bool:
     """Give a file the owner and permissions of another; return whether the owner could be kept."""
     if hasattr(os, "chown"):
         made = scratch.stat()

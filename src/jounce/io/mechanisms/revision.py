@@ -70,7 +70,7 @@ def write_revised(
     written = {name: with_value(data["parameters"][name], value) for name, value in values.items()}
     assembly = mechanism.assembly if mechanism.assembly != data.get("assembly") else None
     text = Path(original).read_bytes().decode("utf-8-sig")
-    revised = (_toml if suffix == ".toml" else _spliced)(text, written, assembly)
+    revised = (_toml if suffix == ".toml" else _with_replaced_scalars)(text, written, assembly)
     with replacing(path, overwrite=overwrite) as scratch:
         with scratch.open("w", encoding="utf-8", newline="") as stream:
             stream.write(revised)
@@ -149,7 +149,7 @@ def _shortest(text: str) -> str:
     return f"{number:f}" if -6 <= number.adjusted() < 18 else f"{number:e}"
 
 
-def _spliced(text: str, values: Mapping[str, Any], assembly: Any) -> str:
+def _with_replaced_scalars(text: str, values: Mapping[str, Any], assembly: Any) -> str:
     """Return YAML or JSON text in which scalars stand in the places of others, and no other character changes."""
     from ruamel.yaml import YAML
     from ruamel.yaml.nodes import MappingNode

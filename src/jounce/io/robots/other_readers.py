@@ -38,7 +38,7 @@ FREE = {  # positions and velocities of a joint that is free
 
 
 @dataclasses.dataclass(frozen=True)
-class TheirJoint:
+class ForeignJoint:
     """A joint of a file in the vectors of another program.
 
     Parameters
@@ -67,7 +67,7 @@ class TheirJoint:
     note: str = ""
 
 
-def as_read_by(reader: str, path: str | PathLike[str], robot: Robot) -> list[TheirJoint]:
+def as_read_by(reader: str, path: str | PathLike[str], robot: Robot) -> list[ForeignJoint]:
     """Return the joints of a robot file in the order in which another program numbers its coordinates.
 
     Parameters
@@ -101,7 +101,7 @@ def as_read_by(reader: str, path: str | PathLike[str], robot: Robot) -> list[The
     return list(_of_mjcf(path, robot) if root.tag == "mujoco" else _of_urdf(reader, root, robot))
 
 
-def permutation(joints: Sequence[TheirJoint], robot: Robot) -> tuple[list[int], list[float]] | None:
+def permutation(joints: Sequence[ForeignJoint], robot: Robot) -> tuple[list[int], list[float]] | None:
     """Return indices and factors with ``theirs = factors * ours[indices]`` for velocities.
 
     None where a velocity of theirs is no multiple of one of ours, or depends on the position.
@@ -117,7 +117,7 @@ def permutation(joints: Sequence[TheirJoint], robot: Robot) -> tuple[list[int], 
     return indices, factors
 
 
-def _of_urdf(reader: str, root: Element, robot: Robot) -> Iterator[TheirJoint]:
+def _of_urdf(reader: str, root: Element, robot: Robot) -> Iterator[ForeignJoint]:
     elements = {element.attributes.get("name", ""): element for element in root.every("joint")}
     by_name = reader == "pinocchio"  # the parser that it uses keeps joints by name
     for name in list(elements) if reader == "yourdfpy" else _depth_first(elements, by_name):
@@ -155,20 +155,20 @@ def _link(joint: Element, role: str) -> str:
     return "" if part is None else part.attributes.get("link", "")
 
 
-def _single(reader: str, name: str, robot: Robot) -> TheirJoint:
+def _single(reader: str, name: str, robot: Robot) -> ForeignJoint:
     """Return a joint of one coordinate, which may follow another."""
     joint = robot.joints[name]
     endless = joint.type == "continuous" and reader == "pinocchio"
     positions = ("cos", "sin") if endless else VALUE
     if joint.mimic is None:
-        return TheirJoint(name, (name,), positions, factors=({name: 1.0},))
+        return ForeignJoint(name, (name,), positions, factors=({name: 1.0},))
     follows = "a constraint holds it there" if reader in ("mujoco", "drake") else "nothing holds it there"
     note = f"a coordinate of its own, where we have it follow {joint.mimic.joint}; {follows}"
     factors = ({joint.mimic.joint: joint.mimic.multiplier},)
-    return TheirJoint(name, (name,), positions, factors=factors, offset=joint.mimic.offset, note=note)
+    return ForeignJoint(name, (name,), positions, factors=factors, offset=joint.mimic.offset, note=note)
 
 
-def _of_several(reader: str, name: str, kind: str, element: Element, *, first: bool) -> TheirJoint:
+def _of_several(reader: str, name: str, kind: str, element: Element, *, first: bool) -> ForeignJoint:
     """Return a joint of several coordinates."""
     known = {"planar": ("pinocchio", "mujoco", "drake"), "floating": tuple(FREE), "spherical": ("mujoco",)}[kind]
     if reader not in known or (kind == "floating" and reader == "drake" and not first):
@@ -178,17 +178,17 @@ def _of_several(reader: str, name: str, kind: str, element: Element, *, first: b
         return _planar(reader, name, element)
     ours = tuple(joint.name for joint in floating_joints("", prefix=name)[1])
     if kind == "spherical":
-        return TheirJoint(name, ours[3:], TURN, SPIN, note="velocities along the axes of the link")
+        return ForeignJoint(name, ours[3:], TURN, SPIN, note="velocities along the axes of the link")
     positions, velocities, note = FREE[reader]
-    return TheirJoint(name, ours, positions, velocities, note=note)
+    return ForeignJoint(name, ours, positions, velocities, note=note)
 
 
-def _planar(reader: str, name: str, element: Element) -> TheirJoint:
+def _planar(reader: str, name: str, element: Element) -> ForeignJoint:
     """Return a planar joint: all but Pinocchio turn x and y with z onto the axis by the shortest turn."""
     ours = tuple(f"{name}_{suffix}" for suffix in ("x", "y", "angle"))
     if reader == "pinocchio":
         note = "in the plane of x and y whatever the axis; velocities along the axes of the link"
-        return TheirJoint(name, ours, ("x", "y", "cos", "sin"), ("vx", "vy", "wz"), note=note)
+        return ForeignJoint(name, ours, ("x", "y", "cos", "sin"), ("vx", "vy", "wz"), note=note)
     axis = element.first("axis")
     direction = np.array((None if axis is None else axis.numbers("xyz", 3, "joints", name)) or [1.0, 0.0, 0.0])
     direction /= np.linalg.norm(direction)
@@ -202,10 +202,10 @@ def _planar(reader: str, name: str, element: Element) -> TheirJoint:
     shortest = Rotation.from_rotvec(turn / sine * np.arctan2(sine, direction[2]) if sine else turn).as_matrix()
     share = shortest[:, :2].T @ axes_with_z_along(direction)[:, :2]
     rows = [{ours[k]: float(x) for k, x in enumerate(row) if abs(x) > 1e-15} for row in share]
-    return TheirJoint(name, ours, ("x", "y", "angle"), ("vx", "vy", "wz"), (*rows, {ours[2]: 1.0}))
+    return ForeignJoint(name, ours, ("x", "y", "angle"), ("vx", "vy", "wz"), (*rows, {ours[2]: 1.0}))
 
 
-def _of_mjcf(path: str | PathLike[str], robot: Robot) -> Iterator[TheirJoint]:
+def _of_mjcf(path: str | PathLike[str], robot: Robot) -> Iterator[ForeignJoint]:
     """Give the joints of an MJCF file by their number in MuJoCo; what they became is in the same order."""
     import mujoco as package
 
@@ -224,10 +224,10 @@ def _of_mjcf(path: str | PathLike[str], robot: Robot) -> Iterator[TheirJoint]:
         ours = tuple(part.name for part in made)
         if count == 6:
             positions, velocities, note = FREE["mujoco"]
-            yield TheirJoint(name, ours, positions, velocities, note=note)
+            yield ForeignJoint(name, ours, positions, velocities, note=note)
         elif count == 3:
-            yield TheirJoint(name, ours, TURN, SPIN, note="velocities along the axes of the link")
+            yield ForeignJoint(name, ours, TURN, SPIN, note="velocities along the axes of the link")
         elif made[0].moving:
             yield _single("mujoco", made[0].name, robot)
         else:
-            yield TheirJoint(name, (), factors=({},), note="an equality holds it where it is; we have it fixed")
+            yield ForeignJoint(name, (), factors=({},), note="an equality holds it where it is; we have it fixed")

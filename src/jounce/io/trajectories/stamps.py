@@ -153,14 +153,14 @@ def _sorted(recording: Recording, steps: np.ndarray) -> Recording:
         f"comes before that of line {recording.lines[row - 1]}" if len(recording.lines) else "comes before another"
     )
     value = {"name": "time", "value": float(recording.times[row])}
-    if back > BACK * usual or _way(recording.values[order, 0]) > ROUGHER * _way(recording.values[:, 0]):
+    if back > BACK * usual or _path_length(recording.values[order, 0]) > ROUGHER * _path_length(recording.values[:, 0]):
         advice = "times start again, or stamps and rows do not belong together; give one recording"
         raise recording.error(f"the stamp {message}: {advice}", row, **value)
     note = f"{len(late)} rows were out of order, and are sorted by their stamps"
     return _taken(recording, order, f"{note}{_at(recording, row)}")
 
 
-def _way(positions: np.ndarray) -> float:
+def _path_length(positions: np.ndarray) -> float:
     steps = np.abs(np.diff(positions, axis=0))
     return float(np.nansum(steps))
 

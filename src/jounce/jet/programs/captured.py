@@ -40,13 +40,13 @@ _known: dict[Any, "Program"] = {}
 
 
 @dataclasses.dataclass(frozen=True)
-class Same:
+class OpaqueObject:
     """An object of which nothing is known but that it is itself."""
 
     value: Any
 
     def __eq__(self, other: object) -> bool:
-        return isinstance(other, Same) and self.value is other.value
+        return isinstance(other, OpaqueObject) and self.value is other.value
 
     def __hash__(self) -> int:
         return id(self.value)
@@ -69,7 +69,7 @@ class Program:
     """
 
     digest: str
-    nameless: tuple[Same, ...]
+    nameless: tuple[OpaqueObject, ...]
     shapes: tuple[tuple[int, ...], ...] = dataclasses.field(compare=False)
     closed: ClosedJaxpr = dataclasses.field(compare=False, repr=False)
 
@@ -78,7 +78,7 @@ class Program:
         return jaxpr_as_fun(self.closed)(*captured, *arguments)
 
 
-class ReadOff(NamedTuple):
+class CapturedFunction(NamedTuple):
     """A function that was read off.
 
     Attributes
@@ -100,7 +100,7 @@ class ReadOff(NamedTuple):
 
 
 @under_own_settings
-def read_off(function: Callable[..., Any], *examples: Any) -> ReadOff:
+def captured_function(function: Callable[..., Any], *examples: Any) -> CapturedFunction:
     """Return what a function of arrays computes.
 
     Parameters
@@ -114,21 +114,21 @@ def read_off(function: Callable[..., Any], *examples: Any) -> ReadOff:
     --------
     >>> import jax.numpy as jnp
     >>> gains = [2.0, 3.0]
-    >>> first = read_off(lambda x: gains[0] * x + gains[1], jnp.zeros(()))
+    >>> first = captured_function(lambda x: gains[0] * x + gains[1], jnp.zeros(()))
     >>> gains[:] = 5.0, 7.0
-    >>> second = read_off(lambda x: gains[0] * x + gains[1], jnp.zeros(()))
+    >>> second = captured_function(lambda x: gains[0] * x + gains[1], jnp.zeros(()))
     >>> first.program == second.program, [float(x) for x in second.captured]
     (True, [5.0, 7.0])
     """
     closed, result = _traced(function, jax.tree.map(_shaped, examples))  # of no weak types, which are other programs
     description = _Description()
     captured = tuple(description.of(closed))
-    key = description.digest(), tuple(map(Same, description.nameless))
+    key = description.digest(), tuple(map(OpaqueObject, description.nameless))
     with _lock:
         program = _known.get(key)
     if program is None:
         given = [_shaped(x) for x in captured], [_shaped(v.aval) for v in closed.jaxpr.invars]
-        whole = jax.make_jaxpr(lambda values, arguments: _Again(values).of(closed, arguments))(*given)
+        whole = jax.make_jaxpr(lambda values, arguments: _Replay(values).of(closed, arguments))(*given)
         program = Program(*key, tuple(np.shape(x) for x in captured), whole)
         if dtype := _narrowed(closed.jaxpr):
             digits = int(jnp.finfo(dtype).precision)
@@ -139,19 +139,19 @@ def read_off(function: Callable[..., Any], *examples: Any) -> ReadOff:
         _known[key] = program  # the last one used is last
         while len(_known) > MOST_TRACED:
             del _known[next(iter(_known))]
-    return ReadOff(program, captured, closed, result)
+    return CapturedFunction(program, captured, closed, result)
 
 
-def value_key(closed: ClosedJaxpr) -> tuple[str, tuple[Same, ...]]:
+def value_key(closed: ClosedJaxpr) -> tuple[str, tuple[OpaqueObject, ...]]:
     """Return what identifies a program and the numbers in it."""
     description = _Description(values=True)
     description.of(closed)
-    return description.digest(), tuple(map(Same, description.nameless))
+    return description.digest(), tuple(map(OpaqueObject, description.nameless))
 
 
-def may_be_old(closed: ClosedJaxpr) -> bool:
+def may_hold_stale_functions(closed: ClosedJaxpr) -> bool:
     """Tell whether a program holds functions of a user that JAX traces once for each object."""
-    return _may_be_old(closed.jaxpr)
+    return _may_hold_stale_functions(closed.jaxpr)
 
 
 def known_as(digest: str) -> AbstractContextManager[None]:
@@ -172,13 +172,13 @@ def _shaped(x: Any) -> jax.ShapeDtypeStruct:
 def _traced(function: Callable[..., Any], examples: Sequence[Any]) -> tuple[ClosedJaxpr, Any]:
     """Return the program of a function as it is now: another function each time, of which JAX remembers nothing."""
     traced = jax.make_jaxpr(lambda *x: function(*x), return_shape=True)(*examples)
-    if not _may_be_old(traced[0].jaxpr):
+    if not _may_hold_stale_functions(traced[0].jaxpr):
         return traced
     with _anew(next(_count)):  # nothing traced before is found under it
         return jax.make_jaxpr(lambda *x: function(*x), return_shape=True)(*examples)
 
 
-def _may_be_old(jaxpr: Jaxpr, within: str = "") -> bool:
+def _may_hold_stale_functions(jaxpr: Jaxpr, within: str = "") -> bool:
     """Tell whether a program holds functions of a user that JAX may have traced before."""
     for equation in jaxpr.eqns:
         name = equation.primitive.name
@@ -186,7 +186,7 @@ def _may_be_old(jaxpr: Jaxpr, within: str = "") -> bool:
             return True
         for inner in _inner(equation):
             known = _is_of_libraries(inner) and _origin(inner) != _CALLER
-            if not known or _may_be_old(inner, str(equation.params.get("name", ""))):
+            if not known or _may_hold_stale_functions(inner, str(equation.params.get("name", ""))):
                 return True
     return False
 
@@ -268,7 +268,7 @@ class Pass(abc.ABC):
         )  # fmt: skip
 
 
-class _Again(Pass):
+class _Replay(Pass):
     """Does what the program does, with other captured numbers."""
 
     def __init__(self, values: Sequence[Any]):

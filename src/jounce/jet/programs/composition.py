@@ -17,7 +17,7 @@ from jax.extend.core import JaxprEqn
 from jounce.base.modules import Module, field
 from jounce.jet.algebra import Jet, bilinear
 from jounce.jet.elementary import FUNCTIONS, erf, tanh
-from jounce.jet.programs.captured import Program, read_off
+from jounce.jet.programs.captured import Program, captured_function
 from jounce.jet.programs.operations import COMPOSED, REARRANGING, STEPWISE
 from jounce.jet.programs.reader import ProgramReader, inner_program
 
@@ -77,7 +77,7 @@ class Composed(Module):
         TypeError
             If the function does not return one scalar for a scalar.
         """
-        program = read_off(function, jax.ShapeDtypeStruct((), float))
+        program = captured_function(function, jax.ShapeDtypeStruct((), float))
         if getattr(program.result, "shape", None) != ():
             raise TypeError(f"a function of time must return one scalar for a scalar, got {program.result}")
         return cls(program.program, program.captured)
@@ -97,7 +97,7 @@ class Composed(Module):
         return result.map(lambda c: c.astype(float))
 
 
-class OfSample(Module):
+class SampleFunction(Module):
     """A function of arrays of one sample, as what it computed when it was read off.
 
     Parameters
@@ -115,9 +115,9 @@ class OfSample(Module):
     shape: tuple[int, ...] = field(static=True)
 
     @classmethod
-    def of(cls, function: Callable[..., Any], *examples: Any) -> "OfSample":
+    def of(cls, function: Callable[..., Any], *examples: Any) -> "SampleFunction":
         """Return what a function computes now of arrays with the shapes and types of examples."""
-        program = read_off(lambda *x: jnp.asarray(function(*x), float), *examples)
+        program = captured_function(lambda *x: jnp.asarray(function(*x), float), *examples)
         return cls(program.program, program.captured, program.result.shape)
 
     def __call__(self, *samples: Any) -> Any:

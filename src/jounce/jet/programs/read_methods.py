@@ -18,7 +18,14 @@ from jax.extend.core import ClosedJaxpr
 
 from jounce.base.modules import Module, Untraced, field
 from jounce.jet.algebra import Jet
-from jounce.jet.programs.captured import Program, Same, known_as, may_be_old, read_off, value_key
+from jounce.jet.programs.captured import (
+    OpaqueObject,
+    Program,
+    captured_function,
+    known_as,
+    may_hold_stale_functions,
+    value_key,
+)
 from jounce.jet.programs.composition import has_rules, on_jets as run
 from jounce.jet.programs.same_programs import is_same
 
@@ -159,14 +166,14 @@ def read_method(
         Calls the method, without arguments, where the former two may not be able to.
     """
     leaves, tree = jax.tree.flatten(([*jets], [*rates]))
-    reading: Reading = Verbatim((Same(object()),), old=False)  # the call raises the error again
+    reading: Reading = Verbatim((OpaqueObject(object()),), old=False)  # the call raises the error again
     functions = [lambda *x: on_jets(*jax.tree.unflatten(tree, x)), *([] if whole is None else [lambda *_: whole()])]
     for function in functions:
         try:
-            program = read_off(lambda *x, f=function: jax.tree.leaves(f(*x)), *leaves)
+            program = captured_function(lambda *x, f=function: jax.tree.leaves(f(*x)), *leaves)
         except Exception:  # noqa: BLE001
             continue
-        reading = Verbatim(value_key(program.traced), may_be_old(program.traced))
+        reading = Verbatim(value_key(program.traced), may_hold_stale_functions(program.traced))
         if function is functions[0]:
             return _as_program(on_values, program.traced, jets) or reading
         break
@@ -178,7 +185,7 @@ def _as_program(on_values: Callable[..., Any], traced: ClosedJaxpr, jets: Sequen
     leaves, tree = jax.tree.flatten([*jets])
     shapes = tuple(x.shape for x in leaves)
     try:
-        program = read_off(on_values, *(x.coefficients[0] if isinstance(x, Jet) else x for x in jets))
+        program = captured_function(on_values, *(x.coefficients[0] if isinstance(x, Jet) else x for x in jets))
         reading = ReadMethod(program.program, program.captured)
         if not program.captured or not has_rules(program.program) or len(jax.tree.leaves(program.result)) != 1:
             return None

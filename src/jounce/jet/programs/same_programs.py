@@ -44,7 +44,7 @@ class _Nodes(Pass):
         made: list[Any] = [v.aval for v in equation.outvars]
         name, shapes = equation.primitive.name, [(aval.shape, str(aval.dtype)) for aval in made]
         if name in _SPREADING:
-            operands = [self._unspread(x) for x in operands]
+            operands = [self._without_broadcast(x) for x in operands]
         if name == "reshape" and given[0].shape == made[0].shape:
             return operands
         parameters, nameless = parameters_of(equation)
@@ -54,7 +54,7 @@ class _Nodes(Pass):
             self._nodes[("spread", node)] = operands[0]
         return [(node, k) for k in range(len(shapes))]
 
-    def _unspread(self, x: Any) -> Any:
+    def _without_broadcast(self, x: Any) -> Any:
         return self._nodes.get(("spread", x[0]), x) if isinstance(x, tuple) else x
 
     def _node(self, key: Any) -> int:

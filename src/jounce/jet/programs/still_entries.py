@@ -13,7 +13,7 @@ import numpy as np
 from jounce.jet.programs.series import Recursion
 
 
-class Still(NamedTuple):
+class ConstantEntries(NamedTuple):
     """What does not change in time.
 
     Attributes
@@ -33,7 +33,7 @@ class Still(NamedTuple):
 
 def still_entries(
     function: Callable[..., Any], parameters: Any, values: Sequence[np.ndarray], rates: Sequence[int]
-) -> Still:
+) -> ConstantEntries:
     """Return what does not change in a differential equation.
 
     It stays so by induction over the orders: what has no coefficients up to one order has none of the next.
@@ -78,7 +78,7 @@ def still_entries(
         new = [still & _no_change(results, rate, still) for rate, still in zip(rates, given, strict=True)]
         remaining = [still & (number == 0) for still, number in zip(factors, results[count:], strict=True)]
         if all(map(np.array_equal, [*new, *remaining], [*given, *factors])):
-            return Still(tuple(given), tuple(factors), forms[0])
+            return ConstantEntries(tuple(given), tuple(factors), forms[0])
         given, factors = new, remaining
 
 

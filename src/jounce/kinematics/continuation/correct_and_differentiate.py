@@ -18,7 +18,7 @@ from jaxtyping import Bool, Float, Int
 from jounce.base.shapes import Numbers, Real
 from jounce.jet import Jet
 from jounce.jet.algebra import stacked
-from jounce.jet.turns import brought_near
+from jounce.jet.turns import shifted_by_turns
 from jounce.kinematics.continuation.corrector import newton_raphson
 from jounce.kinematics.continuation.jacobian_factors import Factor, factored
 from jounce.kinematics.continuation.predictor import hidden_by_laws, laws_predictable, near_prediction, travel_of
@@ -143,7 +143,7 @@ def _outputs(system: System, pose: Pose, angles: Sequence[Numbers], step: Lanes)
         if predicts_turns(group):
             expected = next(known)
             expected = Jet(tuple(jnp.where(jnp.isfinite(expected), expected, 0.0)))
-            result = brought_near(result, expected.evaluate(step))
+            result = shifted_by_turns(result, expected.evaluate(step))
         results.append(stacked(result))
     return tuple(results)
 

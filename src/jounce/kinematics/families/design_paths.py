@@ -16,7 +16,7 @@ from jaxtyping import Bool, Float, Int
 from jounce.execution.mapped import at_lanes
 from jounce.execution.threads import Threads
 from jounce.jet.derivatives import plain_derivatives
-from jounce.jet.turns import brought_near
+from jounce.jet.turns import shifted_by_turns
 from jounce.kinematics.continuation.correct_and_differentiate import SolvedState
 from jounce.kinematics.continuation.path_following import (
     SAMPLES_A_STEP,
@@ -264,7 +264,7 @@ class DesignPaths:
             nearest = _nearest(*known, self._instants[designs], self._ends)
             for values, angle in zip(output, samples.angle, strict=True):
                 expected = self._as_given(angle[nearest], designs)
-                values[designs, :, 0, 0] = brought_near(values[designs, :, 0, 0], expected)
+                values[designs, :, 0, 0] = shifted_by_turns(values[designs, :, 0, 0], expected)
 
 
 @lru_cache(maxsize=16)

@@ -71,7 +71,7 @@ def holding_idle(solver: Callable[[], Callable[..., Any]]) -> Callable[[Callable
 
     def decorate(function: Callable[P, R]) -> Callable[P, R]:
         @functools.wraps(function)
-        def door(*arguments: P.args, **keywords: P.kwargs) -> R:
+        def wrapper(*arguments: P.args, **keywords: P.kwargs) -> R:
             try:
                 return function(*arguments, **keywords)
             except MobilityError as error:
@@ -93,7 +93,7 @@ def holding_idle(solver: Callable[[], Callable[..., Any]]) -> Callable[[Callable
                 vars(result).update(mechanism=given["mechanism"], check_idle=check)
             return cast("R", result)
 
-        return door
+        return wrapper
 
     return decorate
 

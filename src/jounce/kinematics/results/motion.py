@@ -15,7 +15,7 @@ from jounce.errors import MechanismError, check_name
 from jounce.execution.backends import xla_backend
 from jounce.execution.on_demand import OnDemand, read_only_arrays
 from jounce.jet.derivatives import plain_derivatives
-from jounce.jet.turns import brought_near
+from jounce.jet.turns import shifted_by_turns
 from jounce.kinematics.continuation.path_following import ChangePoint
 from jounce.kinematics.results.pose_outputs import check_output, output_group, series_along
 from jounce.kinematics.results.tables import Tabulated
@@ -336,7 +336,7 @@ class Motion(Tabulated):
         coefficients = np.array(coefficients)
         if measures_angle(group):
             (counted,) = history.counting((group,), self.time)
-            coefficients[0, 0] = brought_near(coefficients[0, 0], counted.element.datum.near)
+            coefficients[0, 0] = shifted_by_turns(coefficients[0, 0], counted.element.datum.near)
             return coefficients
         for k, bodies in enumerate(zip(*group.bodies, strict=True)):
             angles = np.where(self.status == Status.OK, coefficients[0, :, k], np.nan)

@@ -12,7 +12,7 @@ from jounce.base.shapes import Numbers
 from jounce.errors import UnsupportedError
 from jounce.execution.compilation import compiled
 from jounce.jet.derivatives import plain_derivatives
-from jounce.jet.turns import brought_near
+from jounce.jet.turns import shifted_by_turns
 from jounce.kinematics.results.motion import Motion
 from jounce.kinematics.results.pose_outputs import output_series
 from jounce.kinematics.sensitivity.sensitivities import Solved
@@ -42,7 +42,7 @@ class TracedMotion(Motion):
         wrapping = iter(solved.continued)
         for k, group in enumerate(model.system.outputs):
             if getattr(group.element, "wraps", ()):
-                counted = brought_near(outputs[k][0], next(wrapping))
+                counted = shifted_by_turns(outputs[k][0], next(wrapping))
                 outputs[k] = jnp.concatenate([counted[None], outputs[k][1:]])
         status: Any = solved.status.astype(int)
         values = tuple(map(plain_derivatives, outputs))

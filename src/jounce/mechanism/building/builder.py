@@ -17,7 +17,7 @@ from jounce.execution.compilation import compiled
 from jounce.jet import Jet
 from jounce.linear_algebra.fronts import Fronts, elimination
 from jounce.linear_algebra.pattern import Pattern
-from jounce.mechanism.building.contents import contents_of, holds_numbers_only, made_or_known, owned_arrays
+from jounce.mechanism.building.contents import contents_of, holds_numbers_only, made_or_stored, owned_arrays
 from jounce.mechanism.building.derived_values import (
     counts_turns,
     with_derived_of,
@@ -145,7 +145,7 @@ def build(mechanism: Mechanism, like: Model | None = None, *, initial: bool = Fa
     if like is not None:
         return _built(mechanism, like, initial=initial)
     contents = contents_of(mechanism, initial)
-    return made_or_known(contents, lambda: _built(mechanism, None, initial=initial), _owned)
+    return made_or_stored(contents, lambda: _built(mechanism, None, initial=initial), _owned)
 
 
 def _owned(model: Model) -> Model | None:

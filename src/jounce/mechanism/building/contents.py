@@ -16,7 +16,7 @@ from typing import Any, TypeVar
 import jax
 import numpy as np
 
-from jounce.base.modules import Module, ReadOnlyDict, is_ours
+from jounce.base.modules import Module, ReadOnlyDict, belongs_to_package
 from jounce.constraints.friction import Friction, GearFriction
 from jounce.mechanism.mechanism import Mechanism
 from jounce.mechanism.user_code import has_own_methods
@@ -80,13 +80,13 @@ def _given_fields(kind: type) -> Callable[[Mapping[str, Any]], Sequence[Any]] | 
 
     The other fields are found later.
     """
-    if not is_ours(kind) or not dataclasses.is_dataclass(kind):
+    if not belongs_to_package(kind) or not dataclasses.is_dataclass(kind):
         return None
     names = [field.name for field in dataclasses.fields(kind) if field.init]
     return itemgetter(*names) if len(names) > 1 else lambda own: [own[name] for name in names]
 
 
-def made_or_known(contents: Contents | None, make: Callable[[], T], owned: Callable[[T], T | None]) -> T:
+def made_or_stored(contents: Contents | None, make: Callable[[], T], owned: Callable[[T], T | None]) -> T:
     """Return what is made of contents, which is kept from the second time on.
 
     Parameters
@@ -140,7 +140,7 @@ def holds_numbers_only(element: Any) -> bool:
             pending += value
         elif kind is dict:
             pending += value.values()
-        elif isinstance(value, Module) and is_ours(kind):
+        elif isinstance(value, Module) and belongs_to_package(kind):
             pending += vars(value).values()
         else:
             return False

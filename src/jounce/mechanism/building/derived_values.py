@@ -14,7 +14,7 @@ from jounce.constraints.facts import value_fields
 from jounce.execution.compilation import compiled
 from jounce.jet import Jet
 from jounce.mechanism.building.starting_guess import pose_at
-from jounce.mechanism.system import Group, holding
+from jounce.mechanism.system import Group, with_field
 from jounce.mechanism.transmissions.axis_angles import measures_angle, with_datum_of
 from jounce.rigid.pose import Pose
 
@@ -25,13 +25,13 @@ def with_offsets(group: Group, pose_type: type[Pose], guess: dict[str, Any]) -> 
     if "offset" not in fields or group.element.offset is not None:
         return group
     offset = _fulfilling_offset(group, guess, pose_type)
-    return holding(group, "offset", offset if isinstance(offset, Tracer) else np.asarray(offset))
+    return with_field(group, "offset", offset if isinstance(offset, Tracer) else np.asarray(offset))
 
 
 @compiled("pose_type", brief=True)
 def _fulfilling_offset(group: Group, guess: dict[str, Any], pose_type: type[Pose]) -> Float[Numbers, "instance 1"]:
     def residual(offset: Any) -> Any:
-        trial = holding(group, "offset", offset)
+        trial = with_field(group, "offset", offset)
         return trial.residual(pose_at(guess, pose_type), Jet([jnp.zeros((1, 1))])).coefficients[0]
 
     zero = jnp.zeros((group.instances, 1))
@@ -45,7 +45,7 @@ def with_sense(group: Group, pose_type: type[Pose], guess: dict[str, Any]) -> Gr
         return group
     pose = pose_at(guess, pose_type)
     sense = group.element.sense_at(*(pose.take(indices) for indices in group.bodies))
-    return holding(group, "sense", sense if sense is None or isinstance(sense, Tracer) else np.asarray(sense))
+    return with_field(group, "sense", sense if sense is None or isinstance(sense, Tracer) else np.asarray(sense))
 
 
 def counts_turns(group: Group) -> bool:
@@ -57,7 +57,7 @@ def with_turn_unit(group: Group, length: Any) -> Group:
     """Return a group whose carriages move by the size of the mechanism, m, with a rad of the leaders of cams."""
     if not counts_turns(group):
         return group
-    return holding(group, "unit", length * np.ones((group.instances, 1)))
+    return with_field(group, "unit", length * np.ones((group.instances, 1)))
 
 
 def with_derived_of(group: Group, known: Group) -> Group:
@@ -65,9 +65,9 @@ def with_derived_of(group: Group, known: Group) -> Group:
     if measures_angle(group):
         return with_datum_of(group, known)
     if hasattr(group.element, "sense"):
-        return holding(group, "sense", known.element.sense)
+        return with_field(group, "sense", known.element.sense)
     if counts_turns(group):
-        return holding(group, "unit", known.element.unit)
+        return with_field(group, "unit", known.element.unit)
     if "offset" not in value_fields(type(group.element)) or group.element.offset is not None:
         return group
-    return holding(group, "offset", known.element.offset)
+    return with_field(group, "offset", known.element.offset)

@@ -49,13 +49,13 @@ def concrete(
     names = tuple(inspect.signature(function).parameters)
 
     @functools.wraps(function)
-    def door(*arguments: P.args, **keywords: P.kwargs) -> R:
+    def wrapper(*arguments: P.args, **keywords: P.kwargs) -> R:
         check_process()
         given = dict(zip(names, arguments, strict=False)) | keywords
         if (location := _traced(given)) is not None and traced is not None:
             others = {name: value for name, value in given.items() if name != names[0]}
             if (location := _traced(others)) is None:
-                return traced(door, given)
+                return traced(wrapper, given)
             raise UnsupportedError(WHAT_IS_NOT_TRACED.format(function.__name__), name=location)
         if location is not None:
             raise UnsupportedError(
@@ -66,7 +66,7 @@ def concrete(
         with eval_context():  # ensure_compile_time_eval would compile each constant inside on its own
             return function(*arguments, **keywords)
 
-    return door
+    return wrapper
 
 
 def concrete_or(

@@ -19,14 +19,14 @@ from jounce.constraints.angles import Datum, angle_of
 from jounce.constraints.base import value_fields
 from jounce.constraints.planar import length_of
 from jounce.errors import UnsupportedError
-from jounce.jet.turns import brought_near
+from jounce.jet.turns import shifted_by_turns
 from jounce.mechanism.building.builder import Model, grouped_elements, model_of
 from jounce.mechanism.building.derived_values import with_offsets, with_sense, with_turn_unit
 from jounce.mechanism.building.preconditions import PLAIN, fields_of
 from jounce.mechanism.building.starting_guess import pose_at, starting_guess
 from jounce.mechanism.mechanism import Mechanism
 from jounce.mechanism.resolve import resolve
-from jounce.mechanism.system import Group, holding
+from jounce.mechanism.system import Group, with_field
 from jounce.mechanism.transmissions.axis_angles import measures_angle
 from jounce.mechanism.transmissions.gear_checks import check_ratios
 from jounce.rigid import PlanarPose, SpatialPose
@@ -184,13 +184,15 @@ def _with_datum(group: Group, pose: SpatialPose, known: Any, near: Any) -> Group
     axis = axis / length_of(axis)[None]
     if element.vector_i is None:
         angle, is_defined = angle_of(attitude, axis)
-        return holding(group, "datum", Datum(attitude, jnp.where(is_defined, brought_near(angle, known), known), near))
+        return with_field(
+            group, "datum", Datum(attitude, jnp.where(is_defined, shifted_by_turns(angle, known), known), near)
+        )
     across = None
     if hasattr(element, "role"):  # a driver or a force acts about the axis, see `axis_angles`
         second = jnp.asarray(element.vector_j)
         along = body_j.to_body(body_i.direction(axis)).coefficients[0]
         across = second - (second * along).sum(axis=0, keepdims=True) * along
-    return holding(group, "datum", Datum(attitude, known, near, across))
+    return with_field(group, "datum", Datum(attitude, known, near, across))
 
 
 def angles_of(model: Model, counted: tuple[tuple[Group, ...], tuple[Group, ...]]) -> Angles:

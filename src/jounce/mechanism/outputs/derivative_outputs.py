@@ -11,7 +11,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
-from jounce.base.modules import field, is_ours, unchecked, with_fields
+from jounce.base.modules import belongs_to_package, field, unchecked, with_fields
 from jounce.base.shapes import Numbers
 from jounce.constraints.base import Nested, Whole
 from jounce.errors import MechanismError, no_such, whole_number
@@ -215,7 +215,7 @@ def _bind(
         return bound_outputs.setdefault(name, output)
     if name in waiting:
         raise MechanismError("this derivative is one of itself", name=f"outputs.{name}.of", value=output.of)
-    stems = [_stem(given, outputs, mechanism) for given in (output.of, output.by)]
+    stems = [_base_output(given, outputs, mechanism) for given in (output.of, output.by)]
     if all(stems) or getattr(output, "bound_operands", output) is None:
         own = {stem: _bind(stem, outputs, mechanism, bound_outputs, (*waiting, name)) for stem in stems if stem}
         try:
@@ -226,7 +226,7 @@ def _bind(
     return bound_outputs.setdefault(name, output)
 
 
-def _stem(name: str, outputs: Mapping[str, AbstractQuantity], mechanism: Any) -> str:
+def _base_output(name: str, outputs: Mapping[str, AbstractQuantity], mechanism: Any) -> str:
     """Return the output that a name is of; empty where there is none."""
     if name in outputs:
         return name
@@ -252,7 +252,7 @@ def _with_operands(output: Any, outputs: Mapping[str, AbstractQuantity], mechani
 
 def _operand(key: str, name: str, outputs: Mapping[str, AbstractQuantity], mechanism: Any) -> Operand:
     """Return the output, or the component of one, that has a name."""
-    stem = _stem(name, outputs, mechanism)
+    stem = _base_output(name, outputs, mechanism)
     if not stem:
         labels = {other: output.component_labels(mechanism) for other, output in outputs.items()}
         known = [each for other, its in labels.items() for each in ([f"{other}_{x}" for x in its] or [other])]
@@ -265,7 +265,7 @@ def _operand(key: str, name: str, outputs: Mapping[str, AbstractQuantity], mecha
 
 def _posed(output: Any) -> bool:
     """Tell whether an output is a function of poses alone, without a reference position."""
-    if not isinstance(output, AbstractOutput) or not is_ours(type(output)):
+    if not isinstance(output, AbstractOutput) or not belongs_to_package(type(output)):
         return False
     return not hasattr(output, "datum") or output.vector_i is not None
 

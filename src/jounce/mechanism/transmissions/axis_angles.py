@@ -10,7 +10,7 @@ from jounce.base.modules import unchecked, with_fields
 from jounce.base.shapes import Numbers
 from jounce.constraints.angles import Datum, angle_of
 from jounce.jet.turns import counted_on, principal, whole_periods
-from jounce.mechanism.system import Group, holding
+from jounce.mechanism.system import Group, with_field
 from jounce.mechanism.time import nearest_instants
 from jounce.mechanism.transmissions.turn_counting import refined_samples
 
@@ -166,7 +166,9 @@ def with_turns(groups: Sequence[Group], near: Sequence[Any]) -> tuple[Group, ...
 def _with_data(groups: Sequence[Group], values: Sequence[Any], put: Callable[[Datum, Any], Datum]) -> tuple[Group, ...]:
     """Return groups with other data, one value for each that measures an angle about an axis."""
     remaining = iter(values)
-    return tuple(holding(g, "datum", put(g.element.datum, next(remaining))) if measures_angle(g) else g for g in groups)
+    return tuple(
+        with_field(g, "datum", put(g.element.datum, next(remaining))) if measures_angle(g) else g for g in groups
+    )
 
 
 def angles_of(groups: Sequence[Group]) -> tuple[Any, ...]:
@@ -201,7 +203,7 @@ def _with_datum(group: Group, coordinates: Coordinates, prescribed: Sequence[Pre
     acts = element.vector_i is not None and hasattr(element, "role")
     across = _across(np.asarray(element.vector_j), attitude, axis) if acts else None
     values = {"attitude": attitude, "angle": angle, "near": angle, "across": across}
-    return holding(group, "datum", unchecked(Datum, values))
+    return with_field(group, "datum", unchecked(Datum, values))
 
 
 def with_datum_of(group: Group, known: Group) -> Group:
@@ -210,7 +212,7 @@ def with_datum_of(group: Group, known: Group) -> Group:
     if datum.across is not None:
         across = _across(group.element.vector_j, np.asarray(datum.attitude), axis_of(known))
         datum = with_fields(datum, across=across)
-    return holding(group, "datum", datum)
+    return with_field(group, "datum", datum)
 
 
 def departure(before: Sequence[Group], after: Sequence[Group]) -> float:

@@ -25,7 +25,7 @@ from jounce.errors import JounceError, MechanismError
 from jounce.execution.compilation import compiled
 from jounce.mechanism.mechanism import GROUND, Mechanism
 from jounce.mechanism.resolve import along_instances, resolve
-from jounce.mechanism.system import POSITION_COMPONENTS, Group, group_elements, holding
+from jounce.mechanism.system import POSITION_COMPONENTS, Group, group_elements, with_field
 from jounce.mechanism.transmissions.joined_points import (
     BodyVector,
     Joined,
@@ -218,9 +218,9 @@ def _with_carriers(
     if not may_have_frame(type(group.element)):
         return group
     if on_line(group.element) and all(name in arms for name in members):
-        return holding(group, "arm", along_instances(*(_number(arms[name].angle) for name in members)))
+        return with_field(group, "arm", along_instances(*(_number(arms[name].angle) for name in members)))
     if shares_points(elements[members[0]]):
-        return holding(group, "slots", distinct(elements[members[0]].bodies)[1])
+        return with_field(group, "slots", distinct(elements[members[0]].bodies)[1])
     if isinstance(group.element, spatial.Gear):
         _check_points_on_axes({name: elements[name] for name in members}, mechanism)
         return _on_frames(group, [elements[name] for name in members], mechanism)
@@ -248,8 +248,8 @@ def _on_frames(group: Group, gears: Sequence[spatial.Gear], mechanism: Mechanism
             data.append((as_array(axis.value), as_array(there.value)))
         if len(data) == len(gears):
             axis, there = (along_instances(*vectors) for vectors in zip(*data, strict=True))
-            group = holding(group, field, _coaxial(axis, there))
-    return holding(group, "whole", _whole_multiples(group.element.ratio))
+            group = with_field(group, field, _coaxial(axis, there))
+    return with_field(group, "whole", _whole_multiples(group.element.ratio))
 
 
 def _check_points_on_axes(gears: Mapping[str, spatial.Gear], mechanism: Mechanism) -> None:
@@ -349,7 +349,7 @@ def _on_hinges(group: Group, cams: Sequence[Cam], mechanism: Mechanism) -> Group
         part, datum = getattr(group.element, field), _coaxial(first, second)
         if part.vector_j is not None:  # its component along the axis has no effect
             datum = with_fields(datum, across=_across(part.vector_j, second))
-        group = holding(group, field, with_fields(part, datum=datum))
+        group = with_field(group, field, with_fields(part, datum=datum))
     return group
 
 

@@ -24,7 +24,7 @@ TORQUES = (
 ENERGY_COLORS = (BLUE, VERMILION, GREEN)
 
 
-def stand_in_note(case: Case) -> str:
+def note_on_substitutes(case: Case) -> str:
     """Word which data are stand-ins for those of the paper: samples, masses and lengths, unless files gave them."""
     chosen = [] if case.measured else ["samples"]
     chosen += ["masses", "lengths"] if case.link is STAND_IN else []
@@ -55,7 +55,7 @@ def accelerations(histories: Mapping[str, History], *, tangential: bool, number:
     """Draw the samples and the law through them, one panel for each motion (figures 4 and 5)."""
     what = "Tangential acceleration" if tangential else "Generalized angular acceleration"
     unit = r"m/s$^2$" if tangential else r"rad/s$^2$"
-    note = stand_in_note(_any_case(histories))
+    note = note_on_substitutes(_any_case(histories))
     figure, grid = _panels(len(histories), 1, (6.0, 4.8), f"{what} (figure {number} of Negrean 2025)", note)
     for panel, history in zip(grid[:, 0], histories.values(), strict=True):
         factor = history.case.link.radius if tangential else 1.0
@@ -83,7 +83,7 @@ def torque(histories: Mapping[str, History], *, rate: int, number: int) -> Figur
         panel.plot(history.time, gravity, color=GREEN, linestyle=":", linewidth=1.3, label="share of gravity")
         panel.set_title(history.case.title)
         panel.set_ylabel(f"{name} / ({unit})")
-    legend_below(figure, grid[0, 0], 3, stand_in_note(_any_case(histories)))
+    legend_below(figure, grid[0, 0], 3, note_on_substitutes(_any_case(histories)))
     figure.align_ylabels()
     return figure
 
@@ -91,7 +91,7 @@ def torque(histories: Mapping[str, History], *, rate: int, number: int) -> Figur
 def energies(histories: Mapping[str, History]) -> Figure:
     """Draw the acceleration energies of orders 1 to 3, by the library and by the closed forms (equations 141-143)."""
     title = "Acceleration energies of orders 1 to 3 (equations 141-143 of Negrean 2025)"
-    figure, grid = _panels(3, len(histories), (7.2, 6.0), title, stand_in_note(_any_case(histories)))
+    figure, grid = _panels(3, len(histories), (7.2, 6.0), title, note_on_substitutes(_any_case(histories)))
     for column, history in enumerate(histories.values()):
         for p, panel in enumerate(grid[:, column], 1):
             computed, closed = history.energies[:, p - 1], history.closed_energies[:, p - 1]

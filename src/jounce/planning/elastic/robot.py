@@ -18,7 +18,7 @@ from jounce.errors import RobotError
 from jounce.integrate import RobotSimulation, simulate
 from jounce.integrate.steps.options import SimulationOptions
 from jounce.jet import Jet
-from jounce.jet.programs.composition import OfSample
+from jounce.jet.programs.composition import SampleFunction
 from jounce.planning.elastic.driven_systems import robot_drives
 from jounce.planning.elastic.drives import Drive, DriveArrays
 from jounce.planning.elastic.motor_torques import MOTOR, torques_of
@@ -100,7 +100,7 @@ class _ElasticForces(AbstractJointLaws):
     indices: tuple[int, ...] = field(static=True)  # of the laws among the robot's own joints
     links: tuple[int, ...] = field(static=True)  # columns of the robot's own joints
     motors: tuple[int, ...] = field(static=True)  # of what moves each: its rotor, or itself
-    feedback: OfSample | None
+    feedback: SampleFunction | None
 
     @property
     def changing(self) -> bool:

@@ -108,10 +108,10 @@ def joined_from_rest(path: Path, start: Float[np.ndarray, " joint"], at: float) 
     length = max(float(np.linalg.norm(way)), np.finfo(float).tiny)
     rate = length / float(np.linalg.norm(p[1]))
     powers = _between(np.stack([start, way]), p * rate ** np.arange(MET)[:, None])
-    return gone_on(path, at, rate, [JoinedPieces(np.zeros(1), x[:, None], 1.0) for x in powers.T], 1.0)
+    return extended_path(path, at, rate, [JoinedPieces(np.zeros(1), x[:, None], 1.0) for x in powers.T], 1.0)
 
 
-def gone_on(path: Path, at: float, rate: float, laws: Sequence[SplineMotion], until: float) -> Path:
+def extended_path(path: Path, at: float, rate: float, laws: Sequence[SplineMotion], until: float) -> Path:
     """Return the path of some laws over s from 0 on, that goes on as another one at a steady rate.
 
     Parameters
@@ -127,7 +127,7 @@ def gone_on(path: Path, at: float, rate: float, laws: Sequence[SplineMotion], un
     """
     stop = until + (path.stop - at) / rate
     named = zip(laws, path.laws.items(), strict=True)
-    whole = Path({name: _spliced(own, law, at, rate, until, stop) for own, (name, law) in named}, 0.0, stop)
+    whole = Path({name: _joined_law(own, law, at, rate, until, stop) for own, (name, law) in named}, 0.0, stop)
     own = whole.derivatives(np.linspace(0.0, until, LOOKS), 0)[:, 0]
     there = path.derivatives(np.linspace(path.start, path.stop, LOOKS), 0)[:, 0]
     away = float(np.sqrt(((own[:, None] - there) ** 2).sum(axis=2)).min(axis=1).max())
@@ -135,7 +135,7 @@ def gone_on(path: Path, at: float, rate: float, laws: Sequence[SplineMotion], un
     return dataclasses.replace(whole, deviation=path.deviation, allowed=path.allowed, words=words, joined=until)
 
 
-def _spliced(
+def _joined_law(
     own: SplineMotion, law: AbstractMotion, at: float, rate: float, until: float, stop: float
 ) -> AbstractMotion:
     """Return a law that is its own until a value of s, and then another one at a steady rate.

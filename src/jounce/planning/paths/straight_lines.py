@@ -65,7 +65,7 @@ class Lines:
         nearest = np.full(len(at), np.inf)
         for step in range(-ADJACENT, ADJACENT + 1):
             line = np.clip(own + step, 0, len(self.at) - 2)
-            nearest = np.minimum(nearest, _away(points, self.points[line], self.points[line + 1]))
+            nearest = np.minimum(nearest, _distances_from_lines(points, self.points[line], self.points[line + 1]))
         return nearest
 
 
@@ -76,7 +76,7 @@ def polynomials_at(law: SplineMotion, at: Float[np.ndarray, " point"]) -> Float[
     return np.polynomial.polynomial.polyval(at - begins[piece], powers[:, piece], tensor=False)
 
 
-def _away(points: np.ndarray, begins: np.ndarray, ends: np.ndarray) -> Float[np.ndarray, " point"]:
+def _distances_from_lines(points: np.ndarray, begins: np.ndarray, ends: np.ndarray) -> Float[np.ndarray, " point"]:
     """Return distances from lines between two points each."""
     along, since = ends - begins, points - begins
     lengths = (along**2).sum(axis=-1)
@@ -84,7 +84,7 @@ def _away(points: np.ndarray, begins: np.ndarray, ends: np.ndarray) -> Float[np.
     return np.linalg.norm(since - share[..., None] * along, axis=-1)
 
 
-def taken_together(points: _Points, near: float) -> tuple[Int[np.ndarray, " vertex"], float]:
+def simplified_polyline(points: _Points, near: float) -> tuple[Int[np.ndarray, " vertex"], float]:
     """Return few of many points such that straight lines between them come near all, in their sequence.
 
     Parameters
@@ -129,7 +129,7 @@ def _off(points: _Points, near: float) -> float:
     fraction = since @ (along / length) if length else np.zeros(len(points))
     if np.max(np.maximum.accumulate(fraction) - fraction) > near:
         return np.inf
-    return float(_away(points, points[:1], points[-1:]).max())
+    return float(_distances_from_lines(points, points[:1], points[-1:]).max())
 
 
 def rounded(lines: Lines, deviation: float, *, timed: bool = False) -> Path:
@@ -153,7 +153,7 @@ def rounded(lines: Lines, deviation: float, *, timed: bool = False) -> Path:
     if timed:
         knots, points, off, chosen = lines.at, lines.points, 0.0, np.arange(len(lines.at))
     else:
-        chosen, off = taken_together(lines.points, TOGETHER * (deviation - lines.own))
+        chosen, off = simplified_polyline(lines.points, TOGETHER * (deviation - lines.own))
         points = lines.points[chosen]
         knots = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1)))
         if not knots[-1] > 0:

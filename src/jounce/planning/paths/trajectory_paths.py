@@ -134,7 +134,7 @@ def path_of_trajectory(trajectory: JointTrajectory, order: int) -> Path:
         if not largest > 0:
             raise TrajectoryError("the path does not move: all its points are the same", name="path")
         rests = _rests(path, times, speeds, RESTING * largest)
-        if min(speeds[0], speeds[-1]) > REST_SPEED * largest and _turns_well(path, times, rests):
+        if min(speeds[0], speeds[-1]) > REST_SPEED * largest and _accelerates_at_rests(path, times, rests):
             return dataclasses.replace(path, passed=(times, times))
         times = np.union1d(times, rests)
         lengths = np.append(0.0, np.cumsum(_between(path, times[:-1], times[1:])))
@@ -236,7 +236,7 @@ def _rests(path: Path, times: np.ndarray, speeds: np.ndarray, slow: float) -> Fl
     return np.union1d(times[resting], best[least <= slow])
 
 
-def _turns_well(path: Path, times: np.ndarray, rests: np.ndarray) -> bool:
+def _accelerates_at_rests(path: Path, times: np.ndarray, rests: np.ndarray) -> bool:
     """Whether a trajectory accelerates wherever it stands still: its own time is then fit to be the parameter."""
     if not len(rests):
         return True

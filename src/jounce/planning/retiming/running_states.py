@@ -14,7 +14,7 @@ from jounce.planning.paths.joining import (
     SHARES,
     State,
     clean_state,
-    gone_on,
+    extended_path,
     joined_from_rest,
     rates_along,
 )
@@ -78,7 +78,7 @@ def retimed_from(
     check_possible(source, source.labels, path.start, path.stop)
     check_state(source, np.asarray(given, float), ROUNDING)
     if largest_ratio(source, state)[0] > 1 - SPARE:  # of points, or of torques
-        state = relieved(source, state * (1 - 2 * ROUNDING) ** np.arange(len(state))[:, None])
+        state = within_torque_limits(source, state * (1 - 2 * ROUNDING) ** np.arange(len(state))[:, None])
         check_state(source, state, -SPARE)
     if along := rates_along(path, state):
         own = dataclasses.replace(conditions, rates=(along[0], conditions.rates[1]), further=along[1:])
@@ -141,7 +141,7 @@ def largest_ratio(
     return float(ratios[worst]), float(values[worst]), labels.every[worst]
 
 
-def relieved(source: RobotQuantities, state: Float[np.ndarray, "derivative joint"]) -> State:
+def within_torque_limits(source: RobotQuantities, state: Float[np.ndarray, "derivative joint"]) -> State:
     """Return a state whose accelerations are changed so that torques at their limits are below them by rounding."""
     if len(state) <= 2 or not source.with_effort:
         return state
@@ -239,6 +239,6 @@ def _path_of(path: Path, at: float, rate: float, curve: JoiningCurve) -> Path:
     splines = curve.splines
     begins, until = splines.ends[:-1], float(splines.ends[-1])
     powers = local_powers(BSpline(splines.knots, curve.coefficients, splines.degree), begins, splines.degree)
-    return gone_on(
+    return extended_path(
         path, at, rate, [SmoothPieces(begins, powers[:, :, k], until) for k in range(powers.shape[2])], until
     )

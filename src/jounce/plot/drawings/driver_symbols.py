@@ -8,13 +8,23 @@ from jaxtyping import Float
 from jounce.mechanism.mechanism import GROUND
 from jounce.plot.drawings.drawing import INK, MARKS, SYMBOLS, Drawing, Flat
 from jounce.plot.drawings.geometry import Symbol
-from jounce.plot.drawings.symbol_parts import PAPER, actuator, ball, normal_of, pin, spring, stand, turn, unit_vector
+from jounce.plot.drawings.symbol_parts import (
+    PAPER,
+    actuator,
+    ball,
+    draw_ground_support,
+    normal_of,
+    pin,
+    spring,
+    turn,
+    unit_vector,
+)
 
 HINGES = ("revolute", "cylindrical", "universal", "screw", "spherical", "slot", "prismatic")  # that have one place
 
 
 def _spring(drawing: Drawing, symbol: Symbol) -> None:
-    stand(drawing, symbol)
+    draw_ground_support(drawing, symbol)
     ends = drawing.ends(symbol)
     spring(drawing, *ends)
     for end in ends:
@@ -22,7 +32,7 @@ def _spring(drawing: Drawing, symbol: Symbol) -> None:
 
 
 def _cylinder_and_rod(drawing: Drawing, symbol: Symbol) -> None:
-    stand(drawing, symbol)
+    draw_ground_support(drawing, symbol)
     ends = drawing.ends(symbol)
     actuator(drawing, *ends)
     for end in ends:

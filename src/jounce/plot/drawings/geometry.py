@@ -227,7 +227,7 @@ def skeleton(mechanism: Mechanism) -> Skeleton:
         kind: {name: _values(element, parameters, components, f"{kind}.{name}") for name, element in elements.items()}
         for kind, elements in mechanism.elements.items()
     }
-    touching = [touch for kind, values in kinds.items() for touch in _touched(mechanism.elements[kind], values)]
+    touching = [touch for kind, values in kinds.items() for touch in _element_points(mechanism.elements[kind], values)]
     start = guessed(mechanism)
     everywhere = [points_at(start[body], local)[0] for _, body, local in touching]
     curves = {name: curve_lines(mechanism, name) for name, joint in mechanism.joints.items() if joint.hidden}
@@ -279,7 +279,7 @@ def _slot(field_name: str) -> int:
     return SLOTS.get(field_name[-2:], 0)
 
 
-def _touched(elements: Mapping[str, Any], values: Mapping[str, Values]) -> Iterator[tuple[str, str, Point]]:
+def _element_points(elements: Mapping[str, Any], values: Mapping[str, Values]) -> Iterator[tuple[str, str, Point]]:
     """Return the name of each element, the body and the place in its frame, for all points of elements."""
     for name, element in elements.items():
         for field_name, value in values[name].items():

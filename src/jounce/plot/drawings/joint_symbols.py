@@ -72,12 +72,12 @@ def _draw_wheel(drawing: Drawing, wheel: Wheel) -> None:
 
 
 def _revolute(drawing: Drawing, symbol: Symbol) -> None:
-    parts.stand(drawing, symbol)
+    parts.draw_ground_support(drawing, symbol)
     parts.pin(drawing, drawing.point(symbol))
 
 
 def _rod(drawing: Drawing, symbol: Symbol) -> None:
-    parts.stand(drawing, symbol)
+    parts.draw_ground_support(drawing, symbol)
     ends = drawing.ends(symbol)
     drawing.line(*ends, width=2.6, stroke="#666666", layer=BARS)
     for end in ends:
@@ -183,7 +183,7 @@ def _rope(drawing: Drawing, symbol: Symbol) -> None:
 
 
 def _spherical(drawing: Drawing, symbol: Symbol) -> None:
-    parts.stand(drawing, symbol)
+    parts.draw_ground_support(drawing, symbol)
     point = drawing.point(symbol)
     angle = np.radians(np.linspace(150.0, 390.0, 20))
     socket = 1.3 * drawing.unit * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
@@ -192,7 +192,7 @@ def _spherical(drawing: Drawing, symbol: Symbol) -> None:
 
 
 def _hinge(drawing: Drawing, symbol: Symbol) -> None:
-    parts.stand(drawing, symbol)
+    parts.draw_ground_support(drawing, symbol)
     slot = symbol.moving_slot
     axes = drawing.frame_along(symbol.bodies[slot], symbol.axis_on(slot))
     point, reach = drawing.point(symbol, slot), 3.2 * drawing.unit * drawing.flat(axes[:, 0])
@@ -227,7 +227,7 @@ def _slider(drawing: Drawing, symbol: Symbol) -> None:
 
 
 def _universal(drawing: Drawing, symbol: Symbol) -> None:
-    parts.stand(drawing, symbol)
+    parts.draw_ground_support(drawing, symbol)
     point, u = drawing.point(symbol), drawing.unit
     for slot, body in enumerate(symbol.bodies):
         color = drawing.colors.get(body, INK)

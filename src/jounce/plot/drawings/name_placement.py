@@ -106,7 +106,7 @@ def place_names(
             own, center = anchors[number, k], anchors[number, k] + offsets[best]
             box = np.concatenate([center - half, center + half])
             boxes[k] = np.vstack([boxes[k], box])
-            strange = strange or bool(_strange(box[None, :2], box[None, 2:], own, anchors[:, k])[0])
+            strange = strange or bool(_is_nearer_to_others(box[None, :2], box[None, 2:], own, anchors[:, k])[0])
         direction, distance = (float(directions[best, 0]), float(directions[best, 1])), float(distances[best])
         placements.append(NamePlace(direction, distance, distance > LEADER or strange))
     return placements
@@ -165,11 +165,13 @@ def _costs(
     clash = np.maximum(0.0, overlap).prod(axis=2).sum(axis=1)
     outside = (np.maximum(0.0, frame[:2] - low) + np.maximum(0.0, high - frame[2:])).sum(axis=1)
     covered = inside @ weights[near]
-    strange = COST_OF_STRANGER * _strange(low, high, own, others)
+    strange = COST_OF_STRANGER * _is_nearer_to_others(low, high, own, others)
     return covered + COST_OF_OVERLAP * clash + COST_OF_EDGE * outside + strange
 
 
-def _strange(low: np.ndarray, high: np.ndarray, own: Pixels, anchors: Points) -> Bool[np.ndarray, " candidate"]:
+def _is_nearer_to_others(
+    low: np.ndarray, high: np.ndarray, own: Pixels, anchors: Points
+) -> Bool[np.ndarray, " candidate"]:
     """Tell which boxes are nearer to another anchor than to their own, so that a name could be read as another's."""
     strangers = anchors[np.linalg.norm(anchors - own, axis=1) > 2.0]  # a joint and its body may have one anchor
     return np.any(_gap(low, high, strangers) <= _gap(low, high, own[None]) + 1.0, axis=1)

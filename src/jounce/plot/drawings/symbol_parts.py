@@ -42,7 +42,7 @@ def _hatching(drawing: Drawing, start: Flat, stop: Flat, side: np.ndarray, count
         drawing.line(foot, foot + side * 0.75 * u - along * 0.55 * u, width=0.8, layer=GUIDES)
 
 
-def stand(drawing: Drawing, symbol: Symbol) -> None:
+def draw_ground_support(drawing: Drawing, symbol: Symbol) -> None:
     """Draw the stand of a joint whose one body is the ground, once where several joints share it."""
     if GROUND not in symbol.bodies[:2]:
         return

@@ -60,7 +60,7 @@ def result_json(command: str, data: Mapping[str, Any]) -> str:
     return json.dumps(whole, indent=1, allow_nan=False)
 
 
-def complaint(kind: str, problem: object) -> str:
+def error_as_json(kind: str, problem: object) -> str:
     """Return an error or a warning as JSON in one line: its kind, message, file, line, name and value."""
     record: dict[str, Any] = {"kind": type(problem).__name__ if isinstance(problem, Exception) else "Error"}
     cause = problem.args[0] if isinstance(problem, Exception) and problem.args else None

@@ -105,7 +105,7 @@ def in_base(axes: tuple[Jet, Jet, Jet], vector: Jet | Numbers) -> Jet:
     return rotated.dense()
 
 
-def falling(axes: tuple[Jet, Jet, Jet], gravity: Numbers, levels: int) -> Float[Numbers, "level 3 batch"]:
+def free_fall_velocity(axes: tuple[Jet, Jet, Jet], gravity: Numbers, levels: int) -> Float[Numbers, "level 3 batch"]:
     """Return the velocity, zero now, of a base that accelerates against gravity, in its axes, (levels, 3, batch)."""
     against = stacked(in_base(axes, -jnp.asarray(gravity)[:, None]))[: levels - 1]
     return jnp.concatenate([jnp.zeros_like(against[:1]), against])

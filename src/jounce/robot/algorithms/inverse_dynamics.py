@@ -11,7 +11,14 @@ from jounce.base.shapes import Array, ArrayLike, Numbers
 from jounce.errors import RobotError, check_choice, flag
 from jounce.jet import Jet, concatenate, cross, matvec
 from jounce.jet.algebra import stacked, total
-from jounce.robot.algorithms.base_motion import BaseMotion, base_arrays, base_body, falling, in_base, scene_axes
+from jounce.robot.algorithms.base_motion import (
+    BaseMotion,
+    base_arrays,
+    base_body,
+    free_fall_velocity,
+    in_base,
+    scene_axes,
+)
 from jounce.robot.algorithms.wrenches import FRAMES, Wrench, wrench_arrays
 from jounce.robot.model.arguments import checked_coordinates, stacked_arguments
 from jounce.robot.model.tree import Frame, Tree
@@ -203,7 +210,7 @@ def _forces_of_free_tree(
     frames, body = constants
     scene = scene_axes(pose[0, 3:], twist)
     applied = _on_bodies(tree, (q, *wrenches), frames, global_axes, scene)
-    moving = twist[:, 3:], twist[:, :3] + falling(scene, tree.gravity, len(twist))
+    moving = twist[:, 3:], twist[:, :3] + free_fall_velocity(scene, tree.gravity, len(twist))
     on_bodies = None if applied is None else applied[:, :-1]
     along, _, _, transmitted = recursive_newton_euler(tree, q, on_bodies, moving)
     forces = to_coordinates(tree, along)

@@ -9,7 +9,7 @@ import jax.numpy as jnp
 
 from jounce.execution.compilation import LARGE
 from jounce.jet.programs.series import Recursion
-from jounce.jet.programs.still_entries import Still, still_entries
+from jounce.jet.programs.still_entries import ConstantEntries, still_entries
 from jounce.robot.recursions.tree_equations import TreeEquations, TreeFactor, TreeState, Unknowns, Wrenches
 
 Series = Any
@@ -49,7 +49,7 @@ def motion_series(
     *,
     reversible: bool = False,
     unrolled: bool = False,
-    still: Still | None = None,
+    still: ConstantEntries | None = None,
 ) -> MotionSeries:
     """Return the series of the motion through a state.
 
@@ -72,7 +72,7 @@ def motion_series(
     unrolled : bool, default False
         Whether each order has code of its own.
     still : Still, optional
-        Of the equations, from `still_motion`.
+        Of the equations, from `constant_motion`.
     """
     factor = equations.factored(motion)
     start = jax.tree.map(lambda x: x[0], given)
@@ -141,13 +141,13 @@ def _poses(motion: TreeState) -> Any:
     return None if motion.base is None else (motion.base.position, motion.base.quaternion)
 
 
-def still_motion(
+def constant_motion(
     read: Callable[[Any], tuple[TreeEquations, Any]],
     parameters: Any,
     motion: TreeState,
     accelerations: Unknowns,
     given: Series,
-) -> Still:
+) -> ConstantEntries:
     """Return what does not change in the motion of a tree.
 
     Parameters

@@ -9,7 +9,7 @@ import numpy as np
 
 from jounce.base.modules import Module, field
 from jounce.errors import RobotError
-from jounce.jet.programs.composition import OfSample
+from jounce.jet.programs.composition import SampleFunction
 from jounce.robot.algorithms.wrenches import Wrench, check_wrenches
 from jounce.robot.model.arguments import floats
 from jounce.robot.model.tree import Frame
@@ -23,7 +23,7 @@ class WrenchPart(Module):
     """The force, or the torque, of a wrench."""
 
     constant: Any
-    function: OfSample | None
+    function: SampleFunction | None
     of_state: bool = field(static=True)
 
     def __call__(self, time: Any, q: Any, rate: Any) -> Any:
@@ -92,7 +92,7 @@ def _part(where: str, given: Any, n: int) -> WrenchPart:
     of_state = len(inspect.signature(given).parameters) == STATE
     state = (jnp.zeros(()), jnp.zeros(n), jnp.zeros(n)) if of_state else (jnp.zeros(()),)
     try:
-        sampled = OfSample.of(given, *state)
+        sampled = SampleFunction.of(given, *state)
     except TypeError as error:
         message = f"must be a function of time, or of time, q and rates, by operations of JAX: {error}"
         raise RobotError(message.splitlines()[0], name=where) from error

@@ -15,7 +15,7 @@ from jounce.jet import Jet, compose
 from jounce.rigid.inertia import vector_numbers
 from jounce.robot.model.arguments import floats
 from jounce.robot.robot import Robot
-from jounce.trajectory.laws.user_laws import tried
+from jounce.trajectory.laws.user_laws import shape_of_result
 
 FRAMES = ("base", "link")
 
@@ -110,7 +110,7 @@ def _derivatives(where: str, value: Any, lead: tuple[int, ...], levels: int, tim
             )
         advice = "it must map a scalar time to three components with functions of jax.numpy"
         try:
-            given = tried("function", advice, lambda t: jnp.asarray(value(t), float), np.zeros(()))
+            given = shape_of_result("function", advice, lambda t: jnp.asarray(value(t), float), np.zeros(()))
         except MechanismError as error:
             raise RobotError(error.message, name=where) from error
         if given != (3,):

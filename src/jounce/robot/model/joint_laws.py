@@ -12,7 +12,7 @@ from jounce.base.modules import Module, field
 from jounce.base.shapes import ArrayLike, Numbers
 from jounce.errors import JounceError, RobotError, check_name
 from jounce.jet import Jet
-from jounce.jet.programs.composition import OfSample
+from jounce.jet.programs.composition import SampleFunction
 from jounce.robot.model.arguments import floats
 from jounce.trajectory.joint_trajectory import JointTrajectory
 from jounce.trajectory.labels import in_order
@@ -35,7 +35,7 @@ class _Expressed(Module):
         return self.expression.evaluate({"t": time, **known})
 
 
-class _OfTime(Module):
+class _ForceOfTime(Module):
     """A motion law, read as a force of time."""
 
     law: AbstractMotion
@@ -75,7 +75,7 @@ class JointLaws(AbstractJointLaws):
     """
 
     constant: Any
-    whole: OfSample | None
+    whole: SampleFunction | None
     single: tuple[Any, ...]
     columns: tuple[int, ...] = field(static=True)
 
@@ -155,7 +155,7 @@ def _single(law: Any, names: tuple[str, ...], where: str) -> Any:
             raise
         return _Expressed(expression, names)
     if isinstance(law, AbstractMotion):
-        return _OfTime(read_laws(law))
+        return _ForceOfTime(read_laws(law))
     if callable(law):
         return _read(law, len(names), (), where)
     value = float(floats(where, law)) if np.ndim(law) == 0 else np.nan
@@ -165,7 +165,7 @@ def _single(law: Any, names: tuple[str, ...], where: str) -> Any:
     return value
 
 
-def _read(function: Callable[..., Any], count: int, shape: tuple[int, ...], where: str) -> OfSample:
+def _read(function: Callable[..., Any], count: int, shape: tuple[int, ...], where: str) -> SampleFunction:
     return read_forces(function, where, shape, (jnp.zeros(()), jnp.zeros(count), jnp.zeros(count)))
 
 
@@ -175,7 +175,7 @@ def read_forces(
     shape: tuple[int, ...],
     state: Sequence[Any],
     arguments: str = "time, q and rates",
-) -> OfSample:
+) -> SampleFunction:
     """Return what a function of a user computes now, checked.
 
     Parameters
@@ -197,7 +197,7 @@ def read_forces(
         If it cannot be used, or returns another shape.
     """
     try:
-        sampled = OfSample.of(function, *state)
+        sampled = SampleFunction.of(function, *state)
     except TypeError as error:
         message = f"must be a function of {arguments}, by operations of JAX: {str(error).splitlines()[0]}"
         raise RobotError(message, name=where) from error

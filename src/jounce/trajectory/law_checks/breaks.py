@@ -8,7 +8,7 @@ from jaxtyping import Float, Int
 
 from jounce.settings import under_own_settings
 from jounce.trajectory.law_checks.seen_jumps import seen_jumps
-from jounce.trajectory.law_checks.smoothness import HIGHEST, SeenLeaders, known_jumps
+from jounce.trajectory.law_checks.smoothness import HIGHEST, LeaderValues, known_jumps
 from jounce.trajectory.laws.composed import FollowingMotion
 from jounce.trajectory.laws.profiles import AbstractProfile
 from jounce.trajectory.laws.stacking import law_derivatives
@@ -48,7 +48,7 @@ def law_breaks(laws: Iterable[AbstractMotion], first: float, last: float, order:
     >>> law_breaks([ramp, bent], 0.0, 1.0, 4).round(9).tolist()
     [0.1, 0.25, 0.75]
     """
-    breaks, seen = [np.zeros(0)], SeenLeaders()
+    breaks, seen = [np.zeros(0)], LeaderValues()
     every = {id(law): law for law in _with_leaders(laws)}.values()  # several laws may have one leader
     for law in every if last > first else ():
         level = min(order + 1, HIGHEST)
@@ -56,7 +56,7 @@ def law_breaks(laws: Iterable[AbstractMotion], first: float, last: float, order:
         jump, bend = np.any(jumps[:-1] != 0, axis=0), jumps[-1] != 0
         breaks.append(instants[jump | bend if np.sum(jump | bend) <= MOST else jump])
         if _may_bend(law):
-            breaks.append(_seen(law, first, last, order))
+            breaks.append(_observed_breaks(law, first, last, order))
     return distinct_instants(np.concatenate(breaks), first, last)
 
 
@@ -138,7 +138,7 @@ def _may_bend(law: Any) -> bool:
     return not isinstance(law, SplineMotion | AbstractProfile)
 
 
-def _seen(law: AbstractMotion, first: float, last: float, order: int) -> Times:
+def _observed_breaks(law: AbstractMotion, first: float, last: float, order: int) -> Times:
     """Return where derivatives of a law are seen to jump."""
     level = min(order + 2, HIGHEST + 1)
 

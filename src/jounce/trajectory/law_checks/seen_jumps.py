@@ -89,7 +89,9 @@ def seen_jumps(
         middle = (low + high) / 2
         between = evaluate(middle)
         usable = np.isfinite(between).all(axis=(1, 2))  # beside a kink there may be no derivatives
-        first = _surprise(low, middle, left, between, sizes) >= _surprise(middle, high, between, right, sizes)
+        first = _unexplained_change(low, middle, left, between, sizes) >= _unexplained_change(
+            middle, high, between, right, sizes
+        )
         earlier, later = usable & first, usable & ~first
         low, high = np.where(later, middle, low), np.where(earlier, middle, high)
         left, right = np.where(later[:, None, None], between, left), np.where(earlier[:, None, None], between, right)
@@ -100,7 +102,7 @@ def seen_jumps(
     return high[some], np.where(jumped, change, 0.0)[some]
 
 
-def _surprise(
+def _unexplained_change(
     low: np.ndarray, high: np.ndarray, left: np.ndarray, right: np.ndarray, sizes: np.ndarray
 ) -> Float[np.ndarray, " cell"]:
     """Return the largest change over cells that slopes do not account for, as a share of the sizes."""

@@ -147,7 +147,7 @@ def knots(law: AbstractMotion, first: float, last: float) -> Float[np.ndarray, "
     return np.unique(instants[np.any(jumps != 0, axis=0)])
 
 
-class SeenLeaders:
+class LeaderValues:
     """Values of leaders that several laws follow, so that each is evaluated but once: while one thing is found."""
 
     def __init__(self) -> None:
@@ -164,7 +164,7 @@ class SeenLeaders:
 
 
 def known_jumps(
-    law: AbstractMotion, first: float, last: float, order: int, seen: SeenLeaders | None = None
+    law: AbstractMotion, first: float, last: float, order: int, seen: LeaderValues | None = None
 ) -> tuple[Float[np.ndarray, " knots"], Float[np.ndarray, "levels knots"], bool]:
     """Return the instants at which derivatives up to an order are known to jump, by how much, and if these are all.
 
@@ -176,7 +176,7 @@ def known_jumps(
         s.
     order : int
         Highest derivative.
-    seen : SeenLeaders, optional
+    seen : LeaderValues, optional
         What is known of leaders, where several laws are asked about.
 
     Examples
@@ -198,10 +198,10 @@ def _is_of_polynomials(law: AbstractMotion) -> bool:
 
 
 def _jumps(
-    law: AbstractMotion, first: float, last: float, order: int = HIGHEST, seen: SeenLeaders | None = None
+    law: AbstractMotion, first: float, last: float, order: int = HIGHEST, seen: LeaderValues | None = None
 ) -> tuple[np.ndarray, Float[np.ndarray, "levels knots"], str]:
     """Return the instants in a time at which derivatives jump, by how much, and what is not known."""
-    none, seen = (np.zeros(0), np.zeros((order + 1, 0))), seen or SeenLeaders()
+    none, seen = (np.zeros(0), np.zeros((order + 1, 0))), seen or LeaderValues()
     match law:
         case OutputMotion() if law.parts:
             return _jumps(law.parts[0], first, last, order, seen)
@@ -280,7 +280,7 @@ def _of_pieces(law: PiecewiseMotion, first: float, last: float, order: int) -> t
 
 
 def _followed(
-    law: AbstractMotion, leader: AbstractMotion, first: float, last: float, order: int, seen: SeenLeaders
+    law: AbstractMotion, leader: AbstractMotion, first: float, last: float, order: int, seen: LeaderValues
 ) -> tuple[np.ndarray, np.ndarray, str]:
     """Return the jumps of a law of what a leader prescribes, where the leader passes its knots.
 
@@ -305,7 +305,7 @@ def _followed(
     values = seen.coefficients(leader, looks)[0]
     jumping = jumps.any(axis=0)
     knots, jumps = knots[jumping], jumps[:, jumping]
-    which, crossing = _passed(values, knots)
+    which, crossing = _knots_between(values, knots)
     if not len(which):
         return *none, unknown or less
     times = _crossings(leader, knots[which], looks[crossing], looks[crossing + 1], seen)
@@ -319,7 +319,7 @@ def _followed(
     return times, np.where(np.abs(change) <= 1e-9 * bound, 0.0, forward * change), unknown or less
 
 
-def _passed(
+def _knots_between(
     values: Float[np.ndarray, " look"], knots: Float[np.ndarray, " knot"]
 ) -> tuple[Int[np.ndarray, " crossing"], Int[np.ndarray, " crossing"]]:
     """Return which knots lie between two values in sequence, and after which value; what is not finite passes none."""
@@ -345,7 +345,7 @@ def _composed(
 
 
 def _crossings(
-    leader: AbstractMotion, knots: np.ndarray, low: np.ndarray, high: np.ndarray, seen: SeenLeaders
+    leader: AbstractMotion, knots: np.ndarray, low: np.ndarray, high: np.ndarray, seen: LeaderValues
 ) -> np.ndarray:
     """Return when a leader passes values, each between an instant before and one after, to rounding.
 

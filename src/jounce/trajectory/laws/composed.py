@@ -17,7 +17,7 @@ Law = AbstractMotion | Expression | str
 """A law, or an expression of ``t`` and of parameters."""
 
 
-class MadeOfOthers(AbstractMotion):
+class CompositeLaw(AbstractMotion):
     """A law whose parts may be expressions of parameters, which have their values from a mechanism."""
 
     parts: tuple[AbstractMotion, ...]
@@ -49,7 +49,7 @@ class MadeOfOthers(AbstractMotion):
 
 def _is_known(part: AbstractMotion | Expression) -> bool:
     """Tell whether a part has numbers already, and waits for no parameters."""
-    if isinstance(part, MadeOfOthers):
+    if isinstance(part, CompositeLaw):
         return bool(part.parts) and not part.is_open
     return not getattr(part, "_open", ()) if isinstance(part, AbstractMotion) else part.names <= {"t"}
 
@@ -62,7 +62,7 @@ def with_values(part: AbstractMotion | Expression, parameters: Mapping[str, Any]
     return ExpressionMotion(part, {name: parameters[name] for name in sorted(part.names - {"t"})})
 
 
-class FollowingMotion(MadeOfOthers):
+class FollowingMotion(CompositeLaw):
     """A motion law of what another law prescribes: a cam on a driven shaft, or an electronic cam.
 
     Parameters
@@ -135,7 +135,7 @@ class FollowingMotion(MadeOfOthers):
         return law(leader(time))
 
 
-class OutputMotion(MadeOfOthers):
+class OutputMotion(CompositeLaw):
     """The motion of a driver with which an output of the mechanism has a law: found by inversion, not by a formula.
 
     While such a mechanism is solved, the output is held to the law in the place of the driver, whose coordinate then

@@ -16,7 +16,7 @@ from jounce.jet import Jet
 from jounce.jet.pieces import last_begun
 from jounce.trajectory.beyond import SLACK
 from jounce.trajectory.checks import whole_number
-from jounce.trajectory.laws.composed import Law, MadeOfOthers, with_values
+from jounce.trajectory.laws.composed import CompositeLaw, Law, with_values
 from jounce.trajectory.laws.piecewise import PiecewiseMotion
 from jounce.trajectory.laws.segment_pieces import Value, number_or_expression, parsed_value
 from jounce.trajectory.laws.user_laws import read_laws
@@ -41,7 +41,7 @@ _SEEN = chebyshev.chebvander(_BETWEEN, DEGREE)
 _RAISED = np.stack([chebyshev.chebint(row, lbnd=-1) for row in np.eye(DEGREE + 1)], axis=1)
 
 
-class IntegratedMotion(MadeOfOthers):
+class IntegratedMotion(CompositeLaw):
     """A motion law one of whose derivatives is another law: of a speed that is known, for example.
 
     Its derivatives from that one on are those of the law, exactly. What is below follows by integration over panels so

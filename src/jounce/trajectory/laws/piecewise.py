@@ -14,14 +14,14 @@ from jounce.errors import MechanismError, TrajectoryError, check_choice
 from jounce.jet import Jet
 from jounce.trajectory.beyond import CLOSED, check_within, continued
 from jounce.trajectory.knots import SMOOTH, derivative_sizes
-from jounce.trajectory.laws.composed import Law, MadeOfOthers
+from jounce.trajectory.laws.composed import CompositeLaw, Law
 from jounce.trajectory.laws.segment_pieces import Value, number_or_expression, parsed_value
 from jounce.units.expression import Expression
 
 BEYOND = ("refuse", "hold", "repeat", "advance")
 
 
-class PiecewiseMotion(MadeOfOthers):
+class PiecewiseMotion(CompositeLaw):
     """A motion law that is one law until an instant, another until the next, and so on.
 
     Where two of them meet, derivatives are those from the right; `jumps` tells which are not continuous.

@@ -7,7 +7,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from jounce.base.modules import changes_parts, is_ours
+from jounce.base.modules import belongs_to_package, changes_parts
 from jounce.errors import JounceError, MechanismError, TrajectoryError
 from jounce.jet import Jet
 from jounce.jet.programs.composition import Composed
@@ -46,7 +46,7 @@ class ReadMotion(AbstractMotion):
             self.computes.source.value.check_instants(first, last)
 
 
-def tried(what: str, advice: str, function: Callable[..., Any], *arguments: np.ndarray) -> tuple[int, ...]:
+def shape_of_result(what: str, advice: str, function: Callable[..., Any], *arguments: np.ndarray) -> tuple[int, ...]:
     """Return the shape of the array that a function of arrays returns; raise MechanismError where it cannot be used."""
     try:
         return jax.eval_shape(function, *arguments).shape
@@ -67,7 +67,7 @@ def tried_law(law: AbstractMotion | Callable[..., Any]) -> AbstractMotion:
     """
     motion = law if isinstance(law, AbstractMotion) else FunctionMotion(law)
     advice = "it must map a scalar time to a scalar with functions of jax.numpy"
-    tried("motion law", advice, lambda t: motion(Jet([t])).coefficients[0], np.zeros((1, 1)))
+    shape_of_result("motion law", advice, lambda t: motion(Jet([t])).coefficients[0], np.zeros((1, 1)))
     return motion
 
 
@@ -140,9 +140,13 @@ def is_users(law: Any) -> bool:
     if not isinstance(law, AbstractMotion):
         return False
     kind = type(law)
-    return isinstance(law, FunctionMotion) or not is_ours(kind.__call__) or changes_parts(kind, (AbstractMotion,))
+    return (
+        isinstance(law, FunctionMotion)
+        or not belongs_to_package(kind.__call__)
+        or changes_parts(kind, (AbstractMotion,))
+    )
 
 
 def _read(law: AbstractMotion) -> ReadMotion:
-    plain = isinstance(law, FunctionMotion) and is_ours(type(law).__call__)
+    plain = isinstance(law, FunctionMotion) and belongs_to_package(type(law).__call__)
     return ReadMotion(Composed.of(law.function) if plain else ReadObject.of(law, [ORDER]))

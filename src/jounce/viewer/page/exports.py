@@ -11,7 +11,7 @@ import numpy as np
 
 from jounce.errors import JounceError
 from jounce.mechanism.time import nearest_instants
-from jounce.viewer.page.local_server import quiet_server, quiet_stop
+from jounce.viewer.page.local_server import quiet_server, stop_silently
 from jounce.viewer.page.overlay import Overlay
 from jounce.viewer.page.scene import ViserScene
 from jounce.viewer.shapes.recording import Recording
@@ -106,7 +106,7 @@ def animation(overlay: Overlay) -> str:
             messages.insert_sleep(pause)
         return messages.as_html()
     finally:
-        quiet_stop(server)
+        stop_silently(server)
 
 
 def frames_shown(recording: Recording) -> list[int]:

@@ -59,7 +59,7 @@ class AccessControl:
         request : websockets.http11.Request
         """
         hosts, origins = (request.headers.get_all(name) for name in ("Host", "Origin"))
-        if len(hosts) != 1 or not _this_machine(hosts[0]) or origins not in ([], [f"http://{hosts[0]}"]):
+        if len(hosts) != 1 or not _is_local_host(hosts[0]) or origins not in ([], [f"http://{hosts[0]}"]):
             return False
         given = parse_qs(urlsplit(request.path).query).get("token", [])
         return len(given) == 1 and secrets.compare_digest(given[0].encode(), self.token.encode())
@@ -141,7 +141,7 @@ def _ignore_what_does_not_fit(server: Any) -> None:
     interface._handle_incoming_message = handled
 
 
-def _this_machine(host: str) -> bool:
+def _is_local_host(host: str) -> bool:
     return re.sub(r":[0-9]+$", "", host).lower() in HOSTS
 
 
@@ -183,12 +183,12 @@ def quiet_server(port: int = 0, label: str | None = None, access: AccessControl 
         _ignore_what_does_not_fit(server)
     except BaseException:
         if server is not None:
-            quiet_stop(server)
+            stop_silently(server)
         raise
     return server
 
 
-def quiet_stop(server: Any) -> None:
+def stop_silently(server: Any) -> None:
     """End a viser server without a word."""
     with redirect_stdout(io.StringIO()):
         server.stop()

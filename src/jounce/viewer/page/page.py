@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from jounce.errors import JounceError
-from jounce.viewer.page.local_server import quiet_stop
+from jounce.viewer.page.local_server import stop_silently
 from jounce.viewer.page.overlay import DisplayOptions, Overlay
 from jounce.viewer.page.player import Player
 from jounce.viewer.page.scene import ViserScene
@@ -160,4 +160,4 @@ class Page:
         """End the threads and the server."""
         self.player.end()
         self.session.close()
-        quiet_stop(self.server)
+        stop_silently(self.server)

@@ -17,7 +17,7 @@ from jounce.written_equations.joint_forms.latex_words import Words
 from jounce.written_equations.joint_forms.polynomials import Atom, Polynomial
 from jounce.written_equations.joint_forms.symbolic_joint import Expansion, GivenLaw, NamingReader, scaled, spatial_pose
 from jounce.written_equations.operations.graph import Graph
-from jounce.written_equations.operations.reading import Entries, NotWrittenError
+from jounce.written_equations.operations.reading import Entries, UnwritableOperationError
 
 PREMISE = (
     r"For bodies that turn against each other about $\hat{\mathbf{u}}$ alone, the axis with unit length, as their "
@@ -51,7 +51,7 @@ def axial_equations(group: Group, order: int) -> list[tuple[str, str]]:
 
     Raises
     ------
-    NotWrittenError
+    UnwritableOperationError
         If the residual is another function of more than the angle there.
     """
     words = _AxialWords(planar=False)
@@ -63,12 +63,12 @@ def axial_equations(group: Group, order: int) -> list[tuple[str, str]]:
     for body in "ij":
         whole = [x.terms.get((), 0) for x in component_jacobian(rate, body, planar=False)]
         if whole[:5] != [0] * 5 or abs(whole[5]) != 1:
-            raise NotWrittenError("its rate is not that of an angle about its axis")
+            raise UnwritableOperationError("its rate is not that of an angle about its axis")
         pairs.append((rf"\Phi_{{q{body}}}", rf"\left[ \mathbf{{0}}, {'-' if whole[5] < 0 else ''}{_AXIS} \right]"))
     for n in range(1, order + 1):
         side = Polynomial({m: -c for m, c in levels[n].terms.items() if m != (("w", "j", n - 1, 2),)})
         if any(atom[0] != "f" for m in side.terms for atom in m):
-            raise NotWrittenError("its right sides are not those of an angle about its axis")
+            raise UnwritableOperationError("its right sides are not those of an angle about its axis")
         pairs.append((words.side(n), words.polynomial(side)))
     return pairs
 

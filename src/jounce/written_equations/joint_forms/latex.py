@@ -20,8 +20,8 @@ from jounce.written_equations.joint_forms.latex_words import Words, escaped, in_
 from jounce.written_equations.joint_forms.polynomials import Atom, Polynomial, TooManyTermsError, without
 from jounce.written_equations.joint_forms.symbolic_joint import SymbolicJoint, symbolic_joint
 from jounce.written_equations.joint_forms.vector_forms import in_angles, recognized, right_side
-from jounce.written_equations.models.mechanism_equations import put_together
-from jounce.written_equations.operations.reading import NotWrittenError
+from jounce.written_equations.models.mechanism_equations import model_of_equations
+from jounce.written_equations.operations.reading import UnwritableOperationError
 
 LONGEST_VALUE = 200  # characters of a value
 MOST_TERMS = 400  # of a right side that a person is to read
@@ -42,7 +42,7 @@ def latex_document(given: Mechanism | Motion, joint: str | None, order: int) -> 
     mechanism = given.mechanism if isinstance(given, Motion) else given
     if joint is not None:
         check_name("joint or driver", joint, (*mechanism.joints, *mechanism.drivers), MechanismError, name="joint")
-    model = given.model if isinstance(given, Motion) else put_together(mechanism)
+    model = given.model if isinstance(given, Motion) else model_of_equations(mechanism)
     body = []
     for group, names in _groups(model):
         chosen = [name for name in names if joint in (None, name)]
@@ -103,8 +103,8 @@ def _section(
             return [*lines, r"\end{itemize}", PREMISE, r"\begin{align*}", *_aligned(rows), r"\end{align*}"]
         joint = symbolic_joint(group, model.pose_type, order)
         rows = joint_equations(joint)
-    except (NotWrittenError, TooManyTermsError) as error:
-        reason = str(error) if isinstance(error, NotWrittenError) else f"it takes {error}"
+    except (UnwritableOperationError, TooManyTermsError) as error:
+        reason = str(error) if isinstance(error, UnwritableOperationError) else f"it takes {error}"
         if is_only:
             message = f"cannot be written out: {reason}; lower the order, or take python or c"
             raise MechanismError(message, name=names[0]) from None
@@ -150,7 +150,7 @@ def joint_equations(joint: SymbolicJoint) -> list[tuple[str, str]]:
 
     Raises
     ------
-    NotWrittenError
+    UnwritableOperationError
         If a right side has more terms than a person reads.
     """
     words, vector_rows = Words(joint.planar), recognized(joint)
@@ -194,7 +194,9 @@ def _turned(joint: SymbolicJoint, row: Polynomial) -> Polynomial:
 
 def _checked(side: Polynomial, n: int) -> Polynomial:
     if len(side.terms) > MOST_TERMS:
-        raise NotWrittenError(f"its right side of order {n} has {len(side.terms)} terms, more than {MOST_TERMS}")
+        raise UnwritableOperationError(
+            f"its right side of order {n} has {len(side.terms)} terms, more than {MOST_TERMS}"
+        )
     return side
 
 

@@ -21,7 +21,7 @@ from jounce.rigid.spatial import quaternion_spins
 from jounce.trajectory import AbstractMotion
 from jounce.written_equations.joint_forms.polynomials import Atom, Polynomial
 from jounce.written_equations.operations.graph import FUNCTIONS, Graph, Node
-from jounce.written_equations.operations.reading import Entries, GraphReader, NotWrittenError
+from jounce.written_equations.operations.reading import Entries, GraphReader, UnwritableOperationError
 
 SLOTS = "ijmn"
 DERIVED = "fghbcke"  # letters of vectors that are made of fields
@@ -37,7 +37,7 @@ class GivenLaw(AbstractMotion):
     def __call__(self, time: Jet) -> Jet:
         """Return the law at the time alone."""
         if time is not self.time:
-            raise NotWrittenError("its law is one of a coordinate, not of time alone")
+            raise UnwritableOperationError("its law is one of a coordinate, not of time alone")
         return Jet(self.coefficients[: time.order + 1])
 
 
@@ -321,10 +321,10 @@ def as_fraction(value: float) -> Fraction:
 
     Raises
     ------
-    NotWrittenError
+    UnwritableOperationError
         If it is not finite.
     """
     if not math.isfinite(value):
-        raise NotWrittenError(f"it has the number {value}, or compares with it")
+        raise UnwritableOperationError(f"it has the number {value}, or compares with it")
     simple = Fraction(value).limit_denominator(40320)
     return simple if float(simple) == value else Fraction(value)

@@ -22,7 +22,7 @@ from jounce.written_equations.models.inputs import Inputs
 from jounce.written_equations.models.mechanism_forces import check_forces, force_functions, output_function
 from jounce.written_equations.operations.functions import Code, Function
 from jounce.written_equations.operations.graph import Graph
-from jounce.written_equations.operations.reading import GraphReader, NotWrittenError
+from jounce.written_equations.operations.reading import GraphReader, UnwritableOperationError
 
 TOLERANCE = 1e-12  # of the assembly from which angles about axes are counted
 
@@ -68,7 +68,7 @@ def mechanism_code(given: Mechanism | Motion, joint: str | None, order: int, qua
         check_name("joint or driver", joint, (*mechanism.joints, *mechanism.drivers), MechanismError, name="joint")
     if FORCES in quantities:
         check_forces(mechanism, order)
-    model = given.model if isinstance(given, Motion) else put_together(mechanism)
+    model = given.model if isinstance(given, Motion) else model_of_equations(mechanism)
     graph = Graph()
     inputs = Inputs(graph, mechanism, model, order)
     own, functions, labels = rows_of(mechanism, model, joint), [], {}
@@ -114,7 +114,7 @@ def _constraints(mechanism: Mechanism, model: Model, inputs: Inputs, own: tuple[
     ]  # fmt: skip
 
 
-def put_together(mechanism: Mechanism) -> Model:
+def model_of_equations(mechanism: Mechanism) -> Model:
     """Return the model of a mechanism, with angles about axes counted from where it is assembled."""
     instant = first_instant(mechanism.time, mechanism.parameter_values)
     model = build(chosen(with_output_drivers(mechanism), instant))
@@ -146,7 +146,7 @@ def _read(system: System, model: Model, inputs: Inputs, rows: slice) -> tuple[np
             inputs.series(range(1, inputs.order + 1)),
             inputs.instants(inputs.order),
         )
-    except NotWrittenError as error:
+    except UnwritableOperationError as error:
         name = model.rows[rows][0].partition(".")[2]
         message = f"cannot be written out: {error}; write its residual, or its law, without that"
         raise MechanismError(message, name=name) from None

@@ -19,7 +19,7 @@ from jounce.mechanism import Mechanism, Model
 from jounce.mechanism.outputs.base import AbstractMotionOutput
 from jounce.written_equations.models.inputs import Inputs
 from jounce.written_equations.operations.functions import Argument, Function
-from jounce.written_equations.operations.reading import Entries, GraphReader, NotWrittenError
+from jounce.written_equations.operations.reading import Entries, GraphReader, UnwritableOperationError
 
 
 def check_forces(mechanism: Mechanism, order: int) -> None:
@@ -149,7 +149,7 @@ def _read(
     """
     try:
         return reader.function(function, *arguments)
-    except NotWrittenError as error:
+    except UnwritableOperationError as error:
         forces = [name for group in model.forces for name in group]
         name = ", ".join(names) or ("forces." + ", ".join(forces) if forces else "joints")
         raise MechanismError(f"cannot be written out: {error}; write it without that", name=name) from None

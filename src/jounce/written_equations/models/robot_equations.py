@@ -16,7 +16,7 @@ from jounce.robot.algorithms.equations_of_motion import mass_matrix_of_tree
 from jounce.robot.algorithms.inverse_dynamics import generalized_forces
 from jounce.written_equations.operations.functions import Argument, Code, Function
 from jounce.written_equations.operations.graph import Graph
-from jounce.written_equations.operations.reading import Entries, GraphReader, NotWrittenError
+from jounce.written_equations.operations.reading import Entries, GraphReader, UnwritableOperationError
 
 TORQUE, MASS_MATRIX, REGRESSOR, ENERGIES = "torque", "mass_matrix", "regressor", "energies"
 QUANTITIES = (TORQUE, MASS_MATRIX, REGRESSOR, ENERGIES)
@@ -69,7 +69,7 @@ def robot_code(robot: Robot, order: int, quantities: Sequence[str], *, drives: b
             labels["PARAMETERS"], values["PARAMETER_VALUES"] = tuple(parameters), tuple(parameters.values())
         if ENERGIES in quantities:
             functions += [_energy(reading, p, drives=drives) for p in range(order)]
-    except NotWrittenError as error:
+    except UnwritableOperationError as error:
         raise RobotError(f"cannot be written out: {error}", name="robot", value=robot.name) from None
     about = tuple(" ".join(text.split()) for text in (*(_ABOUT[x] for x in quantities), _PLACE, "SI units."))
     return Code(robot.name, "equations of motion", reading.graph, order, labels, about, tuple(functions), values)

@@ -57,7 +57,7 @@ _COMPOSED = {name: COMPOSED[name] for name in ("dot_general", "integer_pow", "rs
 }
 
 
-class NotWrittenError(Exception):
+class UnwritableOperationError(Exception):
     """An operation is none on numbers, and cannot be written out."""
 
 
@@ -92,7 +92,7 @@ class GraphReader(ProgramReader):
 
     Raises
     ------
-    NotWrittenError
+    UnwritableOperationError
         If a program holds an operation that is not one on numbers: a loop of unknown length, a linear solve.
     """
 
@@ -156,7 +156,7 @@ class GraphReader(ProgramReader):
             return [self._put_at_places(equation, given)]
         if name in _MOVING:
             return self._moved(equation, operands, given, dtypes)
-        raise NotWrittenError(f"it has the operation '{name}' of JAX, which is none on numbers")
+        raise UnwritableOperationError(f"it has the operation '{name}' of JAX, which is none on numbers")
 
     def _array_or_entries(self, leaf: Any) -> Any:
         return leaf if isinstance(leaf, Entries) else np.asarray(leaf)
@@ -225,7 +225,7 @@ class GraphReader(ProgramReader):
     def _updated(self, given: list[Entries]) -> Entries:
         target, part, *starts = given
         if not self.graph.is_constant(*(int(s.numbers) for s in starts)):
-            raise NotWrittenError("it replaces an entry of an array at an index that changes")
+            raise UnwritableOperationError("it replaces an entry of an array at an index that changes")
         begins = [self.graph.value(int(s.numbers)) for s in starts]
         begins = [min(max(b, 0), n - m) for b, n, m in zip(begins, target.shape, part.shape, strict=True)]
         numbers = target.numbers.copy()
@@ -236,7 +236,7 @@ class GraphReader(ProgramReader):
         """Return an array with entries replaced by others, or with others added to them, at places that are known."""
         target, indices, parts = given
         if not self.graph.is_constant(*indices.numbers.ravel().tolist()):
-            raise NotWrittenError("it writes at an index that changes")
+            raise UnwritableOperationError("it writes at an index that changes")
         known = np.array([self.graph.value(n) for n in indices.numbers.ravel().tolist()], indices.dtype)
         known = jnp.asarray(known.reshape(indices.shape))
 
@@ -279,7 +279,7 @@ class GraphReader(ProgramReader):
         """Return entries of a table at indices that are not known before."""
         if isinstance(table, Entries):
             if not self.graph.is_constant(*table.numbers.ravel().tolist()):
-                raise NotWrittenError("it reads a table whose entries change at an index that changes")
+                raise UnwritableOperationError("it reads a table whose entries change at an index that changes")
             table = np.array([self.graph.value(n) for n in table.numbers.ravel().tolist()]).reshape(table.shape)
         symbols = [n for x in indices for n in x.numbers.ravel().tolist() if not self.graph.is_constant(n)]
         ranges = {n: self.graph.ranges[n] for n in symbols}
@@ -296,13 +296,13 @@ class GraphReader(ProgramReader):
         function = jax.vmap(lambda *at: equation.primitive.bind(table, *at, **equation.params))
         entries = np.asarray(function(*tried))
         if entries.size > MOST_ENTRIES:
-            raise NotWrittenError(f"it has a table of {entries.size} numbers, more than {MOST_ENTRIES}")
+            raise UnwritableOperationError(f"it has a table of {entries.size} numbers, more than {MOST_ENTRIES}")
         owners = self._owners(equation, indices, entries.shape[1:])
         numbers = np.zeros(entries.shape[1:], np.int64)
         for place in np.ndindex(*numbers.shape):
             row = sorted({n for n in owners[place] if n in ranges})
             if len(row) > 1:
-                raise NotWrittenError("it reads a table at two indices that change")
+                raise UnwritableOperationError("it reads a table at two indices that change")
             column = entries[(slice(None), *place)]
             if not row:
                 numbers[place] = self.graph.constant(column[0].item())

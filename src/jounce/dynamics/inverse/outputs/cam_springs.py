@@ -103,7 +103,7 @@ def contact_spring(mechanism: Mechanism, cam: str, spring: str, time: TimeLike |
 
     needed, preload = required(now)
     for _ in range(ROUNDS if len(instants) > 1 else 0):
-        instants = _closer(instants, preload)
+        instants = _refined_at_maxima(instants, preload)
         now = contact(given)
         needed, preload = required(now)
     where = int(np.argmax(preload))
@@ -115,7 +115,7 @@ def contact_spring(mechanism: Mechanism, cam: str, spring: str, time: TimeLike |
     return ContactSpring(float(needed[where]), float(instants[where]), float((sense * now).min()))
 
 
-def _closer(instants: np.ndarray, values: np.ndarray) -> np.ndarray:
+def _refined_at_maxima(instants: np.ndarray, values: np.ndarray) -> np.ndarray:
     """Return instants with further ones on both sides of the highest local maxima of values."""
     edge = [-np.inf]
     before, after = np.concatenate([edge, values[:-1]]), np.concatenate([values[1:], edge])

@@ -69,7 +69,7 @@ def driver_force(motion: Motion, name: str, *, redundant: RedundantReactions | N
     check_motion(motion)
     driver = motion.mechanism.drivers.get(name)
     kind = DriverTorqueOutput if driver is not None and is_turning(driver) else DriverForceOutput
-    return _choosing(motion, redundant).evaluate(kind(name), name)
+    return _with_choice_of_reactions(motion, redundant).evaluate(kind(name), name)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -149,7 +149,7 @@ def joint_reaction(
     check_motion(motion)
     force = JointForceOutput(name, body, frame)
     torque = JointTorqueOutput(name, body, frame, point)
-    chosen = _choosing(motion, redundant)
+    chosen = _with_choice_of_reactions(motion, redundant)
     return Reaction(chosen.evaluate(force, name), chosen.evaluate(torque, name))
 
 
@@ -195,13 +195,13 @@ def ground_reaction(
     [[-32.0, -12.0, 0.0]]
     """
     check_motion(motion)
-    chosen = _choosing(motion, redundant)
+    chosen = _with_choice_of_reactions(motion, redundant)
     return Reaction(
         chosen.evaluate(GroundForceOutput(), "ground"), chosen.evaluate(GroundTorqueOutput(point=point), "ground")
     )
 
 
-def _choosing(motion: Motion, redundant: RedundantReactions | None) -> Motion:
+def _with_choice_of_reactions(motion: Motion, redundant: RedundantReactions | None) -> Motion:
     """Return a motion whose mechanism has another choice of reactions that redundant constraints leave open."""
     if redundant is None or redundant == motion.mechanism.redundant_reactions:
         return motion

@@ -48,7 +48,7 @@ def json_schema(*, own_types: bool = True) -> dict[str, Any]:
         "title": "Mechanism file",
         "description": "A planar or spatial mechanism: bodies, joints, drivers, outputs and parameters.",
     }
-    return head | _tidied(generated)
+    return head | _without_generated_titles(generated)
 
 
 def _definitions(node: Any) -> Iterator[str]:
@@ -60,16 +60,16 @@ def _definitions(node: Any) -> Iterator[str]:
             yield from _definitions(entry)
 
 
-def _tidied(node: Any) -> Any:
+def _without_generated_titles(node: Any) -> Any:
     """Drop titles that pydantic makes up from the names of keys, and defaults that say nothing; put in references."""
     if isinstance(node, list):
-        return [_tidied(item) for item in node]
+        return [_without_generated_titles(item) for item in node]
     if not isinstance(node, dict):
         return node
     if isinstance(node.get("definition"), str):  # pydantic adds a title
         return {"$ref": f"#/$defs/{node['definition']}"}
     return {
-        key: _tidied(item)
+        key: _without_generated_titles(item)
         for key, item in node.items()
         if not (key == "title" and isinstance(item, str)) and not (key == "default" and item is None)
     }

@@ -11,7 +11,7 @@ from collections.abc import Iterable
 from dataclasses import MISSING, dataclass
 from typing import Any
 
-from jounce.base.modules import is_ours
+from jounce.base.modules import belongs_to_package
 from jounce.constraints import catalogue
 from jounce.constraints.facts import facts_of, field_kind, value_fields
 from jounce.io.files.located_data import Location
@@ -85,7 +85,9 @@ def cam_types(space: str) -> dict[str, type[Any]]:
     ['coordinate', 'distance', 'slide']
     """
     return {
-        name: kind for name, kind in catalogue(space, "driver").items() if is_ours(kind) and hasattr(kind, "evaluate")
+        name: kind
+        for name, kind in catalogue(space, "driver").items()
+        if belongs_to_package(kind) and hasattr(kind, "evaluate")
     }
 
 

@@ -13,7 +13,7 @@ from typing import Annotated, Any, Literal, Union
 
 from pydantic import BaseModel, ConfigDict, Discriminator, Field, Tag, create_model
 
-from jounce.base.modules import is_ours
+from jounce.base.modules import belongs_to_package
 from jounce.constraints import catalogue
 from jounce.constraints.base import counted
 from jounce.constraints.facts import facts_of
@@ -198,7 +198,7 @@ def _annotation(kind: type[Any], key: FileKey, size: int) -> Any:
 
 def _has_free_laws(kind: type[Any]) -> bool:
     """Tell whether the laws of a class may be of anything: those of a joint of a user's own, which is no driver."""
-    return kind.role == "joint" and not is_ours(kind)
+    return kind.role == "joint" and not belongs_to_package(kind)
 
 
 def _values(kind: type[Any], size: int) -> dict[str, tuple[Any, Any]]:

@@ -45,7 +45,7 @@ _DIMENSIONS = {"time": TIME, "angle": ANGLE, "length": LENGTH}
 
 
 @dataclasses.dataclass(frozen=True)
-class LedMotion:
+class UnresolvedFollower:
     """A law of the coordinate of another driver, which has a name only until all drivers are read."""
 
     law: Any
@@ -77,20 +77,20 @@ def leader(raw: dict[str, Any], info: Any) -> str | Expression | None:
     return value
 
 
-def led(law: Any, by: str | Expression | None) -> Any:
+def followed_law(law: Any, by: str | Expression | None) -> Any:
     """Return a law as one of the coordinate of a driver, of an expression, or of the time."""
     if by is None:
         return law
     law = law if isinstance(law, AbstractMotion | Expression) else Expression(repr(law))
-    return LedMotion(law, by) if isinstance(by, str) else FollowingMotion(law, by)
+    return UnresolvedFollower(law, by) if isinstance(by, str) else FollowingMotion(law, by)
 
 
-def segmented(raw: dict[str, Any], quantity: str, info: Any) -> AbstractMotion | LedMotion:
+def segmented(raw: dict[str, Any], quantity: str, info: Any) -> AbstractMotion | UnresolvedFollower:
     """Return the law of a profile of segments."""
     entries, by = raw["profile"], leader(raw, info)
     if not isinstance(entries, list | tuple) or not entries:
         raise problem("must be a list of segments, such as {profile: cycloidal, duration: 1 s, to: 20 mm}", "profile")
-    lapse, level = _lapse(by, info), order_of(raw)
+    lapse, level = _independent_variable(by, info), order_of(raw)
     segments = [_segment(entry, k, quantity, lapse, level, info) for k, entry in enumerate(entries)]
     begun = initial_values(raw, level + 1, quantity, lapse, info) if level else []
     if level:
@@ -103,7 +103,7 @@ def segmented(raw: dict[str, Any], quantity: str, info: Any) -> AbstractMotion |
         raise problem(unknown("way", beyond, BEYOND), "beyond", value=beyond)
     try:
         law: AbstractMotion = SegmentedMotion(segments, initial, start, beyond)
-        return led(IntegratedMotion(law, level, begun, start) if level else law, by)
+        return followed_law(IntegratedMotion(law, level, begun, start) if level else law, by)
     except TrajectoryError as error:
         raise problem(error.message, *_place(error.name), value=UNSET if error.value is None else error.value) from None
 
@@ -153,11 +153,11 @@ def expressed(raw: dict[str, Any], quantity: str, info: Any, variables: dict[str
     if set(variables) != {"t"} and len(raw) > 1:
         raise problem("is for laws of t only", next(key for key in raw if key != "expression"), value=UNSET)
     by = leader(raw, info)
-    lapse = _lapse(by, info)
+    lapse = _independent_variable(by, info)
     if by is not None:
         variables = {"t": _DIMENSIONS.get(lapse)}
     law = _rate_law(raw["expression"], order_of(raw), quantity, info, "expression", by=lapse, variables=variables)
-    return led(_integrated(law, raw, quantity, lapse, info), by)
+    return followed_law(_integrated(law, raw, quantity, lapse, info), by)
 
 
 def _rate_law(
@@ -184,7 +184,7 @@ def _place(name: str | None) -> tuple[str | int, ...]:
     return ("profile", *([int(number)] if number else []), *([key] if key else []))
 
 
-def _lapse(by: str | Expression | None, info: Any) -> str:
+def _independent_variable(by: str | Expression | None, info: Any) -> str:
     """Return what a law is of: the time, unless it is that of a cam or of the coordinate of a driver."""
     context = info.context or {}
     if by is None:
@@ -224,7 +224,7 @@ def piecewise(raw: dict[str, Any], quantity: str, info: Any, variables: dict[str
         raise problem("must be a list such as [{until: 1 s, expression: t**2}, {expression: 1}]", "piecewise")
     if set(variables) != {"t"}:
         raise problem("a law of other variables than t is given by one expression", "piecewise", value=UNSET)
-    lapse = _lapse(by, info)
+    lapse = _independent_variable(by, info)
     if by is not None:
         variables = {"t": _DIMENSIONS.get(lapse)}
     laws, ends = [], []
@@ -256,7 +256,7 @@ def piecewise(raw: dict[str, Any], quantity: str, info: Any, variables: dict[str
         number = str(error.name)[len(key) + 1 : -1]
         at = ("piecewise", int(number), key) if number else ("start",) if key == "start" else ("piecewise",)
         raise problem(error.message, *at, value=UNSET if error.value is None else error.value) from None
-    return led(_integrated(law, raw, quantity, lapse, info, 0.0 if start is None else start), by)
+    return followed_law(_integrated(law, raw, quantity, lapse, info, 0.0 if start is None else start), by)
 
 
 def rate(

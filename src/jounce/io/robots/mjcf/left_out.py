@@ -31,7 +31,7 @@ OF_DRIVES = {
 FLUID_UNITS = {"density": "kg/m^3", "viscosity": "Pa s"}
 
 
-class LeftOut(NamedTuple):
+class SkippedPart(NamedTuple):
     """A part of the file that is not read: what it is of whom, its name and line, the entry and its value."""
 
     heading: str
@@ -41,9 +41,9 @@ class LeftOut(NamedTuple):
     value: object
 
 
-def left_out_of_spec(spec: Any, mujoco: Any) -> list[LeftOut]:
+def left_out_of_spec(spec: Any, mujoco: Any) -> list[SkippedPart]:
     """Return what is left out with tendons and their actuators, before these are taken away."""
-    on = _working(spec.option.disableflags, mujoco)
+    on = _is_enabled(spec.option.disableflags, mujoco)
     # MuJoCo itself refuses damping and armature of actuators of other kinds
     drives = [(k, x) for k, x in enumerate(spec.actuators) if x.trntype == mujoco.mjtTrn.mjTRN_TENDON]
     kinds = ((OF_TENDONS, "tendon", enumerate(spec.tendons)), (OF_DRIVES, "actuator", drives))
@@ -55,17 +55,17 @@ def left_out_of_spec(spec: Any, mujoco: Any) -> list[LeftOut]:
             for key, heading in headings.items():
                 value = np.ravel(getattr(part, key))
                 if value.any() and on(key) and (key not in read or value[1:].any()):
-                    left.append(LeftOut(heading, name, line_of(part.info), f"{kind}s.{name}.{key}", _plain(value)))
+                    left.append(SkippedPart(heading, name, line_of(part.info), f"{kind}s.{name}.{key}", _plain(value)))
     for k, actuator in enumerate(spec.actuators if on("actuation") else ()):
         if actuator.ctrlspec == int(mujoco.mjtCtrlInput.mjINPUT_NONE):  # friction and cogging of a motor, its brake
             name = actuator.name or f"actuator_{k}"
-            left.append(LeftOut(UNCONTROLLED, name, line_of(actuator.info), f"actuators.{name}.input", "none"))
+            left.append(SkippedPart(UNCONTROLLED, name, line_of(actuator.info), f"actuators.{name}.input", "none"))
     for k, tendon in enumerate(spec.tendons if on("range") else ()):
         automatic = spec.compiler.autolimits and tendon.limited == int(mujoco.mjtLimited.mjLIMITED_AUTO)
         if tendon.limited == int(mujoco.mjtLimited.mjLIMITED_TRUE) or (automatic and tendon.range[0] < tendon.range[1]):
             name = tendon.name or f"tendon_{k}"
             where = f"tendons.{name}.range"
-            left.append(LeftOut(RANGE_OF_TENDONS, name, line_of(tendon.info), where, tendon.range.tolist()))
+            left.append(SkippedPart(RANGE_OF_TENDONS, name, line_of(tendon.info), where, tendon.range.tolist()))
     return left
 
 
@@ -81,7 +81,7 @@ def _read_of(tendon: Any, mujoco: Any) -> tuple[str, ...]:
 
 def left_out_of_model(
     model: Any, mujoco: Any, bodies: Sequence[str], joints: Sequence[str], fixed: Container[str]
-) -> Iterator[LeftOut]:
+) -> Iterator[SkippedPart]:
     """Give what is left out of joints, bodies and the whole of a compiled model; lines are those of the elements.
 
     Parameters
@@ -93,27 +93,29 @@ def left_out_of_model(
     fixed : container of str
         Joints that an equality holds where they are, which no force moves.
     """
-    on = _working(model.opt.disableflags, mujoco)
+    on = _is_enabled(model.opt.disableflags, mujoco)
     free = [name not in fixed for name in joints]
     for j, name in enumerate(joints):
         stiffness = np.array([model.jnt_stiffness[j], *model.jnt_stiffnesspoly[j]])
         if stiffness.any() and on("stiffness") and free[j] and not single_spring(model, j):
-            yield LeftOut(JOINT_SPRINGS, name, None, f"joints.{name}.stiffness", _plain(stiffness))
+            yield SkippedPart(JOINT_SPRINGS, name, None, f"joints.{name}.stiffness", _plain(stiffness))
         elif stiffness.any() and on("stiffness") and free[j] and model.jnt_springyield[j]:
-            yield LeftOut(YIELD, name, None, f"joints.{name}.springyield", float(model.jnt_springyield[j]))
+            yield SkippedPart(YIELD, name, None, f"joints.{name}.springyield", float(model.jnt_springyield[j]))
         if model.jnt_limited[j] and model.jnt_type[j] == int(mujoco.mjtJoint.mjJNT_BALL) and on("range"):
-            yield LeftOut(RANGE_OF_BALLS, name, None, f"joints.{name}.range", float(model.jnt_range[j, 1]))
+            yield SkippedPart(RANGE_OF_BALLS, name, None, f"joints.{name}.range", float(model.jnt_range[j, 1]))
     passive = on("stiffness") or on("damping")  # MuJoCo leaves out all such forces where it leaves out both
     falls = model.opt.gravity.any() and on("gravity")
     matters = passive and falls and model.jnt_actgravcomp.any()  # else bodies feel less of gravity
     for k in np.flatnonzero((model.body_gravcomp != 0) & (model.body_mass > 0)).tolist() if matters else ():
         if any(free[j] and not model.jnt_actgravcomp[j] for j in _moved_by(model, k)):
-            yield LeftOut(COMPENSATION, bodies[k], None, f"links.{bodies[k]}.gravcomp", float(model.body_gravcomp[k]))
+            yield SkippedPart(
+                COMPENSATION, bodies[k], None, f"links.{bodies[k]}.gravcomp", float(model.body_gravcomp[k])
+            )
     fluid = {key: float(getattr(model.opt, key)) for key in FLUID_UNITS if getattr(model.opt, key)}
     heavy = np.flatnonzero(model.body_mass).tolist()
     if fluid and passive and any(free[j] for k in heavy for j in _moved_by(model, k)):
         shown = " and ".join(f"{key} {value:g} {FLUID_UNITS[key]}" for key, value in fluid.items())
-        yield LeftOut(FLUID, shown, None, f"option.{next(iter(fluid))}", next(iter(fluid.values())))
+        yield SkippedPart(FLUID, shown, None, f"option.{next(iter(fluid))}", next(iter(fluid.values())))
 
 
 def _moved_by(model: Any, body: int) -> Iterable[int]:
@@ -124,7 +126,7 @@ def _moved_by(model: Any, body: int) -> Iterable[int]:
         body = int(model.body_parentid[body])
 
 
-def _working(flags: int, mujoco: Any) -> Callable[[str], bool]:
+def _is_enabled(flags: int, mujoco: Any) -> Callable[[str], bool]:
     """Return whether MuJoCo computes what belongs to an attribute, or the file switches it off."""
     parts = {"stiffness": "SPRING", "damping": "DAMPER", "frictionloss": "FRICTIONLOSS", "gravity": "GRAVITY"}
     parts |= {"springyield": "SPRING", "actuation": "ACTUATION", "range": "LIMIT"}

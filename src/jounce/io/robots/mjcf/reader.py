@@ -18,8 +18,8 @@ from jounce.io.robots.elements.followers import with_room
 from jounce.io.robots.elements.xml_elements import Element
 from jounce.io.robots.mjcf.drives import Drives, works
 from jounce.io.robots.mjcf.files import check_assets, check_copies, included, line_of, quiet_mujoco
-from jounce.io.robots.mjcf.left_out import LeftOut, left_out_of_model, left_out_of_spec
-from jounce.io.robots.mjcf.ties import NO_CLOSURE, Ties, linear_tendons, tied_tendons
+from jounce.io.robots.mjcf.left_out import SkippedPart, left_out_of_model, left_out_of_spec
+from jounce.io.robots.mjcf.ties import NO_CLOSURE, JointRelations, linear_tendons, tied_tendons
 from jounce.rigid.inertia import Inertia
 from jounce.robot.model.couplings import Coupling
 from jounce.robot.model.floating_base import floating_joints
@@ -92,7 +92,7 @@ def read_mjcf(root: Element, faults: Faults, allow: Iterable[str | PathLike[str]
             check_assets(spec, parts, allow)
             model = spec.compile()
     except (ValueError, RuntimeError, OSError) as error:
-        raise _refused(str(error), root) from None
+        raise _as_file_error(str(error), root) from None
     if scaled and model.body_mass[model.body_weldid == 0].any():
         # MuJoCo counts bodies fixed to the world in the total or not, by whether a sensor or the like refers to them
         message = "settotalmass with fusestatic depends on which bodies fixed to the world are kept"
@@ -116,7 +116,7 @@ def _check_numbers(root: Element) -> None:
                 element.numbers(key, len(words), element.attributes.get("name") or element.tag, key)
 
 
-def _refused(says: str, root: Element) -> RobotFileError:
+def _as_file_error(says: str, root: Element) -> RobotFileError:
     """Return MuJoCo's own message as an error with the place that it names."""
     name = re.search(r"[Ee]lement (?:name )?'([^']+)'", says)
     words = re.sub(r"\s*\n?Element (?:name )?'.*", "", says, flags=re.DOTALL)
@@ -149,7 +149,7 @@ def _strip(spec: Any, mujoco: Any, tied: Container[str]) -> None:
     for body in spec.bodies:
         moves = body.name != "world" and (always or not body.explicitinertial)
         for shape in body.geoms:
-            (remaining if moves and _weighs(shape, spec.compiler) else unused).append(shape)
+            (remaining if moves and _has_mass(shape, spec.compiler) else unused).append(shape)
     for shown in (*remaining, *spec.sites):
         shown.material = ""
     for material in spec.materials:  # which stay, for tendons keep their names whatever is set here
@@ -162,7 +162,7 @@ def _strip(spec: Any, mujoco: Any, tied: Container[str]) -> None:
         spec.delete(part)
 
 
-def _weighs(shape: Any, compiler: Any) -> bool:
+def _has_mass(shape: Any, compiler: Any) -> bool:
     """Whether a shape has a part in the mass of its body; its mass is NaN where it follows from the density."""
     first, last = compiler.inertiagrouprange
     return bool(first <= shape.group <= last and (shape.density if np.isnan(shape.mass) else shape.mass) > 0)
@@ -184,7 +184,7 @@ class _Reader:
         self.lines |= {f"links.{self.bodies[body.id]}": line_of(body.info) for body in spec.bodies}
         self.links: list[Link] = []
         self.joints: list[Joint] = []
-        self.ties = Ties(model, mujoco, self.joint_names)
+        self.ties = JointRelations(model, mujoco, self.joint_names)
         self.mimics: dict[str, Mimic] = {}
         self.closures: list[Closure] = []
         self.drives = Drives(model, mujoco, self.joint_names)
@@ -220,7 +220,7 @@ class _Reader:
     def _located(self, error: RobotError) -> RobotFileError:
         return self.error(error.message, error.name or "", value=error.value)
 
-    def tell(self, noted: Iterable[LeftOut], parts: Iterable[Element]) -> None:
+    def tell(self, noted: Iterable[SkippedPart], parts: Iterable[Element]) -> None:
         """Note what is left out, in tendons and actuators as found, and in what is compiled."""
         options = [element for part in parts for element in part.walk() if element.tag == "option"]
         self.lines |= {f"option.{key}": element.line for element in options for key in element.attributes}

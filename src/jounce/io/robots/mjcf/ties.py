@@ -41,7 +41,7 @@ def linear_tendons(spec: Any, mujoco: Any) -> set[str]:
     return {t.name for t in spec.tendons if len(t.path) and all(part.type == along for part in t.path)}
 
 
-class Ties:
+class JointRelations:
     """What joints have to do with one another: those that are held, and those that follow another.
 
     Parameters

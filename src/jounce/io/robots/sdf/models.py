@@ -81,14 +81,14 @@ def chosen_model(
     reader = _Models(faults, tuple(allow))
     version = version_of(root)
     holders = [(root, None), *((world, world) for world in root.every("world"))]
-    given: dict[str, _Given] = {}
+    given: dict[str, _SourceModel] = {}
     for holder, world in holders:
         for model, its_version in reader.models(holder, version):
             label = model.attributes.get("name", "") if len(given) else model.attributes.get("name", "robot")
             if label in given:
                 message = f"two models of one world have this name, the first in line {given[label].model.line}"
                 raise model.error(message, "models", value=label)
-            given[label] = _Given(model, its_version, world)
+            given[label] = _SourceModel(model, its_version, world)
     if not given:
         raise root.error("must hold one <model>, it holds 0", value=[])
     if name is not None and name not in given:
@@ -121,7 +121,7 @@ def version_of(root: Element) -> tuple[int, ...]:
         ) from None
 
 
-class _Given(NamedTuple):
+class _SourceModel(NamedTuple):
     """A model as its file has it, the version of that, and the world that holds it."""
 
     model: Element
@@ -129,7 +129,7 @@ class _Given(NamedTuple):
     world: Element | None
 
 
-def _only_one(given: dict[str, _Given], reader: _Models) -> str:
+def _only_one(given: dict[str, _SourceModel], reader: _Models) -> str:
     """Return the name of the only model, or of the only one that moves, or is not static."""
     loose = [name for name, one in given.items() if not _static(one.model)]
     moving = [name for name in loose if _moves(given[name], reader)] if len(given) > 1 else []
@@ -148,7 +148,7 @@ def _static(model: Element) -> bool:
     return flag_of(model, "static", "static")
 
 
-def _moves(given: _Given, reader: _Models) -> bool:
+def _moves(given: _SourceModel, reader: _Models) -> bool:
     """Whether a model has joints that move, of its own or of those that it nests."""
     if any(part.tag == "joint" and part.attributes.get("type") not in ("fixed", None) for part in given.model.walk()):
         return True
@@ -163,7 +163,7 @@ def _models_of(joint: Element) -> set[str]:
     return {part.content.strip().partition("::")[0] for tag in ("parent", "child") for part in joint.every(tag)}
 
 
-def _joined(label: str, given: dict[str, _Given], joints: list[Element], reader: _Models) -> Element:
+def _joined(label: str, given: dict[str, _SourceModel], joints: list[Element], reader: _Models) -> Element:
     """Return models that joints of the world join as one, those that are static fixed to the world."""
     members, before = {label}, 0
     while len(members) != before:

@@ -65,13 +65,13 @@ def read_bag(path: str, joints: Sequence[str] | None = None, topic: str | None =
         raise
     except Exception as reason:  # noqa: BLE001 - whatever a damaged bag makes of its reader
         words = " ".join(str(reason).split()).encode("ascii", "backslashreplace").decode("ascii")
-        message = f"the bag cannot be read: {words or type(reason).__name__}; {_mending(place)}"
+        message = f"the bag cannot be read: {words or type(reason).__name__}; {_repair_advice(place)}"
         raise TrajectoryError(message, path=path) from None
     recording = in_sequence(recording)
     return recording if joints is None else recording.renamed(tuple(joints))
 
 
-def _mending(place: Path) -> str:
+def _repair_advice(place: Path) -> str:
     """Word how a bag may be mended whose recording or copy was cut short."""
     suffixes = {x.suffix.lower() for x in (place, *(place.iterdir() if place.is_dir() else ()))}
     tool = "mcap recover" if ".mcap" in suffixes else "rosbag reindex" if ".bag" in suffixes else "ros2 bag reindex"

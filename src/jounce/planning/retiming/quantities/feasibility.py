@@ -19,7 +19,7 @@ def check_possible(source: Source, labels: Labels, start: float, stop: float, *,
     s = np.union1d(even, (source.changes[:, None] + near).reshape(-1))
     quantities = source(s)
     at_rest = quantities.second[:, :, G]
-    spare = np.minimum(_spare(quantities.upper, at_rest), _spare(-quantities.lower, -at_rest))
+    spare = np.minimum(_relative_margin(quantities.upper, at_rest), _relative_margin(-quantities.lower, -at_rest))
     if spare.size and spare.min() <= STATIC:
         at, column = np.unravel_index(np.argmin(spare), spare.shape)
         label, value = labels.second[column], float(at_rest[at, column])
@@ -43,7 +43,7 @@ def check_possible(source: Source, labels: Labels, start: float, stop: float, *,
 
 
 @np.errstate(invalid="ignore")
-def _spare(bound: np.ndarray, at_rest: np.ndarray) -> np.ndarray:
+def _relative_margin(bound: np.ndarray, at_rest: np.ndarray) -> np.ndarray:
     """Return what is left up to an upper bound, as a share of the larger of both; infinite where there is none."""
     size = np.maximum(np.maximum(np.abs(bound), np.abs(at_rest)), np.finfo(float).tiny)
     return np.where(np.isfinite(bound), (bound - at_rest) / size, np.inf)
