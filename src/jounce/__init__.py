@@ -37,21 +37,21 @@ _mark_forks()
 
 
 def __getattr__(name: str) -> Any:
-    """Return what the package offers under a name, or a room of it; it is imported the first time."""
+    """Return what the package offers under a name, or a subpackage of it; it is imported the first time."""
     if name == "__all__":
         return [*_offered(), "__version__"]
-    room = None if name.startswith("_") else _offered().get(name)
-    if room is None and (moved := _new_name(name)) is not None:
+    subpackage = None if name.startswith("_") else _offered().get(name)
+    if subpackage is None and (moved := _new_name(name)) is not None:
         warnings.warn(f"jounce.{name} is jounce.{moved} from release 0.5 on", DeprecationWarning, stacklevel=2)
         return functools.reduce(getattr, moved.split("."), sys.modules[__name__])
-    if room is None and (name.startswith("_") or importlib.util.find_spec(f"{__name__}.{name}") is None):
+    if subpackage is None and (name.startswith("_") or importlib.util.find_spec(f"{__name__}.{name}") is None):
         message = f"module {__name__!r} has no attribute {name!r}"
         raise AttributeError(message, name=name, obj=sys.modules[__name__])  # by which Python finds what is meant
     with _importing.lock, _importing.without_garbage_collection():
-        if room in (None, __name__):
+        if subpackage in (None, __name__):
             value = importlib.import_module(f"{__name__}.{name}")
         else:
-            value = getattr(importlib.import_module(room), name)
+            value = getattr(importlib.import_module(subpackage), name)
         if "jounce.settings" in sys.modules:
             from jounce.settings import cover_new_modules
 
@@ -66,10 +66,10 @@ def __dir__() -> list[str]:
 
 @functools.lru_cache(maxsize=1)
 def _offered() -> dict[str, str]:
-    """Return the names in the stub, each with the room that it is imported from."""
+    """Return the names in the stub, each with the subpackage that it is imported from."""
     stub = Path(__file__).with_suffix(".pyi").read_text(encoding="utf-8")
     imports = re.findall(r"^from (\S+) import (\([^)]*\)|.*)", stub, re.MULTILINE)
-    return {name: room for room, names in imports for name in re.findall(r"(\w+) as \w+", names)}
+    return {name: subpackage for subpackage, names in imports for name in re.findall(r"(\w+) as \w+", names)}
 
 
 def _in_a_notebook(thing: _Displayed) -> str:

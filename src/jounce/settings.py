@@ -2,7 +2,7 @@
 
 JAX computes in single precision by default, stops at numbers that are not finite where its settings ask it to
 look for them, and takes hours where it is not to compile. Its settings hold for a thread or for the whole process,
-which belongs to the program that imports this package. So the settings of the process are left alone: what a room
+which belongs to the program that imports this package. So the settings of the process are left alone: what a subpackage
 offers, and all that its objects can do, computes in a context of its own, entered at the first of nested calls.
 Threads, which inherit no context, enter it for themselves.
 """
@@ -228,17 +228,17 @@ def _as_words_of_32_bits(array: np.ndarray) -> np.ndarray:
     return np.array(array[..., None], order="C").view(np.uint32) if _is_wide(array) else array
 
 
-def compute_under_own_settings(room: str) -> None:
-    """Have all that a room offers compute in double precision: its functions, and the classes of all its modules.
+def compute_under_own_settings(subpackage: str) -> None:
+    """Have all public functions of a subpackage, and all classes of its modules, compute in double precision.
 
-    Classes that it does not offer count too, since its results are objects of them, and so do those of modules of the
-    rooms below that it is the first to import. It is at the end of a room's ``__init__.py``, so that whatever is
-    added to the room is included.
+    Classes that are not public count too, since results are objects of them, and so do those of modules of lower
+    subpackages that this one is the first to import. Each ``__init__.py`` ends with a call, so that whatever is added
+    to the subpackage is included.
     """
-    _packages.append(room)
-    offered = vars(sys.modules[room])
+    _packages.append(subpackage)
+    offered = vars(sys.modules[subpackage])
     for name, value in list(offered.items()):
-        if _is_open(value, room) and not name.startswith("_"):
+        if _is_open(value, subpackage) and not name.startswith("_"):
             home = vars(sys.modules[value.__module__])
             offered[name] = wrapper = under_own_settings(value)
             if home.get(value.__name__) is value:
@@ -247,11 +247,11 @@ def compute_under_own_settings(room: str) -> None:
 
 
 def cover_new_modules() -> None:
-    """Have the classes of those modules of the rooms named so far compute in double precision that came since.
+    """Have the classes of modules that were imported since compute in double precision, in the subpackages so far.
 
-    A room above may be the first to import a module of one below.
+    A higher subpackage may be the first to import a module of a lower one.
     """
-    prefixes = tuple(f"{room}." for room in _packages)
+    prefixes = tuple(f"{subpackage}." for subpackage in _packages)
     for name in [name for name in list(sys.modules) if name.startswith(prefixes) and name not in _modules]:
         _modules.add(name)
         for value in list(vars(sys.modules[name]).values()):
@@ -260,9 +260,9 @@ def cover_new_modules() -> None:
     alterations.note(_packages)
 
 
-def _is_open(value: Any, room: str) -> bool:
-    """Tell whether a value is a function of a room that has no wrapper yet."""
-    inside = inspect.isfunction(value) and f"{value.__module__}.".startswith(f"{room}.")
+def _is_open(value: Any, subpackage: str) -> bool:
+    """Tell whether a value is a function of a subpackage that has no wrapper yet."""
+    inside = inspect.isfunction(value) and f"{value.__module__}.".startswith(f"{subpackage}.")
     return inside and not hasattr(value, "own_settings")
 
 

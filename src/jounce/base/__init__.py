@@ -1,1 +1,1 @@
-"""What every room may use: settings of JAX, lazy imports, shapes in types, interrupts, progress."""
+"""What every subpackage may use: settings of JAX, lazy imports, shapes in types, interrupts, progress."""

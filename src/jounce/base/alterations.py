@@ -29,8 +29,8 @@ def note(ready: Collection[str] = ()) -> None:
     """
     modules = sys.modules
     for name in [name for name in list(modules) if name.startswith(f"{PACKAGE}.") and name not in _held]:
-        module, room = modules[name], ".".join(name.split(".", 2)[:2])
-        if (_is_begun(module) and name not in ready) or (_is_begun(modules.get(room)) and room not in ready):
+        module, package = modules[name], ".".join(name.split(".", 2)[:2])
+        if (_is_begun(module) and name not in ready) or (_is_begun(modules.get(package)) and package not in ready):
             continue
         space = vars(module)
         _held[name] = module, dict(space), _tables(space)

@@ -8,7 +8,7 @@ _shown: "Callable[[Displayed], str | None]" = lambda _: None  # noqa: E731 - unt
 class Displayed:
     """What a notebook shows as tables.
 
-    What makes the tables knows all kinds of objects, and so is in a room above them: it is registered by `show_by`.
+    What makes the tables knows all kinds of objects, so it is in a higher subpackage, which registers it by `show_by`.
     """
 
     __slots__ = ()

@@ -6,7 +6,7 @@ import threading
 from collections.abc import Iterator
 
 lock = threading.RLock()
-"""Held while rooms are imported within functions: threads that import several at once may get each other's half."""
+"""Held while functions import subpackages: two threads that import at once may see modules half initialized."""
 
 frozen = threading.Event()
 """Set once objects of others were found frozen, which takes as long as there are many of them to count."""

@@ -1,4 +1,4 @@
-"""The command ``jounce``: one thin function per command; the work is done by the rooms below.
+"""The command ``jounce``: one thin function per command; the work is done by the subpackages below.
 
 Everything that a command needs is imported when it runs, so that none waits for the libraries of another. Results go to
 standard output, messages to standard error; the exit status is 0 for success, 2 for bad input, and 1 where a solve

@@ -183,7 +183,7 @@ class RobotRun(AbstractRun):
             current = current._replace(outcome=np.asarray(int(Outcome.COLLAPSED)))
         return current, steps, count
 
-    def standing(self) -> RobotSteps:
+    def initial_step(self) -> RobotSteps:
         """See `AbstractRun`."""
         at_rest = jax.tree.map(lambda x: np.asarray(x)[None, None, :, 0], self.current.state)
         return RobotSteps(np.array([self.limits.start]), np.zeros(1), at_rest, np.zeros(1, bool))

@@ -358,7 +358,7 @@ class Torques(Problem):
         for name in linear:
             share = self._torques(_with({name: 1.0}, bare), speed) - base
             torques = torques + designs[name][:, None, None, None] * share[which]
-        here, breaks = len(self.instants), self._looks[1]
+        here, breaks = len(self.instants), self._instants_looked_at[1]
         values = {name: torques[:, :here, :, k] for k, name in enumerate(self.robot.joint_names)}
         one_sided = {name: torques[:, here:, :, k] for k, name in enumerate(self.robot.joint_names)}
         status = np.full((count, here), int(Status.OK))
@@ -366,7 +366,7 @@ class Torques(Problem):
         return Histories(values, status, designs.get("speed"), sides)
 
     @functools.cached_property
-    def _looks(self) -> tuple[Float[np.ndarray, " look"], Float[np.ndarray, " side"]]:
+    def _instants_looked_at(self) -> tuple[Float[np.ndarray, " look"], Float[np.ndarray, " side"]]:
         """The instants, then those on both sides of where laws jump or bend; and of which of these they are."""
         first, last = float(self.instants[0]), float(self.instants[-1])
         breaks = law_breaks(self.trajectory.laws.values(), first, last, self.rates + 2)
@@ -376,7 +376,7 @@ class Torques(Problem):
     def _torques(self, robot: Robot, speed: Float[np.ndarray, " speed"]) -> Float[np.ndarray, "speed look rate joint"]:
         followed = FollowedTrajectory(robot, self.trajectory)
         orders = np.arange(self.rates + 3)
-        looks = self._looks[0]
+        looks = self._instants_looked_at[0]
         q = followed.coordinates(looks, self.rates + 2) * (speed[:, None, None, None] ** orders[:, None])
         flat = q.reshape(-1, *q.shape[2:])
         torques = followed.torques(flat, np.tile(looks, len(speed)), True)

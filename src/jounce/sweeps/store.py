@@ -129,7 +129,7 @@ class Store:
         except Exception:  # noqa: BLE001 - whatever is wrong with its files, it is computed again
             return False
 
-    def mended(self, files: Mapping[str, bytes]) -> list[str]:
+    def restore(self, files: Mapping[str, bytes]) -> list[str]:
         """Write files that were there before any chunk again unless they hold what they must; return whose they are.
 
         Raises
@@ -137,7 +137,7 @@ class Store:
         OutputError
             Something else has the place of a file or a folder, and would have to be removed.
         """
-        mended = []
+        restored = []
         with naming_path(self.folder):
             for folder in sorted({*self._folders(files)}):
                 if folder.is_symlink() or (os.path.lexists(folder) and not folder.is_dir()):
@@ -147,8 +147,8 @@ class Store:
                 if (expected := self._expected_content(path, content)) is not None:
                     path.parent.mkdir(parents=True, exist_ok=True)
                     put(path, expected)
-                    mended.append(Path(name).parts[0])
-        return list(dict.fromkeys(mended))
+                    restored.append(Path(name).parts[0])
+        return list(dict.fromkeys(restored))
 
     def _folders(self, files: Mapping[str, bytes]) -> Iterator[Path]:
         """Yield the folders that hold the files of a sweep, now or when it is done."""

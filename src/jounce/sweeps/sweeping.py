@@ -222,7 +222,7 @@ def _whole(plan: Plan) -> Bool[np.ndarray, " chunk"]:
     So are descriptions and coordinates, which are written again.
     """
     store = plan.store
-    if changed := store.mended(plan.files(store.manifest)):
+    if changed := store.restore(plan.files(store.manifest)):
         message = f"{plan.folder}: files of {', '.join(changed)} were lost or changed since, which are written again"
         warnings.warn(DamageWarning(message), stacklevel=2)
     done = store.done(plan.chunks)

@@ -54,8 +54,8 @@ def test_a_part_of_a_motion_does_not_take_the_place_of_a_whole_one():
 def test_the_worker_survives_what_nobody_foresaw():
     errors, done = [], []
     session = Session(Slow(), 1, on_failure=errors.append)
-    session.later(lambda: 1 / 0)
-    session.later(lambda: done.append(True))
+    session.run_between_solves(lambda: 1 / 0)
+    session.run_between_solves(lambda: done.append(True))
     assert session.wait(20.0)
     session.request({"value": 3.0})
     assert session.wait(20.0)

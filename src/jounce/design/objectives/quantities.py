@@ -43,10 +43,10 @@ class Quantities:
         self.fixed = _independent(mechanism, varied)
         self.atoms: dict[str, tuple[str, int | None, int]] = {}
         self.added: dict[str, AbstractQuantity] = {}
-        self.known = self._what_there_is()
+        self.known = self._known_kinds()
         self.text = ""
 
-    def _what_there_is(self) -> dict[str, str]:
+    def _known_kinds(self) -> dict[str, str]:
         """Return the kinds of names: a quantity, a parameter, a driver or a joint."""
         dimensions: dict[str, str] = {}
         for name, output in self.mechanism.outputs.items():

@@ -139,9 +139,11 @@ class Study:
             return feasible
         least = min(met, key=lambda end: max(float(end.broken.max(initial=0.0)), end.near_singular))
         design = self.result(self.mechanism, least, infeasible=True)
-        raise DesignError(f"no design within the bounds was found that {self._unmet(least)}", design=design)
+        raise DesignError(
+            f"no design within the bounds was found that {self._violated_conditions(least)}", design=design
+        )
 
-    def _unmet(self, least: SearchResult) -> str:
+    def _violated_conditions(self, least: SearchResult) -> str:
         """Return words for the conditions that the nearest design breaks."""
         _, numbers, sides = self.problem.stated(least.point, least.evaluation)
         words = []

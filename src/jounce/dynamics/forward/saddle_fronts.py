@@ -62,7 +62,7 @@ class SaddleFronts(Module):
         return _planned(key, pattern.body_count, pattern.entry_count, FRONT_COST)
 
     @classmethod
-    def anew(cls, pattern: Pattern) -> "SaddleFronts | None":
+    def planned(cls, pattern: Pattern) -> "SaddleFronts | None":
         """Plan it, as `of` does, which keeps the plans."""
         size, width, count = sum(pattern.shape), pattern.width, pattern.body_count
         bodies, positions = np.asarray(pattern.bodies), np.asarray(pattern.entry_indices)
@@ -166,7 +166,7 @@ def _planned(
 ) -> SaddleFronts | None:
     """Return the plan for a pattern of these arrays, which does not depend on values."""
     bodies, positions = (np.frombuffer(data, kind).reshape(shape) for shape, kind, data in key)
-    fronts = SaddleFronts.anew(Pattern(bodies, positions, body_count, entry_count))
+    fronts = SaddleFronts.planned(Pattern(bodies, positions, body_count, entry_count))
     for array in jax.tree.leaves(fronts):
         array.setflags(write=False)  # many equations share it
     return fronts

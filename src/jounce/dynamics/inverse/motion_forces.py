@@ -105,14 +105,16 @@ class MotionForces:
         multipliers, known, self._reversals = teeth.multipliers_on_flanks(
             self._balanced, self.flanks, self.model, self.motion
         )
-        if self._looks_for_open:  # what is open presses on no flank that is known: any others tell what depends on it
+        if (
+            self._seeks_undetermined
+        ):  # undetermined forces press on no known flank: random ones tell what depends on them
             multipliers = np.stack([multipliers[0], self._balanced(teeth.random_for_flanks(known))[1]])
         self.flanks = known
         return multipliers
 
     def prepare(self) -> None:
         """Compile the program that balances loads, for any motion of this form."""
-        cases, rows = 1 + self._looks_for_open, len(self.model.rows)
+        cases, rows = 1 + self._seeks_undetermined, len(self.model.rows)
         choice = np.zeros(rows), np.zeros(cases), np.zeros((cases, rows))
         shared = self._balance(None if self.model.system.rank is None else choice)
         large = programs.largest_array(self.model)
@@ -148,7 +150,7 @@ class MotionForces:
     @property
     def _choice(self) -> tuple[Numbers, Numbers, Numbers]:
         """What chooses multipliers of redundant rows: their compliance; of each case, weight of the load and bend."""
-        bends = [np.zeros(len(self.model.rows)), *([self.open.chance()] if self._looks_for_open else [])]
+        bends = [np.zeros(len(self.model.rows)), *([self.open.random_right_side()] if self._seeks_undetermined else [])]
         return self.open.compliance, np.array([1.0, 0.0][: len(bends)]), np.array(bends)
 
     def unique(self, quantity: Callable[["MotionForces"], Numbers], size: float = 1.0) -> Numbers:
@@ -165,11 +167,11 @@ class MotionForces:
             Magnitude of the quantity for a unit force: 1 for a force, a length for a torque.
         """
         values = quantity(self)
-        if self.loose is None:
+        if self.undetermined is None:
             return values
         solved = self.motion.status == Status.OK
-        given = np.abs(quantity(self.loose)[..., solved]).max(axis=-1, initial=0.0)
-        level = np.abs(self.loose.multipliers[..., solved]).max(axis=-1, initial=0.0) * self.open.weights
+        given = np.abs(quantity(self.undetermined)[..., solved]).max(axis=-1, initial=0.0)
+        level = np.abs(self.undetermined.multipliers[..., solved]).max(axis=-1, initial=0.0) * self.open.weights
         limits = OPEN * size * level.max(axis=-1)[:, None]
         open_ = given > limits
         if np.count_nonzero(solved) > 1:  # a quantity that vanishes at all instants has no rates
@@ -179,15 +181,15 @@ class MotionForces:
     @cached_property
     def unique_multipliers(self) -> Numbers:
         """Multipliers, NaN if redundant constraints do not determine them."""
-        if self.loose is None:
+        if self.undetermined is None:
             return self.multipliers
         weights = self.open.weights[:, None]
         return self.unique(lambda forces: forces.multipliers * weights) / weights
 
     @cached_property
-    def loose(self) -> "MotionForces | None":
+    def undetermined(self) -> "MotionForces | None":
         """Random self-balanced forces, if redundant constraints leave forces undetermined and none are chosen."""
-        if not self._looks_for_open:
+        if not self._seeks_undetermined:
             return None
         twin = copy.copy(self)
         twin._numbers = {}
@@ -199,7 +201,7 @@ class MotionForces:
         return twin
 
     @property
-    def _looks_for_open(self) -> bool:
+    def _seeks_undetermined(self) -> bool:
         return self.model.system.rank is not None and self.motion.mechanism.redundant_reactions == "unique"
 
     @cached_property

@@ -150,7 +150,7 @@ class OpenMultipliers:
             raise MechanismError(message, name="redundant_reactions", value=dict(self.selection))
         return compliances
 
-    def chance(self) -> RowNumbers:
+    def random_right_side(self) -> RowNumbers:
         """Return a right side that leaves nothing out of what is open; the same each time."""
         normal = np.random.default_rng(0).standard_normal(len(self.model.rows))
         return normal * self.weights * self._row_scale[:, 0]

@@ -56,7 +56,7 @@ class AbstractRun(abc.ABC):
         """Return where some attempts at a step lead, the steps and whether they were taken, and how many there were."""
 
     @abc.abstractmethod
-    def standing(self) -> Any:
+    def initial_step(self) -> Any:
         """Return the start as a step of no length."""
 
     @abc.abstractmethod
@@ -77,7 +77,7 @@ class AbstractRun(abc.ABC):
                 passed = self.direction * instants <= self.direction * self.current.time.item()
                 progress(int(np.sum(passed)), len(instants))
         if not self.parts:
-            self.parts.append(self.standing())
+            self.parts.append(self.initial_step())
         if self.current.outcome.item() in FAILED:
             self.ending = self.explained()
 

@@ -137,13 +137,13 @@ def simulate_batch(
 
     starts = BatchStart(parametric, begun, nominal.state, rows, float(instants[0]))
 
-    def depart(some: np.ndarray) -> None:
-        runs.depart(some, *starts.of(some))
+    def start_runs(some: np.ndarray) -> None:
+        runs.start_runs(some, *starts.of(some))
 
     first_chunk, *others = runs.chunks(np.arange(len(rows)))
-    depart(first_chunk)  # which makes room for all runs
+    start_runs(first_chunk)  # which makes room for all runs
     with Threads(thread_count()) as pool:
-        list(pool.map(depart, others))
+        list(pool.map(start_runs, others))
         while len(runs.moving):
             list(pool.map(runs.advance, runs.chunks(runs.moving)))
     status = runs.status
@@ -216,7 +216,7 @@ class _Runs:
         """Return runs in chunks of one size; the last chunk repeats its last run."""
         return [runs[np.minimum(np.arange(k, k + self.width), len(runs) - 1)] for k in range(0, len(runs), self.width)]
 
-    def depart(self, runs: np.ndarray, state: State, of_forces: Turns, of_outputs: Turns) -> None:
+    def start_runs(self, runs: np.ndarray, state: State, of_forces: Turns, of_outputs: Turns) -> None:
         """Set runs off from states on the constraints, with the turns that angles about axes have there."""
         equations, time = self._made.at(runs)[0].near(of_forces), np.full(len(runs), self.instants[0])
         current = unexpanded(equations, state, time, order=self.method.expansion_order(float(self.limits.tolerance)))

@@ -49,7 +49,7 @@ class MechanismRun(AbstractRun):
         """See `AbstractRun`."""
         return march(self.start.equations, self.current, self.limits, **self._settings)
 
-    def standing(self) -> DenseOutput:
+    def initial_step(self) -> DenseOutput:
         """See `AbstractRun`."""
         current = self.current
         polynomial = current.expansion.state.map(lambda part: np.asarray(part)[None, ..., 0])

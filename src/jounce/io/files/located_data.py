@@ -143,7 +143,7 @@ class Builder:
         self._count = 0
 
     @property
-    def wants_key(self) -> bool:
+    def expects_key(self) -> bool:
         """Whether the next step must be a key of a mapping, or its close."""
         return bool(self._stack) and isinstance(self._stack[-1][0], dict) and self._key is None
 

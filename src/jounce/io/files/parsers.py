@@ -67,13 +67,13 @@ def read_yaml(path: str, text: str, *, many: bool = False) -> Source:
             if isinstance(event, kinds.ScalarEvent):
                 _refuse_tag(builder, event, line)
                 value = plain_scalar(event.value) if event.implicit[0] else event.value
-                if builder.wants_key:
+                if builder.expects_key:
                     builder.key(value, line)
                 else:
                     builder.value(value, line)
             elif isinstance(event, (kinds.MappingStartEvent, kinds.SequenceStartEvent)):
                 _refuse_tag(builder, event, line)
-                if builder.wants_key:
+                if builder.expects_key:
                     raise builder.fail("a key must be a name, not a mapping or a list", line)
                 builder.open({} if isinstance(event, kinds.MappingStartEvent) else [], line)
             elif isinstance(event, (kinds.MappingEndEvent, kinds.SequenceEndEvent)):
@@ -167,7 +167,7 @@ def read_json(path: str, text: str) -> Source:
                 builder.close()
             case ":" | ",":
                 pass
-            case leaf if builder.wants_key:
+            case leaf if builder.expects_key:
                 builder.key(json.loads(leaf), line)
             case leaf:
                 builder.value(json.loads(leaf), line)

@@ -101,7 +101,7 @@ def _space(source: Source) -> str:
 
 def _validate(source: Source, space: str) -> dict[str, Any]:
     """Check a file against the schema; return its values by key, with numbers and expressions in place of text."""
-    with importing.lock:  # all kinds of outputs are known to the schema, and so the rooms that compute them
+    with importing.lock:  # all kinds of outputs are known to the schema, and so the subpackages that compute them
         from pydantic import ValidationError
 
         from jounce.io.mechanisms.schema.models import file_model

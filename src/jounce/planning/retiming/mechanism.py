@@ -54,7 +54,7 @@ def retime_mechanism(
         if abs(law.duration - before) < STEADY * before:
             break
     if duration is not None and duration >= law.duration:
-        law = search.lasting(law, duration)
+        law = search.lengthened(law, duration)
     note = ""
     for _ in range(SLOWINGS):
         laws, report = _checked(source, mechanism, law)

@@ -194,7 +194,7 @@ def retime(
             return certified(law)
         if duration < NEAR_LEAST * law.duration:
             check_duration(duration, certified(law).stop)
-        return certified(search.lasting(law, duration))
+        return certified(search.lengthened(law, duration))
 
     return retimed_from(chosen_path, state, conditions, quantities, planned)
 
@@ -332,7 +332,7 @@ def _certified(
             note = "" if report.worst is None else f" of the {report.worst.quantity} of {report.worst.joint}"
             message = f"the time law found breaks the limit{note}; try more cells"
             raise SolveError(message, name="cells", value=law.basis.cells)
-        law = search.tightened(law, over)
+        law = search.with_margin(law, over)
     raise AssertionError
 
 

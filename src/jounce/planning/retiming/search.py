@@ -190,7 +190,7 @@ class Search:
             program = dataclasses.replace(program, about=self.node_matrix @ x / scale)
         solution = solve_program(program)
         if solution.coefficients is None:
-            raise self._why_none(program, labels, at)
+            raise self._infeasibility_error(program, labels, at)
         prices = np.zeros(chosen.shape)
         np.add.at(prices, (at, labels), solution.prices[: len(at)])
         counted = np.arange(chosen.shape[1]) < len(self.labels.first)
@@ -198,7 +198,7 @@ class Search:
         self.prices = prices * np.where(counted, 2.0, 1.0) / np.sqrt(scale)
         return solution.coefficients * scale
 
-    def _why_none(self, program: Program, labels: np.ndarray, at: np.ndarray) -> SolveError:
+    def _infeasibility_error(self, program: Program, labels: np.ndarray, at: np.ndarray) -> SolveError:
         """Return the error of a program without a solution: which limit prevents it most."""
         elastic = solve_program(program, elastic=True)
         prices = elastic.prices[: len(at)]
@@ -274,21 +274,21 @@ class Search:
             # a torque that holds weight for the most part falls by a small share of what the motion is slowed
             fell = (before - over) / step if np.isfinite(step) else 1.0
             step, before = over / float(np.clip(fell, LEAST_FALL, 1.0)), over
-            law = self.tightened(law, step)
+            law = self.with_margin(law, step)
         message = (
             "the time law still exceeds its limits after tightening them; smooth the path where it bends sharply, or "
             "try another number of cells"
         )
         raise SolveError(message)
 
-    def tightened(self, law: RateLaw, over: float) -> RateLaw:
+    def with_margin(self, law: RateLaw, over: float) -> RateLaw:
         """Return a law that uses less of its limits by a share: slower as a whole, where no rate is given at an end."""
         if self.duration is None and not any(self.conditions.rates):
             return law.slowed(1 + over)
         self.margin += 1.1 * over
-        return self.lasting(self.run(law.coefficients, settled=True), self.duration)
+        return self.lengthened(self.run(law.coefficients, settled=True), self.duration)
 
-    def lasting(self, law: RateLaw, duration: float | None) -> RateLaw:
+    def lengthened(self, law: RateLaw, duration: float | None) -> RateLaw:
         """Return a law of a duration that is no shorter: as slow as it may be everywhere, from a faster one.
 
         That is the same law slowed evenly, unless rates are given at the ends, or a limit is in the way, as of torques

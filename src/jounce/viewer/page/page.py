@@ -66,7 +66,7 @@ class Page:
         self.server, self.scene = server, ViserScene(server)
         self.lock = threading.RLock()
         self.observers: list[Observer] = []
-        self.session = Session(subject, order, self._arrived, self._failed, self._busy)
+        self.session = Session(subject, order, self._take_over_motion, self._failed, self._busy)
         recording = self.session.recording
         traced = ()
         if recording.appearance.points and recording.order >= 1:
@@ -87,7 +87,7 @@ class Page:
         """What is shown of it."""
         return self.overlay.options
 
-    def _arrived(self, recording: Recording) -> None:
+    def _take_over_motion(self, recording: Recording) -> None:
         """Take over a new motion, in the worker; what takes time is done before the page is touched."""
         overlay = Overlay.of(recording, self.options)
         with self.lock:
@@ -122,7 +122,7 @@ class Page:
                 for observer in self.observers:
                     observer.on_frame(self.frame)
 
-        self.session.later(job)
+        self.session.run_between_solves(job)
 
     def _show(self, overlay: Overlay) -> None:
         self.overlay = overlay

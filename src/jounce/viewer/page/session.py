@@ -99,7 +99,7 @@ class Session:
             self._requested = (dict(self.values), self.order)
             self._news.notify_all()
 
-    def later(self, job: Callable[[], object]) -> None:
+    def run_between_solves(self, job: Callable[[], object]) -> None:
         """Let the worker do something between two solves, such as reactions, which take a moment."""
         with self._news:
             self._jobs.append(job)

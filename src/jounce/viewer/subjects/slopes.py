@@ -142,7 +142,7 @@ class SlopesFolder(Observer):
                 self.text.content = slopes_html(recording, name, order)
 
         self.text.content = "<em>finding slopes ...</em>"
-        self.page.session.later(job)
+        self.page.session.run_between_solves(job)
 
 
 def slopes_html(recording: Any, name: str, order: int) -> str:

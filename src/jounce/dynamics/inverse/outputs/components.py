@@ -65,7 +65,7 @@ class AbstractForceOutput(AbstractMotionOutput):
         solved = motion.status == Status.OK
         if np.isfinite(values[solved]).all():
             return ""
-        if forces.loose is None:
+        if forces.undetermined is None:
             return passing_words(forces)
         return (
             f"not unique, as constraints are redundant: {forces.open.words}; set redundant_reactions to least_norm, "
