@@ -164,9 +164,9 @@ class RobotReading:
 
     def loads(self, robot: Robot, *, moving: bool = False) -> list[CarriedLoad]:
         """Return what a robot carries for parts of a motion."""
-        from jounce.io.robots.payloads import carried_loads
+        from jounce.io.robots.payloads import parsed_loads
 
-        return carried_loads(robot, [text for text in self.payload or () if "@" in text], moving=moving)
+        return parsed_loads(robot, [text for text in self.payload or () if "@" in text], moving=moving)
 
     def trajectory(self, file: Path, robot: Robot, *, samples: bool = False) -> JointTrajectory:
         """Return the trajectory of a file, whose joints are those of a robot where it names none.

@@ -239,7 +239,7 @@ def _belongs_to_package(kind: type[Any]) -> bool:
     return kind.__module__.partition(".")[0] == __name__.partition(".")[0]
 
 
-def by_ratio_alone(element: AbstractConstraint) -> bool:
+def is_bare_ratio(element: AbstractConstraint) -> bool:
     """Tell whether a joint couples moving bodies by a ratio and nothing else: it does not say where its teeth touch."""
     fields = value_fields(type(element))
     given = "ratio" in fields and getattr(element, "ratio", None) is not None and element.role != "driver"

@@ -247,7 +247,7 @@ def _scene(
     step = max(limits[1] - limits[0], limits[3] - limits[2]) / STEPS
     bar = bar_length(max(right - left, upper - lower))
     labels = [label for label in scene.labels if label.owner != f"bodies.{GROUND}"]
-    placements = [_name_places(labels, scene, limits, width) for width in WIDTHS]
+    placements = [_name_positions(labels, scene, limits, width) for width in WIDTHS]
 
     def pixels(points: np.ndarray) -> list[int | None]:
         return [round(v) if math.isfinite(v) else None for v in (points / step).reshape(-1).tolist()]
@@ -284,7 +284,7 @@ def _scene(
     }
 
 
-def _name_places(
+def _name_positions(
     labels: Sequence[Label], scene: Scene, limits: Sequence[float], width: float
 ) -> list[list[Any] | None]:
     """Return direction and distance of names in a sketch of some pixels, placed as those of `sketch` are."""

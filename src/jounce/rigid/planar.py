@@ -57,6 +57,11 @@ class PlanarPose:
         """Build the pose from its coordinates; their jets may be of any order."""
         return cls(position, angle, *sine_cosine(angle))
 
+    @classmethod
+    def at_unit(cls, position: Numbers, angle: Numbers) -> "PlanarPose":
+        """Build the pose of order zero."""
+        return cls.from_jets(Jet([position]), Jet([angle]))
+
     @property
     def order(self) -> int:
         """Highest time derivative that the pose carries."""

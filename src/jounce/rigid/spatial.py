@@ -49,6 +49,13 @@ def quaternion_spins(quaternion: Float[Numbers, "4 *batch"]) -> Quadruples:
     )
 
 
+def quaternion_change(
+    quaternion: Float[Numbers, "4 *batch"], turn: Float[Numbers, "3 *batch"]
+) -> Float[Numbers, "4 *batch"]:
+    """Return how Euler parameters change with a turn about the axes of the body, rad, or by rates with its rate."""
+    return 0.5 * total(spin * part for spin, part in zip(quaternion_spins(quaternion), components(turn), strict=True))
+
+
 def _normalized(quaternion: Float[Numbers, "4 *batch"]) -> Float[Numbers, "4 *batch"]:
     return quaternion / jnp.sqrt(dot(quaternion, quaternion))[None]
 
@@ -88,7 +95,11 @@ class SpatialPose(AbstractFrame):
     ) -> "SpatialPose":
         """Build the pose of order zero; the quaternion is normalized."""
         position = real_or_traced("position", position, JounceError)
-        quaternion = _normalized(real_or_traced("quaternion", quaternion, JounceError))
+        return cls.at_unit(position, _normalized(real_or_traced("quaternion", quaternion, JounceError)))
+
+    @classmethod
+    def at_unit(cls, position: Float[Numbers, "3 *batch"], quaternion: Float[Numbers, "4 *batch"]) -> "SpatialPose":
+        """Build the pose of order zero from Euler parameters that have unit length already."""
         spins, axes = (tuple(Jet([x]) for x in f(quaternion)) for f in (quaternion_spins, body_axes))
         return cls(Jet([position]), Jet([quaternion]), spins, axes, None)
 
@@ -117,10 +128,7 @@ class SpatialPose(AbstractFrame):
     def displaced(self, shift: Float[Numbers, "3 *batch"], turn: Float[Numbers, "3 *batch"]) -> "SpatialPose":
         """Return the pose of order zero moved by a shift, (3, ...) in m, and a turn in body axes, (3, ...) in rad."""
         quaternion = self.quaternion.coefficients[0]
-        turned = quaternion + 0.5 * total(
-            s * w for s, w in zip(quaternion_spins(quaternion), components(turn), strict=True)
-        )
-        return SpatialPose.at(self.position.coefficients[0] + shift, turned)
+        return SpatialPose.at(self.position.coefficients[0] + shift, quaternion + quaternion_change(quaternion, turn))
 
     def extended(
         self, shift: Float[Numbers, "3 *batch"] | None, turn: Float[Numbers, "3 *batch"] | None

@@ -199,7 +199,7 @@ class SplineMotion(AbstractMotion):
         if self.beyond == "refuse" and np.ndim(self.stop) == 0 and not is_traced(where) and np.size(where[2]):
             self.check_instants(float(np.min(where[2])), float(np.max(where[2])))
         # one program where the law is called alone; within a program it is a part of that
-        return (SplineMotion._evaluated if is_traced((self, time)) else _evaluated_alone)(self, time)
+        return (SplineMotion._evaluated if is_traced((self, time)) else _compiled_evaluation)(self, time)
 
     def _evaluated(self, time: Jet) -> Jet:
         """Return the jet of the law, NaN at instants that it refuses."""
@@ -229,4 +229,4 @@ class SplineMotion(AbstractMotion):
         return start, jnp.swapaxes(jnp.take_along_axis(table[..., 0], piece.T[None], axis=1), 1, 2)
 
 
-_evaluated_alone = jax.jit(SplineMotion._evaluated)
+_compiled_evaluation = jax.jit(SplineMotion._evaluated)

@@ -37,16 +37,15 @@ from jounce.dynamics.friction.coupling import has_friction
 from jounce.dynamics.friction.free_motion import FreeFriction, with_friction
 from jounce.dynamics.masses import Gravity, Masses
 from jounce.jet import Jet
-from jounce.jet.algebra import total
 from jounce.jet.coefficients import begun_series
 from jounce.jet.programs.series import Recursion
 from jounce.linear_algebra.least_squares import range_basis
 from jounce.linear_algebra.linear import DenseFactor
 from jounce.mechanism.system import System
 from jounce.mechanism.transmissions.axis_angles import with_turns
-from jounce.rigid import PlanarPose, SpatialPose
+from jounce.rigid import PlanarPose
 from jounce.rigid.pose import Pose
-from jounce.rigid.spatial import body_axes, quaternion_spins
+from jounce.rigid.spatial import quaternion_change
 
 Instants = Float[Numbers, "1 batch"]
 Lanes = Float[Numbers, " batch"]
@@ -149,12 +148,10 @@ class Equations(Module):
 
     def pose_at_rest(self, position: Shifts, attitude: Attitudes) -> Pose:
         """Return the pose of order zero of all bodies, the ground first."""
-        origins = Jet([with_ground(position)])
-        if self.pose_type is PlanarPose:
-            return PlanarPose.from_jets(origins, Jet([with_ground(attitude)[0]]))
-        quaternion = turns_with_ground(attitude)  # the integrator keeps its length one
-        spins, axes = (tuple(Jet([x]) for x in f(quaternion)) for f in (quaternion_spins, body_axes))
-        return SpatialPose(origins, Jet([quaternion]), spins, axes, None)
+        planar = self.pose_type is PlanarPose
+        return self.pose_type.at_unit(
+            with_ground(position), with_ground(attitude)[0] if planar else turns_with_ground(attitude)
+        )
 
     def attitude_of(self, pose: Pose) -> Attitudes:
         """Return the attitude of the moving bodies, as a state has it, from a pose of order zero."""
@@ -201,10 +198,7 @@ class Equations(Module):
 
     def attitude_rate(self, state: State) -> Attitudes:
         """Return how the attitude of a state moves."""
-        if self.pose_type is PlanarPose:
-            return state.spin
-        spins = quaternion_spins(state.attitude)
-        return 0.5 * total(spin * part for spin, part in zip(spins, jnp.split(state.spin, 3), strict=True))
+        return state.spin if self.pose_type is PlanarPose else quaternion_change(state.attitude, state.spin)
 
     def matrix(self, state: State, time: Instants) -> Matrices:
         """Return the matrix of the unknown accelerations and multipliers, scaled; of redundant rows, combinations."""

@@ -75,7 +75,7 @@ class ExtremeFriction:
         self.pressing, self.changes = pressing[rubbing], changes[self._given][:, rubbing]
         self.joints = (np.cumsum(rubbing) - 1)[np.asarray(joints, int)[self._given]]
         self.coefficients = np.asarray(coefficients, float)[rubbing]
-        self.signs_alone = len(np.unique(self.joints)) == len(self.joints)
+        self.signs_only = len(np.unique(self.joints)) == len(self.joints)
 
     def most(
         self, along: Float[np.ndarray, "direction lane"]
@@ -179,7 +179,7 @@ class ExtremeFriction:
         if not np.isfinite(along).all():
             return np.nan, True
         count = len(self.joints)
-        every = self.signs_alone and count <= ALL_SIGNS
+        every = self.signs_only and count <= ALL_SIGNS
         if every:
             trials = np.array(list(itertools.product((1.0, -1.0), repeat=count))).T
         else:

@@ -9,7 +9,7 @@ from jaxtyping import Float
 from jounce.base.modules import with_fields
 from jounce.dynamics.forward.accelerations import Equations
 from jounce.dynamics.masses import gravity_of, masses_of
-from jounce.dynamics.statics.operating_point import OperatingPoint, of_place
+from jounce.dynamics.statics.operating_point import OperatingPoint, changes_of_coordinates
 from jounce.dynamics.statics.variations import at_rest, clock_at, residuals_at
 from jounce.errors import SolveError
 from jounce.jet import Jet
@@ -125,7 +125,7 @@ def _scale(point: OperatingPoint, stiffness: np.ndarray) -> float:
 
 def _stiffness(point: OperatingPoint) -> Float[np.ndarray, "direction direction"]:
     free = point.free
-    return free.T @ point.varied(of_place(free))[0].sum(axis=0)
+    return free.T @ point.varied(changes_of_coordinates(free))[0].sum(axis=0)
 
 
 def _largest_load(point: OperatingPoint) -> float:

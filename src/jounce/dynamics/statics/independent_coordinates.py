@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
-from jounce.dynamics.statics.operating_point import Lanes, OperatingPoint, null_space, of_place
+from jounce.dynamics.statics.operating_point import Lanes, OperatingPoint, changes_of_coordinates, null_space
 from jounce.dynamics.statics.variations import LEVELS, law_variations
 from jounce.errors import MechanismError, check_name
 from jounce.linear_algebra.host_jacobian import RANK_TOLERANCE
@@ -148,10 +148,10 @@ def _check_nowhere(
     """
     gradients, inverse, basis, sizes = reduction
     count, chosen = len(point.scale), names[released:]
-    rows = point.varied(of_place(np.eye(count)))[1][0]
+    rows = point.varied(changes_of_coordinates(np.eye(count)))[1][0]
     directions = null_space(rows)
     directions = directions - basis @ (gradients @ directions) if len(gradients) else directions
-    changes = of_place(directions)
+    changes = changes_of_coordinates(directions)
     for level in (1, 2):
         gaps = point.varied(changes)[1][level]
         measured = _measured(point, chosen, changes, level) if chosen else np.zeros((0, gaps.shape[1]))

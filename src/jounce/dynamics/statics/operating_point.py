@@ -111,7 +111,7 @@ class OperatingPoint:
         sums = np.zeros(1 + len(self.model.bodies))
         groups = self.equations.system.forces
         if groups:
-            unchanged = self.changes(of_place(np.zeros((len(self.scale), 1))))
+            unchanged = self.changes(changes_of_coordinates(np.zeros((len(self.scale), 1))))
             sizes = sizes_of_forces(self.equations, self.coordinates, self.clock, unchanged)
             for group, size in zip(groups, sizes, strict=True):
                 lever = self.model.length if group.element.unit == "N" else 1.0
@@ -162,7 +162,7 @@ class OperatingPoint:
     def output_gradients(self) -> dict[str, Float[np.ndarray, " column"]]:
         """Gradients, by the scaled coordinates, of the components of outputs that are positions or angles, by name."""
         count = len(self.scale)
-        varied = self.outputs_varied(of_place(np.eye(count)))
+        varied = self.outputs_varied(changes_of_coordinates(np.eye(count)))
         components = self.components([x.shape[1] for x in varied])
         groups = self.model.system.outputs
         return {name: varied[g][0, c, k] for name, (g, c, k) in components.items() if not groups[g].element.lost_orders}
@@ -183,7 +183,7 @@ class OperatingPoint:
         return max(k for k, name in enumerate(names) if component == name or component.startswith(f"{name}_"))
 
 
-def of_place(columns: Float[np.ndarray, "column lane"]) -> Lanes:
+def changes_of_coordinates(columns: Float[np.ndarray, "column lane"]) -> Lanes:
     """Return changes of the scaled coordinates alone, and of none of their rates."""
     return np.stack([columns, *[np.zeros_like(columns)] * (LEVELS - 1)])
 

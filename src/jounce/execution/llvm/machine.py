@@ -42,7 +42,7 @@ def vector_width() -> int:
     return 8 if "+avx512f" in can else 4 if "+avx" in can else 2
 
 
-def _highest_level() -> int:
+def _allowed_level() -> int:
     """Return how much LLVM may optimize: nothing where the environment asks this of XLA."""
     levels = re.findall(r"--xla_backend_optimization_level=(\S+)", os.environ.get("XLA_FLAGS", ""))
     return 0 if levels[-1:] == ["0"] else 1
@@ -85,7 +85,7 @@ def _compiled_here(text: str, level: int = 1) -> bytes:
     processor()
     with _lock:
         module = _binding().parse_assembly(text)
-        return _target(min(level, _highest_level())).emit_object(module)
+        return _target(min(level, _allowed_level())).emit_object(module)
 
 
 def _compiled_elsewhere(text: str, hasty: bool) -> bytes | None:

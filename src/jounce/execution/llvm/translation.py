@@ -234,7 +234,7 @@ def _scan(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Array]:
     if p["length"] == 0:
         return [*start, *(np.empty(aval.shape, object) for aval in made)]
     most = MOST_UNROLLED if code.large is None else MOST_UNROLLED_IN_MEMORY
-    if code.large is None and _needs_known_places(p["jaxpr"].jaxpr):
+    if code.large is None and _needs_known_indices(p["jaxpr"].jaxpr):
         most = code.most
     if (unrolled := _unrolled(code, equation, needed, start, rows, most)) is not None:
         return unrolled
@@ -248,11 +248,11 @@ def _scan(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Array]:
         return unrolled
 
 
-def _needs_known_places(program: Any) -> bool:
+def _needs_known_indices(program: Any) -> bool:
     """Tell whether a program has operations for which there is code only where their indices are known."""
     return any(
         equation.primitive.name.startswith("scatter")
-        or any(map(_needs_known_places, jaxprs_in_params(equation.params)))
+        or any(map(_needs_known_indices, jaxprs_in_params(equation.params)))
         for equation in program.eqns
     )
 

@@ -207,13 +207,13 @@ class Progress(NamedTuple):
 def _departures(problem: RobotProblem, polynomial: RobotState, time: Any, since: Any, *, one_by_one: bool) -> Any:
     """Return what `RobotProblem.departures` gives at places on a step, for all at once or one after another."""
 
-    def at_places(since: Any) -> Any:
+    def at_points(since: Any) -> Any:
         state, rates = at(polynomial, since), rates_at(polynomial, since)
         return problem.departures(state, rates, (time + since)[None])
 
     if not one_by_one:
-        return at_places(since)
-    return [jnp.moveaxis(x[..., 0], 0, -1) for x in jax.lax.map(at_places, since[:, None])]
+        return at_points(since)
+    return [jnp.moveaxis(x[..., 0], 0, -1) for x in jax.lax.map(at_points, since[:, None])]
 
 
 def _sizes(problem: RobotProblem, polynomial: RobotState) -> Any:

@@ -52,7 +52,7 @@ def with_payloads(robot: Robot, texts: Iterable[str]) -> Robot:
     return robot
 
 
-def carried_loads(robot: Robot, texts: Iterable[str], *, moving: bool = False) -> list[CarriedLoad]:
+def parsed_loads(robot: Robot, texts: Iterable[str], *, moving: bool = False) -> list[CarriedLoad]:
     """Return loads that links carry during parts of a motion.
 
     Parameters
@@ -74,7 +74,7 @@ def carried_loads(robot: Robot, texts: Iterable[str], *, moving: bool = False) -
     --------
     >>> import jounce as jn
     >>> robot = jn.load_robot("examples/robots/panda.urdf")
-    >>> [load.words for load in carried_loads(robot, ["panda_hand=3 kg@0.8 s:2 s"])]
+    >>> [load.words for load in parsed_loads(robot, ["panda_hand=3 kg@0.8 s:2 s"])]
     ['panda_hand carries 3 kg from 0.8 s to 2 s']
     """
     form = f"a load for a part of a motion is given by LINK=MASS@FROM:TO, its ends {PLACE_FORMS}"

@@ -119,7 +119,7 @@ def load_trajectory(
     if robot is not None and recording.unnamed:
         recording = _named_by(recording, robot)
     if chosen is None and joints is None and not recording.unnamed:
-        recording = _positions_alone(recording, robot)
+        recording = _positions_only(recording, robot)
     if chosen is not None:
         try:
             recording = recording.selected(chosen)
@@ -186,7 +186,7 @@ def _named_by(recording: Recording, robot: Robot) -> Recording:
     raise TrajectoryError(message, path=recording.path, name="joints")
 
 
-def _positions_alone(recording: Recording, robot: Robot | None) -> Recording:
+def _positions_only(recording: Recording, robot: Robot | None) -> Recording:
     """Return a recording without columns whose names say that they hold torques or the like of no joint of a robot."""
     known = () if robot is None else robot.joints
     others = [name for name in recording.names if name in recording.others and name not in known]

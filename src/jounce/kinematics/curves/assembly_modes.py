@@ -251,10 +251,10 @@ class _Search:
             self.starts += 1
             self.since_last_new += 1
             new = gaps[lane] <= CLOSED and self.add({name: x[..., lane] for name, x in coordinates.items()})
-            if new and not self._set_movable_apart():
+            if new and not self._remove_movable():
                 self.since_last_new = 0
 
-    def _set_movable_apart(self) -> bool:
+    def _remove_movable(self) -> bool:
         """Take singular ones for parts of a curve or a surface once they are many, dead points being few; tell it."""
         singular = [x for x in self.configurations if x.smallest < NEARLY_SINGULAR]
         if len(singular) <= (0 if self.movable else MOST_SINGULAR):

@@ -67,10 +67,6 @@ class ChangePoint:
         tangents[0] *= -1
         return dataclasses.replace(self, center=self.center.reversed(), tangents=tangents)
 
-    def shifted(self, arc_length: float) -> "ChangePoint":
-        """Return it with its arc length counted from somewhere else."""
-        return dataclasses.replace(self, center=self.center.shifted(arc_length))
-
 
 def crossing(tracker: PathTracker, here: CurvePoint, ahead: complex) -> tuple[ChangePoint, CurvePoint] | None:
     """Return the change point just ahead and the point beyond it, as far from it as this one, if there is one.

@@ -18,6 +18,7 @@ from jounce.kinematics.curves.series import CurvePoints, curve_points, second_or
 from jounce.mechanism import Model
 from jounce.mechanism.transmissions.axis_angles import conjugate, quaternion_product
 from jounce.rigid import PlanarPose
+from jounce.rigid.spatial import quaternion_change
 
 ORDER = 20
 LANES = 8  # points solved side by side: a number compiles once
@@ -73,10 +74,6 @@ class CurvePoint:
             return c * ((-1.0) ** np.arange(len(c))).reshape(-1, *[1] * (c.ndim - 1))
 
         return self._with_series(alternated, arc_length=-self.arc_length, slope=-self.slope)
-
-    def shifted(self, arc_length: float) -> "CurvePoint":
-        """Return the point with its arc length increased by that of another start."""
-        return dataclasses.replace(self, arc_length=self.arc_length + arc_length)
 
     def shortened(self, order: int) -> "CurvePoint":
         """Return the point with the coefficients above an order set to zero: rounding spoils those first."""
@@ -147,7 +144,7 @@ class PathTracker:
         shift, turn = self.parts(direction)
         first = {"position": shift, "angle": turn[0]} if pose_type is PlanarPose else {"position": shift}
         if "quaternion" in point.coordinates:
-            first["quaternion"] = spun(point.coordinates["quaternion"][0], turn)
+            first["quaternion"] = quaternion_change(point.coordinates["quaternion"][0], turn)
         series = {name: np.zeros_like(c) for name, c in point.coordinates.items()}
         for name, c in point.coordinates.items():
             series[name][0], series[name][1] = c[0], first[name]
@@ -336,11 +333,6 @@ class PathTracker:
 
 def _rank(sizes: Float[np.ndarray, " k"], tolerance: float) -> int:
     return int(np.sum(sizes > tolerance * sizes.max(initial=0.0)))
-
-
-def spun(quaternion: np.ndarray, turn: np.ndarray) -> np.ndarray:
-    """Return how Euler parameters, (4, bodies), change with turns about the axes of the bodies, (3, bodies)."""
-    return 0.5 * quaternion_product(quaternion, np.concatenate([np.zeros_like(turn[:1]), turn]))
 
 
 def spin(quaternion: np.ndarray, other: np.ndarray) -> np.ndarray:

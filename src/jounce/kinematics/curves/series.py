@@ -15,15 +15,14 @@ from jaxtyping import Bool, Float, Int
 from jounce.base.shapes import Numbers
 from jounce.execution.compilation import compiled
 from jounce.jet import Jet
-from jounce.jet.algebra import total
 from jounce.jet.coefficients import begun_series
 from jounce.jet.programs.series import Recursion
 from jounce.linear_algebra.linear import DenseFactor
 from jounce.mechanism.building.starting_guess import pose_at
 from jounce.mechanism.system import System
-from jounce.rigid import PlanarPose, SpatialPose
+from jounce.rigid import PlanarPose
 from jounce.rigid.pose import Pose
-from jounce.rigid.spatial import body_axes, quaternion_spins
+from jounce.rigid.spatial import quaternion_change
 
 MAX_CORRECTIONS = 10
 ROUNDING = 4e-15  # a correction this small leaves the Jacobian as good as new
@@ -176,14 +175,14 @@ def _differentiated(curve: _Curve, pose: Any, value: Any, factor: DenseFactor, o
     attitude = (pose.angle if planar else pose.quaternion).coefficients[0]
 
     def program(point: Any, attitude: Any, value: Any) -> Any:
-        return curve.system.residual(_still(point, attitude), Jet([value[None]])).coefficients[0]
+        return curve.system.residual(pose.at_unit(point, attitude), Jet([value[None]])).coefficients[0]
 
     def parts(solution: Any) -> Any:
         shift, turn = curve.system.coordinates(solution[:count], shifts)
         return shift, turn, curve.value_scale * solution[-1] if curve.driven else jnp.zeros(lanes)
 
     def spun(turn: Any) -> Any:
-        return turn[0] if planar else _spun(attitude, turn)
+        return turn[0] if planar else quaternion_change(attitude, turn)
 
     shift, turn, rate = parts(null)
     recursion = Recursion(program, (point, attitude, value), order)
@@ -215,23 +214,9 @@ def _differentiated(curve: _Curve, pose: Any, value: Any, factor: DenseFactor, o
     return {"position": series[0], name: series[1]}, series[2]
 
 
-def _still(point: Any, attitude: Any) -> Any:
-    """Return the pose of order zero at a point; Euler parameters are of unit length already."""
-    if attitude.ndim < point.ndim:
-        return PlanarPose.from_jets(Jet([point]), Jet([attitude]))
-    spins, axes = (tuple(Jet([x]) for x in f(attitude)) for f in (quaternion_spins, body_axes))
-    return SpatialPose(Jet([point]), Jet([attitude]), spins, axes, None)
-
-
-def _spun(quaternion: Any, turn: Any) -> Any:
-    """Return how Euler parameters change with a turn about the axes of the body."""
-    spins = quaternion_spins(quaternion)
-    return 0.5 * total(spin * part for spin, part in zip(spins, jnp.split(turn, 3), strict=True))
-
-
 def _known_spin(quaternion: Any, turns: Any, k: Any) -> Any:
     """Return what is known of the coefficient of order k of Euler parameters: all but the newest turn's part."""
-    return jnp.sum(_convolved(quaternion, turns, k - 1, jax.vmap(_spun)), axis=0) / k
+    return jnp.sum(_convolved(quaternion, turns, k - 1, jax.vmap(quaternion_change)), axis=0) / k
 
 
 def _convolved(left: Any, right: Any, order: Any, product: Any) -> Any:

@@ -153,10 +153,10 @@ class _Store:
 
         Series are of any size where an instant failed, which is solved again.
         """
-        coordinates_kept, outputs_kept = self.state
-        for name, whole in coordinates_kept.items():
+        stored_coordinates, stored_outputs = self.state
+        for name, whole in stored_coordinates.items():
             whole[..., lanes] = coordinates[name]
-        for whole, part in zip(outputs_kept, outputs, strict=True):
+        for whole, part in zip(stored_outputs, outputs, strict=True):
             if series:
                 with np.errstate(over="ignore"):
                     plain_derivatives(part, out=whole[..., lanes])

@@ -34,7 +34,7 @@ from jounce.mechanism import (
 )
 from jounce.mechanism.laws.driver_outputs import is_turning
 from jounce.mechanism.outputs.attitude_outputs import continued, euler_angles_of
-from jounce.mechanism.outputs.derivative_outputs import bound_alone
+from jounce.mechanism.outputs.derivative_outputs import bound_output
 from jounce.mechanism.system import Group
 from jounce.mechanism.transmissions.axis_angles import AttitudeHistory, attitudes_of, measures_angle
 from jounce.trajectory import HermiteMotion
@@ -290,7 +290,7 @@ class Motion(Tabulated):
         MechanismError
             If the output names a body, joint, driver or force that does not exist, or does not fit the mechanism.
         """
-        given: Any = bound_alone(output, self.mechanism)
+        given: Any = bound_output(output, self.mechanism)
         check_output(given, self.mechanism, name)
         self._check_order(given, name)
         if self.check_idle is not None:

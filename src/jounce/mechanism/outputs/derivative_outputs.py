@@ -191,7 +191,7 @@ def bound(outputs: Mapping[str, AbstractQuantity], mechanism: Any) -> Mapping[st
     return {name: bound_outputs[name] for name in outputs}
 
 
-def bound_alone(output: AbstractQuantity, mechanism: Any) -> AbstractQuantity:
+def bound_output(output: AbstractQuantity, mechanism: Any) -> AbstractQuantity:
     """Return an output that is none of the mechanism, a derivative with the outputs of the mechanism that it names."""
     return _with_operands(output, mechanism.outputs, mechanism) if form_of(output) is DerivativeOutput else output
 

@@ -41,7 +41,7 @@ def draw_retiming(retimed: RetimedTrajectory, title: str = "") -> Figure:
     binds, price = active["binds"].values, active["price"].values.sum(axis=0)
     bound = np.flatnonzero(binds.any(axis=0))
     if not bound.size:
-        return _rate_alone(retimed, title or retimed.report.robot)
+        return _rate_figure(retimed, title or retimed.report.robot)
     chosen = sorted(bound[np.argsort(-price[bound])][:MOST].tolist())
     names = [str(x) for x in active["limit"].values]
     words = list(dict.fromkeys(_quantity(name) for name in names))
@@ -67,7 +67,7 @@ def draw_retiming(retimed: RetimedTrajectory, title: str = "") -> Figure:
     return figure
 
 
-def _rate_alone(retimed: RetimedTrajectory, title: str) -> Figure:
+def _rate_figure(retimed: RetimedTrajectory, title: str) -> Figure:
     with style():
         figure = blank_figure(WIDTH, RATE + 1.0, title, h_pad=0.06)
         axes = figure.subplots(1, 1)

@@ -18,7 +18,7 @@ from jounce.base.shapes import Numbers
 from jounce.jet import Jet, cross
 from jounce.jet.algebra import total
 from jounce.linear_algebra.linear import DenseFactor
-from jounce.rigid.spatial import body_axes, quaternion_spins
+from jounce.rigid.spatial import body_axes, quaternion_change
 from jounce.robot.model.tree import Frame, Tree
 from jounce.robot.recursions.articulated_bodies import ArticulatedBodies, RigidInertia
 from jounce.robot.recursions.drive_forces import (
@@ -230,8 +230,8 @@ class TreeEquations(Module):
         if base is not None and unknowns.base is not None:
             v, w = base.twist[:3], base.twist[3:]
             spin0 = _combined(base.axes, w)
-            quaternion = 0.5 * total(spin * w[k : k + 1] for k, spin in enumerate(quaternion_spins(base.quaternion)))
-            moved = FreeBase(_combined(base.axes, v), quaternion, cross(spin0[:, None], base.axes), unknowns.base)
+            change = quaternion_change(base.quaternion, w)
+            moved = FreeBase(_combined(base.axes, v), change, cross(spin0[:, None], base.axes), unknowns.base)
         turn = z * (turning * rates)
         before = sums_at_parents(tree, turn, spin0)
         arm = cross(before, motion.arm)

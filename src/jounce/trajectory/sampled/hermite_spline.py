@@ -88,7 +88,7 @@ def _spline(times: np.ndarray, table: np.ndarray) -> HermiteMotion:
     bands[2, :-2] = end[levels] * own[:-1]
     bands[0, 2:] = -begin[2 * levels + 1] * own[1:]
     right_side[1:-1] = left[1:] - right[:-1]
-    top = _highest_level(levels)  # at the ends: the first and the last piece have no highest power
+    top = _end_condition(levels)  # at the ends: the first and the last piece have no highest power
     for row, piece, neighbor in ((0, 0, 1), (count - 1, -1, -2)):
         mine, other = (levels, 2 * levels + 1) if row == 0 else (2 * levels + 1, levels)
         bands[1, row] = top[mine] * own[piece]
@@ -115,7 +115,7 @@ def _at_ends(levels: int) -> tuple[np.ndarray, np.ndarray]:
     return factors[order] * basis[order], factors @ basis
 
 
-def _highest_level(levels: int) -> Float[np.ndarray, " given"]:
+def _end_condition(levels: int) -> Float[np.ndarray, " given"]:
     return _basis(levels)[-1]
 
 

@@ -153,7 +153,7 @@ class GraphReader(ProgramReader):
         if name == "dynamic_update_slice":
             return [self._updated(given)]
         if name in ("scatter", "scatter-add"):
-            return [self._put_at_places(equation, given)]
+            return [self._scatter_entries(equation, given)]
         if name in _MOVING:
             return self._moved(equation, operands, given, dtypes)
         raise UnwritableOperationError(f"it has the operation '{name}' of JAX, which is none on numbers")
@@ -232,7 +232,7 @@ class GraphReader(ProgramReader):
         numbers[tuple(slice(b, b + m) for b, m in zip(begins, part.shape, strict=True))] = part.numbers
         return Entries(numbers, target.dtype)
 
-    def _put_at_places(self, equation: JaxprEqn, given: list[Entries]) -> Entries:
+    def _scatter_entries(self, equation: JaxprEqn, given: list[Entries]) -> Entries:
         """Return an array with entries replaced by others, or with others added to them, at places that are known."""
         target, indices, parts = given
         if not self.graph.is_constant(*indices.numbers.ravel().tolist()):

@@ -8,7 +8,7 @@ import numpy as np
 from jounce.base.modules import field
 from jounce.base.shapes import ArrayLike, Numbers
 from jounce.constraints import Cam, Rope
-from jounce.constraints.base import Vector, by_ratio_alone
+from jounce.constraints.base import Vector, is_bare_ratio
 from jounce.constraints.planar import Belt
 from jounce.dynamics.inverse.locked_friction import passing_words
 from jounce.dynamics.inverse.motion_forces import MotionForces
@@ -141,7 +141,7 @@ class _JointOutput(_Reaction):
         """Return why values are NaN, which gears load no bearing of their bodies, and where loads change flanks."""
         joints = motion.mechanism.joints
         bodies = {*_exerting(motion.mechanism, self.joint).bodies} - {GROUND}
-        gears = [name for name, x in joints.items() if by_ratio_alone(x) and bodies & {*x.bodies}]
+        gears = [name for name, x in joints.items() if is_bare_ratio(x) and bodies & {*x.bodies}]
         cams = [
             name for name, x in joints.items() if isinstance(x, Cam) and name != self.joint and bodies & {*x.bodies}
         ]

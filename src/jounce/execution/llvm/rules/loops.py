@@ -56,7 +56,7 @@ def _each(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Array]:
         longest = max(range(len(operands)), key=lambda k: len(operands[k].given))
         operands[longest] = as_read(stored(code, operands[longest]))
     read: list[Stored] = []
-    indices = [[_place_among(read, part, aval.shape) for part in operand.given] for operand in operands]
+    indices = [[_index_among(read, part, aval.shape) for part in operand.given] for operand in operands]
 
     def body(values: Sequence[Value]) -> Value:
         numbers = [x.body([values[k] for k in its]) for x, its in zip(operands, indices, strict=True)]
@@ -65,7 +65,7 @@ def _each(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Array]:
     return [Deferred(tuple(read), kind_of(aval.dtype), body, any(operand.parts for operand in operands))]
 
 
-def _place_among(arrays: list[Stored], array: Stored, shape: Sequence[int]) -> int:
+def _index_among(arrays: list[Stored], array: Stored, shape: Sequence[int]) -> int:
     """Return the place of an array, in a shape, among some, to which it is added if it is none of them."""
     array = spread(array, shape, range(array.ndim) if array.ndim else ())
     for index, other in enumerate(arrays):

@@ -11,7 +11,7 @@ from jaxtyping import Float
 from typing_extensions import TypedDict
 
 from jounce.constraints import Cam
-from jounce.constraints.base import by_ratio_alone, value_fields
+from jounce.constraints.base import is_bare_ratio, value_fields
 from jounce.constraints.planar import Belt
 from jounce.dynamics.inverse.outputs.output_words import belt_words, cam_words, ratio_words
 from jounce.errors import JounceError
@@ -208,7 +208,7 @@ def _remarks(mechanism: Mechanism) -> list[str]:
     if not mechanism.forces and all(body.mass is None for body in mechanism.bodies.values()):
         return []
     joints = mechanism.joints.items()
-    gears = ratio_words([name for name, joint in joints if by_ratio_alone(joint)])
+    gears = ratio_words([name for name, joint in joints if is_bare_ratio(joint)])
     cams = cam_words([name for name, joint in joints if isinstance(joint, Cam)])
     belts = belt_words([name for name, joint in joints if isinstance(joint, Belt)])
     return [words for words in (gears, cams, belts) if words]
