@@ -2,7 +2,6 @@
 
 import gc
 import threading
-from collections import deque
 
 import jax.numpy as jnp
 import numpy as np
@@ -11,42 +10,15 @@ import pytest
 import jounce as jn
 from jounce.execution import buffer_pool
 from jounce.execution.backends import uses_machine_code
-from jounce.execution.buffer_pool import LENT, LINE, MOST_RETURNED, acquire, arrays_in, bytes_needed, lend, release
+from jounce.execution.buffer_pool import LEAST, LINE, arrays_in, bytes_needed, lend
 from jounce.execution.compilation import Compiled
 from tests.problems.small import four_bar
 
 
 @pytest.fixture
-def kept(monkeypatch):
-    blocks = []
+def free(monkeypatch):
+    blocks = {}
     monkeypatch.setattr(buffer_pool, "_free", blocks)
-    return blocks
-
-
-def test_what_was_given_back_is_lent_again(kept):
-    block = acquire(1000)
-    release(block)
-    assert acquire(900) is block
-    assert not kept
-
-
-def test_a_block_that_is_too_small_makes_room_for_another(kept):
-    release(acquire(1000))
-    assert len(acquire(1001)) >= 1001
-    assert not kept
-
-
-def test_no_more_is_kept_than_is_allowed(kept, monkeypatch):
-    monkeypatch.setattr(buffer_pool, "MOST", 1000)
-    for block in [acquire(600), acquire(401), acquire(300), acquire(200), acquire(100)]:
-        release(block)
-    assert list(map(len, kept)) == [600, 300, 100]
-
-
-@pytest.fixture
-def returned(monkeypatch):
-    blocks = deque(maxlen=MOST_RETURNED)
-    monkeypatch.setattr(buffer_pool, "_returned", blocks)
     return blocks
 
 
@@ -55,55 +27,69 @@ def address(block):
 
 
 @pytest.mark.parametrize("part", [lambda x: x[8:16].view(float), lambda x: np.ndarray((3, 1), float, x, 64)[1:].T])
-def test_memory_comes_back_when_no_array_in_it_is_left(returned, part):
-    size = LENT[0]
+def test_memory_comes_back_when_no_array_in_it_is_left(free, part):
+    size = LEAST
     block = lend(size)
     first, array = address(block), part(block)
     array[...] = 3.0
     del block
     gc.collect()
-    assert not returned
+    assert not free
     other = lend(size)
     assert address(other) != first
     other[:] = 0
     assert (array == 3.0).all()
     del array
-    assert len(returned) == 1
+    assert len(free) == 1
     assert address(lend(size - 1)) != first  # it is small: new memory
     assert address(lend(size)) == first
 
 
-def test_few_blocks_are_kept(returned):
-    blocks = [lend(LENT[0]) for _ in range(5)]
-    assert len({address(block) for block in blocks}) == 5
+def test_the_smallest_block_that_is_large_enough_is_lent(free):
+    sizes = [4 * LEAST, 2 * LEAST, 3 * LEAST]
+    blocks = [lend(size) for size in sizes]
+    firsts = list(map(address, blocks))
     del blocks
-    assert len(returned) == MOST_RETURNED
+    assert address(lend(2 * LEAST + 1)) == firsts[2]
+    assert len(lend(4 * LEAST + 1)) == 4 * LEAST + 1
+    assert sorted(map(len, free.values())) == [2 * LEAST, 3 * LEAST, 4 * LEAST, 4 * LEAST + 1]
 
 
-@pytest.mark.parametrize("size", [0, LENT[0] - 1, LENT[1] + 1])
-def test_little_and_very_much_memory_is_new(returned, size):
+def test_what_has_been_free_for_longest_makes_room(free, monkeypatch):
+    monkeypatch.setattr(buffer_pool, "MOST", 6 * LEAST)
+    blocks = [lend(k * LEAST) for k in (1, 2, 3, 4, 7)]
+    lengths = []
+    while blocks:
+        del blocks[0]
+        lengths.append([len(block) // LEAST for block in free.values()])
+    assert lengths == [[1], [1, 2], [1, 2, 3], [4], []]
+
+
+def test_a_much_larger_block_stays_free(free):
+    lend(2 * LEAST + 1)
+    assert len(lend(LEAST)) == LEAST
+    assert len(lend(LEAST + 1)) == 2 * LEAST + 1
+    assert len(free) == 2
+
+
+@pytest.mark.parametrize("size", [0, LEAST - 1])
+def test_little_memory_is_new(free, size):
     assert len(lend(size)) == size
-    assert not returned
+    assert not free
 
 
-def test_a_block_that_came_back_and_is_too_small_makes_room_for_another(returned):
-    lend(LENT[0])
-    assert len(lend(LENT[0] + 1)) == LENT[0] + 1
-    assert [len(block) for block in returned] == [LENT[0] + 1]
-
-
-def test_memory_that_jax_has_taken_over_is_not_lent_again(returned):
-    array = jnp.asarray(lend(LENT[0])[64:128].view(float))
+def test_memory_that_jax_has_taken_over_is_not_lent_again(free):
+    array = jnp.asarray(lend(LEAST)[64:128].view(float))
     expected = np.array(array)
     gc.collect()
     for _ in range(3):
-        lend(LENT[0])[:] = 7
+        lend(LEAST)[:] = 7
     np.testing.assert_array_equal(array, expected)
 
 
 def test_results_of_one_call_stay_as_they_are_in_the_next():
     run = Compiled(lambda x: (x + 1.0, jnp.sum(x)), ())
-    given = [np.full(LENT[0] // 8, float(k)) for k in range(5)]
+    given = [np.full(LEAST // 8, float(k)) for k in range(5)]
     for k, (more, total) in enumerate([run(x) for x in given]):
         np.testing.assert_array_equal(more, k + 1.0)
         assert total == k * len(more)
@@ -123,7 +109,7 @@ def test_arrays_begin_at_lines_and_have_nothing_in_common():
     assert [set(x.ravel().tolist()) for x in arrays] == [{0}, {1}, set(), {3}]
 
 
-def test_motions_are_their_own_beside_others_that_borrow_the_same_memory(kept):
+def test_motions_are_their_own_beside_others_that_borrow_the_same_memory(free):
     """What one motion has found is not what the next writes, in several threads as in one."""
     lengths = [0.038, 0.039, 0.04]
     grid = np.linspace(0.0, 2.0, 3001)
@@ -140,4 +126,4 @@ def test_motions_are_their_own_beside_others_that_borrow_the_same_memory(kept):
         thread.join()
     for k, values in found.items():
         np.testing.assert_array_equal(values, expected[k % 3])
-    assert bool(kept) == uses_machine_code()  # it is machine code that borrows
+    assert bool(free) == uses_machine_code()  # it is machine code that borrows

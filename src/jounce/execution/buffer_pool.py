@@ -1,38 +1,21 @@
-"""Memory that is kept from one computation to the next.
+"""Memory that is lent again once no array in it is left.
 
 The system gives new memory page by page, when each is first touched: a seventh of the time of a long grid in two
-threads, whose memory it takes back after each.
+threads, whose memory it takes back after each, and a quarter of that of a short one.
 """
 
 import math
 import weakref
-from collections import deque
 from collections.abc import Sequence
 
 import numpy as np
 
-MOST = 2**26  # bytes that are kept
+LEAST = 2**16  # bytes of a block that is lent again: new memory of fewer costs little
+MOST = 2**26  # bytes that are free at most
+LARGEST = 2  # block that is lent, by what is needed
 LINE = 64  # bytes of the cache's lines, at which arrays begin
 ENTRY = 8  # bytes of a number
-LENT = 2**16, 2**24  # bytes of blocks that come back by themselves: new memory of fewer costs little
-MOST_RETURNED = 2  # of these: the results of one call are given to the next
-_free: list[np.ndarray] = []
-_returned: deque[bytearray] = deque(maxlen=MOST_RETURNED)
-
-
-def acquire(size: int) -> np.ndarray:
-    """Return a block of so many bytes or more, whatever is in it."""
-    try:
-        block = _free.pop()
-    except IndexError:
-        block = np.empty(0, np.uint8)
-    return block if len(block) >= size else np.empty(size, np.uint8)
-
-
-def release(block: np.ndarray) -> None:
-    """Keep a block for the next who borrows, unless there is enough; nobody may use it any more."""
-    if sum(map(len, _free)) + len(block) <= MOST:
-        _free.append(block)
+_free: dict[int, np.ndarray] = {}  # blocks by their identities, that which came back last at the end
 
 
 def lend(size: int) -> np.ndarray:
@@ -40,18 +23,24 @@ def lend(size: int) -> np.ndarray:
 
     Nobody gives it back: the arrays in it, and only they, keep it.
     """
-    least, most = LENT
-    if not least <= size <= most:
+    if size < LEAST:
         return np.empty(size, np.uint8)
-    try:
-        block = _returned.popleft()
-    except IndexError:
-        block = bytearray()
-    if len(block) < size:
-        block = bytearray(size)
-    lease = np.frombuffer(block, np.uint8)  # the base of arrays in it, as its own memory is that of no array
-    weakref.finalize(lease, _returned.append, block).atexit = False
+    for block in sorted(_free.copy().values(), key=len):
+        # a much larger one would be kept for little; one that is gone another thread was faster to take
+        if size <= len(block) <= LARGEST * size and _free.pop(id(block), None) is not None:
+            break
+    else:
+        block = np.empty(size, np.uint8)
+    lease = np.frombuffer(memoryview(block), np.uint8)  # the base of arrays in it, which the block itself is of none
+    weakref.finalize(lease, _take_back, block).atexit = False
     return lease
+
+
+def _take_back(block: np.ndarray) -> None:
+    """Keep a block for the next; those that have been free for longest go if there is too much."""
+    _free[id(block)] = block
+    while sum(map(len, (blocks := _free.copy()).values())) > MOST:
+        _free.pop(next(iter(blocks)), None)
 
 
 def bytes_needed(shapes: Sequence[Sequence[int]]) -> int:

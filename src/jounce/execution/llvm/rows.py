@@ -7,7 +7,7 @@ transposed in the registers; NumPy takes a third as long for it as the torque of
 from collections.abc import Sequence
 
 from jounce.execution.llvm.text.code import Code
-from jounce.execution.llvm.text.values import IN_MEMORY, Value
+from jounce.execution.llvm.text.values import DTYPES, IN_MEMORY, Value
 
 
 def read(code: Code, pointer: str, size: int, kind: str) -> list[Value]:
@@ -21,38 +21,37 @@ def read(code: Code, pointer: str, size: int, kind: str) -> list[Value]:
             result[k] = "poison"
             for lane, row in enumerate(rows):
                 one, more = code.fresh(), code.fresh()
-                index = _place(code, row, k, kind)
-                code.lines.append(f"{one} = load {IN_MEMORY[kind]}, ptr {index}, align {_align(kind)}, {hint}")
+                index = _address(code, row, k, kind)
+                code.lines.append(f"{one} = load {IN_MEMORY[kind]}, ptr {index}, align {DTYPES[kind].itemsize}, {hint}")
                 code.lines.append(f"{more} = insertelement {of} {result[k]}, {IN_MEMORY[kind]} {one}, i64 {lane}")
                 result[k] = more
     for start in _starts(size, code.width):
         block = []
         for row in rows:
             block.append(code.fresh())
-            index = _place(code, row, start, kind)
-            code.lines.append(f"{block[-1]} = load {of}, ptr {index}, align {_align(kind)}, {hint}")
+            index = _address(code, row, start, kind)
+            code.lines.append(f"{block[-1]} = load {of}, ptr {index}, align {DTYPES[kind].itemsize}, {hint}")
         result[start : start + code.width] = _transposed(code, block, kind)
-    return [Value(_truth(code, str(name)) if kind == "b" else str(name), kind, lanes=True) for name in result]
+    names = [code.truths(str(name), of, lanes=True) if kind == "b" else str(name) for name in result]
+    return [Value(name, kind, lanes=True) for name in names]
 
 
 def write(code: Code, pointer: str, values: Sequence[Value]) -> None:
     """Put the numbers of the instants from `%lane` on, those of each one after another."""
     size, kind = len(values), values[0].kind
     rows, of = _rows(code, pointer, size, kind), f"<{code.width} x {IN_MEMORY[kind]}>"
-    names = [code.operand(value, lanes=True) for value in values]
-    if kind == "b":
-        names = [_wide(code, name) for name in names]
+    names = [code.stored_operand(value, of, lanes=True) for value in values]
     if size < code.width:
         for k, name in enumerate(names):
             for lane, row in enumerate(rows):
-                one, index = code.fresh(), _place(code, row, k, kind)
+                one, index = code.fresh(), _address(code, row, k, kind)
                 code.lines.append(f"{one} = extractelement {of} {name}, i64 {lane}")
-                code.lines.append(f"store {IN_MEMORY[kind]} {one}, ptr {index}, align {_align(kind)}")
+                code.lines.append(f"store {IN_MEMORY[kind]} {one}, ptr {index}, align {DTYPES[kind].itemsize}")
     for start in _starts(size, code.width):
         block = _transposed(code, names[start : start + code.width], kind)
         for row, name in zip(rows, block, strict=True):
-            index = _place(code, row, start, kind)
-            code.lines.append(f"store {of} {name}, ptr {index}, align {_align(kind)}")
+            index = _address(code, row, start, kind)
+            code.lines.append(f"store {of} {name}, ptr {index}, align {DTYPES[kind].itemsize}")
 
 
 def _starts(size: int, width: int) -> list[int]:
@@ -64,11 +63,11 @@ def _rows(code: Code, pointer: str, size: int, kind: str) -> list[str]:
     """Return where the numbers of each of the instants begin."""
     first = code.fresh()
     code.lines.append(f"{first} = mul i64 %lane, {size}")
-    start = _place(code, pointer, first, kind)
-    return [_place(code, start, lane * size, kind) for lane in range(code.width)]
+    start = _address(code, pointer, first, kind)
+    return [_address(code, start, lane * size, kind) for lane in range(code.width)]
 
 
-def _place(code: Code, pointer: str, index: int | str, kind: str) -> str:
+def _address(code: Code, pointer: str, index: int | str, kind: str) -> str:
     name = code.fresh("p")
     code.lines.append(f"{name} = getelementptr {IN_MEMORY[kind]}, ptr {pointer}, i64 {index}")
     return name
@@ -91,19 +90,3 @@ def _transposed(code: Code, block: Sequence[str], kind: str) -> list[str]:
                 result[index] = name
         bit *= 2
     return result
-
-
-def _truth(code: Code, name: str) -> str:
-    result = code.fresh()
-    code.lines.append(f"{result} = trunc <{code.width} x i8> {name} to <{code.width} x i1>")
-    return result
-
-
-def _wide(code: Code, name: str) -> str:
-    result = code.fresh()
-    code.lines.append(f"{result} = zext <{code.width} x i1> {name} to <{code.width} x i8>")
-    return result
-
-
-def _align(kind: str) -> int:
-    return {"b": 1, "i": 4}.get(kind, 8)

@@ -33,7 +33,7 @@ def call_subroutine(code: Code, equation: Any, given: Sequence[Values], write: W
     key = program.jaxpr, tuple([None if v.constant is None else literal(v) for some in values for v in some])
     if (known := code.subroutines.get(key)) is None:
         known = code.subroutines[key] = _written(code, program, given, write)
-    pointers = [_place(code, some) for some, is_read in zip(values, known.is_read, strict=True) if is_read]
+    pointers = [_pointer_to(code, some) for some, is_read in zip(values, known.is_read, strict=True) if is_read]
     regions = [code.room(len(some), "f", lanes=True) if None in some else None for _, some in known.results]
     pointers += [region.pointer for region in regions if region is not None]
     if any(regions):
@@ -44,7 +44,7 @@ def call_subroutine(code: Code, equation: Any, given: Sequence[Values], write: W
     ]
 
 
-def _place(code: Code, values: Sequence[Value]) -> str:
+def _pointer_to(code: Code, values: Sequence[Value]) -> str:
     """Return where an array begins in memory, and put there what is no constant unless all of it is there."""
     varying = [(k, value) for k, value in enumerate(values) if value.constant is None]
     region, _ = varying[0][1].home or (None, 0)

@@ -9,7 +9,7 @@ import jax
 import numpy as np
 from jaxtyping import Float, Int
 
-from jounce.execution.buffer_pool import acquire, arrays_in, bytes_needed, release
+from jounce.execution.buffer_pool import arrays_in, bytes_needed, lend
 from jounce.kinematics.continuation.correct_and_differentiate import SolvedState
 from jounce.kinematics.continuation.solver import Solver
 
@@ -48,9 +48,8 @@ class SolveBuffer:
         known, form = jax.tree.flatten(solver.needed(like) if of_designs else like)
         shapes = [(*leaf.shape[:-1], self.first_anchor + anchors) for leaf in known]
         shapes += [*((*value.shape[:-1], size) for value in (*outputs, *own.values())), *[(size,)] * 4]
-        self.block = acquire(bytes_needed(shapes))
         kinds = [*[float] * (len(shapes) - 2), *[int] * 2]
-        arrays = iter(arrays_in(self.block, shapes, kinds))
+        arrays = iter(arrays_in(lend(bytes_needed(shapes)), shapes, kinds))
         self._known = jax.tree.unflatten(form, [next(arrays) for _ in known])
         nowhere = dict.fromkeys(like[0]), tuple([next(arrays) for _ in outputs]), None
         self.state: tuple[Any, Any, Any] = nowhere if of_designs else self._known
@@ -140,8 +139,4 @@ def solve_in_buffers(
         idle_buffers.append(buffer)
         return count
 
-    try:
-        yield from each(solve, items)
-    finally:
-        while idle_buffers:  # one that a thread still uses is not among them
-            release(idle_buffers.pop().block)
+    yield from each(solve, items)

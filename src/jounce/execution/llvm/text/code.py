@@ -124,26 +124,35 @@ class Code(Scalars):
 
     def load_along(self, region: Region, index: int | Value) -> Value:
         """Return a vector of numbers that lie one after another from a place of memory on."""
-        one, position = IN_MEMORY[region.kind], self._address(region, index)
-        name, of = self.fresh(), f"<{self.width} x {one}>"
+        of, position = f"<{self.width} x {IN_MEMORY[region.kind]}>", self._address(region, index)
         hint = ", !invariant.load !0" if region.given else ""
-        self.lines.append(f"{name} = load {of}, ptr {position}, align {DTYPES[region.kind].itemsize}{hint}")
-        if region.kind == "b":
-            byte, name = name, self.fresh()
-            self.lines.append(f"{name} = trunc {of} {byte} to {self.type_of('b', lanes=True)}")
-        return Value(name, region.kind, True)
+        text = f"load {of}, ptr {position}, align {DTYPES[region.kind].itemsize}{hint}"
+        return self._read(text, of, region.kind, lanes=True)
 
     def store_along(self, region: Region, index: int | Value, value: Value) -> None:
         """Put a vector of numbers one after another from a place of memory on."""
-        one, position, operand = IN_MEMORY[region.kind], self._address(region, index), self.operand(value, lanes=True)
-        of = f"<{self.width} x {one}>"
-        if region.kind == "b":
-            operand = self._bytes(operand, of, lanes=True)
+        of, position = f"<{self.width} x {IN_MEMORY[region.kind]}>", self._address(region, index)
+        operand = self.stored_operand(value, of, lanes=True)
         self.lines.append(f"store {of} {operand}, ptr {position}, align {DTYPES[region.kind].itemsize}")
 
-    def _bytes(self, truths: str, of: str, *, lanes: bool) -> str:
-        """Return truth values as they are in memory, of a type."""
-        return self._emitted(f"zext {self.type_of('b', lanes=lanes)} {truths} to {of}", "b", lanes=True).name
+    def _read(self, text: str, of: str, kind: str, *, lanes: bool, home: tuple[Region, int] | None = None) -> Value:
+        """Return what an instruction reads from memory, of a type there."""
+        name = self.fresh()
+        self.lines.append(f"{name} = {text}")
+        return Value(self.truths(name, of, lanes=lanes) if kind == "b" else name, kind, lanes, home=home)
+
+    def truths(self, numbers: str, of: str, *, lanes: bool) -> str:
+        """Return truth values from what they are in memory, of a type there."""
+        name = self.fresh()
+        self.lines.append(f"{name} = trunc {of} {numbers} to {self.type_of('b', lanes=lanes)}")
+        return name
+
+    def stored_operand(self, value: Value, of: str, *, lanes: bool) -> str:
+        """Return a value as an operand of what puts it into memory, of a type there."""
+        operand = self.operand(value, lanes=lanes)
+        if value.kind != "b":
+            return operand
+        return self._emitted(f"zext {self.type_of('b', lanes=lanes)} {operand} to {of}", "b", lanes=True).name
 
     def _address(self, region: Region, index: int | Value) -> str:
         position = str(index) if isinstance(index, int) else self.operand(index, lanes=False)
@@ -154,51 +163,32 @@ class Code(Scalars):
         """Return the number at a place of memory, which must be one of its own."""
         if isinstance(index, Value) and index.lanes:
             return self._gathered(region, index)
-        position = self._place(region, index)
-        hint = ", !invariant.load !0" if region.given else ""
-        name, home = self.fresh(), (region, index) if isinstance(index, int) else None
-        if region.kind == "b":
-            byte, of = self.fresh(), f"<{self.width} x i8>" if region.lanes else "i8"
-            self.lines += [
-                f"{byte} = load {position}{hint}",
-                f"{name} = trunc {of} {byte} to {self.type_of('b', lanes=region.lanes)}",
-            ]
-        else:
-            self.lines.append(f"{name} = load {position}{hint}")
-        return Value(name, region.kind, region.lanes, home=home)
+        of, position = self._element(region, index)
+        hint, home = ", !invariant.load !0" if region.given else "", (region, index) if isinstance(index, int) else None
+        return self._read(f"load {of}, {position}{hint}", of, region.kind, lanes=region.lanes, home=home)
 
     def store(self, region: Region, index: int | Value, value: Value) -> None:
         """Put a number at a place of memory, which must be one of its own."""
         if isinstance(index, Value) and index.lanes:
             self._scatter(region, index, value)
             return
-        operand = self.operand(value, lanes=region.lanes)
-        if region.kind == "b":
-            of = f"<{self.width} x i8>" if region.lanes else "i8"
-            operand = self._bytes(operand, of, lanes=region.lanes)
-        of, rest = self._place(region, index).split(", ", 1)
-        self.lines.append(f"store {of} {operand}, {rest}")
+        of, position = self._element(region, index)
+        self.lines.append(f"store {of} {self.stored_operand(value, of, lanes=region.lanes)}, {position}")
 
     def _gathered(self, region: Region, index: Value) -> Value:
         """Return numbers at a place of memory that differs from lane to lane."""
         indices, of, kinds = self._addresses(region, index)
-        name, every = self.fresh(), self.operand(self.constant(True), lanes=True)
+        every = self.operand(self.constant(True), lanes=True)
         function = f"@llvm.masked.gather.{kinds}.v{self.width}p0"
         self.intrinsics.add(f"declare {of} {function}(<{self.width} x ptr>, i32, <{self.width} x i1>, {of})")
         align = DTYPES[region.kind].itemsize
         given = f"<{self.width} x ptr> {indices}, i32 {align}, <{self.width} x i1> {every}, {of} poison"
-        self.lines.append(f"{name} = call {of} {function}({given})")
-        if region.kind == "b":
-            byte, name = name, self.fresh()
-            self.lines.append(f"{name} = trunc {of} {byte} to {self.type_of('b', lanes=True)}")
-        return Value(name, region.kind, True)
+        return self._read(f"call {of} {function}({given})", of, region.kind, lanes=True)
 
     def _scatter(self, region: Region, index: Value, value: Value) -> None:
         """Put numbers at a place of memory that differs from lane to lane: each lane has places of its own."""
         indices, of, kinds = self._addresses(region, index)
-        operand, every = self.operand(value, lanes=True), self.operand(self.constant(True), lanes=True)
-        if region.kind == "b":
-            operand = self._bytes(operand, of, lanes=True)
+        operand, every = self.stored_operand(value, of, lanes=True), self.operand(self.constant(True), lanes=True)
         function = f"@llvm.masked.scatter.{kinds}.v{self.width}p0"
         self.intrinsics.add(f"declare void {function}({of}, <{self.width} x ptr>, i32, <{self.width} x i1>)")
         align = DTYPES[region.kind].itemsize
@@ -220,8 +210,8 @@ class Code(Scalars):
         short = f"v{self.width}{'f64' if region.kind == 'f' else one}"
         return self._emitted(address, "l", lanes=True).name, f"<{self.width} x {one}>", short
 
-    def _place(self, region: Region, index: int | Value) -> str:
-        """Return the type of a number in memory, its address, and of what this is a multiple."""
+    def _element(self, region: Region, index: int | Value) -> tuple[str, str]:
+        """Return the type of a number in memory, and its address with what that is a multiple of."""
         one = IN_MEMORY[region.kind]
         of = f"<{self.width} x {one}>" if region.lanes else one
         position = str(index) if isinstance(index, int) else self.operand(index, lanes=False)
@@ -230,7 +220,7 @@ class Code(Scalars):
             position = self._emitted(f"add i64 {first}, %lane", "l", lanes=False).name
         address = f"getelementptr {one if region.given else of}, ptr {region.pointer}, i64 {position}"
         name = self._emitted(address, "l", lanes=False).name
-        return f"{of}, ptr {name}, align {DTYPES[region.kind].itemsize}"
+        return of, f"ptr {name}, align {DTYPES[region.kind].itemsize}"
 
     # -- attempts -----------------------------------------------------------------------------------------------------
 
