@@ -12,12 +12,12 @@ that of the other, and the instant changes with the state: it is where the accel
 
 import dataclasses
 from collections.abc import Callable, Mapping
+from functools import partial
 from typing import Any
 
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jax.errors import ConcretizationTypeError
 from jaxtyping import Float, Int
 
 from jounce.base.modules import with_fields
@@ -25,7 +25,7 @@ from jounce.base.shapes import Numbers
 from jounce.dynamics.forward.accelerations import Equations, Instants, State
 from jounce.dynamics.forward.initial_state import at_rest, initial_as_drivers
 from jounce.dynamics.masses import gravity_of, masses_of
-from jounce.errors import AssemblyError, MobilityError, SolveError, UnsupportedError
+from jounce.errors import UnsupportedError
 from jounce.execution.compilation import compiled
 from jounce.integrate.marching.divided_steps import Pieces, divided_steps, series_through
 from jounce.integrate.marching.force_discontinuities import Kinked, refined_kink_state, shifted, with_value
@@ -39,9 +39,15 @@ from jounce.integrate.steps.options import instants_of
 from jounce.integrate.steps.projection import normalized
 from jounce.jet import Jet
 from jounce.kinematics.position_analysis.solve import checked_order
-from jounce.kinematics.sensitivity.sensitivities import Solved, check_not_redundant, failed, first_of, solved_shapes
+from jounce.kinematics.sensitivity.sensitivities import (
+    Solved,
+    check_not_redundant,
+    first_of,
+    given_instants,
+    solved_or_failed,
+    solved_shapes,
+)
 from jounce.kinematics.sensitivity.traced_motion import TracedMotion
-from jounce.kinematics.status import Status
 from jounce.mechanism import Mechanism, Model
 from jounce.mechanism.building.preconditions import check_holonomic
 from jounce.mechanism.building.traced import Angles, angles_of, template, traced_model
@@ -117,24 +123,16 @@ def _as_floats(values: list[Any]) -> tuple[Any, ...]:
 def _called(simulate: Callable[..., Any], mechanism: Mechanism, options: Mapping[str, Any]) -> TracedMotion:
     """Return a simulation within `jax.jit` or `jax.vmap`: what is compiled calls it, one mechanism after another."""
     order = checked_order(options.get("order", 4))
-    time = mechanism.time if options.get("time") is None else options["time"]
-    try:
-        instants = instants_of(time, mechanism.parameter_values)
-    except ConcretizationTypeError:
-        raise UnsupportedError("the instants depend on values that JAX traces; give them", name="time") from None
+    instants = given_instants(mechanism, options.get("time"), instants_of)
     (values, made), levels = template(mechanism), order + max(lost_orders(mechanism.outputs.values()), 1) + 1
     shapes = solved_shapes(mechanism, len(instants), levels)
     options = {**options, "time": instants, "strict": False}
 
     def solved_at(values: tuple[Any, ...]) -> Solved:
-        try:
-            motion = simulate(made(values), **options)
-        except (AssemblyError, MobilityError, SolveError) as error:
-            status = np.full(len(instants), float(getattr(error, "status", None) or Status.NOT_REACHED))
-            return failed(shapes, status)
+        motion = simulate(made(values), **options)
         return motion.solved if motion.traced else _solved(motion, dict(motion.poses[1]))
 
-    solved = called(solved_at, shapes, _as_floats(values))
+    solved = called(partial(solved_or_failed, solved_at, shapes), shapes, _as_floats(values))
     model = traced_model(mechanism, solved.length, solved.angles, first_of(solved.coordinates))
     check_not_redundant(model)
     return TracedMotion(mechanism, (model, model), instants, order, solved)

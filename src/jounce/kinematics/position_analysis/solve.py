@@ -6,10 +6,9 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from jax.errors import ConcretizationTypeError
 
 from jounce.base.activity import Count
-from jounce.errors import AssemblyError, MechanismError, MobilityError, SolveError, UnsupportedError
+from jounce.errors import AssemblyError, MechanismError, MobilityError, SolveError
 from jounce.execution.backends import joined
 from jounce.execution.background import prepare_later
 from jounce.execution.store.programs import expect
@@ -27,7 +26,7 @@ from jounce.kinematics.position_analysis.limit_position_messages import dead_end
 from jounce.kinematics.results.actuation import actuated
 from jounce.kinematics.results.motion import Motion
 from jounce.kinematics.results.output_programs import prepare_outputs
-from jounce.kinematics.sensitivity.sensitivities import differentiable_motion
+from jounce.kinematics.sensitivity.sensitivities import differentiable_motion, given_instants
 from jounce.kinematics.sensitivity.traced_motion import TracedMotion
 from jounce.kinematics.status import Status
 from jounce.mechanism import Mechanism, Model, build, check_mechanism, time_grid, with_output_drivers
@@ -53,14 +52,7 @@ def _differentiated(solve: Callable[..., Motion], given: Mapping[str, Any]) -> M
     check_mechanism(mechanism)
     options = {name: value for name, value in given.items() if name not in ("mechanism", "time", "order", "strict")}
     order = checked_settings(mechanism, given.get("order", 4), options.get("tolerance", 1e-12))
-    time = mechanism.time if given.get("time") is None else given["time"]
-    try:
-        instants = time_grid(time, mechanism.parameter_values)
-    except ConcretizationTypeError:
-        message = (
-            "the instants depend on values that JAX traces, and are held when a motion is differentiated; give them"
-        )
-        raise UnsupportedError(message, name="time") from None
+    instants = given_instants(mechanism, given.get("time"), time_grid)
     levels = max(order + lost_orders(mechanism.outputs.values()), LOWEST_ORDER) + 1
 
     def solved(mechanism: Mechanism, known: bool) -> Motion:

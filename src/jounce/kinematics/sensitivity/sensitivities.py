@@ -18,11 +18,12 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from jax.core import Tracer
+from jax.errors import ConcretizationTypeError
 from jaxtyping import Float
 
 from jounce.base.modules import with_fields
 from jounce.base.shapes import Numbers
-from jounce.errors import AssemblyError, MechanismError, MobilityError, SolveError
+from jounce.errors import AssemblyError, MechanismError, MobilityError, SolveError, UnsupportedError
 from jounce.execution.compilation import Compiled, compiled
 from jounce.jet import Jet
 from jounce.jet.algebra import stacked
@@ -101,23 +102,17 @@ def differentiable_motion(
     shapes = solved_shapes(mechanism, len(instants), levels)
 
     def on_the_host(strict: bool, values: Values) -> Solved:
-        try:
-            motion = solve(made(values), strict)
-        except (AssemblyError, MobilityError, SolveError) as error:
-            if strict:
-                raise
-            status = np.full(len(instants), float(getattr(error, "status", None) or Status.NOT_REACHED))
-        else:
-            if np.any(motion.status == Status.OK):  # else nothing is known of drivers that follow from outputs
-                return _solved(motion)
-            status = motion.status.astype(float)
-        return failed(shapes, status)
+        motion = solve(made(values), strict)
+        if np.any(motion.status == Status.OK):  # else nothing is known of drivers that follow from outputs
+            return _solved(motion)
+        return _failed(shapes, motion.status)
 
     @jax.custom_jvp
     def solution(values: Values) -> Solved:
         if not any(isinstance(value, Tracer) for value in values):
             return jax.tree.map(jnp.asarray, on_the_host(True, values))
-        each = partial(_one_by_one, partial(on_the_host, False), shapes, [np.ndim(value) for value in values])
+        solve_one = partial(solved_or_failed, partial(on_the_host, False), shapes)
+        each = partial(_one_by_one, solve_one, shapes, [np.ndim(value) for value in values])
         return called_back(each, shapes, values, vmap_method="broadcast_all")
 
     @solution.defjvp
@@ -160,9 +155,27 @@ def solved_shapes(mechanism: Mechanism, count: int, levels: int) -> Solved:
     return Solved(coordinates, of(count), of(), Angles(angle[:3], near), angle[3], continued)
 
 
-def failed(shapes: Solved, status: Float[Numbers, " time"]) -> Solved:
+def _failed(shapes: Solved, status: Any) -> Solved:
     """Return a solution of which only the status is known."""
-    return jax.tree.map(lambda x: np.full(x.shape, np.nan), shapes)._replace(status=status)
+    unknown = jax.tree.map(lambda x: np.full(x.shape, np.nan), shapes)
+    return unknown._replace(status=np.broadcast_to(np.asarray(status, float), shapes.status.shape))
+
+
+def solved_or_failed(solve: Callable[[Values], Solved], shapes: Solved, values: Values) -> Solved:
+    """Return the solution of a design; of one whose motion cannot be begun, only the status is known."""
+    try:
+        return solve(values)
+    except (AssemblyError, MobilityError, SolveError) as error:
+        return _failed(shapes, getattr(error, "status", None) or Status.NOT_REACHED)
+
+
+def given_instants(mechanism: Mechanism, time: Any, read: Callable[..., np.ndarray]) -> Float[np.ndarray, " time"]:
+    """Return the instants that are given, or the mechanism's own, which must not follow from values that JAX traces."""
+    try:
+        return read(mechanism.time if time is None else time, mechanism.parameter_values)
+    except ConcretizationTypeError:
+        message = "the instants depend on values that JAX traces, and are held where a motion is differentiated"
+        raise UnsupportedError(f"{message}; give them", name="time") from None
 
 
 def _solved(motion: Motion) -> Solved:

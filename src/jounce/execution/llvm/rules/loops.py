@@ -254,7 +254,7 @@ def _gather(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Array
     def window(which: list[int | Value]) -> None:
         first, inside = _placed(code, p, array, indices, named, sizes, which)
         batching = [which[k] for k in numbers.start_indices_batching_dims]
-        first = _at(code, array, numbers.operand_batching_dims, batching, first)
+        first = _at(code, array, [*map(int, numbers.operand_batching_dims)], batching, first)
         source = Stored(array.region, tuple(sizes[a] for a in taken), tuple(array.strides[a] for a in taken), first)
         start = _at(code, result, batch, which, result.first)
         target = Stored(result.region, source.shape, tuple(result.strides[a] for a in offsets), start)
@@ -291,7 +291,7 @@ def _scatter(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Arra
     def window(which: list[int | Value]) -> None:
         first, inside = _placed(code, p, result, indices, named, sizes, which)
         batching = [which[k] for k in numbers.scatter_indices_batching_dims]
-        first = _at(code, result, numbers.operand_batching_dims, batching, first)
+        first = _at(code, result, [*map(int, numbers.operand_batching_dims)], batching, first)
         shape, strides = (tuple(its[a] for a in remaining) for its in (sizes, result.strides))
         target = Stored(result.region, shape, strides, first)
         start = _at(code, updates, batch, which, updates.first)
