@@ -31,7 +31,7 @@ def lend(size: int) -> np.ndarray:
             break
     else:
         block = np.empty(size, np.uint8)
-    lease = np.frombuffer(memoryview(block), np.uint8)  # the base of arrays in it, which the block itself is of none
+    lease: np.ndarray = np.frombuffer(block.data, np.uint8)  # the base of arrays in it, as a block is not
     weakref.finalize(lease, _take_back, block).atexit = False
     return lease
 

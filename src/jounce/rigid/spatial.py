@@ -94,8 +94,8 @@ class SpatialPose(AbstractFrame):
         cls, position: Float[Numbers, "3 *batch"] | Refused, quaternion: Float[Numbers, "4 *batch"] | Refused
     ) -> "SpatialPose":
         """Build the pose of order zero; the quaternion is normalized."""
-        position = real_or_traced("position", position, JounceError)
-        return cls.at_unit(position, _normalized(real_or_traced("quaternion", quaternion, JounceError)))
+        origin: Any = real_or_traced("position", position, JounceError)
+        return cls.at_unit(origin, _normalized(real_or_traced("quaternion", quaternion, JounceError)))
 
     @classmethod
     def at_unit(cls, position: Float[Numbers, "3 *batch"], quaternion: Float[Numbers, "4 *batch"]) -> "SpatialPose":

@@ -144,7 +144,7 @@ class PathTracker:
         shift, turn = self.parts(direction)
         first = {"position": shift, "angle": turn[0]} if pose_type is PlanarPose else {"position": shift}
         if "quaternion" in point.coordinates:
-            first["quaternion"] = quaternion_change(point.coordinates["quaternion"][0], turn)
+            first["quaternion"] = np.asarray(quaternion_change(point.coordinates["quaternion"][0], turn))
         series = {name: np.zeros_like(c) for name, c in point.coordinates.items()}
         for name, c in point.coordinates.items():
             series[name][0], series[name][1] = c[0], first[name]
