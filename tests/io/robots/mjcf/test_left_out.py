@@ -199,6 +199,22 @@ def test_a_weld_of_bodies_that_only_a_user_moves_is_left_out(tmp_path, ends):
     assert robot.joint_names == ("joint_0",)
 
 
+def test_a_mocap_body_that_holds_another_stands_still_and_is_told_of(tmp_path):
+    """Where MuJoCo lets it stand, too, the arm hangs on it: the closure stays, and only its motion is left out."""
+    path = tmp_path / "robot.xml"
+    path.write_text(
+        '<mujoco><worldbody><body name="hand" mocap="true" pos="1 0 0"><geom size="0.1"/></body>'
+        '<body name="arm"><joint axis="0 1 0"/><geom size="0.1" pos="1 0 0"/></body></worldbody>'
+        '<equality><connect name="grip" body1="arm" body2="hand" anchor="1 0 0"/></equality></mujoco>'
+    )
+    says = r"motion of mocap bodies, which stand still, with what closures hold to them: hand \(line 1\)"
+    with pytest.warns(jn.errors.RobotWarning, match=says):
+        robot = jn.load_robot(path)
+    assert list(robot.closures) == ["grip"]
+    with pytest.raises(jn.errors.RobotFileError, match="computed without motion of mocap bodies"):
+        jn.load_robot(path, strict=True)
+
+
 def stepped(tmp_path, joint="", after=""):
     """Return how far a weightless knee is bent ten seconds after it was let go at half a radian."""
     path = written(tmp_path, 'gravity="0 0 0"', "", f'damping="0.5" {joint}', after)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import importlib
+import itertools
 import re
 from collections.abc import Container, Iterable
 from os import PathLike
@@ -13,7 +14,7 @@ import numpy as np
 from jaxtyping import Float
 
 from jounce.errors import JounceError, RobotError, RobotFileError
-from jounce.io.robots.elements.faults import FIXED_ALREADY, Faults, left_out
+from jounce.io.robots.elements.faults import FIXED_ALREADY, LEAVE, MOCAP, Faults, left_out
 from jounce.io.robots.elements.followers import with_room
 from jounce.io.robots.elements.xml_elements import Element
 from jounce.io.robots.mjcf.drives import Drives, works
@@ -241,15 +242,16 @@ class _Reader:
             self.lines[f"closures.{names[k]}"] = lines[k]
             if kind in (int(kinds.mjEQ_CONNECT), int(kinds.mjEQ_WELD)):
                 closure = self._closure(k, names[k])
-                rigid = [int(model.body_weldid[self.bodies.index(link)]) for link in closure.links]
-                rigid = [
-                    0 if model.body_mocapid[body] >= 0 else body for body in rigid
-                ]  # which stay where they are here
+                welded = [int(model.body_weldid[self.bodies.index(link)]) for link in closure.links]
+                mocap = [model.body_mocapid[body] >= 0 for body in welded]
+                rigid = [0 if still else body for body, still in zip(welded, mocap, strict=True)]
                 if rigid[0] == rigid[1]:
                     message = f"{closure.links[0]} and {closure.links[1]} are fixed to one another, and need no closure"
                     self.faults.leave_out(FIXED_ALREADY, names[k], RobotFileError(message, **location))
                 else:
                     self.closures.append(closure)
+                    for link in itertools.compress(closure.links, mocap):
+                        self.faults.leave_out(MOCAP, link, RobotFileError(LEAVE.format(MOCAP), **location))
                 continue
             if kind == int(kinds.mjEQ_JOINT):
                 self.ties.add_joints(k, location)

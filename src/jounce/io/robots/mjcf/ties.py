@@ -9,7 +9,8 @@ from jounce.errors import RobotFileError
 from jounce.io.robots.mjcf.files import line_of
 from jounce.robot.model.links_and_joints import Mimic
 
-NO_CLOSURE = "has no equivalent joint or closure; remove it, or set active='false'"
+INACTIVE = "remove it, or set active='false'"
+NO_CLOSURE = f"has no equivalent joint or closure; {INACTIVE}"
 
 
 def tied_tendons(spec: Any, mujoco: Any, path: str) -> set[str]:
@@ -95,7 +96,7 @@ class JointRelations:
                 weights[joint] = weights.get(joint, 0.0) + factor * float(model.wrap_prm[part])
         tied = [joint for joint, weight in weights.items() if weight]
         if len(tied) not in (1, 2):
-            message = "a joint can follow one other only, and this ties another number of them"
+            message = f"a joint can follow one other only, and this ties another number of them; {INACTIVE}"
             raise RobotFileError(message, **location, value=[self.names[joint] for joint in tied])
         leader, follower = tied[0], tied[-1]
         if self.names[follower] in self.mimics:
