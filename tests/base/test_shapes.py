@@ -7,6 +7,7 @@ import xarray as xr
 
 import jounce as jn
 from jounce.base.shapes import by_component
+from jounce.mechanism.building.starting_guess import starting_guess
 
 ZYX = ["z", "y", "x"]
 VECTOR = [0.1, 0.2, 0.3]
@@ -106,3 +107,28 @@ def test_a_robot_takes_vectors_with_labels_as_their_lists(labeled):
     np.testing.assert_array_equal(*places)
     given, turned = ([1.0, 0.0, -9.81], labeled(values=(-9.81, 0.0, 1.0)))
     np.testing.assert_array_equal(robots[0].with_gravity(turned).gravity, given)
+
+
+@pytest.mark.parametrize("labeled", [series, array])
+@pytest.mark.parametrize(
+    "labels, values, plain, form",
+    [
+        ("xyzw", [0.1, 0.2, 0.3, 0.9], [0.9, 0.1, 0.2, 0.3], lambda v: v),
+        ("zyx", [3.0, 2.0, 1.0], [1.0, 2.0, 3.0], lambda v: {"axis": v, "angle": 0.4}),
+        ("zyx", [0.3, 0.2, 0.1], [0.3, 0.2, 0.1], lambda v: {"euler": "zyx", "angles": v}),
+    ],
+    ids=["quaternion", "axis", "Euler angles"],
+)
+def test_quaternions_have_the_scalar_first_and_angles_the_order_of_their_turns(labeled, labels, values, plain, form):
+    bodies = {"b": jn.Body([0, 0, 0], orientation=form(labeled(list(labels), values)))}
+    bodies["same"] = jn.Body([0, 0, 0], orientation=form(plain))
+    free = jn.Mechanism(space="spatial", bodies=bodies, joints={})
+    _, found, expected = starting_guess(free, {}, 3)["quaternion"][..., 0].T
+    np.testing.assert_array_equal(found, expected)
+
+
+@pytest.mark.parametrize("columns", [["x", "y"], ["y", "x"]])
+def test_points_of_curves_and_paths_go_by_the_names_of_their_columns(columns):
+    s = np.linspace(0.0, 1.0, 9)
+    points = pd.DataFrame({"x": s, "y": np.sin(s)})[columns]
+    np.testing.assert_array_equal(jn.joints.SampledCurve(points).points, np.stack([s, np.sin(s)], axis=-1))

@@ -204,6 +204,11 @@ def is_real(x: Any) -> TypeGuard[jax.Array]:
     return isinstance(x, jax.Array) and x.dtype.kind in "fiu"
 
 
+def has_labels(values: Any) -> bool:
+    """Tell whether values are an array of xarray or pandas."""
+    return hasattr(values, "isel") or hasattr(values, "iloc")
+
+
 def by_component(name: str | None, values: Any, error: Callable[..., Exception]) -> Any:
     """Return values with their components in the order x, y, z where they have such labels, in any order.
 

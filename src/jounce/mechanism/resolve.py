@@ -13,7 +13,7 @@ import numpy as np
 from jax.core import Tracer
 
 from jounce.base.modules import Module, belongs_to_package, unchecked
-from jounce.base.shapes import by_component, real_numbers
+from jounce.base.shapes import by_component, has_labels, real_numbers
 from jounce.constraints.facts import SIGNS, facts_of, field_kinds, has_other_sign, stem_of, value_fields
 from jounce.errors import JounceError, MechanismError
 from jounce.forces import AbstractForce, AbstractLaw, ExpressionLaw, FunctionLaw, TimeLaw, VectorLaw
@@ -50,20 +50,15 @@ def resolve(value: Any, parameters: Mapping[str, Any]) -> Any:
         return _number(value)
     if isinstance(value, np.ndarray | jax.Array) and not isinstance(value, Tracer):
         return real_numbers(None, value, MechanismError) if value.dtype.kind in "fiu" else value
-    if _has_labels(value):
+    if has_labels(value):
         return real_numbers(None, by_component(None, value, MechanismError), MechanismError)
     return value
-
-
-def _has_labels(value: Any) -> bool:
-    """Tell whether a value is an array with labels, of xarray or pandas."""
-    return hasattr(value, "isel") or hasattr(value, "iloc")
 
 
 def _is_number(value: Any) -> bool:
     """Tell whether a value is one number: also an array without axes, as an entry of a dataset is."""
     return isinstance(value, numbers.Real) or (
-        (isinstance(value, np.ndarray) or _has_labels(value)) and not np.ndim(value)
+        (isinstance(value, np.ndarray) or has_labels(value)) and not np.ndim(value)
     )
 
 
@@ -126,7 +121,7 @@ def resolve_law(law: Any, force: AbstractForce, parameters: Mapping[str, Any], c
     if components is None or isinstance(law, AbstractLaw) or (callable(law) and not isinstance(law, AbstractMotion)):
         force_law = _scalar_law(law, force, parameters)
     else:
-        law = resolve(law, parameters) if _has_labels(law) else law
+        law = resolve(law, parameters) if has_labels(law) else law
         entries = law.tolist() if isinstance(law, np.ndarray) else law
         if isinstance(entries, str) or not isinstance(entries, Sequence) or len(entries) != components:
             raise MechanismError(f"must be a list of {components} laws or numbers", value=_plain(law))

@@ -4,7 +4,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
-from jounce.base.shapes import ArrayLike, Numbers, Real, is_traced, real_numbers, seconds
+from jounce.base.shapes import ArrayLike, Numbers, Real, by_component, is_traced, real_numbers, seconds
 from jounce.errors import JounceError, TrajectoryError
 from jounce.jet import Jet, cross, dot, sqrt, stack, transpose
 from jounce.jet.pieces import last_begun
@@ -53,7 +53,7 @@ class AttitudeSamples:
     """
 
     def __init__(self, times: ArrayLike, quaternions: ArrayLike, degree: int = 5):
-        times, quaternions = _numbers(times, quaternions, "quaternions")
+        times, quaternions = _numbers(times, by_component("quaternions", quaternions, TrajectoryError), "quaternions")
         _check_times(times, quaternions, "quaternions", (4,), degree)
         length = np.linalg.norm(quaternions, axis=1)
         bad = np.abs(length - 1) > UNIT
@@ -83,7 +83,7 @@ class AttitudeSamples:
         TrajectoryError
             As in the class, and if a matrix is not a rotation.
         """
-        times, matrices = _numbers(times, matrices, "matrices")
+        times, matrices = _numbers(times, by_component("matrices", matrices, TrajectoryError), "matrices")
         _check_times(times, matrices, "matrices", (3, 3), degree)
         try:
             check_rotation(np.moveaxis(matrices, 0, -1), "matrices")

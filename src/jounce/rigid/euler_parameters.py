@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
+from jounce.base.shapes import by_component
 from jounce.errors import MechanismError, show_value, unknown
 from jounce.rigid.rotations import check_sequence
 
@@ -79,6 +80,8 @@ def euler_parameters(orientation: Any) -> Quaternion:
 
 def _numbers(values: Any, count: int, what: str) -> list[float]:
     """Return finite numbers, or raise a MechanismError that says what they are."""
+    if what != "the Euler angles":  # these have the order of the turns, whatever their labels are
+        values = by_component(None, values, MechanismError)
     try:
         numbers = [float(value) for value in values]
     except (TypeError, ValueError):

@@ -12,7 +12,7 @@ from jax.core import Tracer
 from jaxtyping import Float
 
 from jounce.base.modules import Module, field
-from jounce.base.shapes import ArrayLike, real_numbers
+from jounce.base.shapes import ArrayLike, by_component, real_numbers
 from jounce.errors import JounceError, MechanismError, whole_number
 from jounce.jet import Jet, stack
 from jounce.trajectory.curve_checks import check_curve, check_points, derivatives_at, refuses_without_ends
@@ -101,7 +101,7 @@ class SampledCurve(Module):
     degree: int = field(static=True)
 
     def __init__(self, points: ArrayLike, closed: bool = False, degree: int = 5):
-        samples = real_numbers("points", points, MechanismError)
+        samples = real_numbers("points", by_component("points", points, MechanismError), MechanismError)
         self.degree = whole_number("degree", degree, 1, 11, error=MechanismError)
         if not isinstance(closed, bool):
             raise MechanismError("must be true or false", name="closed", value=closed)

@@ -11,7 +11,7 @@ from jaxtyping import Float
 
 from jounce.base.activity import Count
 from jounce.base.moved_names import old_keyword
-from jounce.base.shapes import ArrayLike, real_numbers, seconds
+from jounce.base.shapes import ArrayLike, by_component, real_numbers, seconds
 from jounce.design.objectives.measures import PrescribedPath
 from jounce.design.optimization.result import OptimizedDesign
 from jounce.design.optimization.study import DesignRequest, Study
@@ -202,7 +202,8 @@ def _curve(name: str, given: Any) -> PrescribedPath:
     timed = isinstance(given, tuple) and len(given) == 2 and np.ndim(given[0]) == 1 and np.ndim(given[1]) == 2
     location, expected = f"curves.{name}", "points, (points, components), or a pair of times and points, all finite"
     times = seconds(location, given[0], MechanismError, expected) if timed else None
-    points = real_numbers(location, given[1] if timed else given, MechanismError, expected)
+    points = by_component(location, given[1] if timed else given, MechanismError)
+    points = real_numbers(location, points, MechanismError, expected)
     whole = points.ndim == 2 and len(points) and np.isfinite(points).all()
     if not whole or (times is not None and (times.shape != points.shape[:1] or not np.isfinite(times).all())):
         raise MechanismError(f"must be {expected}", name=location, value=given)

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
-from jounce.base.shapes import real_numbers
+from jounce.base.shapes import by_component, real_numbers
 from jounce.dynamics.motion_values import Coordinates, cut
 from jounce.errors import MechanismError, check_choice, check_name
 from jounce.jet.derivatives import taylor_coefficients
@@ -117,7 +117,7 @@ def _check_order(name: str, given_order: int, order: int) -> None:
 
 def _array(name: str, value: Any, shape: tuple[int, ...]) -> Float[np.ndarray, "..."]:
     """Return finite numbers: of a shape, or where it is not empty, one of them or a list of them."""
-    array = np.array(real_numbers(name, value, MechanismError))
+    array = np.array(real_numbers(name, by_component(name, value, MechanismError), MechanismError))
     if shape:
         scalar = shape == (1,)
         if array.ndim == len(shape) - scalar:

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from jounce.base.shapes import has_labels
 from jounce.constraints.cams import Cam
 from jounce.errors import JounceError, MechanismError
 from jounce.jet import Jet
@@ -66,7 +67,10 @@ def _attitude(orientation: Any, name: str, parameters: dict[str, Any]) -> np.nda
         return np.array([1.0, 0.0, 0.0, 0.0])
     try:
         if isinstance(orientation, Mapping):
-            given = {k: v if k == "euler" else resolve(v, parameters) for k, v in orientation.items()}
+            given = dict(orientation)
+            if has_labels(angles := given.get("angles")):
+                given["angles"] = np.asarray(angles)  # in the order of the turns, whatever their labels are
+            given = {k: v if k == "euler" else resolve(v, parameters) for k, v in given.items()}
         else:
             given = resolve(orientation, parameters)
         return np.array(euler_parameters(given))

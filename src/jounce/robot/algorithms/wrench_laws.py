@@ -8,6 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from jounce.base.modules import Module, field
+from jounce.base.shapes import by_component
 from jounce.errors import RobotError
 from jounce.jet.programs.composition import SampleFunction
 from jounce.robot.algorithms.wrenches import Wrench, check_wrenches
@@ -84,7 +85,7 @@ def wrench_laws(
 
 def _part(where: str, given: Any, n: int) -> WrenchPart:
     if not callable(given):
-        value = np.asarray(floats(where, given))
+        value = np.asarray(floats(where, by_component(where, given, RobotError)))
         if value.shape != (3,) or not np.isfinite(value).all():
             message = "must be three finite numbers, or a function of time, or of time, q and rates"
             raise RobotError(message, name=where, value=value.tolist())
