@@ -138,3 +138,43 @@ def test_derivatives_that_lie_otherwise_are_refused(arm, dims, orders, says):
     with pytest.raises(JounceError) as caught:
         jn.inverse_dynamics(arm, q if orders is None else q.assign_coords(derivative=orders))
     assert says in str(caught.value)
+
+
+T = np.linspace(0.0, 1.0, 6)
+WAVE = np.stack([np.sin(T), np.cos(T), -np.sin(T)], axis=1)
+
+
+def as_array(instants, orders, values):
+    return xarray.DataArray(values, dims=("time", "derivative"), coords={"time": instants, "derivative": orders})
+
+
+def as_table(instants, orders, values):
+    return pandas.DataFrame(values, index=instants, columns=pandas.Index(orders, name="derivative"))
+
+
+@pytest.mark.parametrize("labeled", [as_array, as_table])
+@pytest.mark.parametrize("law", [jn.laws.HermiteMotion, jn.laws.HermiteSplineMotion])
+def test_samples_whose_labels_have_another_order_are_refused(law, labeled):
+    """Times and values that are sorted unlike, or derivatives that are not those of order 0, 1, 2 and so on."""
+    given = labeled(T, [0, 1, 2], WAVE)
+    instant = jn.Jet.variable(0.37, 2)
+    expected = law(T, WAVE)(instant).derivatives()
+    np.testing.assert_array_equal(
+        law(given["time"] if labeled is as_array else given.index, given)(instant).derivatives(), expected
+    )
+    with pytest.raises(jn.errors.TrajectoryError, match="the times are its labels, in another order"):
+        law(T, given[::-1])
+    for orders in ([2, 1, 0], [1, 2, 3]):
+        with pytest.raises(jn.errors.TrajectoryError, match="its derivatives must be those of order 0, 1, 2"):
+            law(T, labeled(T, orders, WAVE))
+    law(T - T[0] + 5.0, given)  # times that are shifted are other times
+
+
+def test_a_column_goes_with_its_times():
+    column = pandas.Series(WAVE[:, 0], index=T)
+    with pytest.raises(JounceError, match="values: the times are its labels, in another order"):
+        jn.laws.SplineMotion(T, column[::-1])
+    with pytest.raises(JounceError, match="values: the times are its labels, in another order"):
+        jn.laws.SplineMotion(T, column.to_xarray()[::-1])
+    jn.laws.SplineMotion(column.index, column)
+    jn.laws.SplineMotion(T, pandas.Series(WAVE[:, 0]))

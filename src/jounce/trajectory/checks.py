@@ -11,6 +11,7 @@ from jounce import errors
 from jounce.base.shapes import ArrayLike, real_numbers, seconds
 from jounce.errors import JounceError, TrajectoryError
 from jounce.rigid import inertia
+from jounce.trajectory.labels import check_rows
 
 whole_number = partial(errors.whole_number, error=TrajectoryError)
 finite_numbers = partial(inertia.finite_numbers, error=TrajectoryError)
@@ -48,6 +49,7 @@ def check_samples(
     times: ArrayLike, values: ArrayLike, error: type[JounceError] = TrajectoryError
 ) -> tuple[Float[np.ndarray, " samples"], Float[np.ndarray, "samples *columns"]]:
     """Return times and values of samples: finite, two at least, a value or row for each time, times that increase."""
+    check_rows("values", times, values, error)
     times, values = seconds("times", times, error), real_numbers("values", values, error)
     if times.ndim != 1 or values.ndim < 1 or len(times) != len(values):
         shapes = f"shapes {times.shape} and {values.shape}"

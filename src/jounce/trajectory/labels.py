@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
+import numpy as np
+
 
 def in_order(
     name: str, values: Any, labels: Sequence[str], error: Callable[..., Exception], what: str = "joints"
@@ -53,6 +55,30 @@ def _check_derivatives(name: str, values: Any, error: Callable[..., Exception]) 
     orders = list(values.indexes.get("derivative", ()))
     if orders and orders != list(range(len(orders))):
         raise error("its derivatives must be those of order 0, 1, 2 and so on", name=name, value=orders)
+
+
+def check_rows(name: str, times: Any, values: Any, error: Callable[..., Exception]) -> None:
+    """Check the labels of samples, a row for each time, which may have a column for each derivative.
+
+    Raises
+    ------
+    Exception
+        That given, if the rows have the times as labels, in another order; or if columns that are labeled as
+        derivatives are not those of order zero, one and so on.
+    """
+    rows = labels_of_rows(values)
+    instants = list(np.ravel(np.asarray(times))) if rows else []
+    if rows != instants and len(rows) == len(instants) and set(rows) == set(instants):
+        message = "the times are its labels, in another order: sort times and values alike"
+        raise error(message, name=name, value=f"{rows[0]} first")
+    if hasattr(values, "isel") and hasattr(values, "indexes") and "derivative" in values.dims[1:]:
+        columns, named = list(values.indexes.get("derivative", ())), True
+    else:
+        columns = list(getattr(values, "columns", ()))
+        named = getattr(getattr(values, "columns", None), "name", None) == "derivative"
+    orders = list(range(len(columns)))
+    if columns != orders and (named or set(columns) == set(orders)) and columns:
+        raise error("its derivatives must be those of order 0, 1, 2 and so on", name=name, value=columns)
 
 
 def labels_of_rows(values: Any) -> list[object]:

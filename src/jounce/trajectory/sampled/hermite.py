@@ -9,6 +9,7 @@ from jounce.base.shapes import ArrayLike, seconds
 from jounce.errors import TrajectoryError, check_choice
 from jounce.trajectory.checks import finite_numbers, finite_row
 from jounce.trajectory.knots import Jumps, knot_jumps
+from jounce.trajectory.labels import check_rows
 from jounce.trajectory.motion import SplineMotion
 
 BEYOND = ("refuse", "hold", "continue")
@@ -50,6 +51,7 @@ class HermiteMotion(SplineMotion):
 
     def __init__(self, times: ArrayLike, derivatives: ArrayLike, beyond: str = "refuse", *, incomplete: bool = False):
         check_choice("beyond", beyond, BEYOND, TrajectoryError)
+        check_rows("derivatives", times, derivatives, TrajectoryError)
         instants = finite_row("times", times, seconds)
         shape = np.shape(derivatives)
         columns = shape[1] if len(shape) == 2 and shape[1] else 1
