@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import xarray as xr
 
 import jounce as jn
 from jounce import drivers, jet, spatial
@@ -40,6 +41,15 @@ def test_values_are_crossed_when_the_closed_form_says():
     roots = (5 + np.array([-1, 1]) * np.sqrt(5)) / 10
     for times, expected in zip(found, (roots, roots[:1], roots[1:], []), strict=True):
         assert times == pytest.approx(list(expected), abs=1e-14)
+
+
+def test_values_may_be_numbers_of_arrays_and_components_are_called_as_datasets_call_them():
+    place = jn.outputs.PointOutput("stone", [0, 0])
+    expected = happened(height(1.0))
+    for value in (np.float32(1.0), np.int64(1), np.array(1.0), xr.DataArray(1.0)):
+        assert happened(jn.Event(place, value, component="y")) == expected
+    with pytest.raises(jn.errors.MechanismError, match=r"events.component: .*'z'.*; valid: x, y"):
+        happened(jn.Event(place, component="z"))
 
 
 @pytest.mark.slow
@@ -176,6 +186,8 @@ def test_the_beginning_of_a_run_is_no_crossing():
     "keywords, words",
     [
         ({"value": np.nan}, "value: must be a finite number"),
+        ({"value": [1.0]}, "value: must be a finite number"),
+        ({"value": True}, "value: must be a finite number"),
         ({"derivative": 5}, "derivative: must be a whole number from 0 to 4"),
         ({"component": -1}, "component: must be a whole number"),
         ({"direction": 2}, "direction: must be -1, 0 or 1"),

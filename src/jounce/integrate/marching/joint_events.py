@@ -49,7 +49,7 @@ class JointEvent:
     """
 
     of: str | Callable[..., Any]
-    value: float = 0.0
+    value: Any = 0.0
     derivative: int = 0
     direction: int = 0
     terminal: bool = False

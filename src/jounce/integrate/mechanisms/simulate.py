@@ -11,7 +11,7 @@ from jounce.base.activity import Count
 from jounce.constraints import AbstractConstraint
 from jounce.dynamics.forward.ground import with_ground
 from jounce.dynamics.forward.initial_state import ConsistentStart, consistent_start
-from jounce.errors import JounceError, MechanismError, SolveError
+from jounce.errors import JounceError, MechanismError, SolveError, check_choice
 from jounce.execution.backends import joined
 from jounce.execution.store.programs import expect
 from jounce.integrate.marching.marching import RunLimits
@@ -195,6 +195,10 @@ def _detector_of(event: Event, mechanism: Mechanism, start: ConsistentStart) -> 
     group = output_group(event.output, mechanism, start.model)
     pose = start.equations.pose(start.state)
     components = jax.eval_shape(lambda: group.evaluate(pose).coefficients[0]).shape[0]
+    if isinstance(event.component, str):
+        labels = event.output.component_labels(mechanism)
+        check_choice("component", event.component, labels, MechanismError, name="events.component")
+        event = dataclasses.replace(event, component=labels.index(event.component))
     if event.component >= components:
         message = f"the output has {components} component{'s' if components > 1 else ''}, counted from 0"
         raise MechanismError(message, name="events.component", value=event.component)

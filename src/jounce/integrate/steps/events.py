@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from jaxtyping import Float, Int
 
-from jounce.base.shapes import is_traced
+from jounce.base.shapes import is_traced, real_numbers
 from jounce.dynamics.forward.accelerations import State
 from jounce.dynamics.forward.ground import turns_with_ground, with_ground
 from jounce.dynamics.motion_values import Coordinates
@@ -53,8 +53,8 @@ class Event:
         That is crossed, in the unit of the output (of its derivative).
     derivative : int, default 0
         Which time derivative crosses it: 1 with value 0 finds turning points.
-    component : int, default 0
-        Of a vector output.
+    component : int or str, default 0
+        Of a vector output: counted from 0, or as datasets call it, such as ``"y"``.
     direction : int, default 0
         1 for rising crossings only, -1 for falling ones, 0 for both; as time goes on, also in a run backward.
     terminal : bool, default False
@@ -73,9 +73,9 @@ class Event:
     """
 
     output: Any
-    value: float = 0.0
+    value: Any = 0.0
     derivative: int = 0
-    component: int = 0
+    component: int | str = 0
     direction: int = 0
     terminal: bool = False
 
@@ -88,13 +88,19 @@ class Event:
                 "Euler angles jump by whole turns; watch an entry of the rotation matrix, or a RelativeAngleOutput"
             )
             raise MechanismError(message, name="output", value=type(self.output).__name__)
-        check_crossing(self, MechanismError, derivative=4, component=4)
+        counted = {} if isinstance(self.component, str) else {"component": 4}
+        check_crossing(self, MechanismError, derivative=4, **counted)
 
 
 def check_crossing(event: Any, error: type[JounceError], **most: int) -> None:
-    """Raise an error unless the value, the direction and whole numbers of an event, up to some limits, are valid."""
-    if not (isinstance(event.value, int | float) and math.isfinite(event.value)):
+    """Raise an error unless the value, the direction and whole numbers of an event, up to some limits, are valid.
+
+    The value becomes a number of Python, whichever it is.
+    """
+    number = real_numbers("value", event.value, error, "a finite number")
+    if number.ndim or not np.isfinite(number):
         raise error("must be a finite number", name="value", value=event.value)
+    object.__setattr__(event, "value", float(number))
     for name, limit in most.items():
         whole_number(name, getattr(event, name), most=limit, error=error)
     if event.direction not in (-1, 0, 1):
