@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from jax.lax import GatherScatterMode
 
+from jounce.execution.llvm.rules.windows import windows_of
 from jounce.execution.llvm.text.arrays import Values, constants, each, filled, in_memory
 from jounce.execution.llvm.text.code import Code, flat
 from jounce.execution.llvm.text.values import DTYPES, Region, UnsupportedOperationError, Value, kind_of
@@ -185,50 +186,6 @@ def dynamic_update_slice(code: Code, _: Any, given: Sequence[Values]) -> Sequenc
     return [result]
 
 
-def _positions(
-    indices: np.ndarray,
-    shape: Sequence[int],
-    named: Sequence[Any],
-    batching: Mapping[Any, Any],
-    sizes: Sequence[int],
-    *,
-    drop: bool,
-) -> np.ndarray:
-    """Return which elements of an array are in windows of it, -1 for those of a window that is not inside.
-
-    Parameters
-    ----------
-    indices : array of shape (windows..., index)
-        Where windows start.
-    shape : sequence of int
-        Of the array.
-    named : sequence of int
-        The axes of the array that the indices are of.
-    batching : mapping
-        Axes of the array along which there is a window of length one for each element, and the axes of the windows
-        that count them.
-    sizes : sequence of int
-        Of a window.
-    drop : bool
-        Whether windows that are not inside have no elements; otherwise they are moved.
-
-    Returns
-    -------
-    array of shape (windows..., sizes...)
-    """
-    batch = indices.shape[:-1]
-    starts = np.zeros((*batch, len(shape)), int)
-    starts[..., list(named)] = indices
-    for axis, which in batching.items():
-        starts[..., axis] = np.arange(shape[axis]).reshape([-1 if k == which else 1 for k in range(len(batch))])
-    inside = starts.clip(0, np.subtract(shape, sizes))
-    strides = np.array([int(np.prod(shape[axis + 1 :])) for axis in range(len(shape))], int)
-    offsets = np.tensordot(strides, np.indices(sizes), 1)
-    result = (inside @ strides)[(..., *[None] * len(sizes))] + offsets
-    fits = (inside == starts).all(axis=-1)[(..., *[None] * len(sizes))]
-    return np.where(fits, result, -1) if drop else result
-
-
 def _known(indices: Values) -> tuple[np.ndarray, int | None]:
     """Return indices as numbers, zero where they are not known, and which of the columns has such ones, if one has."""
     known = np.vectorize(lambda value: 0 if value.constant is None else int(value.constant), otypes=[int])(indices)
@@ -248,29 +205,19 @@ def _with_column(indices: np.ndarray, column: int, number: int) -> np.ndarray:
 def gather(code: Code, equation: Any, given: Sequence[Values]) -> Sequence[Values]:
     """Return parts of an array at indices."""
     array, indices = given
-    p, numbers, dtype = equation.params, equation.params["dimension_numbers"], equation.outvars[0].aval.dtype
+    windows, dtype = windows_of(equation), equation.outvars[0].aval.dtype
     known, axis = _known(indices)
-    drop, batches = p["mode"] == GatherScatterMode.FILL_OR_DROP, indices.ndim - 1
-    batching = dict(zip(numbers.operand_batching_dims, numbers.start_indices_batching_dims, strict=True))
-    left_out = tuple(batches + axis for axis in (*numbers.collapsed_slice_dims, *numbers.operand_batching_dims))
-
-    def at(table: np.ndarray) -> np.ndarray:
-        result = _positions(table, array.shape, numbers.start_index_map, batching, p["slice_sizes"], drop=drop)
-        result = result.squeeze(left_out)
-        return np.moveaxis(result, range(batches, result.ndim), numbers.offset_dims)
-
-    values = [*flat(array), code.constant(filler(p, dtype), kind_of(dtype))]
+    values = [*flat(array), code.constant(filler(equation.params, dtype), kind_of(dtype))]
     if axis is None:
-        return [_taken(values, at(known))]
-    along = numbers.start_index_map[axis]
-    size, width = array.shape[along], p["slice_sizes"][along]
+        return [_taken(values, windows.positions(known, array.shape))]
+    along = windows.named[axis]
+    size, width = array.shape[along], windows.sizes[along]
     # one beyond each end, too; or while all of a part is inside, so that numbers in memory need not be copied
-    least, most = (-1, size) if drop else (0, size - width)
-    tables = [at(_with_column(known, axis, k)) for k in range(least, most + 1)]
+    least, most = (-1, size) if windows.drop else (0, size - width)
+    tables = [windows.positions(_with_column(known, axis, k), array.shape) for k in range(least, most + 1)]
     result = np.empty(tables[0].shape, object)
-    which = [k for k in range(result.ndim) if k not in numbers.offset_dims]
     for position in np.ndindex(result.shape):
-        index = within(code, indices[(*(position[k] for k in which), axis)], least, most)
+        index = within(code, indices[(*(position[k] for k in windows.batch), axis)], least, most)
         index = code.arithmetic("add", index, code.constant(-least, index.kind))
         result[position] = _element(code, [values[table[position]] for table in tables], index)
     return [result]
@@ -297,20 +244,7 @@ def scatter(code: Code, equation: Any, given: Sequence[Values]) -> Sequence[Valu
     known, moving = _known(indices)
     if not updates.size or not array.size:
         return [array]
-    p, add = equation.params, equation.primitive.name == "scatter-add"
-    numbers, windows, batches = p["dimension_numbers"], p["dimension_numbers"].update_window_dims, indices.ndim - 1
-    batching = dict(zip(numbers.operand_batching_dims, numbers.scatter_indices_batching_dims, strict=True))
-    left_out = (*numbers.inserted_window_dims, *numbers.operand_batching_dims)
-    remaining = dict(zip((axis for axis in range(array.ndim) if axis not in left_out), windows, strict=True))
-    sizes = [updates.shape[remaining[axis]] if axis in remaining else 1 for axis in range(array.ndim)]
-    drop = p["mode"] == GatherScatterMode.FILL_OR_DROP
-
-    def at(table: np.ndarray) -> np.ndarray:
-        result = _positions(table, array.shape, numbers.scatter_dims_to_operand_dims, batching, sizes, drop=drop)
-        result = result.squeeze(tuple(batches + axis for axis in left_out))
-        return np.moveaxis(result, range(batches, result.ndim), windows)
-
-    result = flat(array)
+    windows, add, result = windows_of(equation), equation.primitive.name == "scatter-add", flat(array)
 
     def put(index: int, value: Value, here: Value) -> None:
         if index >= 0:
@@ -318,16 +252,15 @@ def scatter(code: Code, equation: Any, given: Sequence[Values]) -> Sequence[Valu
             result[index] = code.select(here, new, result[index])
 
     if moving is None:
-        for index, value in zip(at(known).ravel().tolist(), flat(updates), strict=True):
+        for index, value in zip(windows.positions(known, array.shape).ravel().tolist(), flat(updates), strict=True):
             put(index, value, code.constant(True))
         return [filled(array.shape, result)]
-    along = numbers.scatter_dims_to_operand_dims[moving]
-    starts = range(array.shape[along] - sizes[along] + 1)
-    tables = [at(_with_column(known, moving, start)) for start in starts]
-    which = [k for k in range(updates.ndim) if k not in windows]
+    along = windows.named[moving]
+    starts = range(array.shape[along] - windows.sizes[along] + 1)
+    tables = [windows.positions(_with_column(known, moving, start), array.shape) for start in starts]
     for position in np.ndindex(updates.shape):
-        index = indices[(*(position[k] for k in which), moving)]
-        index = index if drop else within(code, index, starts[0], starts[-1])
+        index = indices[(*(position[k] for k in windows.batch), moving)]
+        index = index if windows.drop else within(code, index, starts[0], starts[-1])
         for start, table in zip(starts, tables, strict=True):
             here = code.compare("eq", index, code.constant(start, index.kind))
             put(int(table[position]), updates.item(position), here)

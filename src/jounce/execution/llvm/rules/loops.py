@@ -4,11 +4,10 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-from jax.lax import GatherScatterMode
-
 from jounce.execution.llvm.rules.indexing import clamped_starts, filler, within
 from jounce.execution.llvm.rules.loops_along_axes import REDUCTIONS, StoredRule, dot, extreme
 from jounce.execution.llvm.rules.operations import ELEMENTWISE, RULES
+from jounce.execution.llvm.rules.windows import Windows, windows_of
 from jounce.execution.llvm.text.arrays import Rule, filled
 from jounce.execution.llvm.text.code import Code
 from jounce.execution.llvm.text.stored import (
@@ -186,38 +185,27 @@ def _disjoint(code: Code, array: InMemory, changed: Stored) -> InMemory:
 # -- at indices -------------------------------------------------------------------------------------------------------
 
 
-def _placed(
-    code: Code,
-    p: Any,
-    array: Stored,
-    rows: Stored,
-    numbers: Mapping[int, int],
-    sizes: Sequence[int],
-    batch: Sequence[int | Value],
-) -> tuple[int | Value, Value]:
-    """Return the place of the first number of a window, moved into the array, and whether it was there already.
-
-    Parameters
-    ----------
-    rows : Stored
-        Indices, of which the last axis are those of a window.
-    numbers : mapping
-        Of the axes of the array for which there are indices, to their places among them.
-    sizes : sequence of int
-        Of a window, for each axis of the array.
-    batch : sequence
-        Which window it is.
-    """
-    position, inside = array.first, code.constant(True)
-    for axis, size in enumerate(array.shape):
-        if axis not in numbers:
-            continue
-        where = _at(code, rows, range(rows.ndim), (*batch, numbers[axis]), rows.first)
-        index = code.converted(without_home(code.load(rows.region, where)), "l")
-        remaining = within(code, index, 0, size - sizes[axis])
+def _window_at(
+    code: Code, windows: Windows, array: Stored, indices: Stored, which: Sequence[int | Value]
+) -> tuple[Stored, Value]:
+    """Return a window, moved into an array, and whether it was there already or need not be."""
+    first, inside = array.first, code.constant(True)
+    for k, axis in enumerate(windows.named):
+        where = _at(code, indices, range(indices.ndim), (*which, k), indices.first)
+        index = code.converted(without_home(code.load(indices.region, where)), "l")
+        remaining = within(code, index, 0, array.shape[axis] - windows.sizes[axis])
         inside = code.logic("and", inside, code.compare("eq", remaining, index))
-        position = further(code, position, remaining, array.strides[axis])
-    return position, inside if p["mode"] == GatherScatterMode.FILL_OR_DROP else code.constant(True)
+        first = further(code, first, remaining, array.strides[axis])
+    first = _at(code, array, [*windows.batching], [which[k] for k in windows.batching.values()], first)
+    shape, strides = (tuple(its[axis] for axis in windows.remaining) for its in (windows.sizes, array.strides))
+    return Stored(array.region, shape, strides, first), inside if windows.drop else code.constant(True)
+
+
+def _part_of(code: Code, windows: Windows, whole: Stored, which: Sequence[int | Value]) -> Stored:
+    """Return where a window is in the array of all of them."""
+    first = _at(code, whole, windows.batch, which, whole.first)
+    shape, strides = (tuple(its[k] for k in windows.offsets) for its in (whole.shape, whole.strides))
+    return Stored(whole.region, shape, strides, first)
 
 
 def _at(
@@ -229,35 +217,26 @@ def _at(
     return first
 
 
-def _windows(
+def _each_window(
     code: Code, shape: Sequence[int], body: Callable[[list[int | Value]], None], before: Sequence[int | Value] = ()
 ) -> None:
     """Write loops over the windows of an array."""
     if not shape:
         body(list(before))
         return
-    counted(code, shape[0], lambda k: _windows(code, shape[1:], body, (*before, k)))
+    counted(code, shape[0], lambda k: _each_window(code, shape[1:], body, (*before, k)))
 
 
 def _gather(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Array]:
     """Return parts of an array at indices."""
-    p, array, indices = equation.params, stored(code, given[0]), stored(code, given[1])
-    numbers, aval = p["dimension_numbers"], equation.outvars[0].aval
+    array, indices, windows = stored(code, given[0]), stored(code, given[1]), windows_of(equation)
+    aval = equation.outvars[0].aval
     result = new_storage(code, aval.shape, kind_of(aval.dtype), lanes=array.lanes or indices.lanes)
-    offsets = list(numbers.offset_dims)
-    batch = [axis for axis in range(result.ndim) if axis not in offsets]
-    left_out = *numbers.collapsed_slice_dims, *numbers.operand_batching_dims
-    taken = [axis for axis in range(array.ndim) if axis not in left_out]
-    sizes, named = p["slice_sizes"], {int(axis): k for k, axis in enumerate(numbers.start_index_map)}
-    beyond = stored(code, filled((), [code.constant(filler(p, aval.dtype), result.kind)]))
+    beyond = stored(code, filled((), [code.constant(filler(equation.params, aval.dtype), result.kind)]))
 
     def window(which: list[int | Value]) -> None:
-        first, inside = _placed(code, p, array, indices, named, sizes, which)
-        batching = [which[k] for k in numbers.start_indices_batching_dims]
-        first = _at(code, array, [*map(int, numbers.operand_batching_dims)], batching, first)
-        source = Stored(array.region, tuple(sizes[a] for a in taken), tuple(array.strides[a] for a in taken), first)
-        start = _at(code, result, batch, which, result.first)
-        target = Stored(result.region, source.shape, tuple(result.strides[a] for a in offsets), start)
+        source, inside = _window_at(code, windows, array, indices, which)
+        target = _part_of(code, windows, result, which)
         if inside.constant is not None:
             put(code, target, source)
             return
@@ -265,7 +244,7 @@ def _gather(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Array
         nest(code, [source, other], [target], lambda values: [code.select(inside, *values)])
 
     if array.size:
-        _windows(code, [result.shape[axis] for axis in batch], window)
+        _each_window(code, [result.shape[axis] for axis in windows.batch], window)
     else:
         put(code, result, spread(beyond, result.shape, ()))
     return [result]
@@ -275,36 +254,21 @@ def _scatter(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Arra
     """Put numbers at indices, or add them to what is there."""
     result = _to_change(code, equation, given)
     indices, updates = (stored(code, _disjoint(code, stored(code, array), result)) for array in given[1:])
-    p, add = equation.params, equation.primitive.name == "scatter-add"
-    numbers = p["dimension_numbers"]
+    windows, add = windows_of(equation), equation.primitive.name == "scatter-add"
     if not updates.size or not result.size:
         return [result]
-    windows = list(numbers.update_window_dims)
-    batch = [axis for axis in range(updates.ndim) if axis not in windows]
-    left_out = *numbers.inserted_window_dims, *numbers.operand_batching_dims
-    remaining = [axis for axis in range(result.ndim) if axis not in left_out]
-    sizes = [1] * result.ndim
-    for axis, of in zip(remaining, windows, strict=True):
-        sizes[axis] = updates.shape[of]
-    named = {int(axis): k for k, axis in enumerate(numbers.scatter_dims_to_operand_dims)}
 
     def window(which: list[int | Value]) -> None:
-        first, inside = _placed(code, p, result, indices, named, sizes, which)
-        batching = [which[k] for k in numbers.scatter_indices_batching_dims]
-        first = _at(code, result, [*map(int, numbers.operand_batching_dims)], batching, first)
-        shape, strides = (tuple(its[a] for a in remaining) for its in (sizes, result.strides))
-        target = Stored(result.region, shape, strides, first)
-        start = _at(code, updates, batch, which, updates.first)
-        source = Stored(updates.region, target.shape, tuple(updates.strides[a] for a in windows), start)
+        target, inside = _window_at(code, windows, result, indices, which)
 
         def body(values: Sequence[Value]) -> Sequence[Value]:
             old, value = values
             changed = code.arithmetic("add", old, value) if add else value
             return [code.select(inside, changed, old)]
 
-        nest(code, [target, source], [target], body, adds=True)
+        nest(code, [target, _part_of(code, windows, updates, which)], [target], body, adds=True)
 
-    _windows(code, [updates.shape[axis] for axis in batch], window)
+    _each_window(code, [updates.shape[axis] for axis in windows.batch], window)
     return [result]
 
 

@@ -1,0 +1,74 @@
+"""The windows of an array that gathers read and scatters write, as JAX says where they are."""
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from jax.lax import GatherScatterMode
+
+
+class Windows(NamedTuple):
+    """Windows of an array, one for each place along some axes of the array that they are taken to or put from.
+
+    Attributes
+    ----------
+    named : tuple of int
+        The axes of the array that the indices are of, in their order.
+    batching : dict of int to int
+        Axes of the array along which there is a window of length one for each element, and the axes of the windows that
+        count them.
+    sizes : tuple of int
+        Of a window, for each axis of the array.
+    remaining : tuple of int
+        The axes of the array that a window has.
+    offsets, batch : tuple of int
+        Where these are in the array of all windows, and its other axes.
+    drop : bool
+        Whether windows that are not inside have no elements; otherwise they are moved.
+    """
+
+    named: tuple[int, ...]
+    batching: dict[int, int]
+    sizes: tuple[int, ...]
+    remaining: tuple[int, ...]
+    offsets: tuple[int, ...]
+    batch: tuple[int, ...]
+    drop: bool
+
+    def positions(self, indices: np.ndarray, shape: Sequence[int]) -> np.ndarray:
+        """Return which elements of an array of a shape are in its windows, -1 for those of a window that is not inside.
+
+        Where windows start is given by indices that are known, (windows..., index).
+        """
+        batch = indices.shape[:-1]
+        starts = np.zeros((*batch, len(shape)), int)
+        starts[..., list(self.named)] = indices
+        for axis, which in self.batching.items():
+            starts[..., axis] = np.arange(shape[axis]).reshape([-1 if k == which else 1 for k in range(len(batch))])
+        inside = starts.clip(0, np.subtract(shape, self.sizes))
+        strides = np.array([int(np.prod(shape[axis + 1 :])) for axis in range(len(shape))], int)
+        offsets = np.tensordot(strides, np.indices(self.sizes), 1)
+        result = (inside @ strides)[(..., *[None] * len(shape))] + offsets
+        if self.drop:
+            result = np.where((inside == starts).all(axis=-1)[(..., *[None] * len(shape))], result, -1)
+        result = result.squeeze(tuple(len(batch) + axis for axis in range(len(shape)) if axis not in self.remaining))
+        return np.moveaxis(result, range(len(batch), result.ndim), self.offsets)
+
+
+def windows_of(equation: Any) -> Windows:
+    """Return the windows that a gather reads, or that a scatter writes."""
+    p, numbers = equation.params, equation.params["dimension_numbers"]
+    (array, *_, updates), result = [x.aval.shape for x in equation.invars], equation.outvars[0].aval.shape
+    if equation.primitive.name == "gather":
+        axes = numbers.offset_dims, numbers.collapsed_slice_dims, numbers.start_index_map
+        whole, counted = result, numbers.start_indices_batching_dims
+    else:
+        axes = numbers.update_window_dims, numbers.inserted_window_dims, numbers.scatter_dims_to_operand_dims
+        whole, counted = updates, numbers.scatter_indices_batching_dims
+    offsets, left_out, named = (tuple(map(int, some)) for some in axes)
+    batching = {int(axis): int(k) for axis, k in zip(numbers.operand_batching_dims, counted, strict=True)}
+    remaining = tuple(axis for axis in range(len(array)) if axis not in (*left_out, *batching))
+    of_window = dict(zip(remaining, (whole[k] for k in offsets), strict=True))
+    sizes = tuple(of_window.get(axis, 1) for axis in range(len(array)))
+    batch = tuple(k for k in range(len(whole)) if k not in offsets)
+    return Windows(named, batching, sizes, remaining, offsets, batch, p["mode"] == GatherScatterMode.FILL_OR_DROP)
