@@ -1,13 +1,13 @@
 """Events of robots: instants at which a joint, a rate of it, or a function of the state crosses a value."""
 
 import dataclasses
-import math
 from collections.abc import Callable
 from typing import Any
 
 import jax
 import jax.numpy as jnp
 import numpy as np
+from numpy.polynomial.polynomial import polyder, polyval
 
 from jounce.errors import RobotError, check_name
 from jounce.execution.chunks import in_chunks
@@ -110,7 +110,4 @@ def _at_samples(function: SampleFunction | None, time: Any, q: Any, rates: Any) 
 
 def _at(coefficients: np.ndarray, since: np.ndarray, derivative: int) -> np.ndarray:
     """Return values of a derivative of polynomials, (steps, order + 1), at times from their beginnings."""
-    values = np.zeros_like(since)
-    for k in range(coefficients.shape[1] - 1, derivative - 1, -1):
-        values = values * since + (coefficients[:, k] * math.perm(k, derivative))[:, None]
-    return values
+    return np.asarray(polyval(since, polyder(coefficients.T, derivative)[..., None], tensor=False))

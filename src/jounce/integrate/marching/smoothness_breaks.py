@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Bool, Float
+from numpy.polynomial.polynomial import polyder, polyval
 
 from jounce.integrate.marching.marching import DenseOutput
 
@@ -146,6 +147,4 @@ def _left_out(series: Terms, since: float, level: int) -> float:
 
 def _derivative(series: Terms, since: float, level: int) -> Float[np.ndarray, " part"]:
     """Return a derivative of series at a time from where they begin."""
-    orders = np.arange(level, len(series))
-    factors = np.array([math.perm(int(k), level) for k in orders], float)
-    return (factors * since ** (orders - level).astype(float)) @ series[level:]
+    return np.asarray(polyval(since, polyder(series, level)))

@@ -10,6 +10,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
+from numpy.polynomial.polynomial import polyval
 
 from jounce.base.shapes import Numbers
 from jounce.dynamics.forward.accelerations import Equations, Lanes, State
@@ -92,9 +93,7 @@ def attitudes_at(
     series: Float[Numbers, "place order 4 bodies"], since: Float[np.ndarray, " place"]
 ) -> Float[np.ndarray, "4 bodies+1 place"]:
     """Return the Euler parameters of all bodies, the ground first, a time into steps of known Taylor coefficients."""
-    attitudes = np.zeros((len(since), *series.shape[2:]))
-    for k in range(series.shape[1])[::-1]:
-        attitudes = attitudes * since[:, None, None] + np.asarray(series[:, k])
+    attitudes = polyval(since[:, None, None], np.swapaxes(series, 0, 1), tensor=False)
     return np.asarray(turns_with_ground(np.moveaxis(attitudes, 0, -1)))
 
 

@@ -11,6 +11,7 @@ import dataclasses
 import itertools
 from collections.abc import Sequence
 from functools import partial
+from operator import attrgetter
 from typing import Any, NamedTuple
 
 import jax
@@ -33,6 +34,7 @@ PASSAGE_DEVIATION = 1e-8  # part of the way: two branches separated by a gap g d
 NEARLY_SINGULAR = 1e-6  # part of the span: a motion that ends this close before a singular position ends at it
 LEAST_PASSAGE = 0.2  # part of the way to a change point by which the motion must go on beyond it
 NEARBY = 0.1  # radii: a singular position nearer than this spoils high derivatives where the motion is smooth
+INSTANT = attrgetter("instant")  # of an anchor
 SAMPLES_A_STEP = 8  # attitudes looked at in a step to count turns: no body turns by half a turn between two of them
 
 
@@ -92,10 +94,6 @@ class Anchor(NamedTuple):
         return 1 / abs(self.det_rate) if abs(self.det_rate) > 0 else np.inf
 
 
-def _instant(anchor: Anchor) -> float:
-    return anchor.instant
-
-
 @dataclasses.dataclass(frozen=True)
 class ChangePoint:
     """A singular position that a motion passes smoothly: when, s, and the radius of its Taylor series there, s."""
@@ -141,8 +139,8 @@ class FollowedPath:
 
     def anchors_around(self, first: float, last: float) -> list[Anchor]:
         """Return the anchors between two instants, with one before them and one after, where there are some."""
-        begin = bisect.bisect_right(self.anchors, first, key=_instant) - 1
-        end = bisect.bisect_left(self.anchors, last, key=_instant)
+        begin = bisect.bisect_right(self.anchors, first, key=INSTANT) - 1
+        end = bisect.bisect_left(self.anchors, last, key=INSTANT)
         return self.anchors[max(min(begin, len(self.anchors) - 1), 0) : end + 1]
 
     def ended(self, status: Status, instant: float, fault: str) -> "FollowedPath":

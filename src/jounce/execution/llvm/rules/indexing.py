@@ -1,7 +1,8 @@
 """Operations that move elements of arrays, and those that take or put them at indices found by the program."""
 
 import itertools
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -10,7 +11,7 @@ from jax.lax import GatherScatterMode
 from jounce.execution.llvm.rules.windows import windows_of
 from jounce.execution.llvm.text.arrays import Values, constants, each, filled, in_memory
 from jounce.execution.llvm.text.code import Code, flat
-from jounce.execution.llvm.text.values import DTYPES, Region, UnsupportedOperationError, Value, kind_of
+from jounce.execution.llvm.text.values import DTYPES, UnsupportedOperationError, Value, kind_of
 
 MOST_CANDIDATES = 64  # places of an array among which a number is picked by comparing, and not from memory
 
@@ -101,7 +102,7 @@ def split(_: Code, equation: Any, given: Sequence[Values]) -> Sequence[Values]:
 # -- at indices -------------------------------------------------------------------------------------------------------
 
 
-def _element(code: Code, values: Sequence[Value], index: Value) -> Value:
+def _element(code: Code, index: Value, *values: Value) -> Value:
     """Return the number at an index, which is in bounds: from memory, or picked by comparing."""
     if index.constant is not None:
         return values[int(index.constant)]
@@ -115,15 +116,12 @@ def _element(code: Code, values: Sequence[Value], index: Value) -> Value:
     return result
 
 
-def _row(code: Code, home: tuple[Region, int], index: Value, shape: Sequence[int], more: int = 0) -> Values:
-    """Return an array of some in memory, `more` after that at an index in bounds, which is one for all lanes."""
-    region, first = home
-    size = int(np.prod(shape))
-    start = code.arithmetic("mul", code.converted(index, "l"), code.constant(size, "l"))
-    offsets = range(first + more * size, first + (more + 1) * size)
-    return filled(
-        shape, [code.load(region, code.arithmetic("add", start, code.constant(offset, "l"))) for offset in offsets]
-    )
+def _rows(code: Code, whole: Values, index: Value, shape: Sequence[int]) -> Values:
+    """Return rows of an array from an index in bounds on, which is one for all lanes, by way of memory."""
+    region, first = in_memory(code, flat(whole))
+    start = code.arithmetic("mul", code.converted(index, "l"), code.constant(int(np.prod(whole.shape[1:])), "l"))
+    places = (code.constant(first + k, "l") for k in range(int(np.prod(shape))))
+    return filled(shape, [code.load(region, code.arithmetic("add", start, place)) for place in places])
 
 
 def within(code: Code, index: Value, least: int, most: int) -> Value:
@@ -150,18 +148,13 @@ def dynamic_slice(code: Code, equation: Any, given: Sequence[Values]) -> Sequenc
         elif not np.prod(shape):
             result = np.empty(shape, object)
         elif not index.lanes:
-            home = in_memory(code, flat(rows))
-            result = np.stack([_row(code, home, index, shape[1:], k) for k in range(size)])
+            result = _rows(code, rows, index, shape)
         else:
-            pick = _picked(code, index)
+            pick = partial(_element, code, index)
             windows = [rows[k : len(rows) - size + 1 + k] for k in range(size)]
             result = np.stack([each(pick, *(window[k, ...] for k in range(len(window)))) for window in windows])
         array = np.moveaxis(result, 0, axis)
     return [array]
-
-
-def _picked(code: Code, index: Value) -> Callable[..., Value]:
-    return lambda *values: _element(code, values, index)
 
 
 def dynamic_update_slice(code: Code, _: Any, given: Sequence[Values]) -> Sequence[Values]:
@@ -219,7 +212,7 @@ def gather(code: Code, equation: Any, given: Sequence[Values]) -> Sequence[Value
     for position in np.ndindex(result.shape):
         index = within(code, indices[(*(position[k] for k in windows.batch), axis)], least, most)
         index = code.arithmetic("add", index, code.constant(-least, index.kind))
-        result[position] = _element(code, [values[table[position]] for table in tables], index)
+        result[position] = _element(code, index, *(values[table[position]] for table in tables))
     return [result]
 
 
