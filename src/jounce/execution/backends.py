@@ -51,10 +51,10 @@ def joined(backends: Iterable[str]) -> str:
     return ", ".join(sorted(set(backends)))
 
 
-def tell_missing(what: str) -> None:
+def warn_of_missing(what: str) -> None:
     """Warn, once for each operation and each limit, that XLA computes what there is no machine code for.
 
-    What is made beforehand, and may not be needed, is told of when it is.
+    Of what is made beforehand, and may not be needed, it warns when it is.
     """
     if what in _warned or is_ahead():
         return

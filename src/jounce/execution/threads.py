@@ -63,12 +63,12 @@ def in_callers_context(function: Callable[[Item], Result]) -> Callable[[Item], R
 
 
 class Threads:
-    """Threads that compute one batch each, beside the one that asks, started when there are several; to be closed.
+    """Threads that compute one batch each, while the one that asks waits, started when there are several; to be closed.
 
     Parameters
     ----------
     count : int
-        Of threads, that which asks among them.
+        Of threads; of one, it is that which asks.
     compiled : bool, default False
         Whether what they are to compute is compiled already, so that none has to go before the others.
     """
@@ -98,32 +98,11 @@ class Threads:
             yield from map(function, items)
             return
         if self._pool is None:
-            self._pool = ThreadPoolExecutor(self.count - 1, thread_name_prefix="jounce")  # and the one that asks
-        waiting: deque[tuple[Future[Result], Item]] = deque()
-        called = in_callers_context(function)
+            self._pool = ThreadPoolExecutor(self.count, thread_name_prefix="jounce")
+        waiting, called = deque[Future[Result]](), in_callers_context(function)
         for item in items:
-            waiting.append((self._pool.submit(called, item), item))
+            waiting.append(self._pool.submit(called, item))
             if len(waiting) > AHEAD * self.count:
-                yield _first_result(function, waiting)
+                yield waiting.popleft().result()
         while waiting:
-            yield _first_result(function, waiting)
-
-
-def _first_result(function: Callable[[Item], Result], waiting: deque[tuple[Future[Result], Item]]) -> Result:
-    """Return the result of the first item; until a thread has found it, compute those that none has taken up."""
-    for k in range(len(waiting)):
-        future, item = waiting[k]
-        if waiting[0][0].done():
-            break
-        if future.cancel():
-            waiting[k] = _computed(function, item), item
-    return waiting.popleft()[0].result()
-
-
-def _computed(function: Callable[[Item], Result], item: Item) -> Future[Result]:
-    future: Future[Result] = Future()
-    try:
-        future.set_result(function(item))
-    except Exception as error:  # noqa: BLE001 - raised in its turn, as those of the other threads
-        future.set_exception(error)
-    return future
+            yield waiting.popleft().result()

@@ -17,7 +17,7 @@ import numpy as np
 
 from jounce.base.activity import compiling
 from jounce.base.shapes import only_arrays
-from jounce.execution.backends import tell_missing, uses_machine_code
+from jounce.execution.backends import uses_machine_code, warn_of_missing
 from jounce.execution.background import ByKey
 from jounce.execution.llvm.modules import object_file
 from jounce.execution.llvm.programs import Program, Single
@@ -129,7 +129,7 @@ class Translated:
 
         program = self._programs.get(key, make)
         if isinstance(program, str):
-            tell_missing(program)
+            warn_of_missing(program)
             return None
         return program
 

@@ -17,8 +17,8 @@ from jounce.kinematics.curves.assembly_modes import (
 )
 from jounce.kinematics.curves.branches import trace as trace
 from jounce.kinematics.curves.crossings import ChangePoint as ChangePoint
-from jounce.kinematics.curves.curve import Curve as Curve, CurveBranch as CurveBranch
-from jounce.kinematics.curves.limits import LimitPosition as LimitPosition
+from jounce.kinematics.curves.curve import Curve as Curve
+from jounce.kinematics.curves.limits import CurveBranch as CurveBranch, LimitPosition as LimitPosition
 from jounce.kinematics.families.solve_batch import solve_batch as solve_batch
 from jounce.kinematics.position_analysis.chunked_motion import (
     ChunkedMotion as ChunkedMotion,

@@ -20,11 +20,10 @@ from jounce.kinematics.assembly.assemble import (
 )
 from jounce.kinematics.assembly.axis_directions import axis_signs, drawn_axis_signs
 from jounce.kinematics.assembly.gauss_newton import assemble_from_guess
-from jounce.kinematics.curves.curve import Curve
+from jounce.kinematics.curves.curve import Curve, curve_through
 from jounce.kinematics.curves.path_tracker import PathTracker
-from jounce.kinematics.curves.start import posed
+from jounce.kinematics.curves.start import instant_of, posed
 from jounce.kinematics.curves.starts import assemble_side_by_side
-from jounce.kinematics.curves.tracing import instant_of, traced
 from jounce.mechanism import Mechanism, build, check_mechanism
 from jounce.mechanism.building.preconditions import check_holonomic, concrete
 from jounce.mechanism.carriages import check_without_ends
@@ -309,7 +308,7 @@ class _Search:
         while number < len(self.configurations):
             if self.configurations[number].circuit is None:
                 begun = posed(self.mechanism, self.configurations[number].coordinates)
-                curves = traced(begun, self.instant, driver).connected()
+                curves = curve_through(begun, self.instant, driver).connected()
                 circuits.append(curves[0])
                 self.configurations[number].circuit, self.configurations[number].branch = len(circuits), 1
                 before = 0  # branches of the curves through the same change points

@@ -3,8 +3,8 @@
 from jounce.base.shapes import Real
 from jounce.errors import MechanismError, whole_number
 from jounce.kinematics.curves.choice import chosen
-from jounce.kinematics.curves.curve import Curve, CurveSettings
-from jounce.kinematics.curves.tracing import check_number, instant_of, traced
+from jounce.kinematics.curves.curve import Curve, CurveSettings, curve_through
+from jounce.kinematics.curves.start import check_number, instant_of
 from jounce.mechanism import Mechanism, check_mechanism
 from jounce.mechanism.building.preconditions import check_holonomic, concrete
 from jounce.mechanism.carriages import check_without_ends
@@ -72,4 +72,4 @@ def trace(
     count = whole_number("count", count, 2, 10**7, error=MechanismError)
     check_number("length", length, 1e-6, 1e6)
     instant = instant_of(mechanism, time)
-    return traced(chosen(mechanism, instant), instant, driver, CurveSettings(order, count, float(length)))
+    return curve_through(chosen(mechanism, instant), instant, driver, CurveSettings(order, count, float(length)))

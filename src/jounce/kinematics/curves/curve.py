@@ -17,10 +17,10 @@ from jounce.jet.derivatives import plain_derivatives
 from jounce.jet.turns import WHOLE_TURN
 from jounce.kinematics.continuation.path_following import within_steps
 from jounce.kinematics.curves.crossings import ChangePoint, departed
-from jounce.kinematics.curves.limits import LimitPosition, limits_between, values_between
+from jounce.kinematics.curves.limits import CurveBranch, LimitPosition, limits_between, values_between
 from jounce.kinematics.curves.path import End, Path, step_to_configuration, track_both_directions
 from jounce.kinematics.curves.path_tracker import LANES, CurvePoint, PathTracker, with_angular_velocity
-from jounce.kinematics.curves.start import Freed, posed
+from jounce.kinematics.curves.start import Freed, freed, posed, start_of_curve
 from jounce.kinematics.results.motion import Motion
 from jounce.kinematics.results.pose_outputs import output_values
 from jounce.kinematics.status import Status
@@ -35,24 +35,6 @@ SAMPLES = 8  # in each step at which attitudes are looked at for turns
 AXES = ("point", "arc_length", "driver_value")
 MOST_CURVES = 64  # of a circuit
 FULL_TURN = 1e-6  # rad, by which a gain of the driver may differ from whole turns
-
-
-@dataclasses.dataclass(frozen=True)
-class CurveBranch:
-    """A part of a circuit between limit positions of the driver, in the sense of Chase and Mirth (1993).
-
-    Attributes
-    ----------
-    start, stop : float
-        Arc length; the stop of the last branch of a closed curve may lie a length further on.
-    low, high : float
-        Range of the driver's value on it, rad or m; a branch without limits makes whole turns.
-    """
-
-    start: float
-    stop: float
-    low: float
-    high: float
 
 
 class CurveSettings(NamedTuple):
@@ -388,6 +370,15 @@ class Curve(Displayed):
     def evaluate(self, output: AbstractOutput, name: str = "output") -> "xarray.DataArray":
         """Return any output along the curve, as an `xarray.DataArray`."""
         return self._motion.evaluate(output, name).rename(time="point")
+
+
+def curve_through(
+    mechanism: Mechanism, instant: float, driver: str | None, settings: CurveSettings | None = None
+) -> Curve:
+    """Return the curve of a mechanism through its starting guess."""
+    free, settings = freed(mechanism, instant, driver), settings or CurveSettings()
+    tracker, start = start_of_curve(free)
+    return Curve(mechanism, free, tracker, track_both_directions(tracker, start, settings.length), settings)
 
 
 def _one_of(items: Any, number: Any, name: str, what: str) -> Any:

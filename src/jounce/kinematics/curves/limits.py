@@ -1,4 +1,4 @@
-"""Limit positions: where the value of the driver turns back along a curve, read off its series."""
+"""Limit positions, where the value of the driver turns back along a curve, read off its series; branches between."""
 
 import dataclasses
 from typing import Literal
@@ -41,6 +41,24 @@ class LimitPosition:
     arc_length: float
     value: float
     kind: Kind
+
+
+@dataclasses.dataclass(frozen=True)
+class CurveBranch:
+    """A part of a circuit between limit positions of the driver, in the sense of Chase and Mirth (1993).
+
+    Attributes
+    ----------
+    start, stop : float
+        Arc length; the stop of the last branch of a closed curve may lie a length further on.
+    low, high : float
+        Range of the driver's value on it, rad or m; a branch without limits makes whole turns.
+    """
+
+    start: float
+    stop: float
+    low: float
+    high: float
 
 
 def limits_between(point: CurvePoint, stop: float, unit: float) -> list[LimitPosition]:

@@ -1,6 +1,8 @@
 """Where a curve of configurations starts: a mechanism with the value of one driver free, assembled."""
 
 import dataclasses
+import math
+import numbers
 from typing import Any
 
 import numpy as np
@@ -13,6 +15,7 @@ from jounce.jet import Jet
 from jounce.kinematics.assembly.assemble import check_assembled, find_assembly, freely_moving
 from jounce.kinematics.curves.path_tracker import CurvePoint, PathTracker
 from jounce.mechanism import Mechanism, build
+from jounce.mechanism.time import first_instant
 from jounce.trajectory import ExpressionMotion
 
 TIME = "time"
@@ -153,6 +156,22 @@ def _check_freedom(tracker: PathTracker, point: CurvePoint) -> None:
     raise SingularityError(
         "the start is a change point, where branches cross, so that no one curve starts there: start at another instant"
     )
+
+
+def check_number(name: str, value: Any, least: Any, most: Any) -> None:
+    """Raise MechanismError unless an option is a finite number between bounds."""
+    fits = isinstance(value, numbers.Real) and not isinstance(value, bool) and math.isfinite(float(value))
+    if not fits or not least <= value <= most:
+        bounds = "" if not math.isfinite(most) else f" from {least:g} to {most:g}"
+        raise MechanismError(f"must be a finite number{bounds}", name=name, value=value)
+
+
+def instant_of(mechanism: Mechanism, time: Any) -> float:
+    """Return an instant that was given, or the first of a mechanism's own time, s."""
+    if time is None:
+        return first_instant(mechanism.time, mechanism.parameter_values)
+    check_number("time", time, -math.inf, math.inf)
+    return float(time)
 
 
 def posed(mechanism: Mechanism, coordinates: dict[str, np.ndarray]) -> Mechanism:
