@@ -13,7 +13,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from jounce.base.modules import Module, field, jit_over_arrays
+from jounce.base.modules import Module, field
 
 CHECKED = []
 
@@ -169,18 +169,3 @@ def test_a_class_with_an_abstract_method_has_no_objects():
 
     with pytest.raises(TypeError, match="abstract"):
         Law()
-
-
-def test_functions_over_arrays_are_traced_for_each_constant_once():
-    traced = []
-
-    @jit_over_arrays
-    def force(spring, at):
-        traced.append(spring.length)
-        return spring.stiffness * (at - spring.length)
-
-    assert force(Spring(np.array(3.0), ["a"]), np.array(0.5)) == pytest.approx(1.2)
-    assert force(Spring(np.array(4.0), ["a"]), np.array(0.5)) == pytest.approx(1.6)
-    assert force(Spring(np.array(4.0), ["a"], 0.3), np.array(0.5)) == pytest.approx(0.8)
-    assert traced == [0.1, 0.3]
-    assert jax.grad(lambda k: force(Spring(k, ["a"]), np.array(0.5)))(2.0) == pytest.approx(0.4)

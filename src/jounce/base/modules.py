@@ -9,13 +9,12 @@ import inspect
 import operator
 from abc import ABCMeta
 from collections.abc import Callable, Iterable, Mapping, Set
-from functools import lru_cache, partial, wraps
-from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar, cast, dataclass_transform
+from functools import lru_cache
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar, dataclass_transform
 
 import jax
 import numpy as np
 
-_TRACED = object()  # in the place of an array
 _being_made: set[int] = set()  # the identities of modules whose `__init__` runs
 
 
@@ -209,7 +208,6 @@ class Untraced:
 
 
 M = TypeVar("M")
-F = TypeVar("F", bound=Callable[..., Any])
 
 
 def with_fields(module: M, **values: Any) -> M:
@@ -242,25 +240,6 @@ def unchecked(kind: type[M], values: Mapping[str, Any]) -> M:
 def field_names(kind: type[Any]) -> Set[str]:
     """Return the names of the fields of a dataclass, in their order."""
     return dict.fromkeys(field.name for field in dataclasses.fields(kind)).keys()
-
-
-def jit_over_arrays(function: F) -> F:
-    """Return a function that `jax.jit` compiles, with arrays in its arguments traced, and all else constants."""
-
-    @partial(jax.jit, static_argnums=0)
-    def compiled(constants: Any, arrays: list[Any]) -> Any:
-        structure, others = constants
-        remaining = iter(arrays)
-        return function(*structure.unflatten(next(remaining) if x is _TRACED else x for x in others))
-
-    @wraps(function)
-    def called(*arguments: Any) -> Any:
-        leaves, structure = jax.tree.flatten(arguments)
-        traced = [isinstance(leaf, np.ndarray | np.generic | jax.Array) for leaf in leaves]
-        others = tuple(_TRACED if is_traced else x for x, is_traced in zip(leaves, traced, strict=True))
-        return compiled((structure, others), [x for x, is_traced in zip(leaves, traced, strict=True) if is_traced])
-
-    return cast(F, called)
 
 
 @jax.tree_util.register_pytree_node_class

@@ -9,7 +9,7 @@ import jax.numpy as jnp
 import numpy as np
 from numpy.polynomial import chebyshev
 
-from jounce.base.modules import field, jit_over_arrays
+from jounce.base.modules import field
 from jounce.base.shapes import Numbers
 from jounce.errors import TrajectoryError
 from jounce.jet import Jet
@@ -161,7 +161,7 @@ def _at(begins: Any, halves: Any, table: Any, instants: Any) -> Any:
     return jnp.where(inside, powers[0] + u * ahead - behind, jnp.nan)
 
 
-@jit_over_arrays
+@jax.jit
 def _panels(law: AbstractMotion, start: Any) -> tuple[Numbers, Numbers, Numbers]:
     """Return panels to both sides of a start, and the integral of a law from there on each of them.
 
