@@ -120,8 +120,8 @@ def _rows(code: Code, whole: Values, index: Value, shape: Sequence[int]) -> Valu
     """Return rows of an array from an index in bounds on, which is one for all lanes, by way of memory."""
     region, first = in_memory(code, flat(whole))
     start = code.arithmetic("mul", code.converted(index, "l"), code.constant(int(np.prod(whole.shape[1:])), "l"))
-    places = (code.constant(first + k, "l") for k in range(int(np.prod(shape))))
-    return filled(shape, [code.load(region, code.arithmetic("add", start, place)) for place in places])
+    offsets = (code.constant(first + k, "l") for k in range(int(np.prod(shape))))
+    return filled(shape, [code.load(region, code.arithmetic("add", start, offset)) for offset in offsets])
 
 
 def within(code: Code, index: Value, least: int, most: int) -> Value:
