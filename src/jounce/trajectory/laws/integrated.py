@@ -95,9 +95,9 @@ class IntegratedMotion(CompositeLaw):
             self.parts = ()
             return
         begin = jnp.asarray(begin, float)
-        table = _panels(read_laws(self.parts[0]), jax.lax.stop_gradient(begin))
-        self.breakpoints, self.halves, self.coefficients = table
-        self.initial = given[0] - _at(*table, begin)  # nothing, but for its slope by the start
+        begins, halves, powers = _panels(read_laws(self.parts[0]), jax.lax.stop_gradient(begin))
+        self.breakpoints, self.halves, self.coefficients = begins, halves, powers
+        self.initial = given[0] - _at(begins, halves, powers, begin)  # nothing, but for its slope by the start
 
     @property
     def is_open(self) -> bool:
