@@ -22,8 +22,6 @@ from jounce.dynamics.inverse.motion_forces import MotionForces
 from jounce.dynamics.masses import Masses, masses_of
 from jounce.dynamics.motion_values import Coordinates, cut, derivatives_along, pose_of
 from jounce.errors import MechanismError
-from jounce.execution.chunks import in_chunks
-from jounce.execution.compilation import compiled
 from jounce.execution.mapped import Mapped
 from jounce.jet import Jet
 from jounce.jet.derivatives import plain_derivatives
@@ -200,16 +198,10 @@ def _numbers(motion: Motion, order: int) -> dict[str, np.ndarray]:
     pose_type, coordinates = motion.poses
     plain = in_si_units(motion.model)
 
-    def chunk(lanes: np.ndarray) -> Any:
-        bodies = {name: values[..., lanes] for name, values in coordinates.items()}
-        residual, jacobian = _position_equations(plain, cut(bodies, 0), motion.time[lanes], pose_type)
-        if not order:
-            return residual, jacobian, np.zeros((0, *residual.shape))
-        instants = np.tile(motion.time[lanes], order)
-        rights = _right_sides(plain, _without_unknowns(bodies, order), instants, pose_type)
-        return residual, jacobian, rights
-
-    residual, jacobian, right_side = in_chunks(chunk, len(motion.time))
+    residual, jacobian = _position_equations.along(plain, (cut(coordinates, 0), motion.time), pose_type=pose_type)
+    right_side = np.zeros((0, *residual.shape))
+    if order:
+        right_side = _right_sides.along(plain, (coordinates, motion.time), pose_type=pose_type, order=order)
     chosen = row_order(motion.mechanism, motion.model)
     return {
         "residual": residual[chosen].T,
@@ -223,13 +215,14 @@ def _without_unknowns(coordinates: Coordinates, order: int) -> Coordinates:
     elements = {}
     for name, values in coordinates.items():
         first = name == "angular_velocity"  # its coefficients are those of rates
-        whole = np.zeros((order + 1 - first, *values.shape[1:-1], order, values.shape[-1]))
-        known = np.asarray(values)[: len(whole)]
-        whole[: len(known)] = known[..., None, :]
-        if name != "quaternion":  # the attitude follows from where it is and from how it turns
-            for k in range(1, order + 1):
-                whole[k - first, ..., k - 1, :] = 0.0
-        elements[name] = whole.reshape(*whole.shape[:-2], -1)
+        levels = list(values[: order + 1 - first])
+        levels += [jnp.zeros_like(values[0])] * (order + 1 - first - len(levels))
+        unknown = name != "quaternion"  # the attitude follows from where it is and from how it turns
+        copies = [
+            [jnp.zeros_like(level) if unknown and k + first == copy else level for copy in range(1, order + 1)]
+            for k, level in enumerate(levels)
+        ]
+        elements[name] = jnp.stack([jnp.concatenate(copy, axis=-1) for copy in copies])
     return elements
 
 
@@ -241,7 +234,11 @@ def position_equations(
     return system.residual(pose, time).coefficients[0], system.jacobian(pose, time)
 
 
-_position_equations = compiled("pose_type")(position_equations)
+@Mapped
+def _position_equations(
+    system: System, lanes: tuple[Coordinates, Lanes], *, pose_type: type[Pose]
+) -> tuple[Rows, Jacobian]:
+    return position_equations(system, *lanes, pose_type)
 
 
 def right_sides(
@@ -259,7 +256,12 @@ def right_sides(
     return -factorials[:, None, None] * jnp.stack(parts)
 
 
-_right_sides = compiled("pose_type")(right_sides)
+@Mapped
+def _right_sides(
+    system: System, lanes: tuple[Coordinates, Lanes], *, pose_type: type[Pose], order: int
+) -> Float[Numbers, "derivative row instant"]:
+    bodies, instants = lanes
+    return right_sides(system, _without_unknowns(bodies, order), jnp.tile(instants, order), pose_type)
 
 
 def _velocities(motion: Motion, order: int) -> Float[np.ndarray, "time derivative column"]:
