@@ -13,7 +13,7 @@ from jounce.constraints.friction import velocities, velocity_at
 from jounce.dynamics.friction.coupling import has_flanks
 from jounce.dynamics.motion_values import pose_of
 from jounce.errors import MechanismError
-from jounce.execution.compilation import compiled
+from jounce.execution.mapped import Mapped
 from jounce.jet import Jet, cross
 from jounce.jet.algebra import stacked
 from jounce.kinematics import Motion, Status
@@ -53,7 +53,7 @@ def check_meshing(motion: Motion, groups: Sequence[Group], coordinates: Callable
 def _check_pitch_line(motion: Motion, element: Any, poses: Sequence[Any], names: Sequence[str]) -> None:
     """Raise MechanismError where wheels are not at their pitch radius from the line they roll on."""
     slope = np.tan(np.asarray(element.pressure_angle))
-    away = np.asarray(_parted(element, poses, motion.time, motion.poses[0]))
+    away = np.asarray(_parted.along(element, (poses, motion.time), pose_type=motion.poses[0]))
     away = np.where(slope > 0, away / np.where(slope > 0, slope, 1.0), 0.0)
     radius = np.asarray(element.radius)
     bad = (np.abs(away) > OFF_PITCH * radius) & (motion.status == Status.OK)
@@ -70,7 +70,7 @@ def _check_pitch_line(motion: Motion, element: Any, poses: Sequence[Any], names:
 
 def _check_pitch_points(motion: Motion, gears: Any, poses: Sequence[Any], names: Sequence[str]) -> None:
     """Raise MechanismError where gears in space do not touch at their pitch point as their ratio says."""
-    its = {name: np.asarray(value) for name, value in _meshing(gears, poses, motion.time, motion.poses[0]).items()}
+    its = _meshing.along(gears, poses, pose_type=motion.poses[0])
     (first, second), drift, speed = its["radii"], its["drift"], its["speed"]
     helix = 0.0 if gears.helix_angle is None else np.asarray(gears.helix_angle)
     rolls = its["sliding"] <= ROLLING * first
@@ -133,8 +133,8 @@ def _check_pitch_points(motion: Motion, gears: Any, poses: Sequence[Any], names:
             raise MechanismError(message, name=f"{names[at[0]]}.{where}")
 
 
-@compiled("pose_type", brief=True)
-def _meshing(gears: Any, poses: Sequence[Any], instants: Any, pose_type: Any) -> Mapping[str, Any]:  # noqa: ARG001
+@Mapped
+def _meshing(gears: Any, poses: Sequence[Any], *, pose_type: Any) -> Mapping[str, Any]:
     """Return how gears in space touch, (instances, time): lengths in m, for turns of gear i by one rad."""
     moving = [pose_of(pose, pose_type, 1) for pose in poses]
     bodies, rates = [movable(pose.truncate(0)) for pose in moving], velocities([movable(pose) for pose in moving])
@@ -160,9 +160,10 @@ def _size(vector: Jet) -> Any:
     return jnp.linalg.norm(vector.coefficients[0], axis=0)
 
 
-@compiled("pose_type", brief=True)
-def _parted(element: Any, poses: Any, instants: Any, pose_type: Any) -> Any:
+@Mapped
+def _parted(element: Any, lanes: tuple[Sequence[Any], Any], *, pose_type: Any) -> Any:
     """Return the difference of a residual with and without a flank."""
+    poses, instants = lanes
     built = [pose_type.from_coordinates({name: Jet([c[0]]) for name, c in pose.items()}) for pose in poses]
     group = Group(element, ())
     time = Jet([instants[None]])

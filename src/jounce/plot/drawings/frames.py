@@ -13,7 +13,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
-from jounce.execution.compilation import compiled
+from jounce.execution.mapped import Mapped
 from jounce.jet import Jet
 from jounce.jet.algebra import stacked
 from jounce.kinematics import Motion
@@ -53,7 +53,7 @@ def assembled(mechanism: Mechanism) -> dict[str, Frame]:
     started = dataclasses.replace(fixed, drivers={**fixed.drivers, **fixed.initial}, initial={})
     first = first_instant(mechanism.time, mechanism.parameter_values)
     model, coordinates = assemble(build(chosen(started, first)), first, ASSEMBLY_TOLERANCE, free=True)
-    return _by_body(mechanism, _frames(model.pose_type, coordinates))
+    return _by_body(mechanism, _frames.along((), coordinates, pose_type=model.pose_type))
 
 
 def guessed(mechanism: Mechanism) -> dict[str, Frame]:
@@ -67,14 +67,16 @@ def guessed(mechanism: Mechanism) -> dict[str, Frame]:
     [0.1321, 0.0]
     """
     guess = starting_guess(mechanism, mechanism.parameter_values, POSITION_COMPONENTS[mechanism.space])
-    return _by_body(mechanism, _frames(PlanarPose if mechanism.space == "planar" else SpatialPose, guess))
+    pose_type = PlanarPose if mechanism.space == "planar" else SpatialPose
+    return _by_body(mechanism, _frames.along((), guess, pose_type=pose_type))
 
 
 def frames(motion: Motion) -> dict[str, Frame]:
     """Return the frames of all bodies of a motion, the ground first; NaN at instants that were not solved."""
     if "frames" not in motion.derived:
         pose_type, coordinates = motion.poses
-        whole = _frames(pose_type, {name: derivatives[0] for name, derivatives in coordinates.items()})
+        first = {name: derivatives[0] for name, derivatives in coordinates.items()}
+        whole = _frames.along((), first, pose_type=pose_type)
         motion.derived["frames"] = np.where(np.asarray(motion.status) == 0, whole, np.nan)
     return _by_body(motion.mechanism, motion.derived["frames"])
 
@@ -84,8 +86,8 @@ def _by_body(mechanism: Mechanism, whole: Any) -> dict[str, Frame]:
     return {body: by_time[..., k] for k, body in enumerate(names)}
 
 
-@compiled("pose_type")
-def _frames(pose_type: Any, coordinates: Mapping[str, Any]) -> Any:
+@Mapped
+def _frames(_: tuple[()], coordinates: Mapping[str, Any], *, pose_type: Any) -> Any:
     """Return origin and axes of all bodies, shape (components, 1 + components, bodies, time)."""
     pose = pose_type.from_coordinates({name: Jet((value,)) for name, value in coordinates.items()})
     columns = [pose.position, *(pose.direction(unit) for unit in np.eye(pose_type.shifts))]
