@@ -439,3 +439,37 @@ def test_a_moving_link_named_ground():
     robot = jn.Robot("odd", [jn.Link("base"), jn.Link("ground", ROD)], [jn.Joint("A", "base", "ground")])
     with pytest.raises(jn.errors.RobotError, match="a link of this name moves"):
         robot.mechanism()
+
+
+def crank_rocker(turn, side):
+    """The angles of coupler and rocker of a four-bar with links of 1, 3, 2 and 3 m, by the law of cosines."""
+    pin, far = np.array([np.cos(turn), np.sin(turn)]), np.array([3.0, 0.0])
+    diagonal = far - pin
+    length = np.hypot(*diagonal)
+    along = np.arctan2(diagonal[1], diagonal[0]) + side * np.arccos((9.0 + length**2 - 4.0) / (6.0 * length))
+    tip = pin + 3.0 * np.array([np.cos(along), np.sin(along)]) - far
+    return along, np.arctan2(tip[1], tip[0])
+
+
+@pytest.mark.parametrize("side", [1, -1])
+def test_a_loop_stays_in_the_assembly_in_which_it_is_drawn(side):
+    """Wherever the law of the crank starts: the crank is moved there, and turns round."""
+    drawn = np.radians(60)
+    coupler, rocker = crank_rocker(drawn, side)
+    angles = {"crank": drawn, "coupler": coupler - drawn, "rocker": rocker}
+    turned = {name: Rotation.from_euler("z", angle).as_matrix() for name, angle in angles.items()}
+    rod = jn.Inertia(1.0, center_of_mass=[0.5, 0, 0], tensor=[0, 1 / 12, 1 / 12])
+    robot = jn.Robot(
+        "four-bar",
+        [jn.Link("base"), *(jn.Link(name, rod) for name in angles)],
+        [
+            jn.Joint("A", "base", "crank", rotation=turned["crank"]),
+            jn.Joint("B", "crank", "coupler", position=[1, 0, 0], rotation=turned["coupler"]),
+            jn.Joint("D", "base", "rocker", position=[3, 0, 0], rotation=turned["rocker"]),
+        ],
+        closures=[jn.robot.Closure("C", ("coupler", "rocker"), "pin", points=[[3, 0, 0], [2, 0, 0]], axis=[0, 0, 1])],
+    )
+    for turn in np.radians([-360, -225, -120, -30, 45, 150, 210, 330]):
+        found = jn.solve(robot.mechanism(drivers={"A": float(turn)}), [0.0], order=0).outputs["D"][0, 0]
+        expected = crank_rocker(drawn + turn, side)[1] - rocker
+        assert abs(np.exp(1j * found) - np.exp(1j * expected)) < 1e-9

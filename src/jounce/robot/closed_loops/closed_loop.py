@@ -51,6 +51,7 @@ def mechanism(
     q : array_like of shape (n,) or dict of str to float, optional
         Coordinates near which the mechanism is assembled, where the joints start unless given: at zero, or in the pose
         of an MJCF file. Driven joints start where their laws do, the others are moved until the loops are closed.
+        Unless given, a robot drawn with its loops closed stays in that assembly as driven joints go to their start.
     drivers : dict of str to law, or JointTrajectory, optional
         Laws of coordinates, by name of the joint: expressions of t, functions of time, motions or numbers; rad or m.
         The driver of joint A is named ``A_drive``, and its force is the torque or force of the joint.
@@ -112,7 +113,7 @@ def mechanism(
     if robot.closures:
         loops = Loops(robot)
         free = np.array([name not in driven for name in robot.joint_names], bool)
-        start = loops.closed(start, free)
+        start = _closed_start(robot, loops, start, free, drawn=q is None)
         borne = loops.wrenches if redundant_reactions else [needed for needed, _ in loops.independent(start)]
         pairs = zip(robot.closures.values(), borne, strict=True)
         joints |= {closure.name: parts.closure(closure, needed) for closure, needed in pairs if len(needed)}
@@ -163,6 +164,20 @@ def _start(
                 raise RobotError(message, name=f"drivers.{name}", value=value)
             start[robot.joint_names.index(name)] = value
     return start
+
+
+def _closed_start(
+    robot: AbstractRobot, loops: Loops, start: np.ndarray, free: np.ndarray, *, drawn: bool
+) -> np.ndarray:
+    """Return coordinates at which the loops are closed: in the assembly in which the robot is drawn, if it is.
+
+    The driven joints are moved from there to where their laws start.
+    """
+    if drawn:
+        reached = loops.followed(given_coordinates(robot, None), start, free)
+        if reached is not None:
+            return reached
+    return loops.closed(start, free)
 
 
 def body_point(robot: AbstractRobot, link: str, point: ArrayLike = (0.0, 0.0, 0.0)) -> tuple[str, np.ndarray]:

@@ -37,6 +37,10 @@ GivenCoordinates = TypeAliasType("GivenCoordinates", Mapping[str, float] | Array
 
 RANK_TOLERANCE = 1e-5  # rad, or sizes of the robot: files give axes with six digits
 MAX_STEPS = 100
+DRAWN = 0.05  # rad, or sizes of the robot: coordinates that move less until the loops close are those of a drawn pose
+STRIDE = 0.1  # rad, or sizes of the robot: of joints that lead the others
+STRAY = 0.3  # of a step: what leads to the same assembly is nearer to where the velocities point
+SHORTEST = 1e-4  # of the largest step
 SWAY = 0.05  # rad, or sizes of the robot: how far a position in general is from the one given
 
 
@@ -209,6 +213,43 @@ class Loops:
                 break
         self._check_closed(q)
         return q
+
+    def followed(
+        self, q: Float[np.ndarray, " joint"], target: Float[np.ndarray, " joint"], free: np.ndarray
+    ) -> Float[np.ndarray, " joint"] | None:
+        """Return where joints that are free come to from coordinates q, as the others go straight to a target.
+
+        Small steps along the velocities keep the loops in one assembly. None if they are open at q already, or open on
+        the way.
+        """
+        try:
+            here = self.closed(q, free)
+        except RobotError:
+            return None
+        if np.abs((here - q) / self.scale).max(initial=0.0) > DRAWN:
+            return None
+        lead = np.where(free, 0.0, (target - q) / self.scale)
+        length = float(np.abs(lead).max(initial=0.0))
+        share, most = 0.0, min(STRIDE / max(length, 1e-300), 1.0)
+        step = most
+        while share < 1.0:
+            part = min(step, 1.0 - share)
+            slopes = np.concatenate([w @ s for w, s in zip(self.wrenches, self.gaps(here)[1], strict=True)])
+            change = part * lead
+            change[free] = np.linalg.lstsq(slopes[:, free], -slopes @ change, rcond=RANK_TOLERANCE)[0]
+            predicted = here + self.scale * change
+            try:
+                there = self.closed(predicted, free)
+                off = np.abs((there - predicted) / self.scale).max() / max(np.abs(change).max(), STRIDE / 10)
+            except RobotError:
+                there, off = here, np.inf
+            if off > STRAY:
+                step = part / 2
+                if step < SHORTEST * most:
+                    return None
+                continue
+            here, share, step = there, share + part, min(2 * part, most)
+        return np.where(free, here, target)
 
     def _check_closed(self, q: np.ndarray) -> None:
         gaps, _ = self.gaps(q)
