@@ -216,7 +216,7 @@ def _without_unknowns(coordinates: Coordinates, order: int) -> Coordinates:
     for name, values in coordinates.items():
         first = name == "angular_velocity"  # its coefficients are those of rates
         levels = list(values[: order + 1 - first])
-        levels += [jnp.zeros_like(values[0])] * (order + 1 - first - len(levels))
+        levels += [jnp.zeros(values.shape[1:])] * (order + 1 - first - len(levels))
         unknown = name != "quaternion"  # the attitude follows from where it is and from how it turns
         copies = [
             [jnp.zeros_like(level) if unknown and k + first == copy else level for copy in range(1, order + 1)]
