@@ -7,6 +7,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from mpmath import mp
 
 import jounce as jn
 from jounce.jet.derivatives import taylor_coefficients
@@ -317,6 +318,67 @@ def test_torque_is_the_part_of_the_wrench_along_the_axis():
         assert joint.child == link
         part = wrenches[:, :, k, 3:] if joint.turning else wrenches[:, :, k, :3]
         near(part @ joint.axis, torque[..., k])
+
+
+def test_a_sensor_between_arm_and_tool_feels_the_motion_of_the_tool():
+    """Newton and Euler for a tool at an angle of t sin(2 t) about a level axis, differentiated in thirty digits."""
+    mass, center, tensor = 1.3, [0.1, -0.2, 0.3], [[0.05, 0.01, -0.004], [0.01, 0.06, 0.002], [-0.004, 0.002, 0.04]]
+    links = [
+        jn.Link("base"),
+        jn.Link("arm", jn.Inertia(4.0, [0.2, 0, 0])),
+        jn.Link("tool", jn.Inertia(mass, center, tensor)),
+    ]
+    mount = [[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]
+    pin = jn.Joint("pin", "base", "arm", axis=[0, 0, 1])
+    sensor = jn.Joint("sensor", "arm", "tool", "fixed", position=[0.5, 0.1, 0.0], rotation=mount)
+    robot = jn.Robot("crane", links, [pin, sensor], gravity=[0.0, -9.81, 0.0])
+
+    def turned(t, vector):
+        c, s = mp.cos(t * mp.sin(2 * t)), mp.sin(t * mp.sin(2 * t))
+        return [c * vector[0] - s * vector[1], s * vector[0] + c * vector[1], vector[2]]
+
+    from_mount = (np.array(mount) @ center).tolist()
+    about_center = np.array(mount) @ tensor @ np.array(mount).T  # of the tool, in the axes of the arm
+
+    def force(t):
+        place = [mp.diff(lambda x, k=k: turned(x, np.add([0.5, 0.1, 0.0], from_mount))[k], t, 2) for k in range(3)]
+        return [mass * place[0], mass * (place[1] + mp.mpf("9.81")), mass * place[2]]
+
+    def wrench(t):
+        rate = lambda x: mp.diff(lambda y: y * mp.sin(2 * y), x)  # noqa: E731
+        spin = [mp.diff(lambda x, k=k: turned(x, about_center[:, 2] * rate(x))[k], t) for k in range(3)]
+        pull, arm = force(t), turned(t, from_mount)
+        moment = [spin[k] + arm[k - 2] * pull[k - 1] - arm[k - 1] * pull[k - 2] for k in range(3)]
+        return [*pull, *moment]
+
+    with mp.workdps(40):
+        instant = mp.mpf("0.4")
+        q = [[float(mp.diff(lambda t: t * mp.sin(2 * t), instant, k))] for k in range(5)]
+        expected = [[mp.diff(lambda t, i=i: wrench(t)[i], instant, k) for i in range(6)] for k in range(3)]
+    found = jn.robot.joint_wrenches(robot, q, frame="base", fixed=["sensor"])
+    near(found[:, 1], np.array(expected, float), 1e-12)
+    near(found[:, :1], jn.robot.joint_wrenches(robot, q, frame="base"))
+    push = jn.robot.Wrench("tool", force=[3.0, 1.0, -2.0], frame="base")
+    pushed = jn.robot.joint_wrenches(robot, q, frame="base", fixed=["sensor"], wrenches=[push])
+    near(pushed[0, 1] - found[0, 1], [-3.0, -1.0, 2.0, 0.0, 0.0, 0.0], 1e-12)
+
+
+def test_fixed_joints_are_named_once_and_are_fixed():
+    q = np.zeros((3, 7))
+    fixed = [name for name, joint in ROBOT.joints.items() if not joint.moving]
+    assert fixed
+    whole, some = (jn.robot.joint_wrenches(ROBOT, q, fixed=names) for names in (fixed, fixed[:0:-1] + fixed[:1]))
+    near(some, whole[:, [*range(7), *range(7 + len(fixed) - 1, 7, -1), 7]])
+    links = [jn.Link("base"), jn.Link("arm", jn.Inertia(1.0, [1, 0, 0])), jn.Link("tip")]
+    joints = [jn.Joint("pin", "base", "arm", axis=[0, 1, 0]), jn.Joint("point", "arm", "tip", "fixed")]
+    assert not jn.robot.joint_wrenches(jn.Robot("arm", links, joints), np.ones((3, 1)), fixed=["point"])[:, 1].any()
+    for given, says in (
+        (fixed[0], "fixed: must be a list of names of fixed joints"),
+        ([ROBOT.joint_names[0]], "fixed: no fixed joint has this name, got 'joint_0'; valid: fixed_2"),
+        ([fixed[0]] * 2, "fixed: a joint is there twice"),
+    ):
+        with pytest.raises(jn.errors.RobotError, match=says):
+            jn.robot.joint_wrenches(ROBOT, q, fixed=given)
 
 
 def test_frames_of_reactions_are_checked():

@@ -1,5 +1,6 @@
 """Torques of a prescribed motion and the wrenches that its joints carry, with their rates, to any order."""
 
+import dataclasses
 from collections.abc import Sequence
 from typing import Any
 
@@ -7,8 +8,8 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
-from jounce.base.shapes import Array, ArrayLike, Numbers
-from jounce.errors import RobotError, check_choice, flag
+from jounce.base.shapes import Array, ArrayLike, Numbers, is_traced
+from jounce.errors import RobotError, check_choice, check_name, flag
 from jounce.jet import Jet, concatenate, cross, matvec
 from jounce.jet.algebra import stacked, total
 from jounce.robot.algorithms.base_motion import (
@@ -93,7 +94,13 @@ def inverse_dynamics(
 
 
 def joint_wrenches(
-    robot: Robot, q: ArrayLike, *, wrenches: Sequence[Wrench] = (), time: ArrayLike | None = None, frame: str = "link"
+    robot: Robot,
+    q: ArrayLike,
+    *,
+    wrenches: Sequence[Wrench] = (),
+    time: ArrayLike | None = None,
+    frame: str = "link",
+    fixed: Sequence[str] = (),
 ) -> Array[Numbers, "*batch derivative body 6"]:
     """Return the forces and moments that the joints carry, and their rates: what bearings and flanges feel.
 
@@ -104,17 +111,20 @@ def joint_wrenches(
     frame : {"link", "base"}, default "link"
         Axes of the components: those of the moved link, of which the rates are then the rates of the components, or
         those of the base.
+    fixed : sequence of str, optional
+        Fixed joints that are wanted, too, such as that of a force sensor between flange and tool, or of the base
+        bolted to the ground.
 
     Returns
     -------
     array of shape (..., order - 1, bodies, 6)
         Force, N, and moment about the origin of the link, N m, that each of `robot.moving_links` gets through its joint
-        from its parent, by s.
+        from its parent, by s; then the children of the `fixed` joints in their order.
 
     Raises
     ------
     RobotError
-        If q or a wrench does not fit the robot.
+        If q or a wrench does not fit the robot, or a joint of `fixed` is none that is fixed.
 
     Examples
     --------
@@ -126,10 +136,39 @@ def joint_wrenches(
     """
     check_choice("frame", frame, FRAMES, RobotError)
     q = checked_coordinates(robot, q, 2)
+    links = [*robot.moving_links, *(robot.joints[name].child for name in _checked_fixed(robot, fixed))]
+    if fixed:
+        robot, q = _with_held_joints(robot, q, fixed)
     arrays, static = _applied(robot, q, wrenches, time)
     turned = [robot.frames[link].rotation for link in robot.moving_links]
     aligned = np.moveaxis(np.array(turned).reshape(-1, 3, 3), 0, -1)
-    return _joint_wrenches(robot, arrays[0], (arrays[1], aligned), (*static, frame == "base"))
+    carried = _joint_wrenches(robot, arrays[0], (arrays[1], aligned), (*static, frame == "base"))
+    return carried[..., [robot.moving_links.index(link) for link in links], :] if fixed else carried
+
+
+def _checked_fixed(robot: Robot, names: Sequence[str]) -> Sequence[str]:
+    """Return the names of fixed joints, or raise RobotError."""
+    if isinstance(names, str) or not isinstance(names, Sequence):
+        raise RobotError("must be a list of names of fixed joints", name="fixed", value=names)
+    known = [name for name, joint in robot.joints.items() if not joint.moving]
+    for name in names:
+        check_name("fixed joint", name, known, RobotError, name="fixed")
+    if len(set(names)) < len(names):
+        raise RobotError("a joint is there twice", name="fixed", value=list(names))
+    return names
+
+
+def _with_held_joints(robot: Robot, q: Any, names: Sequence[str]) -> tuple[Robot, Any]:
+    """Return the robot with joints that turn, at zero, in the place of fixed ones."""
+    joints = [
+        dataclasses.replace(joint, type="continuous", axis=(0, 0, 1)) if name in names else joint
+        for name, joint in robot.joints.items()
+    ]
+    held = robot.changed(joints=joints, strict=False)  # a fixed link may be a frame without mass
+    column = {name: k for k, name in enumerate(robot.joint_names)}
+    of = jnp if is_traced(q) else np
+    wider = of.concatenate([q, of.zeros((*q.shape[:-1], 1))], axis=-1)  # the last column is that of all held joints
+    return held, wider[..., [column.get(name, len(column)) for name in held.joint_names]]
 
 
 def _applied(
