@@ -142,8 +142,8 @@ def joint_wrenches(
     arrays, static = _applied(robot, q, wrenches, time)
     turned = [robot.frames[link].rotation for link in robot.moving_links]
     aligned = np.moveaxis(np.array(turned).reshape(-1, 3, 3), 0, -1)
-    carried = _joint_wrenches(robot, arrays[0], (arrays[1], aligned), (*static, frame == "base"))
-    return carried[..., [robot.moving_links.index(link) for link in links], :] if fixed else carried
+    of_bodies = _joint_wrenches(robot, arrays[0], (arrays[1], aligned), (*static, frame == "base"))
+    return of_bodies[..., [robot.moving_links.index(link) for link in links], :] if fixed else of_bodies
 
 
 def _checked_fixed(robot: Robot, names: Sequence[str]) -> Sequence[str]:
