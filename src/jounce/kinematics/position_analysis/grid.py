@@ -15,6 +15,7 @@ import jax
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from jounce.execution.buffer_pool import arrays_in, bytes_needed, lend
 from jounce.execution.threads import Threads
 from jounce.jet.derivatives import plain_derivatives
 from jounce.kinematics.continuation.change_points import LARGEST_DISAGREEMENT, bridged, half_width, spoiled
@@ -49,7 +50,8 @@ class GridSolver:
         if len(solved) == len(time) and not path.change_points and self._reached.all():
             self._leaves = path.solved_leaves  # all are solved, and stay as they are
         else:
-            self._leaves = [np.empty((*x.shape[:-1], len(time) + len(self._anchors))) for x in like.leaves]
+            shapes = [(*x.shape[:-1], len(time) + len(self._anchors)) for x in like.leaves]
+            self._leaves = arrays_in(lend(bytes_needed(shapes)), shapes, [float] * len(shapes))
             if solved.size:
                 self._store_lanes(solved, [x[..., solved] for x in path.solved_leaves])
         self._store: SolvedState = jax.tree.unflatten(like.structure, self._leaves)
