@@ -1,11 +1,11 @@
 #!/usr/bin/env bash
 # MuJoCo MJX 3.17.0: springs and dampers that are not linear, and armature and damping of actuators, are left out.
 #
-# MuJoCo 3.17.0 reads `stiffness="3 2"` (a torque of 3 x + 2 x |x|), `damping="3 2"`, and a motor with damping or armature.
-# mjx.put_model refuses what MJX lacks, "... not implemented"; one would expect that here, or the same acceleration. MJX
-# computes with the first number alone, and without what the motor adds. There is no message. Output seen, in rad/s^2:
-# "stiffness 3 2: MuJoCo 11.956, MJX 12.429; damping 3 2: 6.692, 9.271; motor: 4.517, 14.798". Exits with 1 if that is no
-# longer so.
+# MuJoCo 3.17.0 reads `stiffness="3 2"` (a torque of 3 x + 2 x^2), `damping="3 2"` (3 v + 2 v |v|), and a motor with
+# damping or armature. mjx.put_model refuses what MJX lacks, "... not implemented"; one would expect that here, or the
+# same acceleration. MJX computes with the first number alone, and without what the motor adds. There is no message.
+# Output seen, in rad/s^2: "stiffness 3 2: MuJoCo 11.956, MJX 12.429; damping 3 2: 6.692, 9.271; motor: 4.517, 14.798".
+# Exits with 1 if that is no longer so.
 set -euo pipefail
 folder=$(mktemp -d)
 trap 'rm -rf "$folder"' EXIT
