@@ -1,7 +1,7 @@
 """Carriages: bodies without mass whose positions are the hidden coordinates of joints, such as a curve parameter.
 
-The carriage of a joint is a body of the mechanism beside those of its user. Its first coordinates are the parameters,
-in units of the curve, and its last one is that unit, so that their ratio is known from its pose alone.
+A carriage is a body of the mechanism beside those of the user. Its first coordinates are the parameters times a unit
+length of the curve, and its last coordinate is that unit: the parameters follow from the pose alone.
 """
 
 from collections.abc import Mapping
@@ -19,8 +19,8 @@ from jounce.trajectory.curve_checks import derivatives_at
 from jounce.trajectory.curves import HALF_WINDOW, CurveLaw, ParametricCurve, SampledCurve
 
 ENDING = ".s"
-SAMPLES = 721  # of a curve, and to each side of a surface its root, where it may be nearest
-ALIKE, SLIGHT = 1.25, 1e-6  # how much farther, and of the size of a curve, another part may be and count as near
+SAMPLES = 721  # of a curve, in the search for its nearest point
+ALIKE, SLIGHT = 1.25, 1e-6  # factor, and share of the curve size, by which a part as near may be farther
 STEPS = 40
 
 
@@ -36,7 +36,7 @@ def carriage_of(joint: str) -> str:
 
 
 def carriages(name: str, element: Any) -> tuple[str, ...]:
-    """Return the names of the carriages that a joint has beside its bodies; `name` is its dotted name, or its name."""
+    """Return the names of the carriages of a joint; `name` is the name of the joint, dotted or plain."""
     return (carriage_of(name.partition(".")[2] or name),) if getattr(element, "hidden", ()) else ()
 
 
@@ -51,16 +51,16 @@ def curve_in(values: Mapping[str, Any]) -> CurveLaw:
 
 
 def carriage_guess(curve: CurveLaw, start: Any, point: Any) -> Any:
-    """Return where a carriage starts.
+    """Return the starting position of a carriage.
 
     Parameters
     ----------
     curve : CurveLaw
-        Of the joint.
+        Curve or surface of the joint.
     start : list of float or None
-        Guess of the parameters; None for what is nearest.
+        Guess of the parameters; None for the nearest point of the curve.
     point : array of shape (components,)
-        Where the point is, at the starting guess of the bodies, in the frame of the curve, m.
+        Guided point at the starting guess of the bodies, in the frame of the curve, m.
 
     Raises
     ------
@@ -96,7 +96,7 @@ def _nearest(curve: CurveLaw, point: Any) -> Any:
     elif curve.lap is not None:
         low, high = 0.0, _plain((curve.lap,))[0]
     grid = np.linspace(low, high, SAMPLES)
-    if any(isinstance(x, Tracer) for x in jax.tree.leaves((curve, point))):  # it was looked at before JAX traced it
+    if any(isinstance(x, Tracer) for x in jax.tree.leaves((curve, point))):  # checked below before JAX traced it
         points = curve(Jet([jnp.asarray(grid)])).coefficients[0]
         far = jnp.sum((points - jnp.asarray(point)[:, None]) ** 2, axis=0)
         return jnp.asarray(grid)[jnp.nanargmin(far)]
@@ -110,7 +110,7 @@ def _nearest(curve: CurveLaw, point: Any) -> Any:
     near = np.flatnonzero((far <= before) & (far <= after) & np.isfinite(far))
     step = (high - low) / (SAMPLES - 1)
     lower, upper = np.maximum(grid[near] - step, low), np.minimum(grid[near] + step, high)
-    for _ in range(STEPS):  # by thirds
+    for _ in range(STEPS):  # ternary search
         a, b = lower + (upper - lower) / 3, upper - (upper - lower) / 3
         sizes = np.split(np.linalg.norm(away(np.concatenate([a, b]))[0] - np.asarray(point)[:, None], axis=0), 2)
         nearer = sizes[0] < sizes[1]
@@ -139,21 +139,21 @@ def _plain(values: Any) -> list[Any]:
 
 
 def _turned(away: Any, first: float, second: float) -> bool:
-    """Tell whether the tangents at two values of a parameter have different directions."""
+    """Return whether the tangents at two values of a parameter have different directions."""
     tangents = away(np.array([first, second]))[1]
     tangents = tangents / np.linalg.norm(tangents, axis=0)
     return abs(float(tangents[:, 0] @ tangents[:, 1])) < 1 - 1e-6
 
 
 def has_ends(mechanism: Any) -> bool:
-    """Tell whether a mechanism holds a point on a curve, or on a surface, that has ends."""
+    """Return whether a joint of a mechanism has a curve or a surface with ends."""
     parts = (part for joint in mechanism.joints.values() if joint.hidden for part in vars(joint).values())
     curves = [part for part in parts if isinstance(part, ParametricCurve | SampledCurve)]
     return any(not curve.closed and getattr(curve, "range", curve) is not None for curve in curves)
 
 
 def check_without_ends(mechanism: Any, what: str) -> None:
-    """Raise UnsupportedError if a mechanism has curves with ends, which are not looked for."""
+    """Raise UnsupportedError if a mechanism has curves with ends, which `what` does not detect."""
     if has_ends(mechanism):
         message = (
             f"{what} does not look for the ends of curves yet, and would go on beyond; give a curve without a range"
@@ -162,9 +162,9 @@ def check_without_ends(mechanism: Any, what: str) -> None:
 
 
 def with_carriages(bodies: Mapping[str, Any], joints: Mapping[str, Any], kind: type[Any]) -> Mapping[str, Any]:
-    """Return the bodies of a mechanism, those of its user first, and then the carriages of its joints.
+    """Return the bodies of a mechanism: those of the user first, then the carriages of the joints.
 
-    `kind` is the class of carriages; the place of a new one is None, as it follows from the guess of the bodies.
+    `kind` is the class of carriages; the position of a new carriage is None, as it follows from the starting guess.
     """
     names = [carriage for name, joint in joints.items() for carriage in carriages(name, joint)]
     own = {name: body for name, body in bodies.items() if not isinstance(body, kind)}

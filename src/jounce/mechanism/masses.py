@@ -1,4 +1,4 @@
-"""Masses of bodies in numbers; impossible ones are refused."""
+"""Masses, centers of mass and inertias of bodies as checked numbers."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -15,25 +15,27 @@ from jounce.rigid.inertia import ADVICE, Inertia
 def body_mass(
     name: str, body: Body, parameters: Mapping[str, Any], components: int, *, solid: bool = True
 ) -> tuple[Any, Any, Any]:
-    """Return mass, center of mass, (2,) or (3,), and inertia about it, () or (3, 3), of a body; zero where not given.
+    """Return the mass, the center of mass, (2,) or (3,), and the inertia about it, () or (3, 3), of a body.
+
+    Values that are not given are zero.
 
     Parameters
     ----------
     name : str
-        Of the body, for messages.
+        Name of the body, for messages.
     body : Body
-        Its values may be expressions.
+        Body with values that may be expressions.
     parameters : mapping of str to float
         Values of the names in expressions.
     components : int
         2 in the plane, 3 in space.
     solid : bool, default True
-        Whether to refuse moments that no solid body has; the rotor of a drive may be counted in those of a link.
+        Whether to refuse moments that no rigid body has; those of a link may contain the rotor of a drive.
 
     Raises
     ------
     MechanismError
-        If a value has a wrong shape or is not finite, mass or inertia is negative, or no real body has such moments.
+        If a value has a wrong shape or is not finite, a mass or inertia is negative, or no rigid body has such moments.
 
     Examples
     --------

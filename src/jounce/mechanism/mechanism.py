@@ -1,4 +1,4 @@
-"""The mechanism as its user sees it: named bodies, joints, drivers, outputs and parameters; frozen."""
+"""The mechanism as the user states it: named bodies, joints, drivers, outputs and parameters; frozen."""
 
 import dataclasses
 import re
@@ -25,8 +25,8 @@ from jounce.units.shown_units import ShownUnits
 from jounce.units.values import parse_value, stated_dimensions
 
 GROUND = "ground"
-CLASSES = {"outputs": AbstractQuantity, "forces": AbstractForce}  # constraints otherwise
-RESERVED_OUTPUTS = (  # the axes of a result
+CLASSES = {"outputs": AbstractQuantity, "forces": AbstractForce}  # other kinds contain constraints
+RESERVED_OUTPUTS = (  # axes of a result
     "time",
     "derivative",
     "component",
@@ -38,19 +38,19 @@ RESERVED_OUTPUTS = (  # the axes of a result
 )
 NEAREST = "nearest"
 SIDES = {"above": (-1, 1), "below": (-1, -1), "right": (0, 1), "left": (0, -1)}
-"""Where a body may be wished to lie: the component of the global frame, and its sign."""
+"""Sides on which a body may be requested to lie: a component of the global frame, and its sign."""
 MAPPINGS = ("bodies", "joints", "drivers", "forces", "initial", "outputs", "parameters", "units", "dimensions")
 RATE_COLUMN = re.compile(r".*_d[0-9]+", re.DOTALL)
 
 
 @dataclasses.dataclass(frozen=True)
 class Body:
-    """A rigid body: where it is guessed to start, and its mass where forces are requested.
+    """A rigid body: the starting guess of its pose, and its mass properties if forces are requested.
 
     Parameters
     ----------
     position : sequence
-        Starting guess of the origin of its frame in the global frame, (2,) or (3,), m.
+        Starting guess of the origin of the body frame in the global frame, (2,) or (3,), m.
     angle : number or expression, default 0
         Starting guess of the angle of a planar body, rad.
     orientation : sequence of 4 numbers, or dict, optional
@@ -58,13 +58,13 @@ class Body:
         ``{"axis": [x, y, z], "angle": ...}``, or ``{"euler": "zxz", "angles": [...]}`` (lower-case letters for fixed
         axes, upper-case ones for those of the body), rad. Numbers may be expressions of the parameters.
     mass : number or expression, optional
-        For the dynamics; kinematics does not use it. kg.
+        Mass, kg; kinematics does not use it.
     inertia : number, sequence, expression or Inertia, optional
         Moment of inertia about the center of mass, kg m^2: one number in the plane; in space three principal moments
         along the axes of the body, or a symmetric matrix in these axes. An `Inertia` gives the mass and the center of
         mass too.
     center_of_mass : sequence, optional
-        In the frame of the body, m; its origin unless given.
+        Center of mass in the frame of the body, m; the origin of the frame by default.
 
     Raises
     ------
@@ -98,7 +98,7 @@ class Body:
 
 
 class Carriage(Body):
-    """A body without mass for the hidden coordinates of a joint, such as the parameter of a curve: see `carriages`."""
+    """A massless body for the hidden coordinates of a joint, such as the parameter of a curve: see `carriages`."""
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -110,39 +110,41 @@ class Mechanism(Displayed):
     space : str
         ``"planar"`` or ``"spatial"``.
     bodies : dict of str to Body
-        The moving bodies; the body ``"ground"`` always exists besides.
+        The moving bodies; the body ``"ground"`` always exists beside them.
     joints, drivers : dict of str to AbstractConstraint
-        By name; their values may be numbers (SI), or expressions of the parameters, which alone state units.
+        Constraints by name. Their values may be numbers (SI), or expressions of the parameters, which alone state
+        units.
     forces : dict of str to AbstractForce, optional
-        Applied forces and torques, by name; they do not bear on motion that is prescribed.
+        Applied forces and torques, by name; they do not affect prescribed motion.
     initial : dict of str to AbstractConstraint, optional
-        Drivers that hold at the start of a simulation only: they give the position and the velocity there, by value and
-        first derivative of their law, and are then released.
+        Drivers that hold at the start of a simulation only: the value and the first derivative of their laws give the
+        initial position and velocity.
     outputs : dict of str to AbstractQuantity, optional
-        Quantities requested, by name.
+        Requested quantities, by name.
     parameters : dict of str to number or str, optional
         Named values: numbers (SI), or text as in a file: a number with a unit, or an expression of the others. A unit
-        must suit where the parameter is used.
+        must suit the use of the parameter.
     gravity : sequence, optional
         Acceleration of free fall in the global frame, (2,) or (3,), m/s^2; zero unless given.
     time : array_like, optional
-        The instants that `jounce.solve` takes when it is given none, s.
+        The instants at which `jounce.solve` solves by default, s.
     redundant_reactions : str or dict of str to dict, default "unique"
-        Which reactions to give where constraints are redundant: ``"unique"`` those that are, the others are NaN;
-        ``"least_norm"`` all, such that the sum of the squares of the forces of all constraint rows, and of their
-        couples over the size of the mechanism, is least; or those of elastic joints: by the name of a joint, its
-        stiffness ``force``, N/m, and ``torque``, N m/rad; what is not given is rigid.
+        Choice of reactions where constraints are redundant: ``"unique"`` gives the unique reactions, and NaN for the
+        others; ``"least_norm"`` gives those with the least sum of squares of the forces of all constraint rows, and of
+        their couples over the size of the mechanism; stiffnesses give those of elastic joints: by the name of a joint,
+        ``force``, N/m, and ``torque``, N m/rad; a joint or a direction without stiffness is rigid.
     title : str, optional
         One line for tables and figures.
     units : dict of str to str, optional
-        In which results are shown and written: units by ``angle``, ``length``, ``force``, ``torque``, ``energy``,
-        ``power``, or the name of an output. Values inside, and those of `Motion`, are in SI.
+        Units of shown and written results, by ``angle``, ``length``, ``force``, ``torque``, ``energy``, ``power``, or
+        the name of an output. Values inside, and those of `Motion`, are in SI.
     assembly : int, str or dict, optional
-        Which of several assemblies is meant, where the nearest to the starting guess by chance of iteration will not
-        do: its number as `jounce.assemblies` counts, ``"nearest"`` for the truly nearest to the guess, or for some
-        bodies ``"above"``, ``"below"``, ``"left"`` or ``"right"``: where the middle of its joints lies farthest there.
+        Choice among several assemblies, if the one to which the iteration from the starting guess converges will not
+        do: its number as `jounce.assemblies` counts, ``"nearest"`` for the nearest to the guess, or for some bodies
+        ``"above"``, ``"below"``, ``"left"`` or ``"right"``: the middle of the joints of the body lies farthest that
+        way.
     dimensions : dict of str to tuple of Dimension, optional
-        Which dimensions parameters may have, where it is known: a file tells it by units and by use.
+        Dimensions that parameters may have, if known: for a mechanism from a file, by their units and use.
 
     Raises
     ------
@@ -217,7 +219,7 @@ class Mechanism(Displayed):
 
     @property
     def rigid_bodies(self) -> dict[str, Body]:
-        """The moving bodies but for the carriages by which joints count their hidden coordinates."""
+        """The moving bodies except for carriages, which carry the hidden coordinates of joints."""
         return {name: body for name, body in self.bodies.items() if not isinstance(body, Carriage)}
 
     @property
@@ -266,11 +268,11 @@ class Mechanism(Displayed):
             try:
                 element.check(self)
             except MechanismError as error:
-                error.name = f"{location}.{error.name}"  # it knows its fields only
+                error.name = f"{location}.{error.name}"  # the output names its field only
                 raise
 
     def _check_columns(self) -> None:
-        """Refuse outputs whose columns in a table would have the same name: a point C and an angle C_x."""
+        """Raise MechanismError if columns of outputs in a table have the same name: a point C and an angle C_x."""
         for name in self.outputs:
             stem, _, label = name.rpartition("_")
             if stem in self.outputs and label in self.outputs[stem].component_labels(self):
@@ -278,7 +280,7 @@ class Mechanism(Displayed):
                 raise MechanismError(message, name=f"outputs.{name}")
 
     def check_fit(self, element: AbstractConstraint | AbstractForce | AbstractQuantity, location: str) -> None:
-        """Raise MechanismError unless an element exists in this space and names bodies that there are."""
+        """Raise MechanismError unless an element suits the space of the mechanism and names existing bodies."""
         if element.space and element.space != self.space:
             raise MechanismError(f"is {element.space}, in a {self.space} mechanism", name=location)
         for body in getattr(element, "bodies", ()):
@@ -292,7 +294,7 @@ class Mechanism(Displayed):
 
     @cached_property
     def parameter_values(self) -> dict[str, Any]:
-        """Values of all parameters, those given by expressions of others too.
+        """Values of all parameters, including those given by expressions of others.
 
         Raises
         ------
@@ -320,7 +322,7 @@ class Mechanism(Displayed):
 
     @cached_property
     def checked_intervals(self) -> set[tuple[float, float]]:
-        """The first and last instants between which its laws were looked at for units other than of SI, s."""
+        """First and last instants, s, of the intervals in which the laws were checked for likely degrees."""
         return set()
 
     def with_parameters(self, **values: Any) -> "Mechanism":
@@ -339,7 +341,7 @@ class Mechanism(Displayed):
         MechanismError
             If a parameter does not exist.
         UnitError, ExpressionError
-            If a text is no value, or one of another dimension than the file has.
+            If a text is no value, or a value of another dimension than the parameter has in the file.
 
         Examples
         --------
@@ -366,20 +368,20 @@ class Mechanism(Displayed):
 
 
 def names_column(name: str) -> bool:
-    """Tell whether a name is that of an axis of results, or of a rate in a table of them: no output may have it."""
+    """Return whether a name is reserved for an axis of results or for a rate in tables, and no output may have it."""
     return name in RESERVED_OUTPUTS or RATE_COLUMN.fullmatch(name) is not None
 
 
 def check_body_name(given: object, error: type[JounceError], **location: Any) -> None:
-    """Raise an error unless a moving body may have a name; `location` is that of the name."""
+    """Raise an error unless a moving body may have a name; `location` says where the name is given."""
     if given == GROUND:
         raise error("the body 'ground' always exists and never moves; give another name", **location)
 
 
 def check_output_name(given: object, error: type[JounceError], **location: Any) -> None:
-    """Raise an error unless an output may have a name; `location` is that of the name.
+    """Raise an error unless an output may have a name; `location` says where the name is given.
 
-    Spaces, brackets and quotes are allowed: tables keep them. Files of mechanisms allow less.
+    Spaces, brackets and quotes are allowed, as in tables. Mechanism files allow less.
     """
     if not isinstance(given, str) or not given:
         raise error("the name of an output is text that is not empty", value=given, **location)
@@ -390,6 +392,6 @@ def check_output_name(given: object, error: type[JounceError], **location: Any) 
 
 
 def check_mechanism(given: object) -> None:
-    """Raise MechanismError for anything but a mechanism, such as the name of a file."""
+    """Raise MechanismError unless the argument is a mechanism, not, for example, a file name."""
     if not isinstance(given, Mechanism):
         raise MechanismError("must be a jn.Mechanism; jn.load reads one from a file", name="mechanism", value=given)

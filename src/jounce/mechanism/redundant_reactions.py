@@ -1,4 +1,4 @@
-"""The choice of reactions that redundant constraints leave open: checked, and with numbers for expressions."""
+"""The choice of reactions that redundant constraints leave open: its check, and its numeric values."""
 
 import math
 from collections.abc import Collection, Mapping
@@ -13,11 +13,11 @@ STIFFNESSES = {"force": "stiffness", "torque": "torsional stiffness"}
 PLACE = "redundant_reactions"
 
 RedundantReactions = str | Mapping[str, Any]
-"""One of the choices, or stiffnesses, force and torque, by the names of joints."""
+"""One of the choices, or force and torque stiffnesses by the names of joints."""
 
 
 def check_redundant_reactions(choice: RedundantReactions | Refused, names: Collection[str]) -> None:
-    """Raise MechanismError unless it is one of the choices, or stiffnesses by the names of joints."""
+    """Raise MechanismError unless the value is one of the choices, or stiffnesses by the names of joints."""
     if not isinstance(choice, Mapping):
         if choice not in CHOICES:
             message = f"must be one of {', '.join(CHOICES)}, or stiffnesses by the names of joints"
@@ -33,12 +33,12 @@ def check_redundant_reactions(choice: RedundantReactions | Refused, names: Colle
 
 
 def resolved_reactions(choice: RedundantReactions, parameters: Mapping[str, Any]) -> str | dict[str, dict[str, float]]:
-    """Return the choice with numbers for expressions of the parameters.
+    """Return the choice with numbers in the place of expressions of the parameters.
 
     Raises
     ------
     MechanismError
-        If a stiffness is no number above zero.
+        If a stiffness is no positive number.
     """
     if not isinstance(choice, Mapping):
         return choice

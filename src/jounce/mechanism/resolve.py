@@ -24,14 +24,14 @@ from jounce.trajectory.curves import resolve_curve
 from jounce.trajectory.laws.user_laws import read_laws, shape_of_result, tried_law
 from jounce.units.values import expression_in_si
 
-_ROWS, _REAL = frozenset((list, tuple)), frozenset((int, float))  # read first: to ask for what is abstract takes long
+_ROWS, _REAL = frozenset((list, tuple)), frozenset((int, float))  # tested first: checks by abstract classes are slow
 _NUMBERS = frozenset((float, np.float64, np.ndarray))
 Element = Module
 """A joint, driver, force or output."""
 
 
 def resolve(value: Any, parameters: Mapping[str, Any]) -> Any:
-    """Return the number or array that a value stands for; it may be given by an expression of the parameters."""
+    """Return the number or array of a value, which may be given by an expression of the parameters."""
     kind = type(value)
     if kind is float:
         return value
@@ -56,7 +56,7 @@ def resolve(value: Any, parameters: Mapping[str, Any]) -> Any:
 
 
 def _is_number(value: Any) -> bool:
-    """Tell whether a value is one number: also an array without axes, as an entry of a dataset is."""
+    """Return whether a value is one number, also as an array without axes, such as an entry of a dataset."""
     return isinstance(value, numbers.Real) or (
         (isinstance(value, np.ndarray) or has_labels(value)) and not np.ndim(value)
     )
@@ -67,7 +67,7 @@ def _number(value: Any) -> float:
 
 
 def _are_numbers(entries: list[Any]) -> bool:
-    """Tell whether entries are numbers, or rows of numbers of one length."""
+    """Return whether entries are numbers, or rows of numbers of one length."""
     if set(map(type, entries)) <= {float}:
         return True
     numeric = all(isinstance(x, float) or (isinstance(x, np.ndarray) and x.dtype.kind == "f") for x in entries)
@@ -75,7 +75,7 @@ def _are_numbers(entries: list[Any]) -> bool:
 
 
 def resolve_motion(motion: Any, parameters: Mapping[str, Any]) -> AbstractMotion:
-    """Return the motion law that a number, an expression, a Python function or a law stands for."""
+    """Return the motion law given by a number, an expression, a Python function or a law."""
     if isinstance(motion, AbstractMotion):
         return _traceable(motion.resolved(parameters))
     if _is_number(motion):
@@ -98,25 +98,25 @@ def _check_names(expression: Expression, own: set[str], parameters: Mapping[str,
 
 
 def _traceable(motion: AbstractMotion) -> AbstractMotion:
-    """Return a law after trying it once, on shapes only: Python functions can fail in ways that need words."""
+    """Return a law after a trial on shapes only: Python functions can fail in ways that need an explanation."""
     if type(motion).__call__ is SplineMotion.__call__ and belongs_to_package(type(motion)):
-        return motion  # numbers that were checked; to trace it takes longer than to solve a short grid
+        return motion  # checked numbers: tracing takes longer than solving a short grid
     return read_laws(tried_law(motion))
 
 
 def resolve_law(law: Any, force: AbstractForce, parameters: Mapping[str, Any], components: int | None) -> AbstractLaw:
-    """Return the law of a force that a number, an expression, a Python function or a motion law stands for.
+    """Return the law of a force, given by a number, an expression, a Python function or a motion law.
 
     Parameters
     ----------
     law : object
-        As a user gives it; a list of them for a force with components.
+        Law as a user gives it; a list of laws for a force with components.
     force : AbstractForce
-        Says what expressions call displacement and velocity.
+        Force that names displacement and velocity in expressions.
     parameters : mapping
-        Values of other names in expressions.
+        Values of the other names in expressions.
     components : int or None
-        Size of a vector, None for a scalar.
+        Size of a vector; None for a scalar.
     """
     if components is None or isinstance(law, AbstractLaw) or (callable(law) and not isinstance(law, AbstractMotion)):
         force_law = _scalar_law(law, force, parameters)
@@ -148,7 +148,7 @@ def _scalar_law(law: Any, force: AbstractForce, parameters: Mapping[str, Any]) -
         size = _number(law)
         if not np.isfinite(size):
             raise MechanismError("must be finite", value=size)
-        return ExpressionLaw("size", {"size": size}, *names)  # a leaf: laws that differ in it are stacked
+        return ExpressionLaw("size", {"size": size}, *names)  # a leaf, so that laws with different sizes can be stacked
     if isinstance(law, str):
         law = expression_in_si(law)
     if isinstance(law, Expression):
@@ -164,12 +164,12 @@ def _scalar_law(law: Any, force: AbstractForce, parameters: Mapping[str, Any]) -
 
 
 def parameter_value(name: str, value: Any) -> Any:
-    """Return the value of a parameter as a float; what JAX traces stays as it is.
+    """Return the value of a parameter as a float; a traced value is returned unchanged.
 
     Raises
     ------
     MechanismError
-        If it is not one finite number.
+        If the value is not one finite number.
     """
     if type(value) is float and math.isfinite(value):
         return value
@@ -188,13 +188,13 @@ def parameter_value(name: str, value: Any) -> Any:
 
 @cache
 def _shapes(kind: str, components: int) -> tuple[tuple[int, ...], ...]:
-    """Return the shapes that values of a kind may have."""
+    """Return the permitted shapes of a kind of value."""
     vector = (components,)
     return {"scalar": ((),), "vector": (vector,), "tensor": (vector, vector * 2)}[kind]
 
 
 def check_value(kind: str, value: Any, components: int, sign: str = "any") -> None:
-    """Raise MechanismError unless a value fits its field: shape, finite, and of the `sign` that its class states."""
+    """Raise MechanismError unless a value is finite, and has the shape of its field and the `sign` stated for it."""
     if isinstance(value, float):
         shape, entries = (), [value]
     elif isinstance(value, np.ndarray) and value.dtype.kind == "f":
@@ -216,7 +216,7 @@ def check_value(kind: str, value: Any, components: int, sign: str = "any") -> No
 
 
 def resolved(value: Any, name: str, kind: str, components: int, parameters: Mapping[str, Any]) -> Any:
-    """Return what a value of a body stands for, checked: a ``scalar``, ``vector`` or ``tensor``; `name` is dotted."""
+    """Return the checked value of a body: a ``scalar``, ``vector`` or ``tensor``; `name` is its dotted name."""
     try:
         array = resolve(value, parameters)
         check_value(kind, array, components)
@@ -230,7 +230,7 @@ def _plain(value: Any) -> Any:
 
 
 def resolve_element(element: Element, parameters: Mapping[str, Any], components: int, name: str) -> dict[str, Any]:
-    """Return the values of a joint, driver, force or output as arrays, by field, checked."""
+    """Return the checked values of a joint, driver, force or output as arrays, by field."""
     values, facts = {}, facts_of(type(element))
     kinds = field_kinds(type(element))
     for field_name, field in value_fields(type(element)).items():
@@ -245,14 +245,14 @@ def resolve_element(element: Element, parameters: Mapping[str, Any], components:
                 value = resolve(value, parameters)
                 check_value(kind, value, components, facts.signs[field_name])
             elif kind == "part" and value is not None:
-                # in a file the follower of a cam is the cam
+                # a mechanism file states the follower of a cam as the cam itself
                 place = name if field_name == "follower" else f"{name}.{field_name}"
                 value = unchecked(type(value), _of_part(value, parameters, components, place))
             elif kind == "points":
                 value = _points(resolve(value, parameters), len(element.slots or element.bodies), components)
             elif kind == "wrenches":
                 value = _wrenches(resolve(value, parameters))
-            elif kind == "nested" and value is not None:  # the bodies are those of the whole
+            elif kind == "nested" and value is not None:  # the bodies are those of the containing element
                 of_bodies = hasattr(value, "bodies")
                 place = name if of_bodies else f"{name}.{field_name}"
                 nested = resolve_element(value, parameters, components, place)
@@ -260,7 +260,7 @@ def resolve_element(element: Element, parameters: Mapping[str, Any], components:
         except JounceError as error:
             raise error.located(name=f"{name}.{field_name}") from None
         values[field_name] = value
-    for field_name in (name for name, kind in kinds.items() if kind == "curve"):  # last, as they know their start
+    for field_name in (name for name, kind in kinds.items() if kind == "curve"):  # last, since a curve needs its start
         try:
             start = [values[name] for name in values if name.startswith("start")]
             start = None if any(x is None for x in start) else start
@@ -273,13 +273,13 @@ def resolve_element(element: Element, parameters: Mapping[str, Any], components:
 
 
 def _of_part(element: Element, parameters: Mapping[str, Any], components: int, name: str) -> dict[str, Any]:
-    """Return the values of an element within another one, which has its bodies."""
+    """Return the values of an element within another element, which holds the bodies."""
     rest = {field.name: field.default for field in dataclasses.fields(type(element)) if not field.init}
     return {"bodies": ()} | rest | resolve_element(element, parameters, components, name)
 
 
 def _points(value: Any, count: int, components: int) -> Any:
-    """Return rows of numbers, one for each body, checked."""
+    """Return the points of an element, one for each body, after a check."""
     if isinstance(value, Tracer):
         return value
     if not (isinstance(value, np.ndarray) and value.dtype.kind == "f" and value.shape == (count, components)):
@@ -293,7 +293,7 @@ def _points(value: Any, count: int, components: int) -> Any:
 
 
 def _wrenches(value: Any) -> Any:
-    """Return rows of six numbers, checked."""
+    """Return rows of six numbers after a check."""
     if not isinstance(value, Tracer):
         rows = isinstance(value, np.ndarray) and value.dtype.kind == "f" and value.ndim == 2 and value.shape[1] == 6
         if not rows or not len(value):
@@ -306,7 +306,7 @@ def _wrenches(value: Any) -> Any:
 
 
 def _check_directions(values: Mapping[str, Any], never_parallel: Iterable[tuple[str, str]], name: str) -> None:
-    """Raise MechanismError where a direction is parallel to another that it must not be parallel to."""
+    """Raise MechanismError if two directions are parallel that must not be."""
     for field, other in never_parallel:
         vector, axis = values[field], values[other]
         if isinstance(axis, np.ndarray) and isinstance(vector, np.ndarray):
@@ -318,7 +318,7 @@ def _check_directions(values: Mapping[str, Any], never_parallel: Iterable[tuple[
 
 
 def _of_size_one(vector: np.ndarray) -> list[float]:
-    """Return the entries of a vector over the largest, so that no product overflows; Python is faster for so few."""
+    """Return the entries of a vector divided by the largest, so that no product overflows, as a list for speed."""
     entries = vector.tolist()
     size = max(map(abs, entries))
     return [entry / size for entry in (*entries, 0.0)[:3]]
@@ -326,7 +326,7 @@ def _of_size_one(vector: np.ndarray) -> list[float]:
 
 @lru_cache(maxsize=1000)
 def static_fields(kind: type[Element]) -> tuple[str, ...]:
-    """Return the names of the fields that hold no numbers, `bodies` aside."""
+    """Return the names of the static fields of a class except `bodies`."""
     return tuple(
         field.name
         for field in dataclasses.fields(kind)
@@ -335,23 +335,23 @@ def static_fields(kind: type[Element]) -> tuple[str, ...]:
 
 
 def group_key(element: Element, values: Mapping[str, Any]) -> Any:
-    """Return what instances must share to be stacked: class, words, and the structure of their values."""
+    """Return what instances must share to be stacked: class, static fields, and the structure of their values."""
     static = static_fields(type(element))
     words = (len(element.bodies), *(getattr(element, name) for name in static))
     numbers_only = {name: value for name, value in values.items() if name not in static}
     if all(type(value) in _NUMBERS or isinstance(value, jax.Array) for value in numbers_only.values()):  # traced, too
         shapes = tuple((name, np.shape(value)) for name, value in numbers_only.items())
-        return type(element), words, shapes  # the whole structure, without flattening
+        return type(element), words, shapes  # defines the structure without flattening
     leaves, structure = jax.tree.flatten(numbers_only)
     return type(element), words, structure, tuple(np.shape(leaf) for leaf in leaves)
 
 
 def stack_elements(elements: Sequence[Element], values: Sequence[Mapping[str, Any]]) -> Any:
-    """Return one element whose values hold all instances, along an axis before the batch axis."""
+    """Return one element with the values of all instances, along an axis before the batch axis."""
     kind = type(elements[0])
     static = static_fields(kind)
     stacked: dict[str, Any] = {"bodies": (), **_found_later(kind)}
-    for name in value_fields(kind):  # those of no `init` are found later, from the pose of the bodies
+    for name in value_fields(kind):  # fields without `init` are set later, from the poses of the bodies
         its = [v[name] for v in values]
         if name in static or its[0] is None:
             stacked[name] = its[0]
@@ -359,18 +359,18 @@ def stack_elements(elements: Sequence[Element], values: Sequence[Mapping[str, An
             stacked[name] = along_instances(*its)
         else:
             stacked[name] = jax.tree.map(along_instances, *its)
-    return unchecked(kind, stacked)  # the checks were made for each instance
+    return unchecked(kind, stacked)  # each instance was checked
 
 
 @lru_cache(maxsize=1000)
 def _found_later(kind: type[Element]) -> Mapping[str, Any]:
-    """Return the fields of a class that are not given, with what they are until they are found."""
+    """Return the default values of the fields that are set later."""
     return {field.name: field.default for field in dataclasses.fields(kind) if not field.init}
 
 
 def along_instances(*values: Any) -> Any:
-    """Return values of one shape side by side, (..., instances, 1); they may be traced by JAX."""
+    """Return values of one shape stacked along an axis of instances, (..., instances, 1); they may be traced."""
     if any(issubclass(kind, Tracer) for kind in set(map(type, values))):
         return jnp.stack([jnp.asarray(value) for value in values], axis=-1)[..., None]
-    rows = np.array(values)  # in a fraction of the time of np.stack
+    rows = np.array(values)  # faster than np.stack
     return np.ascontiguousarray(rows.transpose(*range(1, rows.ndim), 0))[..., None]

@@ -1,4 +1,4 @@
-"""Whether the units of parameters suit where they are used, in mechanisms that are built in Python."""
+"""A check that the units of parameters suit their uses, in mechanisms built in Python."""
 
 from collections.abc import Iterator, Mapping
 from typing import Any
@@ -15,11 +15,11 @@ from jounce.units.values import parse_value
 
 _BODY = {"position": "length", "angle": "angle", "mass": "mass", "inertia": "inertia", "center_of_mass": "length"}
 _Use = tuple[str, Any, str, dict[str, Dimension | None]]
-"""Where a value stands, the value, what is expected there, and the variables that it may have."""
+"""Location of a value, the value, its expected dimension, and the variables that it may contain."""
 
 
 def check_stated_units(mechanism: Any, dimensions: Mapping[str, Dimension]) -> None:
-    """Raise UnitError where parameters of these dimensions are used for something else, as in a file."""
+    """Raise UnitError if parameters are used where values of other dimensions are expected, as in a file."""
     for where, value, expected, variables in _uses(mechanism):
         if isinstance(value, list | tuple | np.ndarray):
             entries = np.ravel(np.asarray(value, dtype=object)).tolist()
@@ -46,13 +46,13 @@ def _uses(mechanism: Any) -> Iterator[_Use]:
 
 
 def _uses_of(element: Module, where: str, clock: Dimension | None = TIME) -> Iterator[_Use]:
-    """Yield the values of an element; what its laws of motion depend on is the time, or what is not known."""
+    """Yield the values of an element; `clock` is the dimension of the variable of motion laws, None if unknown."""
     kinds, dimensions = field_kinds(type(element)), facts_of(type(element)).dimensions
     for field in value_fields(type(element)):
         kind, value, place = kinds[field], getattr(element, field), f"{where}.{field}"
         expected = at_coordinate(dimensions[field], getattr(element, "coordinate", None))
         if kind in ("part", "nested") and value is not None:
-            yield from _uses_of(value, place, None)  # the law of a cam is of a coordinate
+            yield from _uses_of(value, place, None)  # the law of a cam depends on a coordinate
         elif kind in ("law", "laws") and isinstance(element, AbstractForce):
             yield place, value, expected, variables_of(type(element))
         elif kind == "motion":

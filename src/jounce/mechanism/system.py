@@ -1,4 +1,4 @@
-"""A mechanism in numbers: instances of a type stacked, bodies by index, residual and Jacobian of the whole."""
+"""A mechanism in numbers: stacked instances, bodies by index, residual and Jacobian of the whole."""
 
 import dataclasses
 from collections.abc import Callable, Mapping, Sequence
@@ -31,12 +31,12 @@ POSITION_COMPONENTS = {"planar": 2, "spatial": 3}
 
 
 class Group(Module):
-    """All joints, drivers, forces or outputs of one type, evaluated together.
+    """All joints, drivers, forces or outputs of one type with one structure, evaluated together.
 
     Parameters
     ----------
     element : AbstractConstraint, AbstractForce or AbstractOutput
-        Its values have shape (..., instances, 1).
+        Element with values of shape (..., instances, 1).
     bodies : tuple of tuple of int
         For each body slot, the indices of the bodies of the instances; 0 is the ground.
     """
@@ -71,49 +71,49 @@ class Group(Module):
         return self._acting(pose, time)[1].truncate(pose.order - 1)
 
     def finite(self, pose: Pose, time: Jet) -> Bool[Numbers, "instance batch"]:
-        """Return where forces and the velocities they work on are finite numbers, shape (instances, batch)."""
+        """Return whether each force and the velocity on which it does work are finite, shape (instances, batch)."""
         velocity, force = (jnp.isfinite(jet.coefficients[0]).all(axis=0) for jet in self._acting(pose, time))
         return velocity & force
 
     def power(self, pose: Pose, time: Jet) -> Float[Jet, "instance batch"]:
-        """Return the power that forces put into the mechanism, shape (instances, batch), W."""
+        """Return the power that forces supply to the mechanism, shape (instances, batch), W."""
         velocity, force = self._acting(pose, time)
         return force.dot(velocity)
 
     def velocity(self, pose: Pose, time: Jet) -> Float[Jet, "component instance batch"]:
-        """Return the velocities that forces work on, shape (components, instances, batch)."""
+        """Return the velocities on which forces do work, shape (components, instances, batch)."""
         return with_rows(self.element.velocity(*self._poses(pose), time))
 
     def energy(self, pose: Pose, time: Jet) -> Float[Jet, "instance batch"]:
-        """Return the energy that forces have stored, shape (instances, batch), J."""
+        """Return the energy that forces store, shape (instances, batch), J."""
         return self.element.energy(self.element.displacement(*self._poses(pose), time))
 
     def variation(self, pose: Pose, change: Pose, time: Jet) -> Jet:
-        """Return how residuals, or how far forces act along, vary as all bodies move by a change.
+        """Return the variation of residuals, or of the displacements of forces, for a change of the poses.
 
-        Shape (rows, instances, batch), or (components, instances, batch).
+        The shape is (rows, instances, batch) or (components, instances, batch).
         """
         return with_rows(self.element.variation(tuple(self._poses(pose)), tuple(self._poses(change)), time))
 
     def _acting(self, pose: Pose, time: Jet) -> tuple[Jet, Jet]:
-        """Return the velocities that forces work on, and the forces."""
+        """Return the velocities on which forces do work, and the forces."""
         poses = self._poses(pose)
         displacement, velocity = self.element.displacement(*poses, time), self.element.velocity(*poses, time)
-        # or XLA computes both again in all that a law makes of them
+        # without the barrier, XLA computes both again at each use
         displacement, velocity = jax.lax.optimization_barrier((displacement, velocity))
         return with_rows(velocity), with_rows(self.element.force(displacement, velocity, time))
 
     def derivative_blocks(self, pose: Pose, time: Jet, scale: Float[Numbers, " coordinate"]) -> list[Any]:
-        """Return the derivatives of the residuals by the coordinates of the bodies in each slot that may move.
+        """Return the derivatives of the residuals by the coordinates of the bodies in each moving slot.
 
-        They are the linear map from the coefficients of order one of a body to those of the residual. Each block has
-        the shape (coordinates, rows, instances, batch).
+        Each block is the linear map from the first-order coefficients of a body to those of the residual, and has the
+        shape (coordinates, rows, instances, batch).
         """
         return _derivative_blocks(self.element, self._poses(pose), time, scale, self.moving_slots)
 
     @property
     def moving_slots(self) -> tuple[int, ...]:
-        """Slots that hold a body other than the ground."""
+        """Slots with at least one body other than the ground."""
         return tuple(slot for slot, bodies in enumerate(self.bodies) if any(bodies))
 
     def _poses(self, pose: Pose) -> list[Any]:
@@ -148,13 +148,13 @@ def _derivative_blocks(
 def with_field(group: Group, name: str, value: Any) -> Group:
     """Return a group with another value in a field of its elements.
 
-    It is no method, as Equinox makes an object of each method that is looked up, which takes longer than the rest.
+    A function is used, because Equinox makes an object for each look-up of a method, which takes longer than the rest.
     """
     return with_fields(group, element=with_fields(group.element, **{name: value}))
 
 
 class OmittedLaw(AbstractMotion):
-    """No motion, in the place of a law on which nothing depends."""
+    """A law of zero that replaces a law on which no result depends."""
 
     def __call__(self, time: Jet) -> Jet:
         """Return zero."""
@@ -162,19 +162,19 @@ class OmittedLaw(AbstractMotion):
 
 
 def law_left_out(group: Group, *, only_if_evaluated: bool = False) -> Group:
-    """Return a group without its law, unless how residuals change with bodies may depend on that.
+    """Return a group without its law, unless the derivatives of the residuals by the poses may depend on the law.
 
     Parameters
     ----------
     group : Group
-        Of joints or drivers.
+        Group of joints or drivers.
     only_if_evaluated : bool, default False
-        Whether the law is left out only if `evaluate` gives its value from the poses of bodies that move by it.
+        Whether to omit the law only if `evaluate` gives its value from the poses of the bodies.
     """
     element = users_class(type(group.element))
     kind = next(kind for kind in element.__mro__ if "residual" in vars(kind))
     is_separable = vars(kind).get("separable", False)
-    if is_separable and only_if_evaluated:  # `evaluate` may have been changed by a class that keeps the residual
+    if is_separable and only_if_evaluated:  # a subclass may override `evaluate` and inherit the residual
         is_separable = getattr(kind, "evaluate", None) is getattr(element, "evaluate", object)
     return with_field(group, "motion", OmittedLaw()) if is_separable else group
 
@@ -211,27 +211,27 @@ def group_elements(
 
 
 def _stacked(elements: Sequence[Any], values: Sequence[Mapping[str, Any]]) -> Any:
-    """Return one element with the values of several, and with what its methods compute where a user wrote them."""
+    """Return one element with the values of several, and with the readings of methods that a user wrote."""
     element, readings = stack_elements(elements, values), [its[READINGS] for its in values if READINGS in its]
     return with_readings(element, jax.tree.map(along_instances, *readings)) if readings else element
 
 
 class System(Module):
-    """All constraints and forces of a mechanism as functions on one pose of all its bodies, the ground first.
+    """All constraints and forces of a mechanism as functions of one pose of all its bodies, the ground first.
 
-    Coordinates of positions are scaled by a length of the mechanism, and rows by the size of their derivatives, so
-    that steps and pivots mean the same for a watch and a crane.
+    Position coordinates are scaled by a length of the mechanism, and rows by the size of their derivatives, so that
+    steps and pivots are comparable for a watch and a crane.
     """
 
     groups: tuple[Group, ...]
     outputs: tuple[Group, ...]
-    pattern: Pattern  # where the entries of the blocks of the groups stand in the Jacobian
+    pattern: Pattern  # positions of the blocks of the groups in the Jacobian
     row_scale: Float[Numbers, "row 1"]
     column_scale: Float[Numbers, " coordinate"]  # one for each coordinate of a body
     body_count: int = field(static=True)
     forces: tuple[Group, ...] = ()
-    fronts: Fronts | None = None  # how a large Jacobian is eliminated
-    rank: int | None = field(static=True, default=None)  # of the Jacobian in general, where rows are redundant
+    fronts: Fronts | None = None  # elimination of a large Jacobian
+    rank: int | None = field(static=True, default=None)  # generic rank of the Jacobian, where rows are redundant
     reflected: bool = field(static=True, default=False)  # whether the Jacobian is eliminated by reflections
 
     @property
@@ -241,27 +241,27 @@ class System(Module):
 
     @property
     def rank_is_open(self) -> bool:
-        """Whether constraints are redundant by a number that only the assembled bodies show; programs depend on it."""
+        """Whether the number of redundant constraints is only known after assembly; programs depend on it."""
         rows, columns = self.shape
         return rows > columns and self.rank is None
 
     @property
     def elimination_order(self) -> Order:
-        """Rows and columns in the order in which reflections eliminate the Jacobian: few of its zeros are filled."""
+        """Order of rows and columns in which reflections eliminate the Jacobian with little fill-in."""
         touched = []
         for group, count in zip(self.groups, self.pattern.row_counts, strict=True):
             touched += [frozenset(b - 1 for b in bodies if b) for bodies in zip(*group.bodies, strict=True)] * count
         return elimination_order(tuple(touched), self.body_count, self.pattern.width)
 
     def residual(self, pose: Pose, time: Jet) -> Float[Jet, "row batch"]:
-        """Return the residuals of all constraints, shape (rows, batch), scaled."""
-        if not self.groups:  # bodies that fly freely
+        """Return the scaled residuals of all constraints, shape (rows, batch)."""
+        if not self.groups:  # free bodies
             return Jet.constant(jnp.zeros((0, time.coefficients[0].shape[-1])), pose.order)
         parts = [group.residual(pose, time).map(_flat) for group in self.groups]
         return concatenate(parts) * self.row_scale
 
     def variation(self, pose: Pose, change: Pose, time: Jet) -> Float[Jet, "row batch"]:
-        """Return how the residuals of all constraints, shape (rows, batch), scaled, vary with displacements."""
+        """Return the variation of the scaled residuals, shape (rows, batch), for a change of the pose."""
         if not self.groups:
             return Jet.constant(jnp.zeros((0, time.coefficients[0].shape[-1])), pose.order)
         parts = [group.variation(pose, change, time).map(_flat) for group in self.groups]
@@ -274,21 +274,21 @@ class System(Module):
             return matrix * self.row_scale[:, :, None]
 
     def entries(self, pose: Pose, time: Jet) -> Float[Numbers, "entry batch"]:
-        """Return the entries of the Jacobian that are not zero for certain, before rows are scaled."""
+        """Return the structurally nonzero entries of the Jacobian, before the rows are scaled."""
         frozen = Jet.constant(time.coefficients[0], 1)
         blocks = [b for group in self.groups for b in group.derivative_blocks(pose, frozen, self.column_scale)]
-        none = jnp.zeros((0, pose.position.shape[-1]))  # bodies that fly freely
+        none = jnp.zeros((0, pose.position.shape[-1]))  # free bodies
         return jnp.concatenate([*map(_flat, blocks), none])
 
     def admissible(self, time: Jet) -> Bool[Numbers, "driver batch"]:
-        """Return at which instants each driver has a permitted value, shape (drivers, batch)."""
+        """Return whether the value of each driver is admissible at each instant, shape (drivers, batch)."""
         lanes = time.coefficients[0].shape[-1]
         drivers = [group for group in self.groups if group.is_driver]
         parts = [jnp.broadcast_to(g.element.admissible(time), (g.instances, lanes)) for g in drivers]
         return jnp.concatenate([*parts, jnp.ones((0, lanes), bool)])
 
     def laws(self, time: Jet, *, periodic: bool = False) -> list[Jet]:
-        """Return the jets of the motion laws; `periodic` for only those, in rad, whose drivers ignore whole turns."""
+        """Return the jets of the motion laws; with `periodic`, only those of drivers that ignore whole turns, rad."""
         drivers = (
             group.element for group in self.groups if group.is_driver and (group.element.periodic or not periodic)
         )
@@ -297,11 +297,11 @@ class System(Module):
         ]
 
     def applied_forces(self, pose: Pose, time: Jet) -> Float[Jet, "coordinate body batch"]:
-        """Return what the applied forces do to all bodies, shape (coordinates, bodies, batch), the ground first.
+        """Return the generalized applied forces on all bodies, shape (coordinates, bodies, batch), the ground first.
 
         Forces are in global axes, moments about the origin of each body and in its axes. They are conjugate to the
-        virtual velocities of ``pose.varied``, from which they follow by transposing how far each force acts along: no
-        Jacobian is written. The order is one less than that of the pose; gravity is not among them.
+        virtual velocities of ``pose.varied``, and follow by transposing the variation of the force displacements: no
+        Jacobian is written. The order is one less than that of the pose; gravity is not included.
         """
         order = pose.order - 1
         if not self.forces:
@@ -315,18 +315,18 @@ class System(Module):
         return conjugate_series(along, pose.truncate(order), sizes)
 
     def constraint_forces(self, pose: Pose, time: Jet, multipliers: Float[Numbers, "order row batch"]) -> Jet:
-        """Return ``Phi_q^T lambda`` of all bodies for coefficients of multipliers, as `applied_forces` has forces.
+        """Return ``Phi_q^T lambda`` of all bodies for Taylor coefficients of multipliers, shaped like `applied_forces`.
 
-        The orders of pose, time and multipliers are the same.
+        Pose, time and multipliers have the same order.
         """
         if not self.groups:
             return Jet.constant(jnp.zeros((pose.shifts + pose.turns, *pose.position.shape[1:])), pose.order)
         return conjugate_series(lambda still, change: stacked(self.variation(still, change, time)), pose, multipliers)
 
     def finite_forces(self, pose: Pose, time: Jet) -> Bool[Numbers, "force batch"]:
-        """Return where each applied force is a finite number, shape (forces, batch); the pose has velocities.
+        """Return whether each applied force is finite, shape (forces, batch); the pose contains velocities.
 
-        Where the velocity is not finite, as for the distance of two points that meet, the force has no direction.
+        A force has no direction where its velocity is not finite, as for the distance of two coincident points.
         """
         lanes = time.coefficients[0].shape[-1]
         moving = [group.finite(movable(pose.truncate(1)), time.truncate(1)) for group in self.forces]
@@ -336,7 +336,7 @@ class System(Module):
     def coordinates(
         self, solution: Float[Numbers, "column batch"], shifts: int
     ) -> tuple[Float[Numbers, "shift body batch"], Float[Numbers, "turn body batch"]]:
-        """Turn a scaled solution, shape (columns, batch), into shifts and turns of all bodies, (c, bodies, batch)."""
+        """Return the shifts and turns of all bodies, (c, bodies, batch), of a scaled solution, (columns, batch)."""
         count = self.column_scale.shape[0]
         parts = jnp.swapaxes(solution.reshape(self.body_count, count, -1), 0, 1)
         parts = jnp.pad(parts * self.column_scale[:, None, None], ((0, 0), (1, 0), (0, 0)))
@@ -344,16 +344,17 @@ class System(Module):
 
 
 def conjugate_series(along: Callable[[Any, Any], Any], pose: Pose, sizes: Any) -> Jet:
-    """Return the forces on all bodies that are conjugate to what some sizes act along, (coordinates, bodies, batch).
+    """Return the forces on all bodies that are conjugate to given displacements, (coordinates, bodies, batch).
 
     Parameters
     ----------
     along : callable
-        Of a pose and a change of it: how what is acted along varies, coefficients of the shapes of the sizes; linear.
+        Returns the variation of the displacements for a pose and its change: linear in the change, in the structure of
+        `sizes`.
     pose : SpatialPose or PlanarPose
-        Of the order of the sizes.
+        Pose of the order of the sizes.
     sizes : pytree of array
-        Taylor coefficients.
+        Taylor coefficients of the force components.
     """
     still, order = movable(pose), pose.order
 
@@ -369,7 +370,7 @@ def conjugate_series(along: Callable[[Any, Any], Any], pose: Pose, sizes: Any) -
 
 
 def movable(pose: Pose) -> Any:
-    """Return a pose without certain zeros, which may be moved in thought."""
+    """Return a pose without structural zeros, ready for a variation."""
     pose = each_jet(Jet.dense, pose)
     if isinstance(pose, SpatialPose) and pose.order and pose.angular_velocity is None:
         rest = Jet.constant(jnp.zeros_like(pose.position.coefficients[0]), pose.order - 1).dense()

@@ -1,4 +1,4 @@
-"""Time grids: evenly spaced or given instant by instant, checked before any computing."""
+"""Time grids: evenly spaced or given instant by instant, checked before the solution."""
 
 import dataclasses
 from collections.abc import Mapping
@@ -14,26 +14,27 @@ from jounce.mechanism.resolve import resolve
 from jounce.trajectory import Expression
 
 MAX_INSTANTS = 10_000_000
-FEW = 3  # instants, fewer than which no count is
-PART_OF_STEP = 1e-6  # a last step that is so short is added to the one before
+FEW = 3  # a smaller integer is no likely number of instants
+PART_OF_STEP = 1e-6  # a last step shorter than this share is merged with the one before
 
 
 @dataclasses.dataclass(frozen=True)
 class TimeGrid:
-    """Evenly spaced instants with both ends, s.
+    """Evenly spaced instants from start to stop, both included, s.
 
     Parameters
     ----------
     start, stop : number or expression
         First and last instant, s.
     step : number or expression, optional
-        Spacing, s, the last step being shorter where the others do not arrive at the stop; or `count`, the number of
-        instants with both ends.
+        Spacing, s. The last step is shorter if the step does not divide the interval.
+    count : number or expression, optional
+        Number of instants, both ends included, instead of `step`.
 
     Warns
     -----
     UnitWarning
-        The step is a whole number longer than the grid: the number of instants was likely meant.
+        If the step is a whole number longer than the grid: the number of instants was likely meant.
 
     Examples
     --------
@@ -60,14 +61,16 @@ TimeLike = TypeAliasType("TimeLike", ArrayLike | TimeGrid)
 
 @dataclasses.dataclass(frozen=True)
 class SpacedInstants:
-    """The instants of an evenly spaced grid, computed where they are requested, s.
+    """The instants of an evenly spaced grid, computed when requested, s.
 
     Parameters
     ----------
     start, step : float
+        First instant and spacing, s.
     count : int
+        Number of instants.
     stop : float
-        The last instant, to the bit.
+        Last instant, s, which is exact.
     """
 
     start: float
@@ -79,7 +82,7 @@ class SpacedInstants:
         return self.count
 
     def __getitem__(self, which: Any) -> Any:
-        """Return instants by index or slice, as of an array."""
+        """Return instants by index or slice, like an array."""
         chosen = range(self.count)[which]
         if isinstance(chosen, int):
             return self._at(np.array([chosen]))[0]
@@ -98,23 +101,23 @@ Instants = Float[np.ndarray, " time"] | SpacedInstants
 
 
 def time_grid(time: TimeLike | None, parameters: Mapping[str, Any]) -> Array[np.ndarray, " time"]:
-    """Return the instants of a grid, shape (time,), s; raise MechanismError as `instants_of` does."""
+    """Return the instants of a grid, shape (time,), s; raise MechanismError like `instants_of`."""
     return np.asarray(instants_of(time, parameters))
 
 
 def instants_of(time: TimeLike | None, parameters: Mapping[str, Any]) -> Instants:
-    """Return the instants of a grid, s, those of an evenly spaced one without a place in memory.
+    """Return the instants of a grid, s; an evenly spaced grid takes no memory.
 
     Raises
     ------
     MechanismError
-        If there is none, or they are not finite, not increasing, or more than ten million.
+        If no grid is given, or its instants are not finite, not increasing, or more than ten million.
     """
     if time is None:
         raise MechanismError("no time grid is given, by the mechanism or by the call", name="time")
     if isinstance(time, TimeGrid):
         return _spaced(time, parameters)
-    instants = np.array(seconds("time", time, MechanismError))  # a copy: what is given may change
+    instants = np.array(seconds("time", time, MechanismError))  # a copy, since the argument may change later
     if instants.ndim != 1 or not instants.size:
         raise MechanismError("the time grid must be a list of at least one instant", name="time", value=time)
     if not np.isfinite(instants).all():
@@ -155,7 +158,7 @@ def _spaced(grid: TimeGrid, parameters: Mapping[str, Any]) -> SpacedInstants:
         raise MechanismError("the step must be greater than zero", name="time.step", value=values["step"])
     else:
         steps = (stop - start) / values["step"]
-        part = PART_OF_STEP + 2 * np.spacing(max(abs(start), abs(stop))) / values["step"]  # what late instants round to
+        part = PART_OF_STEP + 2 * np.spacing(max(abs(start), abs(stop))) / values["step"]  # rounding of late instants
         whole = np.floor(steps + part)
         count = whole + 1 + (steps > whole + part)  # the last step is shorter
     if count > MAX_INSTANTS:
@@ -165,7 +168,7 @@ def _spaced(grid: TimeGrid, parameters: Mapping[str, Any]) -> SpacedInstants:
 
 
 def last_step_words(instants: Instants) -> str:
-    """Tell that the last step of a grid is shorter than the others, which are alike; nothing where it is not.
+    """Return a remark that the last step of a grid is shorter than the other, equal steps; empty if it is not.
 
     Examples
     --------
@@ -185,7 +188,7 @@ def last_step_words(instants: Instants) -> str:
 def nearest_instants(
     known: Float[np.ndarray, " known"], instants: Float[np.ndarray, " time"]
 ) -> Int[np.ndarray, " time"]:
-    """Return, for each instant, the index of the nearest of some in any order, the earlier one of two.
+    """Return, for each instant, the index of the nearest known instant, in any order; of two, the earlier.
 
     Examples
     --------
@@ -205,5 +208,5 @@ def nearest_instants(
 
 
 def first_instant(time: TimeLike | None, parameters: Mapping[str, Any]) -> float:
-    """Return the first of the instants of a mechanism, s; 0 where it has none."""
+    """Return the first instant of a mechanism, s; 0 if it has no time grid."""
     return 0.0 if time is None else float(time_grid(time, parameters)[0])

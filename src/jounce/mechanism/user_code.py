@@ -1,7 +1,7 @@
-"""Joints, drivers, forces and outputs of users: what their methods compute is read off when a model is built.
+"""User-defined joints, drivers, forces and outputs: their methods are read as programs when a model is built.
 
-An element of a user's class is replaced by one of a class made here, whose methods do what was read off; see
-`jounce.jet.programs.read_methods`. It stays an instance of the user's class, and everything else of it is as it was.
+An element of a user's class is replaced by one of a derived class, whose methods run the programs; see
+`jounce.jet.programs.read_methods`. The replacement is an instance of the user's class, and unchanged otherwise.
 """
 
 import dataclasses
@@ -32,8 +32,8 @@ from jounce.rigid.pose import Pose
 from jounce.trajectory import AbstractMotion
 from jounce.trajectory.laws.user_laws import ReadMotion
 
-ORDER = 2  # to which methods are compared with what was read off
-READINGS = "readings"  # the field that holds them
+ORDER = 2  # of the comparison of methods with their programs
+READINGS = "readings"  # field of the programs
 _METHODS = {
     AbstractConstraint: ("residual", "evaluate", "admissible", "sense_at"),
     AbstractForce: ("displacement", "velocity", "force", "energy", "variation"),
@@ -43,16 +43,16 @@ _classes: weakref.WeakKeyDictionary[type, type] = weakref.WeakKeyDictionary()
 
 
 def readings_of(element: Any, values: Mapping[str, Any], components: int) -> dict[str, Reading]:
-    """Return what the methods of a user's element compute, by name; nothing for elements of this package.
+    """Return the programs of the methods of a user's element, by name; empty for elements of this package.
 
     Parameters
     ----------
     element : AbstractConstraint, AbstractForce or AbstractOutput
-        As the user gave it.
+        Element as the user gave it.
     values : mapping
-        Of its fields, as `resolve_element` returns them.
+        Values of its fields, from `resolve_element`.
     components : int
-        Of positions: 2 in the plane, 3 in space.
+        Components of positions: 2 in the plane, 3 in space.
     """
     kind = type(element)
     names = _read_methods(kind)
@@ -67,17 +67,17 @@ def readings_of(element: Any, values: Mapping[str, Any], components: int) -> dic
 
 
 def has_own_methods(kind: type) -> bool:
-    """Tell whether a user may have written a method by which elements of a class compute."""
+    """Return whether a user may have written a method by which the elements of a class compute."""
     return bool(_read_methods(kind))
 
 
 def with_readings(element: Any, readings: Mapping[str, Reading]) -> Any:
-    """Return an element whose methods do what was read off; its values may be those of stacked instances."""
+    """Return an element whose methods run given programs; its values may be those of stacked instances."""
     return unchecked(_class_for(type(element)), vars(element) | {READINGS: dict(readings)})
 
 
 def holds_users_code(elements: Iterable[Any]) -> bool:
-    """Tell whether there is code of a user in some elements, as they were given."""
+    """Return whether elements, as given, contain code of a user."""
 
     def is_code(value: Any) -> bool:
         if isinstance(value, list | tuple):
@@ -95,7 +95,7 @@ def holds_users_code(elements: Iterable[Any]) -> bool:
 
 
 def users_code(groups: Sequence[Any]) -> tuple[Any, ...] | None:
-    """Return what distinguishes the code of users in the elements of groups; None where JAX traces its numbers."""
+    """Return what distinguishes the user code in the elements of groups; None if JAX traces its numbers."""
     read = ReadMotion, ReadLaw
     parts_found: list[Any] = []
     for group in groups:
@@ -109,12 +109,12 @@ def users_code(groups: Sequence[Any]) -> tuple[Any, ...] | None:
 
 
 def users_class(kind: type) -> type:
-    """Return the class that a user wrote, in the place of the one that was made for it."""
+    """Return the class that a user wrote, given it or the class derived from it."""
     return vars(kind).get("stands_for", kind)
 
 
 def _read_methods(kind: type) -> tuple[str, ...]:
-    """Return the names of the methods of a class that a user may have written, or that call such."""
+    """Return the names of the methods of a class that a user may have written, or that call such methods."""
     known = [(name, method) for name in _methods_of(kind) if (method := getattr(kind, name, None)) is not None]
     if (
         known
@@ -127,12 +127,12 @@ def _read_methods(kind: type) -> tuple[str, ...]:
 
 @lru_cache(maxsize=1000)
 def _methods_of(kind: type) -> tuple[str, ...]:
-    """Return the names of the methods by which elements of a class compute; none for others."""
+    """Return the names of the methods by which the elements of a class compute; empty for other classes."""
     return next((names for role, names in _METHODS.items() if issubclass(kind, role)), ())
 
 
 def _class_description(kind: type) -> tuple[str, ...]:
-    """Return what a class says of its elements beside its methods."""
+    """Return the facts that a class states beside its methods."""
     ours = [base for base in kind.__mro__ if belongs_to_package(base)]
     named = {name for base in ours for name, value in vars(base).items() if name[0] != "_" and not callable(value)}
     fields = {field.name for field in dataclasses.fields(kind)}
@@ -140,7 +140,7 @@ def _class_description(kind: type) -> tuple[str, ...]:
 
 
 def _class_for(kind: type) -> type:
-    """Return the class of elements of a user's class whose methods were read off."""
+    """Return the derived class of a user's class whose methods run programs."""
     if kind not in _classes:
         role = next(role for role in _METHODS if issubclass(kind, role))
         own: dict[str, Any] = {name: _dispatched(name) for name in _METHODS[role] if hasattr(kind, name)}
@@ -168,7 +168,7 @@ def _dispatched(name: str) -> Callable[..., Any]:
 
 
 def _plain(element: Any) -> Any:
-    """Return an element of the user's own class."""
+    """Return an element as an instance of the user's own class."""
     kind = users_class(type(element))
     return unchecked(kind, {name: value for name, value in vars(element).items() if name != READINGS})
 
@@ -193,7 +193,7 @@ def _laws(element: Any) -> list[str]:
 
 
 def _inputs(element: Any, arguments: tuple[Any, ...]) -> list[Any]:
-    """Return jets and arrays on which the value of a method depends: its arguments, laws at that time, and fields."""
+    """Return the jets and arrays on which a method depends: its arguments, the laws at its time, and fields."""
     jets = [jet for argument in arguments for jet in _jets(argument)]
     laws = _laws(element)
     if isinstance(arguments[-1], Jet):
@@ -203,7 +203,7 @@ def _inputs(element: Any, arguments: tuple[Any, ...]) -> list[Any]:
 
 
 def _fields_with_numbers(kind: type, laws: Sequence[str]) -> list[str]:
-    """Return the fields of a class beside its laws and its words, which are constants of a program."""
+    """Return the fields of a class except laws and static fields, which are constants of a program."""
     return [name for name in value_fields(kind) if name not in (*laws, *static_fields(kind))]
 
 
@@ -217,20 +217,20 @@ def _jets(argument: Any) -> list[Jet]:
 
 
 class _Reader:
-    """Reads off the methods of an element."""
+    """Reads the methods of an element as programs."""
 
     def __init__(self, element: Any, values: Mapping[str, Any], components: int):
         self.kind = type(element)
         stacked = stack_elements([element], [values])
         if "offset" in value_fields(self.kind) and stacked.offset is None:
-            stacked = with_fields(stacked, offset=np.zeros((1, 1)))  # found later, from the pose of the bodies
+            stacked = with_fields(stacked, offset=np.zeros((1, 1)))  # set later, from the poses of the bodies
         self.element, self.laws = stacked, _laws(stacked)
         self.settled = all(field.init for field in dataclasses.fields(self.kind))
         self.poses = [_example(components) for _ in element.bodies]
         self.time = _series((), ORDER)
 
     def check_positions(self) -> None:
-        """Raise UnsupportedError where a residual uses velocities: it has fewer derivatives than its bodies then."""
+        """Raise UnsupportedError if a residual uses velocities, and so has fewer derivatives than its bodies."""
         example = (*self.poses, self.time)
         try:
             inspect.signature(self.kind.residual).bind(self.element, *example)
@@ -251,7 +251,7 @@ class _Reader:
             raise
         except Exception as failure:
             if not self.settled:
-                return  # a field that is found later may be missing
+                return  # a field that is set later may be missing
             message = (
                 f"the residual of {self.kind.__qualname__} cannot be evaluated ({type(failure).__name__}: "
                 f"{str(failure).strip().partition(chr(10))[0]}): it must consist of operators and functions of "
@@ -273,11 +273,11 @@ class _Reader:
             raise UnsupportedError(message)
 
     def check_forces(self) -> None:
-        """Raise MechanismError where a force is no jet, or has another shape than the displacement."""
+        """Raise MechanismError if a force is no jet, or its shape is not that of the displacement."""
         try:
             displacement, velocity = self._displacement()
             force = jax.eval_shape(self.element.force, displacement, velocity, self.time)
-        except Exception:  # noqa: BLE001 - its use raises the error again
+        except Exception:  # noqa: BLE001 - raised again when the force is used
             return
         if not isinstance(force, Jet) or force.shape != velocity.shape:
             message = (
@@ -328,7 +328,7 @@ class _Reader:
         return (*self.poses, self.time)
 
     def _displacement(self) -> tuple[Jet, Jet]:
-        """Return what stands for the displacement of a force and its velocity."""
+        """Return shapes that represent the displacement of a force and its velocity."""
 
         def both(*given: Any) -> Any:
             return self.element.displacement(*given), self.element.velocity(*given)
@@ -338,12 +338,12 @@ class _Reader:
 
 
 def _series(shape: tuple[int, ...], order: int) -> Jet:
-    """Return what stands for a jet of one instance at one instant."""
+    """Return shapes that represent a jet of one instance at one instant."""
     return Jet([jax.ShapeDtypeStruct((*shape, 1, 1), float)] * (order + 1))
 
 
 def _example(components: int) -> Pose:
-    """Return what stands for the pose of a body."""
+    """Return shapes that represent the pose of a body."""
     if components == 2:
         return PlanarPose(_series((2,), ORDER), *(_series((), ORDER) for _ in range(3)))
     spins, axes = (tuple(_series((size,), ORDER) for _ in range(3)) for size in (4, 3))
@@ -351,7 +351,7 @@ def _example(components: int) -> Pose:
 
 
 def _rebuilt(argument: Any, jets: Iterator[Jet], rates: Iterator[Any]) -> Any:
-    """Return an argument with other jets."""
+    """Return an argument with its jets replaced."""
     if isinstance(argument, SpatialPose):
         position, quaternion, *rest = (next(jets) for _ in range(8))
         return SpatialPose(position, quaternion, tuple(rest[:3]), tuple(rest[3:]), next(rates))

@@ -89,7 +89,7 @@ def derivatives_at(formulas: Sequence[Any], parameters: Parameters, *others: Par
 
 
 def _may_break(text: str) -> bool:
-    """Tell whether an expression may have kinks or poles."""
+    """Return whether an expression may have kinks or poles."""
     return "/" in text or "**" in text or not set(_FUNCTION.findall(text)) <= SMOOTH - {"tan"}
 
 

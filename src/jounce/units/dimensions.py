@@ -107,7 +107,7 @@ def check_dimension(dimension: Dimension, kind: str, what: str, *, exactly: bool
 
 
 def is_rate(dimension: Dimension, bases: Iterable[str], order: int, by: str = "time") -> bool:
-    """Tell whether a dimension is that of a derivative of one of some base quantities by the time, or by another one.
+    """Return whether a dimension is that of a derivative of one of some base quantities by the time, or by another one.
 
     By an angle or a length, powers of angles do not count: mm, mm/rad and mm/deg^2 are rates of a cam by its angle.
     """

@@ -284,7 +284,7 @@ def _unit_within(text: str, known: Collection[str]) -> str | None:
 
 
 def _divided_by_a_name(unit: str, known: Collection[str]) -> bool:
-    """Tell whether what follows a number is a division by a name of an expression: 1/t is no number per tonne."""
+    """Return whether what follows a number is a division by a name of an expression: 1/t is no number per tonne."""
     first = re.match(_ATOM, unit.lstrip("/ "))
     return unit.startswith("/") and first is not None and (first.group() in known or first.group() == "pi")
 

@@ -70,7 +70,7 @@ def in_units(dataset: xarray.Dataset, units: Mapping[str, str] | ShownUnits) -> 
 
 
 def is_si(unit: str | None) -> bool:
-    """Tell whether a unit is one of SI; what says none is taken to be, and what is no unit of mechanics is none.
+    """Return whether a unit is one of SI; what says none is taken to be, and what is no unit of mechanics is none.
 
     Examples
     --------
@@ -127,7 +127,7 @@ def name_and_last_word(text: str) -> tuple[str, str | None]:
 
 
 def _moves(text: str) -> bool:
-    """Tell whether a text is a unit of angles, lengths, times or their rates."""
+    """Return whether a text is a unit of angles, lengths, times or their rates."""
     try:
         return {base for base, _ in unit_size(text)[1]} <= {"angle", "length", "time"}
     except UnitError:
@@ -157,7 +157,7 @@ def unit_unread(name: str, dimensions: Iterable[Dimension]) -> str | None:
 
 
 def names_a_unit(name: str) -> bool:
-    """Tell whether a name, as the heading of a column, says a unit; a unit in brackets after it counts instead.
+    """Return whether a name, as the heading of a column, says a unit; a unit in brackets after it counts instead.
 
     Examples
     --------

@@ -50,7 +50,7 @@ def dumped(data: Mapping[str, Any], suffix: str, path: str = "") -> str:
 
 
 def _same(first: Any, second: Any) -> bool:
-    """Tell whether data are the same; 1 and 1.0 are, 1 and true are not."""
+    """Return whether data are the same; 1 and 1.0 are, 1 and true are not."""
     if isinstance(first, Mapping) and isinstance(second, Mapping):
         return list(first) == list(second) and all(_same(first[key], second[key]) for key in first)
     if isinstance(first, (list, tuple)) and isinstance(second, (list, tuple)):

@@ -126,7 +126,7 @@ class Source:
 
 
 def shows_value(error: JounceError) -> bool:
-    """Tell whether the message of an error holds the value itself: that of an expression with the place within it."""
+    """Return whether the message of an error holds the value itself: that of an expression with the place within it."""
     return isinstance(error, ExpressionError) and error.column is not None
 
 

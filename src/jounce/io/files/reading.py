@@ -269,7 +269,7 @@ def note_result(path: str | PathLike[str]) -> None:
 
 
 def is_result(path: str | PathLike[str]) -> bool:
-    """Tell whether this process wrote a file that nobody has changed since."""
+    """Return whether this process wrote a file that nobody has changed since."""
     real = os.path.realpath(path)
     try:
         return _results.get(real) == _identity(Path(real).stat())
@@ -282,7 +282,7 @@ def _identity(status: os.stat_result) -> tuple[int, ...]:
 
 
 def is_input(path: str | PathLike[str]) -> bool:
-    """Tell whether a file was read as an input by this process, under this name or any other."""
+    """Return whether a file was read as an input by this process, under this name or any other."""
     real = os.path.realpath(path)
     try:
         status = Path(real).stat()

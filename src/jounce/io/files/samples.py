@@ -155,7 +155,7 @@ def read_table(path: str | Path) -> dict[str, Float[np.ndarray, " row"]]:
 
 
 def has_column(path: str | Path, names: Iterable[str]) -> bool:
-    """Tell whether a CSV file has a column of one of some names, or does not name its columns at all."""
+    """Return whether a CSV file has a column of one of some names, or does not name its columns at all."""
     table = Table(str(path), TrajectoryError)
     return table.header_line is None or any(name in table.header for name in names)
 

@@ -160,7 +160,7 @@ class _CamFile:
                 warn_caller(UnitWarning(str(fault)))
 
     def _is_plain(self, raw: Any) -> bool:
-        """Tell whether a length is a number without a unit, or the parameter of one."""
+        """Return whether a length is a number without a unit, or the parameter of one."""
         return isinstance(
             (self.data.get("parameters") or {}).get(raw, raw) if isinstance(raw, str) else raw, int | float
         )

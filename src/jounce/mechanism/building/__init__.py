@@ -1,1 +1,1 @@
-"""Building a mechanism, and one whose parameters are traced."""
+"""The numeric model of a mechanism, also with parameters that JAX traces."""

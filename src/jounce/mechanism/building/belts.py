@@ -1,4 +1,4 @@
-"""Courses of belts: strands, wraps and length, from the centers of their pulleys."""
+"""Courses of belts: strands, wraps and length, from the centers of the pulleys."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
@@ -14,18 +14,19 @@ Points = Float[np.ndarray, "2 *batch"]
 
 
 class BeltCourse(NamedTuple):
-    """Where a belt runs; angles in rad, lengths in m, NaN where the pulleys overlap.
+    """Course of a belt; angles in rad, lengths in m, NaN where the pulleys overlap.
 
     Attributes
     ----------
     line : array of shape (...)
         Angle of the line of centers, from the first to the second.
     leaving : array of shape (...)
-        Angle from there to where the strand on its left leaves the first pulley; that on its right, as much below.
+        Angle from the line of centers to the point at which the strand on its left leaves the first pulley; the strand
+        on its right leaves at the negative angle.
     wraps : tuple of array of shape (...)
-        Angles over which the belt lies on each pulley.
+        Wrap angle on each pulley.
     length : array of shape (...)
-        Of the whole belt.
+        Length of the whole belt.
     """
 
     line: Any
@@ -35,16 +36,16 @@ class BeltCourse(NamedTuple):
 
 
 def belt_course(first: Points, second: Points, radii: Sequence[float], crossed: bool) -> BeltCourse:
-    """Return where a belt runs around two pulleys.
+    """Return the course of a belt around two pulleys.
 
     Parameters
     ----------
     first, second : array of shape (2, ...)
-        Their centers, m.
+        Centers of the pulleys, m.
     radii : sequence of float
-        m.
+        Radii of the pulleys, m.
     crossed : bool
-        Whether its strands cross.
+        Whether the strands cross.
 
     Examples
     --------
@@ -66,12 +67,12 @@ def belt_course(first: Points, second: Points, radii: Sequence[float], crossed: 
 
 
 def belt_outline(course: BeltCourse, centers: Sequence[Points], radii: Sequence[float], crossed: bool) -> Any:
-    """Return points around a belt, (..., points, 2), m: of the strand on the left, around the second pulley, and back.
+    """Return points on the outline of a belt, (..., points, 2), m, in order from the strand on the left.
 
     The first half of the points is on the second pulley, the other half on the first.
     """
     share = np.linspace(-1.0, 1.0, 33)
-    side = -1.0 if crossed else 1.0  # of the second pulley on which the strand on the left arrives
+    side = -1.0 if crossed else 1.0  # side of the second pulley at which the strand on the left arrives
     line, leaving = course.line[..., None], course.leaving[..., None]
     around_second = line - side * (np.pi - leaving if crossed else leaving) * share
     around_first = line + np.pi - (np.pi - leaving) * share
@@ -83,7 +84,7 @@ def belt_outline(course: BeltCourse, centers: Sequence[Points], radii: Sequence[
 
 
 def check_room(motion: Any) -> None:
-    """Raise MechanismError where pulleys that no body carries at one distance overlap in a motion, with the instant."""
+    """Raise MechanismError if pulleys without a common arm overlap in a motion, and name the instant."""
     model = motion.model
     for group, members in named_groups(model):
         if isinstance(group.element, Belt) and group.element.arm is None:
@@ -109,7 +110,7 @@ def _check_belts(group: Any, names: Sequence[str], coordinates: Mapping[str, Any
 
 
 def centers_of(coordinates: Mapping[str, Any], bodies: Sequence[int], point: Any) -> Float[np.ndarray, "2 body time"]:
-    """Return where points of planar bodies are, m."""
+    """Return the global positions of a point on planar bodies, m."""
     position = np.asarray(coordinates["position"])[0][:, list(bodies)]
     angle = np.asarray(coordinates["angle"])[0][list(bodies)]
     x, y = np.asarray(point)

@@ -1,4 +1,4 @@
-"""From names to indices, once: the numeric model of a mechanism and where each of its rows comes from."""
+"""The numeric model of a mechanism: names resolved to indices, and the origin of each row."""
 
 import dataclasses
 from collections.abc import Sequence
@@ -73,11 +73,12 @@ class Model:
     length : float
         Size of the mechanism, by which positions are scaled, m.
     reference : dict of str to array
-        Coordinates from which angles about axes are counted: those of the starting guess, until assembled.
+        Coordinates from which angles about axes are counted: the starting guess until the mechanism is assembled.
     prescribed : tuple of PrescribedAngle
-        Angles that drivers prescribe there, with their whole turns.
+        Angles that drivers prescribe at the reference coordinates, with their whole turns.
     history : AttitudeHistory, optional
-        In space, from the starting guess to where the drivers fulfill their laws, where that is more than half a turn.
+        Spatial attitudes on the way from the starting guess to the start of the driver laws, where that way exceeds
+        half a turn.
     """
 
     system: System
@@ -100,13 +101,13 @@ class Model:
 
 
 def named_groups(model: Model) -> list[tuple[Group, tuple[str, ...]]]:
-    """Return the groups of joints and drivers, with the names of their instances, as those of rows."""
+    """Return the groups of joints and drivers, each with the names of its instances as in `Model.rows`."""
     pairs = zip(model.system.groups, group_rows(model), strict=True)
     return [(group, model.rows[rows][: group.instances]) for group, rows in pairs]
 
 
 def group_rows(model: Model) -> list[slice]:
-    """Return where the rows of each group stand: those of all its instances in turn, once for each row of the joint."""
+    """Return the slice of rows of each group: one row of every instance in turn, repeated for each row of the joint."""
     return list(_group_rows(model.rows, tuple([group.instances for group in model.system.groups])))
 
 
@@ -128,12 +129,12 @@ def build(mechanism: Mechanism, like: Model | None = None, *, initial: bool = Fa
     Parameters
     ----------
     mechanism : Mechanism
-        To be solved.
+        Mechanism to be solved.
     like : Model, optional
-        Of the same mechanism with other values of its parameters, which may be traced by JAX here: its starting guess,
-        its size, and the offsets that follow from them, are taken over.
+        Model of the same mechanism with other parameter values; those of `mechanism` may then be traced by JAX. The
+        starting guess, the size, and the offsets that follow from them, are taken over.
     initial : bool, default False
-        Whether its initial conditions hold, beside the drivers.
+        Whether the initial conditions hold, beside the drivers.
 
     Raises
     ------
@@ -149,7 +150,7 @@ def build(mechanism: Mechanism, like: Model | None = None, *, initial: bool = Fa
 
 
 def _owned(model: Model) -> Model | None:
-    """Return a model that shares no arrays with others, so that it may be kept; None for one with curves or parts."""
+    """Return a copy of a model that shares no arrays, so that it may be stored; None for a model with curves."""
     system = model.system
     if not all(holds_numbers_only(group.element) for group in (*system.groups, *system.forces, *system.outputs)):
         return None
@@ -204,7 +205,7 @@ def model_of(
     length: Any,
     history: AttitudeHistory | None,
 ) -> Model:
-    """Return the model of groups that are whole: joints and drivers, forces, outputs, with their names."""
+    """Return the model of complete groups of joints and drivers, of forces and of outputs, with their names."""
     (groups, names), (forces, force_names), (outputs, output_names) = parts
     pose_type = PlanarPose if "angle" in guess else SpatialPose
     row_counts = [_row_count(group, pose_type, guess) for group in groups]
@@ -241,7 +242,7 @@ def model_of(
 def grouped_elements(mechanism: Mechanism, *, initial: bool = False) -> tuple[Grouped, Grouped, Grouped]:
     """Return the groups of joints and drivers, of forces and of outputs; values may be traced by JAX.
 
-    Initial conditions are among the drivers, where they are requested.
+    With `initial`, the initial conditions are among the drivers.
     """
 
     def grouped(*kinds: str) -> Grouped:
@@ -263,22 +264,22 @@ def with_reference(
     keep: bool = False,
     laws: Sequence[np.ndarray] | None = None,
 ) -> tuple[Model, float]:
-    """Return the model with angles about axes counted from a position, and how far off those of drivers were, rad.
+    """Return the model with angles about axes counted from a position, and the error of the driver angles before, rad.
 
     Parameters
     ----------
     model : Model
-        Of a mechanism.
+        Model of a mechanism.
     coordinates : dict of str to array
-        Of all bodies, the ground first, assembled.
+        Assembled coordinates of all bodies, the ground first.
     instant : float
-        At which they are there, s.
+        Instant of the coordinates, s.
     prescribed : tuple of PrescribedAngle
-        Angles that are prescribed there by others than the drivers, such as initial conditions.
+        Angles that other elements than drivers prescribe at the instant, such as initial conditions.
     keep : bool, default False
-        Whether angles go on from those counted so far, instead of those that the frames of the bodies have.
+        Whether angles continue those counted so far, instead of following from the body frames.
     laws : sequence of array, optional
-        What `law_values` returns at that instant, where it is known.
+        Result of `law_values` at the instant, if known.
     """
     system = model.system
     if not any(map(measures_angle, (*system.groups, *system.forces, *system.outputs))):
@@ -293,7 +294,7 @@ def with_reference(
 
 
 def counted_as_in(groups: tuple[Group, ...], model: Model) -> tuple[Group, ...]:
-    """Return groups with angles about axes counted as if they had been in the model when it was assembled."""
+    """Return groups whose angles about axes are counted as if the groups had been in the assembled model."""
     if model.history is None or not any(map(measures_angle, groups)):
         return groups
     first, last = ({"quaternion": model.history.quaternion[..., instant]} for instant in (slice(1), slice(-1, None)))
@@ -314,7 +315,7 @@ def _law_values(motions: list[AbstractMotion], instant: Float[Numbers, "1 1"]) -
 
 
 def _plain(names: tuple[tuple[str, ...], ...]) -> tuple[tuple[str, ...], ...]:
-    """Return names in groups without the kind before them."""
+    """Return grouped names without the prefix of their kind."""
     return tuple(tuple(name.partition(".")[2] for name in members) for members in names)
 
 
@@ -322,7 +323,7 @@ def _plain(names: tuple[tuple[str, ...], ...]) -> tuple[tuple[str, ...], ...]:
 def _layout(
     bodies: tuple[tuple[tuple[int, ...], ...], ...], row_counts: tuple[int, ...], width: int, body_count: int
 ) -> tuple[Pattern, Fronts | None]:
-    """Return where the entries of the Jacobian stand, and how it is eliminated: the same for all values, so is kept."""
+    """Return the sparsity pattern of the Jacobian and its elimination order, which are the same for all values."""
     pattern = Pattern.of([Group(None, its) for its in bodies], row_counts, width, body_count)
     fronts = elimination(pattern)
     for array in jax.tree.leaves((pattern, fronts)):
@@ -340,7 +341,7 @@ def _row_count(group: Group, pose_type: type[Pose], guess: dict[str, Any]) -> in
 def _row_count_of(
     structure: Any, shapes: tuple[Shape, ...], pose_type: type[Pose], poses: tuple[tuple[str, Shape], ...]
 ) -> int:
-    """Read the number of rows off the shape of the residual; it depends on the structure only, so is kept."""
+    """Return the number of rows of the residual, which depends on the structure of the group only."""
 
     def residual(leaves: tuple[Any, ...], guess: dict[str, Any], time: Any) -> Any:
         group = jax.tree.unflatten(structure, leaves)

@@ -1,8 +1,8 @@
-"""The contents of a mechanism as one value that can be compared, and the models of the last ones that were solved.
+"""The contents of a mechanism as one comparable value, and a cache of the models of the mechanisms solved last.
 
-Whoever solves a mechanism twice has it read twice, as any number in it may have changed. Reading numbers off is fast,
-and making a model of them is not; so a model is made again only where one of its values is another one. What a user
-wrote, functions and classes, is not compared but read each time: it may compute something else than before.
+A mechanism is read each time it is solved, because any number in it may have changed. Reading numbers is fast, and
+building a model is not: a model is built again only if a value differs. User-defined functions and classes are not
+compared but read each time, because they may compute something else than before.
 """
 
 import dataclasses
@@ -25,18 +25,18 @@ from jounce.trajectory import Expression
 T = TypeVar("T")
 Contents = tuple[tuple[type, ...], bytes]
 FIELDS = ("space", "bodies", "joints", "drivers", "forces", "initial", "outputs", "gravity")
-"""Of a mechanism: those that a model is built of, beside the values of parameters."""
+"""Fields of a mechanism from which its model is built, beside the values of the parameters."""
 PLAIN = frozenset({float, int, bool, str, type(None)})
-CHECKED = frozenset({Friction, GearFriction})  # with code of the joint that has it, each time
-LARGE = 10_000  # entries of an array: comparing more takes as long as a model
-MOST = 4  # models that are kept
-_results: OrderedDict[Contents, Any] = OrderedDict()  # None where contents were seen once
+CHECKED = frozenset({Friction, GearFriction})  # checked by code of their joint each time
+LARGE = 10_000  # entries of an array: comparing more takes as long as building a model
+MOST = 4  # stored models
+_results: OrderedDict[Contents, Any] = OrderedDict()  # None for contents that were seen once
 
 
 def contents_of(mechanism: Mechanism, *more: Any) -> Contents | None:
-    """Return all that the model of a mechanism depends on, and `more`; None where values do not determine it.
+    """Return everything that the model of a mechanism depends on, and `more`; None if values do not determine it.
 
-    Values are distinguished with their types, and to the last bit: 0.0 from -0.0, and 1 from 1.0.
+    Values are distinguished by type, and to the last bit: 0.0 from -0.0, and 1 from 1.0.
     """
     values: list[Any] = []
     kinds: list[type] = []
@@ -50,7 +50,7 @@ def contents_of(mechanism: Mechanism, *more: Any) -> Contents | None:
             if set(map(type, value)) <= PLAIN:
                 values.append(value)
             else:
-                values += (..., kind is list, len(value))  # no value of a user is an ellipsis
+                values += (..., kind is list, len(value))  # an ellipsis is no value of a mechanism
                 pending += value
         elif (kind is dict or kind is ReadOnlyDict) and set(map(type, value)) <= {str}:
             values += (..., tuple(value))
@@ -60,26 +60,23 @@ def contents_of(mechanism: Mechanism, *more: Any) -> Contents | None:
         elif kind is Expression:
             values += (..., "expression", value.text)
         elif (read := _given_fields(kind)) is None:
-            return None  # of a user
+            return None  # a class of a user
         else:
             values += (..., "fields", len(kinds))
             kinds.append(kind)
             try:
                 pending += read(vars(value))
-            except KeyError:  # values are elsewhere than usual
+            except KeyError:  # a field that is not in the dictionary of the instance
                 return None
     different = set(kinds)
     if not different.isdisjoint(CHECKED) or any(map(has_own_methods, different)):
         return None
-    return tuple(kinds), marshal.dumps(values, 2)  # in later versions, bytes depend on who else has a value
+    return tuple(kinds), marshal.dumps(values, 2)  # later versions depend on the reference counts of values
 
 
 @lru_cache(maxsize=1000)
 def _given_fields(kind: type) -> Callable[[Mapping[str, Any]], Sequence[Any]] | None:
-    """Return what reads the fields of a class that are given, in their order; None for a class of a user.
-
-    The other fields are found later.
-    """
+    """Return the function that reads the init fields of a class, in order; None for a class of a user."""
     if not belongs_to_package(kind) or not dataclasses.is_dataclass(kind):
         return None
     names = [field.name for field in dataclasses.fields(kind) if field.init]
@@ -87,16 +84,16 @@ def _given_fields(kind: type) -> Callable[[Mapping[str, Any]], Sequence[Any]] | 
 
 
 def made_or_stored(contents: Contents | None, make: Callable[[], T], owned: Callable[[T], T | None]) -> T:
-    """Return what is made of contents, which is kept from the second time on.
+    """Return the result for some contents, which is stored from the second call on.
 
     Parameters
     ----------
     contents : tuple, optional
-        See `contents_of`; None for what is made each time.
+        See `contents_of`; None to make the result each time.
     make : callable
-        Makes it.
+        Makes the result.
     owned : callable
-        Returns a copy that shares no values with the contents; None where there is none.
+        Returns a copy of the result that shares no values with the contents; None if there is none.
     """
     if contents is None:
         return make()
@@ -113,7 +110,7 @@ def made_or_stored(contents: Contents | None, make: Callable[[], T], owned: Call
 
 
 def owned_arrays(tree: T) -> T:
-    """Return copies of the arrays in a pytree, which nobody writes to; other leaves as they are."""
+    """Return a pytree with read-only copies of its arrays; other leaves are unchanged."""
 
     def owned(leaf: Any) -> Any:
         if type(leaf) is not np.ndarray:
@@ -126,9 +123,9 @@ def owned_arrays(tree: T) -> T:
 
 
 def holds_numbers_only(element: Any) -> bool:
-    """Tell whether the values of an element are arrays, words, or formulas of them, all of which `owned_arrays` copies.
+    """Return whether `owned_arrays` copies all values of an element: arrays, plain values and expressions.
 
-    Curves, and what was read of a user's code, hold more than JAX sees.
+    Curves and user code hold data that are no leaves of a pytree.
     """
     pending = list(vars(element).values())
     while pending:

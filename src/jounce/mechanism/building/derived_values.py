@@ -20,7 +20,7 @@ from jounce.rigid.pose import Pose
 
 
 def with_offsets(group: Group, pose_type: type[Pose], guess: dict[str, Any]) -> Group:
-    """Fill in the offsets that were not given: those with which the starting guess fulfills the joint."""
+    """Return a group with offsets; a missing offset is the one with which the starting guess satisfies the joint."""
     fields = value_fields(type(group.element))
     if "offset" not in fields or group.element.offset is not None:
         return group
@@ -40,7 +40,7 @@ def _fulfilling_offset(group: Group, guess: dict[str, Any], pose_type: type[Pose
 
 
 def with_sense(group: Group, pose_type: type[Pose], guess: dict[str, Any]) -> Group:
-    """Fill in with which sign of the Euler parameters an attitude is compared: that of the starting guess."""
+    """Return a group with the sign of the Euler parameters to which its attitudes are compared, as at the guess."""
     if not hasattr(group.element, "sense"):
         return group
     pose = pose_at(guess, pose_type)
@@ -49,19 +49,19 @@ def with_sense(group: Group, pose_type: type[Pose], guess: dict[str, Any]) -> Gr
 
 
 def counts_turns(group: Group) -> bool:
-    """Return whether carriages count the turns of the leaders of a group of cams."""
+    """Return whether a group consists of cams whose leader turns are counted by carriages."""
     return isinstance(group.element, Cam) and bool(group.element.hidden)
 
 
 def with_turn_unit(group: Group, length: Any) -> Group:
-    """Return a group whose carriages move by the size of the mechanism, m, with a rad of the leaders of cams."""
+    """Return a group of cams whose carriages move by the size of the mechanism, m, for each rad of the leader."""
     if not counts_turns(group):
         return group
     return with_field(group, "unit", length * np.ones((group.instances, 1)))
 
 
 def with_derived_of(group: Group, known: Group) -> Group:
-    """Return a group with offsets and signs that another one has derived from a position."""
+    """Return a group with the offsets and signs of another group, which were derived from a position."""
     if measures_angle(group):
         return with_datum_of(group, known)
     if hasattr(group.element, "sense"):

@@ -1,4 +1,4 @@
-"""Where joints, drivers and forces are among the groups of a system and its rows, by their names."""
+"""Indices of joints, drivers and forces among the groups and the rows of a system, by name."""
 
 import dataclasses
 
@@ -7,7 +7,7 @@ from jounce.mechanism.building.builder import Model, group_rows
 
 @dataclasses.dataclass(frozen=True)
 class ElementIndex:
-    """Where a joint or driver is among the groups of a system, and its group and itself among the rows."""
+    """Indices of a joint or driver: its group, its instance in the group, the rows of the group, and its own rows."""
 
     group: int
     instance: int

@@ -29,17 +29,18 @@ WHAT_IS_NOT_TRACED = (
 def concrete(
     function: Callable[P, R], traced: Callable[[Callable[P, R], Mapping[str, Any]], R] | None = None
 ) -> Callable[P, R]:
-    """Make a function that decides by values refuse what JAX traces, and a fork of a process that used JAX.
+    """Return a function that refuses traced arguments, and a fork of a process that used JAX.
 
-    Within `jax.jit` it computes at once, since nothing it gets depends on what is traced: the result is a constant.
+    It guards functions that branch on values. Within `jax.jit` the guarded function runs eagerly, since no argument is
+    traced: the result is a constant.
 
     Parameters
     ----------
     function : callable
-        To be guarded.
+        Function to be guarded.
     traced : callable, optional
-        What to do instead where only the first argument holds traced values: it gets the guarded function and the
-        arguments by name.
+        Replacement, called if only the first argument holds traced values, with the guarded function and the arguments
+        by name.
 
     Raises
     ------
@@ -72,12 +73,12 @@ def concrete(
 def concrete_or(
     traced: Callable[[Callable[..., Any], Mapping[str, Any]], Any],
 ) -> Callable[[Callable[P, R]], Callable[P, R]]:
-    """Return what guards a function as `concrete` does, with something to do instead; editors see its parameters."""
+    """Return a decorator like `concrete` with a replacement for traced values; editors see the parameters."""
     return partial(concrete, traced=traced)
 
 
 def check_holonomic(mechanism: Any, what: str, instead: str = "simulate the motion") -> None:
-    """Raise UnsupportedError, by name, for a joint that holds velocities where positions are requested."""
+    """Raise UnsupportedError if a mechanism has a nonholonomic joint; `what` names the request."""
     for name, joint in mechanism.joints.items():
         if getattr(joint, "nonholonomic", False):
             message = (
@@ -88,7 +89,7 @@ def check_holonomic(mechanism: Any, what: str, instead: str = "simulate the moti
 
 
 def _traced(given: Mapping[str, Any]) -> str | None:
-    """Return the dotted name of the first value that JAX traces, None if there is none."""
+    """Return the dotted name of the first traced value; None if there is none."""
     if core.trace_state_clean() or not holds_tracer(given):  # nearly always: within no transformation
         return None
     pending: list[tuple[tuple[str | int, ...], Any]] = [((), given)]
@@ -102,7 +103,7 @@ def _traced(given: Mapping[str, Any]) -> str | None:
 
 
 def holds_tracer(given: Mapping[str, Any]) -> bool:
-    """Tell whether JAX traces something in what is given."""
+    """Return whether arguments hold a value that JAX traces."""
     pending: list[Any] = [given]
     while pending:
         value = pending.pop()
@@ -123,11 +124,11 @@ def holds_tracer(given: Mapping[str, Any]) -> bool:
 
 
 def _entries(value: Any) -> list[tuple[str | int, Any]]:
-    """Return what an object, a mapping or a list holds, by name or index."""
+    """Return the entries of an object, a mapping or a list, by name or index."""
     names = fields_of(type(value))
     if names is None:
         return list(value.items())
-    if names:  # those of an object are looked up at once: Equinox has a slow way of its own for each
+    if names:  # read from the dictionary of the object: attribute access of Equinox modules is slow
         own = getattr(value, "__dict__", None)
         held = partial(getattr, value) if own is None else own.get
         return [(name, held(name, None)) for name in names]
@@ -136,7 +137,7 @@ def _entries(value: Any) -> list[tuple[str | int, Any]]:
 
 @lru_cache(maxsize=1000)
 def fields_of(kind: type[Any]) -> tuple[str, ...] | None:
-    """Return the names of the fields of a class, or those that it says; none for one without; None for a mapping."""
+    """Return the names of the fields of a class that may be traced; None for a mapping."""
     if issubclass(kind, Tracer):
         return ()
     if issubclass(kind, Mapping):

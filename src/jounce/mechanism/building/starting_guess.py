@@ -45,7 +45,7 @@ def _carriage_guess(
         return np.asarray(body.position, float)
     joint = joint_of(name)
     element = mechanism.joints[joint]
-    if isinstance(element, Cam):  # no turn of its leader: whole turns are counted on the way to the laws
+    if isinstance(element, Cam):  # zero turns of the leader: whole turns are counted on the way to the laws
         return np.array([0.0, 0.0, 1.0])
     values = resolve_element(element, parameters, components, f"joints.{joint}")
     start = [x for key, x in values.items() if key.startswith("start")]
@@ -69,7 +69,7 @@ def _attitude(orientation: Any, name: str, parameters: dict[str, Any]) -> np.nda
         if isinstance(orientation, Mapping):
             given = dict(orientation)
             if has_labels(angles := given.get("angles")):
-                given["angles"] = np.asarray(angles)  # in the order of the turns, whatever their labels are
+                given["angles"] = np.asarray(angles)  # in the order of the turns, whatever their labels
             given = {k: v if k == "euler" else resolve(v, parameters) for k, v in given.items()}
         else:
             given = resolve(orientation, parameters)

@@ -1,8 +1,8 @@
-"""Mechanisms of which JAX traces some values: the values out and in again, and the model that depends on them.
+"""Mechanisms with traced values: their extraction and replacement, and the model as a function of them.
 
-What a solution decides by values, it decides outside of what is traced: whole turns, signs, the size of the mechanism.
-The rest of a model is a function of the traced values, and is assembled here as one: also the offsets that follow
-from the starting guess, and the position in which angles about axes are counted from.
+Decisions by values are made outside of the traced function: whole turns, signs, the size of the mechanism. The rest of
+a model is a function of the traced values, including the offsets that follow from the starting guess, and the position
+from which angles about axes are counted.
 """
 
 import dataclasses
@@ -33,18 +33,18 @@ from jounce.rigid import PlanarPose, SpatialPose
 from jounce.trajectory import Expression
 
 Part = tuple[Any, ...]
-"""One array for each group of joints and drivers, of forces or of outputs that measures an angle about an axis."""
+"""One array for each group (of joints and drivers, of forces, or of outputs) that measures an angle about an axis."""
 
 
 class Angles(NamedTuple):
-    """Angles about axes as a solution counted them, for each group that measures some, rad; see `Datum`.
+    """Angles about axes as a solution counted them, for each group that measures such angles, rad; see `Datum`.
 
     Attributes
     ----------
     angle : tuple of tuple of array of shape (instances, 1)
-        Of joints and drivers, of forces and of outputs, where the mechanism is assembled.
+        Angles of joints and drivers, of forces and of outputs at the assembled position.
     near : tuple of tuple of array of shape (instances, time)
-        Of forces and of outputs at all instants.
+        Angles of forces and of outputs at all instants.
     """
 
     angle: tuple[Part, Part, Part]
@@ -52,9 +52,9 @@ class Angles(NamedTuple):
 
 
 def template(tree: Any) -> tuple[list[Any], Callable[[Sequence[Any]], Any]]:
-    """Return the values that JAX traces in a mechanism, and what makes it again from others in their places.
+    """Return the traced values of a mechanism, and a function that rebuilds the mechanism with other values.
 
-    The second holds none of them. Numbers become plain ones on the way, as a mechanism is checked for.
+    The function holds no traced value.
     """
     values: list[Any] = []
     maker = _maker(tree, values)
@@ -62,7 +62,10 @@ def template(tree: Any) -> tuple[list[Any], Callable[[Sequence[Any]], Any]]:
 
 
 def _maker(value: Any, values: list[Any]) -> Callable[[Iterator[Any]], Any] | None:
-    """Return what makes a nesting again from other values in place of the traced ones; None where it holds none."""
+    """Return the function that rebuilds a nested value with other values for the traced ones; None if none is traced.
+
+    The traced values are appended to `values`.
+    """
     kind = type(value)
     if isinstance(value, Tracer):
         values.append(value)
@@ -82,7 +85,7 @@ def _maker(value: Any, values: list[Any]) -> Callable[[Iterator[Any]], Any] | No
     makers = {key: maker for key, part in parts.items() if (maker := _maker(part, values)) is not None}
     if not makers:
         return None
-    fixed = parts | dict.fromkeys(makers)  # which holds no traced values
+    fixed = parts | dict.fromkeys(makers)  # without the traced values
     return lambda left: joined(fixed | {key: maker(left) for key, maker in makers.items()})
 
 
@@ -91,7 +94,7 @@ def _as_sequence(kind: type[Any], parts: Mapping[Any, Any]) -> Any:
 
 
 def _copied(kind: type[Any], fields: Mapping[str, Any]) -> Any:
-    copy = object.__new__(kind)  # its values were checked before JAX traced them, or are when it is solved
+    copy = object.__new__(kind)  # its values were checked before tracing, or are checked when it is solved
     for name, field in fields.items():
         object.__setattr__(copy, name, field)
     return copy
@@ -107,19 +110,19 @@ def traced_model(
     Parameters
     ----------
     mechanism : Mechanism
-        Some of its values may be traced.
+        Mechanism with values that may be traced.
     length : float
-        Its size, m.
+        Size of the mechanism, m.
     angles : Angles, optional
-        As a solution counted them. Without, angles about axes are those of the attitude matrices: they tell the same
-        at the position in which the mechanism is assembled, and need to know of none.
+        Angles about axes as a solution counted them. By default, they follow from the attitude matrices, which suffices
+        at the assembled position.
     first : dict of str to array, optional
-        Coordinates of all bodies in that position, the ground first, (..., bodies, 1).
+        Coordinates of all bodies at the assembled position, the ground first, (..., bodies, 1).
 
     Raises
     ------
     UnsupportedError
-        If an offset would follow from an orientation that is traced.
+        If an offset follows from a traced orientation.
     """
     posed = _with_plain_orientations(mechanism)
     planar = mechanism.space == "planar"
@@ -142,7 +145,7 @@ def traced_model(
 
 
 def _with_plain_orientations(mechanism: Mechanism) -> Mechanism:
-    """Return a mechanism whose orientations, where a solution looks for its positions from, are not traced."""
+    """Return the mechanism without its traced orientations, which serve as starting guesses only."""
     values = mechanism.parameter_values
     traced = [name for name, body in mechanism.bodies.items() if _depends(body.orientation, values)]
     if not traced:
@@ -160,7 +163,7 @@ def _with_plain_orientations(mechanism: Mechanism) -> Mechanism:
 
 
 def _depends(orientation: Any, values: Mapping[str, Any]) -> bool:
-    """Tell whether an orientation holds values that JAX traces, or expressions of them."""
+    """Return whether an orientation holds traced values, or expressions of them."""
     if isinstance(orientation, Mapping):
         return any(_depends(entry, values) for key, entry in orientation.items() if key != "euler")
     if isinstance(orientation, list | tuple):
@@ -171,7 +174,7 @@ def _depends(orientation: Any, values: Mapping[str, Any]) -> bool:
 
 
 def _counted(groups: tuple[Group, ...], angles: Part, near: Part, pose: Any) -> tuple[Group, ...]:
-    """Return groups whose angles about axes are counted from a pose, with the turns that are known."""
+    """Return groups whose angles about axes are counted from a pose, with known whole turns."""
     known = zip(angles, near, strict=True)
     return tuple(_with_datum(group, pose, *next(known)) if measures_angle(group) else group for group in groups)
 
@@ -188,7 +191,7 @@ def _with_datum(group: Group, pose: SpatialPose, known: Any, near: Any) -> Group
             group, "datum", Datum(attitude, jnp.where(is_defined, shifted_by_turns(angle, known), known), near)
         )
     across = None
-    if hasattr(element, "role"):  # a driver or a force acts about the axis, see `axis_angles`
+    if hasattr(element, "role"):  # a driver or a force acts about the axis: see `axis_angles`
         second = jnp.asarray(element.vector_j)
         along = body_j.to_body(body_i.direction(axis)).coefficients[0]
         across = second - (second * along).sum(axis=0, keepdims=True) * along
@@ -201,9 +204,9 @@ def angles_of(model: Model, counted: tuple[tuple[Group, ...], tuple[Group, ...]]
     Parameters
     ----------
     model : Model
-        That was solved.
+        Model of the solution.
     counted : tuple of tuple of Group
-        Its forces and its outputs, with the turns of all instants.
+        Groups of its forces and of its outputs, with the turns at all instants.
     """
     system = model.system
     data = [[g.element.datum for g in part if measures_angle(g)] for part in (system.groups, *counted)]

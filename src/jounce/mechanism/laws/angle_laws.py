@@ -1,4 +1,4 @@
-"""Laws of angles that are likely in degrees: a warning, once, when a file is read or a mechanism is first solved."""
+"""A warning of angle laws that are likely in degrees, once, when a file is read or a mechanism is first solved."""
 
 from collections.abc import Iterator
 from typing import Literal, NamedTuple
@@ -33,10 +33,11 @@ class DriverLaw(NamedTuple):
     Attributes
     ----------
     name : str
+        Name of the driver.
     driver : AbstractConstraint
-        As the mechanism was given it.
+        The driver as given to the mechanism.
     law : AbstractMotion
-        With numbers in the place of parameters.
+        Its law with numbers in the place of parameters.
     """
 
     name: str
@@ -45,12 +46,12 @@ class DriverLaw(NamedTuple):
 
 
 def laws_of_angles(mechanism: Mechanism) -> Iterator[DriverLaw]:
-    """Yield the laws of drivers that turn something, without invalid ones, which their use refuses."""
+    """Yield the valid laws of drivers of angles; invalid laws are refused when used."""
     return laws_of(mechanism, "angle")
 
 
 def laws_of(mechanism: Mechanism, dimension: Literal["angle", "length"]) -> Iterator[DriverLaw]:
-    """Yield the laws of drivers that turn or move something, without invalid ones, which their use refuses."""
+    """Yield the valid laws of drivers of angles or of lengths; invalid laws are refused when used."""
     try:
         held, parameters = with_output_drivers(mechanism), mechanism.parameter_values
     except JounceError:
@@ -69,7 +70,7 @@ def laws_of(mechanism: Mechanism, dimension: Literal["angle", "length"]) -> Iter
 
 
 def degrees_doubt(law: AbstractMotion, first: float, last: float) -> str:
-    """Say why the law of an angle is likely in degrees, by its values from a first to a last instant, s; or nothing."""
+    """Return why an angle law is likely in degrees, by its values between two instants, s; an empty text if not."""
     values = values_of(law, first, last)
     if values is not None and (why := degrees_meant(values)):
         return why
@@ -79,31 +80,31 @@ def degrees_doubt(law: AbstractMotion, first: float, last: float) -> str:
 
 
 def names_angle(of: DriverLaw, angles: frozenset[str] = frozenset()) -> bool:
-    """Tell whether a law is a formula with a unit of an angle, or with one of the parameters that are angles."""
+    """Return whether a law is an expression with an angle unit, or with a parameter that is an angle."""
     if not isinstance(of.law, ExpressionMotion) or not isinstance(getattr(of.driver, "motion", None), Expression | str):
         return False
     return "deg" in of.law.expression.text or bool(angles & of.law.expression.names)
 
 
 def settle(driver: AbstractConstraint) -> None:
-    """Note that the law of a driver needs no further warning."""
+    """Mark the law of a driver as one that needs no further warning."""
     _settled[id(driver)] = driver
 
 
 def warn_of_degrees(mechanism: Mechanism, first: float, last: float) -> None:
-    """Warn of laws of angles that are likely in degrees, once for each driver.
+    """Warn of angle laws that are likely in degrees, once for each driver.
 
     Parameters
     ----------
     mechanism : Mechanism
-        About to be solved.
+        Mechanism about to be solved.
     first, last : float
-        s.
+        Interval of time, s.
 
     Warns
     -----
     UnitWarning
-        With the name of the driver, what its law is over the run, and the unit that may be meant.
+        With the name of the driver, the values of its law in the interval, and the unit that may be meant.
     """
     intervals = mechanism.checked_intervals
     if (first, last) in intervals:
@@ -118,7 +119,7 @@ def warn_of_degrees(mechanism: Mechanism, first: float, last: float) -> None:
 
 
 def _constant_doubt(law: AbstractMotion) -> str:
-    """Say why a formula is likely in degrees, by its value at time zero; or nothing."""
+    """Return why an expression is likely in degrees, by its value at time zero; an empty text if it is not."""
     if not isinstance(law, ExpressionMotion) or "pi" in law.expression.text:
         return ""
     try:
@@ -129,7 +130,7 @@ def _constant_doubt(law: AbstractMotion) -> str:
 
 
 def number_doubt(value: float) -> str:
-    """Word why a number of rad is likely one of degrees; nothing if it is not.
+    """Return why a number in rad is likely in degrees; an empty text if it is not.
 
     Examples
     --------
@@ -140,7 +141,7 @@ def number_doubt(value: float) -> str:
 
 
 def _angle_of_leader(law: AbstractMotion) -> float | None:
-    """Return over which part of its leader's way a law is given, None where it follows none, or has no ends."""
+    """Return the range of the leader coordinate over which a law is given; None without a leader or without ends."""
     if not isinstance(law, FollowingMotion) or not law.parts:
         return None
     own = law.parts[0]

@@ -1,4 +1,4 @@
-"""The laws of cams as laws of time, where what leads a cam has a law of time itself."""
+"""The laws of cams as laws of time, where the leader of a cam is driven by a law of time."""
 
 import math
 from collections.abc import Iterator, Mapping
@@ -20,7 +20,7 @@ from jounce.trajectory import FollowingMotion, OutputMotion
 
 
 def same_coordinate(element: Any, other: Any) -> bool:
-    """Tell whether two drivers have the same coordinate, whatever their laws.
+    """Return whether two drivers prescribe the same coordinate, whatever their laws.
 
     Examples
     --------
@@ -45,7 +45,7 @@ def _plain(element: Any, name: str) -> str:
 
 
 def driver_of_leader(mechanism: Mechanism, cam: Cam) -> str | None:
-    """Return the name of the driver that moves the leader of a cam by a law of time, None if none does."""
+    """Return the name of the driver of the leader of a cam; None if there is none."""
     for name, driver in mechanism.drivers.items():
         try:
             if same_coordinate(coordinate_of_element(driver), cam.leader):
@@ -56,7 +56,7 @@ def driver_of_leader(mechanism: Mechanism, cam: Cam) -> str | None:
 
 
 def leader_name(mechanism: Mechanism, cam: Cam) -> str | None:
-    """Return the name of a driver, joint, initial condition or output that has the coordinate that leads a cam."""
+    """Return the name of a driver, joint, initial condition or output with the leader coordinate of a cam, or None."""
     kinds = (mechanism.drivers, mechanism.joints, mechanism.initial)
     names = [cam.of] if cam.of else []
     for name in [*names, *(x for kind in kinds for x in kind), *mechanism.outputs]:
@@ -72,18 +72,18 @@ def leader_name(mechanism: Mechanism, cam: Cam) -> str | None:
 
 
 def check_turns(mechanism: Mechanism, model: Model, coordinates: Mapping[str, Any], instant: float) -> None:
-    """Raise MechanismError where a cam does not count the turns with which the law of its leader starts, in space.
+    """Raise MechanismError if a spatial cam has not counted the turns with which the law of its leader starts.
 
     Parameters
     ----------
     mechanism : Mechanism
-        Put together.
+        Assembled mechanism.
     model : Model
-        Of it.
+        Its model.
     coordinates : mapping of str to array
-        Of all bodies, the ground first, assembled at the instant, (..., bodies, 1).
+        Coordinates of all bodies at the instant, the ground first, (..., bodies, 1).
     instant : float
-        s.
+        Instant at which the mechanism is assembled, s.
     """
     for name, cam in mechanism.joints.items():
         if not (isinstance(cam, Cam) and cam.hidden) or (leader := driver_of_leader(mechanism, cam)) is None:
@@ -99,7 +99,7 @@ def check_turns(mechanism: Mechanism, model: Model, coordinates: Mapping[str, An
 
 
 def _law_value(model: Model, driver: str, instant: float) -> float:
-    """Return the value of the law of a driver by its dotted name at an instant, s."""
+    """Return the value of the law of a driver at an instant, s; `driver` is its dotted name."""
     for group, names in named_groups(model):
         if driver in names:
             values = np.asarray(group.element.motion(Jet([np.full((1, 1), instant)])).coefficients[0])
@@ -108,9 +108,9 @@ def _law_value(model: Model, driver: str, instant: float) -> float:
 
 
 def cams_in_time(mechanism: Mechanism) -> Iterator[tuple[str, FollowingMotion]]:
-    """Yield the laws of cams whose leaders are driven, as laws of time, by the names of the cams.
+    """Yield the name and the law of time of each cam with a driven leader.
 
-    Invalid laws are left out: their use refuses them.
+    Invalid laws are left out: they are refused when used.
     """
     values = mechanism.parameter_values
     for name, cam in mechanism.joints.items():

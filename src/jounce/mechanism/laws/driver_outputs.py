@@ -1,4 +1,4 @@
-"""The coordinates of drivers as outputs: what their laws prescribe, read off the bodies."""
+"""The coordinates of drivers as outputs, measured on the bodies."""
 
 from typing import Any
 
@@ -9,9 +9,9 @@ from jounce.mechanism.outputs.base import AbstractMotionOutput
 
 
 def is_turning(driver: Any) -> bool:
-    """Tell whether the law of a driver is an angle, so that what it exerts is a torque.
+    """Return whether the law of a driver is an angle, so that the driver exerts a torque.
 
-    A class that does not state its dimension drives an angle where it has no points.
+    A class that does not state the dimension of its law drives an angle if it has no points.
     """
     stated = dimension_of_field(driver, "motion")
     if stated != "any":
@@ -41,10 +41,10 @@ class _DriverCoordinateOutput(AbstractMotionOutput):
 
 
 class DriverAngleOutput(_DriverCoordinateOutput):
-    """Angle of a driver, rad, as its law has it: that of the bodies, also where the law follows from an output."""
+    """Coordinate of a driver of an angle, rad, measured on the bodies; also if the driver follows from an output."""
 
     unit = "rad"
 
 
 class DriverDisplacementOutput(_DriverCoordinateOutput):
-    """Displacement of a driver, m, as its law has it: that of the bodies, also where the law follows from an output."""
+    """Coordinate of a driver of a length, m, measured on the bodies; also if the driver follows from an output."""

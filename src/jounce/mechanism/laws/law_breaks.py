@@ -1,4 +1,4 @@
-"""Where the laws of a mechanism jump or bend: no series goes on beyond, and peaks may be limits from one side."""
+"""Breaks in the laws of a mechanism: no series continues beyond a break, and peaks there may be one-sided limits."""
 
 from collections.abc import Iterable, Iterator, Sequence
 from typing import Any
@@ -19,29 +19,28 @@ from jounce.trajectory.law_checks.breaks import distinct_instants, law_breaks, m
 from jounce.trajectory.motion import AbstractMotion, ExpressionMotion
 from jounce.units.expression import Expression
 
-ANYWHERE = 0.7310585786300049  # of a displacement and its rate, where laws of forces are looked at for jumps in time
-OF_FORCES = 2  # derivatives by which forces are ahead of the motion
+ANYWHERE = 0.7310585786300049  # displacement and rate at which laws of forces are searched for jumps in time
+OF_FORCES = 2  # derivatives that forces need beyond those of the motion
 
 
 @under_own_settings
 def breaks_of_laws(
     mechanism: Mechanism, first: float, last: float, order: int, *, forces: bool | None = None
 ) -> Float[np.ndarray, " time"]:
-    """Return the instants at which laws of drivers, or of outputs they follow from, jump or bend, s.
+    """Return the instants at which laws of drivers, or of outputs that drivers follow, jump or bend, s.
 
-    Laws of forces count as laws of time: not where a displacement or its rate, or a
-    Python function, makes them jump.
+    Laws of forces count as laws of time: jumps that a displacement, its rate or a Python function causes are not found.
 
     Parameters
     ----------
     mechanism : Mechanism
-        With numbers in the place of parameters.
+        Mechanism with numbers in the place of parameters.
     first, last : float
-        s.
+        Interval of time, s.
     order : int
-        Of the highest derivative of the motion that matters.
+        Highest derivative of the motion that matters.
     forces : bool, optional
-        Whether laws of forces count; unless given, where an output is a force.
+        Whether laws of forces count; by default, if an output is a force.
 
     Examples
     --------
@@ -59,14 +58,14 @@ def breaks_of_laws(
 
 @under_own_settings
 def laws_may_break(mechanism: Mechanism, *, forces: bool | None = None) -> bool:
-    """Tell whether a law that `breaks_of_laws` looks at may jump or bend anywhere, whatever its parameters are."""
+    """Return whether a law that `breaks_of_laws` searches may jump or bend anywhere, whatever the parameter values."""
     counted = _shows_forces(mechanism) if forces is None else forces
     return any(map(may_break, laws_of(mechanism))) or (counted and any(map(may_break, laws_of_forces(mechanism))))
 
 
 @under_own_settings
 def breaks_depend_on(mechanism: Mechanism, names: Iterable[str]) -> bool:
-    """Tell whether where the laws of a mechanism jump or bend may depend on some of its parameters.
+    """Return whether the breaks of the laws of a mechanism may depend on some of its parameters.
 
     Examples
     --------
@@ -86,13 +85,13 @@ def breaks_depend_on(mechanism: Mechanism, names: Iterable[str]) -> bool:
 
     try:
         jax.eval_shape(resolved, values)
-    except Exception:  # noqa: BLE001 - a law that needs numbers in the place of parameters
+    except Exception:  # noqa: BLE001 - a law that requires numbers in the place of parameters
         return True
     return any(isinstance(number, Tracer) for number in numbers)
 
 
 def laws_of(mechanism: Mechanism) -> list[AbstractMotion]:
-    """Return the laws of drivers, and of cams that these lead, with numbers in the place of parameters."""
+    """Return the laws of drivers and of the cams that they lead, with numbers in the place of parameters."""
     values, drivers = mechanism.parameter_values, with_output_drivers(mechanism).drivers.values()
     motions = (getattr(driver, "motion", None) for driver in drivers)
     laws = [resolve_motion(motion, values) for motion in motions if motion is not None]
@@ -100,7 +99,7 @@ def laws_of(mechanism: Mechanism) -> list[AbstractMotion]:
 
 
 def laws_of_forces(mechanism: Mechanism) -> list[AbstractMotion]:
-    """Return the laws of forces that depend on time, as laws of time alone."""
+    """Return the time-dependent laws of forces, as laws of time alone."""
     laws = []
     for force in mechanism.forces.values():
         fields = [name for name, kind in field_kinds(type(force)).items() if kind in ("law", "laws")]
@@ -113,7 +112,7 @@ def _shows_forces(mechanism: Mechanism) -> bool:
 
 
 def _in_time(law: Any, force: AbstractForce, parameters: dict[str, Any]) -> Iterator[AbstractMotion]:
-    """Yield a law of a force, or its components, where it depends on time, as a law of time alone."""
+    """Yield a law of a force, or each of its components, as a law of time alone if it depends on time."""
     if isinstance(law, VectorLaw):
         law = law.parts
     if isinstance(law, Sequence | np.ndarray) and not isinstance(law, str):

@@ -1,4 +1,4 @@
-"""Checks of the laws of a mechanism at the requested instants, before any computing."""
+"""Checks of the laws of a mechanism at the requested instants, before the solution."""
 
 from collections.abc import Iterator
 
@@ -18,14 +18,14 @@ _PLAIN = frozenset((float, int, str, type(None), np.ndarray))  # no law
 
 
 def check_laws(mechanism: Mechanism, instants: np.ndarray, order: int, *, forces: bool) -> None:
-    """Raise for laws that end before the instants do, and warn of samples that do not support the derivatives.
+    """Raise an error if laws end before the instants do, and warn if samples do not support the derivatives.
 
     Parameters
     ----------
     mechanism : Mechanism
-        About to be solved.
+        Mechanism about to be solved.
     instants : ndarray of shape (time,)
-        s, in any order.
+        Instants, s, in any order.
     order : int
         Highest derivative of the motion.
     forces : bool
@@ -34,14 +34,14 @@ def check_laws(mechanism: Mechanism, instants: np.ndarray, order: int, *, forces
     Raises
     ------
     MechanismError
-        A law through samples says nothing of some of the instants.
+        If a law through samples is not defined at some of the instants.
 
     Warns
     -----
     UnitWarning
-        A law of an angle is likely in degrees: a warning, once for each driver.
+        If a law of an angle is likely in degrees, once for each driver.
     SampleWarning
-        The estimated error of a derivative of samples exceeds a tenth of its peak, as for a `JointTrajectory`.
+        If the estimated error of a derivative of samples exceeds a tenth of its peak, as for a `JointTrajectory`.
     """
     first, last = float(np.min(instants)), float(np.max(instants))
     warn_of_degrees(mechanism, first, last)
@@ -71,7 +71,7 @@ def check_laws(mechanism: Mechanism, instants: np.ndarray, order: int, *, forces
 
 
 def _motions(element: AbstractConstraint | AbstractForce) -> Iterator[tuple[str, AbstractMotion]]:
-    """Return the motion laws among the values of a driver or a force, by field."""
+    """Yield the motion laws among the values of a driver or a force, with their fields."""
     for field in value_fields(type(element)):
         value = getattr(element, field)
         if type(value) in _PLAIN:

@@ -1,4 +1,4 @@
-"""Outputs that are held to a law in the place of drivers, whose laws then follow from the motion."""
+"""Drivers that hold outputs to laws, in the place of drivers whose laws then follow from the motion."""
 
 import dataclasses
 from collections.abc import Mapping
@@ -29,13 +29,13 @@ from jounce.trajectory import OutputMotion
 
 
 def output_laws(mechanism: Mechanism) -> dict[str, OutputMotion]:
-    """Return the laws of outputs from which those of drivers follow, by driver."""
+    """Return the laws of outputs from which drivers follow, by driver."""
     motions = {name: getattr(driver, "motion", None) for name, driver in mechanism.drivers.items()}
     return {name: motion for name, motion in motions.items() if isinstance(motion, OutputMotion)}
 
 
 def with_outputs(mechanism: Mechanism, outputs: Mapping[str, AbstractQuantity]) -> Mechanism:
-    """Return the mechanism with other outputs, and with those of its own that drivers follow from."""
+    """Return the mechanism with other outputs, and with those of its own outputs that drivers follow."""
     followed = {motion.output for motion in output_laws(mechanism).values()}
     followed |= {name.rpartition("_")[0] for name in followed}
     followed_outputs = {name: output for name, output in mechanism.outputs.items() if name in followed}
@@ -43,21 +43,22 @@ def with_outputs(mechanism: Mechanism, outputs: Mapping[str, AbstractQuantity]) 
 
 
 def without_output_laws(mechanism: Mechanism) -> Mechanism:
-    """Return the mechanism with laws of zero for the drivers that follow from outputs, to which a law adds only."""
+    """Return the mechanism with zero laws for the drivers that follow from outputs."""
     led = {name: dataclasses.replace(mechanism.drivers[name], motion=0.0) for name in output_laws(mechanism)}
     return dataclasses.replace(mechanism, drivers={**mechanism.drivers, **led}) if led else mechanism
 
 
 def with_output_drivers(mechanism: Mechanism) -> Mechanism:
-    """Return the mechanism with drivers that hold outputs to their laws, in the place of those that follow from them.
+    """Return the mechanism with output drivers in the place of the drivers that follow from outputs.
 
-    They have the names of the drivers that they stand for. Outputs that follow from the whole motion, such as forces,
-    are left out: they are those of the drivers. A mechanism without such laws is returned as it is.
+    An output driver holds an output to its law, and has the name of the driver that it replaces. Outputs of the whole
+    motion, such as forces, are left out: they belong to the replaced drivers. A mechanism without such laws is returned
+    unchanged.
 
     Raises
     ------
     MechanismError
-        If an output does not exist, cannot be held, or is held twice, or its driver says nothing of its coordinate.
+        If an output does not exist, cannot be held, or is held twice, or the class of its driver defines no coordinate.
     """
     led = output_laws(mechanism)
     if not led:
@@ -81,7 +82,7 @@ def with_output_drivers(mechanism: Mechanism) -> Mechanism:
 
 
 def driver_of_output(mechanism: Any, motion: OutputMotion, location: str) -> AbstractConstraint:
-    """Return the driver that holds an output to a law; of a mechanism its space and outputs count."""
+    """Return the driver that holds an output to a law; `mechanism` needs a space and outputs only."""
     output, component = _named(mechanism, motion.output, location)
     law, spatial = motion.law, mechanism.space == "spatial"
     match output:
@@ -99,7 +100,7 @@ def driver_of_output(mechanism: Any, motion: OutputMotion, location: str) -> Abs
             size = POSITION_COMPONENTS[mechanism.space]
             along = [float(k == component) for k in range(size)]
             return kind((GROUND, *output.bodies), [0.0] * size, output.point, along, law)
-    if {"point_i", "point_j", "vector_i"} <= {field.name for field in dataclasses.fields(output)}:  # a slide
+    if {"point_i", "point_j", "vector_i"} <= {field.name for field in dataclasses.fields(output)}:  # a slide output
         kind = SpatialSlideDriver if spatial else SlideDriver
         return kind(output.bodies, output.point_i, output.point_j, output.vector_i, law)
     message = "cannot be held to a law; name an angle, a distance, a slide, or a component of a point, such as C_y"
@@ -107,7 +108,7 @@ def driver_of_output(mechanism: Any, motion: OutputMotion, location: str) -> Abs
 
 
 def _named(mechanism: Any, name: str, location: str) -> tuple[Any, int | None]:
-    """Return an output by its name, and which component of it is meant, if one is."""
+    """Return an output by its name, and the index of its component if the name is that of a component."""
     if name in mechanism.outputs:
         return mechanism.outputs[name], None
     stem, _, label = name.rpartition("_")

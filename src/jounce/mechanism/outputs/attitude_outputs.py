@@ -22,7 +22,7 @@ ENTRIES = tuple(row + column for row in LETTERS for column in LETTERS)
 class EulerParametersOutput(AbstractOutput):
     """Euler parameters e0, e1, e2, e3 of a spatial body, from its frame to the global one, the scalar first.
 
-    Of the two quadruples of an attitude, that of the starting guess, and the one that goes on from it.
+    The sign of the quadruple is that of the starting guess, continued along the motion.
     """
 
     unit = "1"
@@ -47,7 +47,7 @@ class RelativeEulerParametersOutput(EulerParametersOutput):
 
 
 class RotationMatrixOutput(AbstractOutput):
-    """Rotation matrix A of a spatial body, which takes components in its frame to global ones, row by row."""
+    """Rotation matrix A of a spatial body, from components in its frame to global ones, in rows."""
 
     unit = "1"
     space = "spatial"
@@ -60,19 +60,19 @@ class RotationMatrixOutput(AbstractOutput):
 
 
 class RelativeRotationMatrixOutput(RotationMatrixOutput):
-    """Rotation matrix ``A_i^T A_j``, which takes components in the frame of spatial body j to those in that of i."""
+    """Rotation matrix ``A_i^T A_j``, from components in the frame of spatial body j to those in the frame of body i."""
 
     body_count = 2
 
 
 class EulerAnglesOutput(AbstractOutput):
-    """Euler angles of a spatial body: three turns, one after the other, that take the global frame to that of the body.
+    """Euler angles of a spatial body: three successive turns from the global frame to that of the body.
 
-    A sequence in capitals ("ZXZ") turns about axes that move with the body (intrinsic), in small letters ("zxz") about
-    those that stay (extrinsic); the angles are in the order of its letters, as those of `jounce.rigid.rotation_matrix`
-    and of SciPy. The second angle is in [0, pi] where the first and last letters are the same, else in [-pi/2, pi/2];
-    the others are continuous over turns along a motion, and within half a turn of zero at its start. Where the first
-    and last axes are parallel they are not determined, and have no derivatives.
+    A sequence in capitals ("ZXZ") turns about axes that move with the body (intrinsic), one in small letters ("zxz")
+    about fixed axes (extrinsic). The angles are in the order of the letters, as in `jounce.rigid.rotation_matrix` and
+    in SciPy. The second angle is in [0, pi] if the first and last letters are the same, else in [-pi/2, pi/2]. The
+    others are continuous over turns along a motion, and within half a turn of zero at its start. Where the first and
+    last axes are parallel, these angles are undefined, and have no derivatives.
     """
 
     sequence: str = field(static=True)
@@ -92,13 +92,13 @@ class EulerAnglesOutput(AbstractOutput):
 
 
 class RelativeEulerAnglesOutput(EulerAnglesOutput):
-    """Euler angles of ``A_i^T A_j``: three turns that take the frame of spatial body i to that of body j."""
+    """Euler angles of ``A_i^T A_j``: three successive turns from the frame of spatial body i to that of body j."""
 
     body_count = 2
 
 
 def _matrix(bodies: Any) -> list[list[Jet]]:
-    """Return the entries of ``A_i^T A_j``, or of A_j where there is one body."""
+    """Return the entries of ``A_i^T A_j``, or of A_j for a single body."""
     *base, body = bodies
     if base:
         return [[side.dot(axis) for axis in body.axes] for side in base[0].axes]
@@ -116,14 +116,14 @@ def continued(
     Parameters
     ----------
     output : EulerAnglesOutput
-        Whose angles they are.
+        Output of the angles.
     angles : array of shape (3, time)
-        Of the output, up to whole turns; those that are not finite count for nothing.
+        Angles up to whole turns; instants with angles that are not finite are ignored.
     instants : array of shape (time,)
-        s.
+        Instants of the angles, s.
     passed : tuple
-        Instants in the order of the motion, (places,), and the angles there, up to whole turns, (3, places): near
-        enough to each other that no turn is lost between them.
+        Instants in the order of the motion, (places,), and the angles there, up to whole turns, (3, places), close
+        enough to each other that no turn is missed.
     """
     between, known = passed
     whole = np.concatenate([known, angles], axis=1)
@@ -142,8 +142,8 @@ def euler_angles_of(sequence: str, attitudes: Float[np.ndarray, "4 place"]) -> F
         return np.zeros((3, 0))
     import warnings
 
-    from scipy.spatial.transform import Rotation  # here, since importing SciPy takes half a second
+    from scipy.spatial.transform import Rotation  # local, since the import of SciPy takes half a second
 
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore", UserWarning)  # where two axes are parallel; passed over at once
+        warnings.simplefilter("ignore", UserWarning)  # angles where two axes are parallel: the caller ignores them
         return Rotation.from_quat(attitudes.T, scalar_first=True).as_euler(sequence).T

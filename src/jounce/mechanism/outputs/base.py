@@ -20,17 +20,17 @@ from jounce.rigid.pose import Pose
 
 
 class AbstractQuantity(Module):
-    """A quantity of a motion with its unit, of the poses of some bodies or of the whole motion."""
+    """A quantity of a motion with its unit: a function of the poses of some bodies, or of the whole motion."""
 
     unit: ClassVar[str] = "m"
-    space: ClassVar[str] = ""  # planar or spatial where only one makes sense
-    lost_orders: ClassVar[int] = 0  # derivatives by which it is shorter than the motion
-    rate_names: ClassVar[tuple[str, ...]] = ()  # of the quantity and its rates, where they are no velocities
+    space: ClassVar[str] = ""  # planar or spatial, if it exists in one only
+    lost_orders: ClassVar[int] = 0  # derivatives by which the quantity is shorter than the motion
+    rate_names: ClassVar[tuple[str, ...]] = ()  # names of the value and its rates, if they are not those of a position
     body_count: ClassVar[int] = 0
-    labels: ClassVar[tuple[str, ...]] = ("x", "y", "z")  # of the components, where there are some
-    axes: ClassVar[tuple[tuple[str, tuple[str, ...]], ...]] = ()  # of components that are those of no vector
-    of_forces: ClassVar[bool] = False  # whether applied forces bear on it
-    dimensions: ClassVar[Mapping[str, str]] = USUAL_DIMENSIONS  # these facts are those of `AbstractConstraint`
+    labels: ClassVar[tuple[str, ...]] = ("x", "y", "z")  # of the components, if there are several
+    axes: ClassVar[tuple[tuple[str, tuple[str, ...]], ...]] = ()  # of components other than those of a vector
+    of_forces: ClassVar[bool] = False  # whether the quantity depends on applied forces
+    dimensions: ClassVar[Mapping[str, str]] = USUAL_DIMENSIONS  # these four facts are those of `AbstractConstraint`
     signs: ClassVar[Mapping[str, str]] = USUAL_SIGNS
     choices: ClassVar[Mapping[str, tuple[str, ...]]] = MappingProxyType({})
     never_parallel: ClassVar[tuple[tuple[str, str], ...]] = ()
@@ -39,19 +39,19 @@ class AbstractQuantity(Module):
         """Raise MechanismError unless the quantity exists in a mechanism; names of bodies are checked elsewhere."""
 
     def is_vector(self, mechanism: Any) -> bool:
-        """Tell whether the quantity has components along the axes of a frame."""
+        """Return whether the quantity has components along the axes of a frame."""
         del mechanism
         return False
 
     def component_labels(self, mechanism: Any) -> tuple[str, ...]:
-        """Return the names of the components of the quantity in a mechanism; none where it is one number."""
+        """Return the names of the components of the quantity in a mechanism; none for a scalar."""
         if self.axes:
             return tuple(self.labels)
         return tuple(self.labels[: 2 if mechanism.space == "planar" else 3]) if self.is_vector(mechanism) else ()
 
 
 def lost_orders(outputs: Iterable[AbstractQuantity]) -> int:
-    """Return by how many derivatives some outputs are shorter than the motion, at most."""
+    """Return the largest number of derivatives by which outputs are shorter than the motion."""
     return max((output.lost_orders for output in outputs), default=0)
 
 
@@ -65,11 +65,11 @@ class AbstractMotionOutput(AbstractQuantity):
         """Return the Taylor coefficients of the quantity at all instants, shape (order + 1, components, time)."""
 
     def prepare(self, motion: Any) -> None:
-        """Make programs that any motion of such a form needs, unless they are there; none in general."""
+        """Compile the programs that any motion of the same form needs; none by default."""
         del motion
 
     def remark(self, motion: Any, values: Any) -> str:
-        """Return a remark on plain derivatives, time first, such as why they are NaN; nothing in general."""
+        """Return a remark on derivatives, time first, such as why they are NaN; an empty text by default."""
         del motion, values
         return ""
 
@@ -80,23 +80,23 @@ class AbstractOutput(AbstractQuantity):
     Parameters
     ----------
     bodies : tuple of str
-        Names of the bodies that it depends on, in the order of the poses that `evaluate` takes.
+        Names of the bodies on which it depends, in the order of the poses that `evaluate` takes.
     """
 
     bodies: tuple[str, ...] = field(static=True, converter=lambda b: (b,) if isinstance(b, str) else tuple(b))
 
-    turning: ClassVar[bool] = False  # an angle known up to whole turns, made continuous along the motion
-    wraps: ClassVar[tuple[bool, ...]] = ()  # which components are angles in a range, continued once all are known
+    turning: ClassVar[bool] = False  # an angle known up to whole turns, to be continued along the motion
+    wraps: ClassVar[tuple[bool, ...]] = ()  # which components are angles in a range, to be continued along the motion
     body_count: ClassVar[int] = 1
     may_repeat: ClassVar[bool] = False  # whether a body may be named more than once
 
     def __check_init__(self):
-        if self.body_count:  # else the output knows its bodies
+        if self.body_count:  # otherwise the output finds its bodies itself
             check_bodies(self, (self.body_count,), "takes", "be of")
         check_words(self)
 
     @abc.abstractmethod
-    def evaluate(self, *bodies: Any, **_: Any) -> Jet:  # with both, type checkers let parameters be named
+    def evaluate(self, *bodies: Any, **_: Any) -> Jet:  # *bodies and **_ let subclasses name the parameters
         """Return the jet of the quantity, of shape (...) or (components, ...), from the poses of the bodies."""
 
 
@@ -114,7 +114,7 @@ class PointOutput(AbstractOutput):
 
 
 class ParameterOutput(AbstractOutput):
-    """Parameter of the curve on which a joint holds a point, in the unit that it has there.
+    """Parameter of the curve on which a joint holds a point, in the unit of the curve.
 
     Parameters
     ----------
@@ -146,7 +146,7 @@ class ParameterOutput(AbstractOutput):
 
 
 class ParametersOutput(ParameterOutput):
-    """Parameters u and v of the surface on which a joint holds a point, in the units that they have there."""
+    """Parameters u and v of the surface on which a joint holds a point, in the units of the surface."""
 
     space = "spatial"
     count = 2
@@ -170,14 +170,14 @@ class AngleOutput(AbstractOutput):
 class RelativeAngleOutput(AbstractOutput):
     """Signed angle about an axis of body i, from a vector of body i to one of body j, rad, continuous over turns.
 
-    Without vectors it is the angle of ``A_i^T A_j`` where the mechanism is assembled, and the turn from there.
-    Vectors are seen along the axis: where one has no part across it there is no angle.
+    Without vectors, it is the angle of ``A_i^T A_j`` at the assembled position plus the turn since then. With vectors,
+    it is the angle between their projections along the axis, and undefined where a projection vanishes.
     """
 
     axis: Vector
     vector_i: Vector = None
     vector_j: Vector = None
-    datum: Any = field(default=None, init=False)  # found when the mechanism is assembled
+    datum: Any = field(default=None, init=False)  # set when the mechanism is assembled
 
     unit = "rad"
     space = "spatial"
@@ -225,7 +225,7 @@ class AngularVelocityOutput(AbstractOutput):
 
 
 class DistanceOutput(AbstractOutput):
-    """Distance of a point on body i from one on body j, m."""
+    """Distance between a point on body i and a point on body j, m."""
 
     point_i: Vector  # m, in the frame of each body
     point_j: Vector

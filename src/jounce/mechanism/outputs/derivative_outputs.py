@@ -1,6 +1,6 @@
 """Derivatives of outputs with respect to other outputs: bump steer, motion ratios, mechanical advantages, rates.
 
-Along a motion ``dy/dx = y' / x'``, and the next derivative with respect to x is that of this one: quotients of series.
+Along a motion ``dy/dx = y' / x'``, and higher derivatives follow by repeating this quotient of series.
 """
 
 from collections import Counter
@@ -20,9 +20,9 @@ from jounce.jet.algebra import stacked
 from jounce.jet.rounding import nan_where_rounding, rates_of
 from jounce.mechanism.outputs.base import AbstractMotionOutput, AbstractOutput, AbstractQuantity
 
-HIGHEST = 10  # derivative with respect to an output
-OFF_ZERO = 1e-3  # sizes of what moves: the least size of a quantity that is zero where it stands still
-MOST_NAMED = 4  # instants
+HIGHEST = 10  # order of a derivative with respect to an output
+OFF_ZERO = 1e-3  # least size of a vanishing length, relative to the size of the mechanism
+MOST_NAMED = 4  # instants in a remark
 RATES = ("derivative", "rate", "second rate", "third rate", "fourth rate")
 
 
@@ -36,21 +36,21 @@ class Operand(NamedTuple):
 class DerivativeOutput(AbstractMotionOutput):
     """Derivative of an output with respect to another along the motion, ``d^n of / d by^n``.
 
-    Bump steer is that of a toe angle with respect to the height of the wheel, a motion ratio that of the length of a
-    spring, a wheel rate that of a force. Where `by` stands still there is none.
+    Bump steer is the derivative of a toe angle with respect to the wheel height, a motion ratio that of a spring
+    length, a wheel rate that of a force. The derivative is undefined where `by` stands still.
 
     Parameters
     ----------
     of, by : str
-        Names of outputs of the mechanism, or of components of them, such as ``C_y``.
+        Names of outputs of the mechanism, or of components of outputs, such as ``C_y``.
     order : int, default 1
-        n, up to 10.
+        n, from 1 to 10.
     """
 
     of: str = field(static=True)
     by: str = field(static=True)
     order: Whole = field(static=True, default=1)
-    bound_operands: Any = field(default=None, init=False)  # the operands, once it is an output of a mechanism
+    bound_operands: Any = field(default=None, init=False)  # set when the output becomes one of a mechanism
 
     source: ClassVar[str] = "of"
     rate_names = RATES
@@ -60,7 +60,7 @@ class DerivativeOutput(AbstractMotionOutput):
 
     @property
     def operands(self) -> tuple[Operand, Operand]:
-        """The outputs that it is of, in a mechanism."""
+        """The outputs `of` and `by` of the mechanism."""
         if self.bound_operands is None:
             message = "its outputs are found when it is an output of a mechanism, and `evaluate` is given one"
             raise MechanismError(message, name="of", value=self.of)
@@ -73,12 +73,12 @@ class DerivativeOutput(AbstractMotionOutput):
 
     @property
     def lost_orders(self) -> int:  # type: ignore[override] - of an instance, as it depends on the order
-        """Derivatives by which it is shorter than the motion."""
+        """Derivatives by which the output is shorter than the motion."""
         return int(self.order) + max(operand.output.lost_orders for operand in self.operands)
 
     @property
     def of_forces(self) -> bool:  # type: ignore[override] - of an instance
-        """Whether applied forces bear on it."""
+        """Whether the output depends on applied forces."""
         return any(operand.output.of_forces for operand in self.operands)
 
     def coefficients(self, motion: Any) -> Numbers:
@@ -88,7 +88,7 @@ class DerivativeOutput(AbstractMotionOutput):
         return stacked(derivative_by(y, x, int(self.order), scale))[:, None]
 
     def remark(self, motion: Any, values: Float[np.ndarray, "time derivative"]) -> str:
-        """Return why values are NaN at instants that were solved, and at which."""
+        """Return why values are NaN at solved instants, and at which instants."""
         missing = ~np.isfinite(values).all(axis=1) & (np.asarray(motion.status) == 0)
         if not missing.any():
             return ""
@@ -98,7 +98,7 @@ class DerivativeOutput(AbstractMotionOutput):
 
 
 class PosedDerivativeOutput(AbstractOutput):
-    """A `DerivativeOutput` whose outputs are functions of poses, as a mechanism has it."""
+    """A `DerivativeOutput` of outputs that are functions of poses, within a mechanism."""
 
     of: str = field(static=True)
     by: str = field(static=True)
@@ -106,14 +106,14 @@ class PosedDerivativeOutput(AbstractOutput):
     first: Nested
     second: Nested
     components: tuple[int, int] = field(static=True)
-    count: int = field(static=True)  # bodies of the first
+    count: int = field(static=True)  # number of bodies of the first output
 
     form: ClassVar[type] = DerivativeOutput
     rate_names = RATES
 
     @property
     def operands(self) -> tuple[Operand, Operand]:
-        """The outputs that it is of."""
+        """The outputs `of` and `by`."""
         return Operand(self.first, self.components[0]), Operand(self.second, self.components[1])
 
     @property
@@ -123,7 +123,7 @@ class PosedDerivativeOutput(AbstractOutput):
 
     @property
     def lost_orders(self) -> int:  # type: ignore[override] - of an instance, as it depends on the order
-        """Derivatives by which it is shorter than the motion."""
+        """Derivatives by which the output is shorter than the motion."""
         return int(self.order) + max(operand.output.lost_orders for operand in self.operands)
 
     def evaluate(self, *bodies: Any) -> Jet:
@@ -144,11 +144,11 @@ def derivative_by(y: Jet, x: Jet, order: int, scale: Any) -> Jet:
     Parameters
     ----------
     y, x : Jet
-        Of shape (...).
+        Series of shape (...).
     order : int
-        Of the derivative.
+        Order of the derivative.
     scale : array of shape (...)
-        The size of x.
+        Size of x.
     """
     speed = x.differentiate()
     nearness, rate = rates_of(speed, scale, jnp.ndim(scale))
@@ -158,7 +158,7 @@ def derivative_by(y: Jet, x: Jet, order: int, scale: Any) -> Jet:
 
 
 def _scale(x: Jet, unit: str, reach: Any) -> Any:
-    """Return the size of a quantity: an angle has 1 rad, a length is not smaller than a part of what moves."""
+    """Return the size of a quantity: 1 for an angle; for a length, at least a fraction of the size of the mechanism."""
     size = jnp.abs(x.coefficients[0])
     return jnp.ones_like(size) if unit == "rad" else size + (OFF_ZERO * reach if unit == "m" else 0.0)
 
@@ -168,20 +168,20 @@ def _component(jet: Jet, component: int) -> Jet:
 
 
 def _series(motion: Any, operand: Operand) -> Jet:
-    """Return the series of an output of a motion, or of a component, of shape (time,)."""
+    """Return the series of an output of a motion, or of its component, of shape (time,)."""
     series = motion.series(operand.output)
     return Jet(tuple(series[:, max(operand.component, 0)]))
 
 
 def bound(outputs: Mapping[str, AbstractQuantity], mechanism: Any) -> Mapping[str, AbstractQuantity]:
-    """Return outputs of a mechanism, derivatives among them with the outputs that they name.
+    """Return outputs of a mechanism, with the operands of the derivatives among them.
 
-    Those that name none that is left keep what they have: some of the outputs of a mechanism may be requested alone.
+    A derivative whose operands are not among the outputs keeps those that it has: outputs may be requested alone.
 
     Raises
     ------
     MechanismError
-        If a derivative names no output, none that is one number, or itself.
+        If an operand of a derivative does not exist, is no scalar, or is the derivative itself.
     """
     if not any(form_of(output) is DerivativeOutput for output in outputs.values()):
         return outputs
@@ -192,12 +192,12 @@ def bound(outputs: Mapping[str, AbstractQuantity], mechanism: Any) -> Mapping[st
 
 
 def bound_output(output: AbstractQuantity, mechanism: Any) -> AbstractQuantity:
-    """Return an output that is none of the mechanism, a derivative with the outputs of the mechanism that it names."""
+    """Return an output that the mechanism need not contain; a derivative gets operands from the mechanism."""
     return _with_operands(output, mechanism.outputs, mechanism) if form_of(output) is DerivativeOutput else output
 
 
 def form_of(output: AbstractQuantity) -> type[Any]:
-    """Return the class by which an output was given, and is named in files."""
+    """Return the class by which an output is given, and which files name."""
     form: Any = getattr(type(output), "form", type(output))
     return form
 
@@ -209,7 +209,7 @@ def _bind(
     bound_outputs: dict[str, AbstractQuantity],
     waiting: tuple[str, ...],
 ) -> AbstractQuantity:
-    """Return an output with those that it names, which are put among those found before it."""
+    """Return an output, bound to its operands, which are added to `bound_outputs`."""
     output: Any = outputs[name]
     if name in bound_outputs or form_of(output) is not DerivativeOutput:
         return bound_outputs.setdefault(name, output)
@@ -227,7 +227,7 @@ def _bind(
 
 
 def _base_output(name: str, outputs: Mapping[str, AbstractQuantity], mechanism: Any) -> str:
-    """Return the output that a name is of; empty where there is none."""
+    """Return the name of the output to which a name of an output or a component belongs; empty if there is none."""
     if name in outputs:
         return name
     stem, _, label = name.rpartition("_")
@@ -235,7 +235,7 @@ def _base_output(name: str, outputs: Mapping[str, AbstractQuantity], mechanism: 
 
 
 def _with_operands(output: Any, outputs: Mapping[str, AbstractQuantity], mechanism: Any) -> AbstractQuantity:
-    """Return a derivative with the outputs that it names."""
+    """Return a derivative with its operands."""
     of, by = (_operand(key, getattr(output, key), outputs, mechanism) for key in ("of", "by"))
     words = {"of": output.of, "by": output.by, "order": output.order}
     if not (_posed(of.output) and _posed(by.output)):
@@ -251,7 +251,7 @@ def _with_operands(output: Any, outputs: Mapping[str, AbstractQuantity], mechani
 
 
 def _operand(key: str, name: str, outputs: Mapping[str, AbstractQuantity], mechanism: Any) -> Operand:
-    """Return the output, or the component of one, that has a name."""
+    """Return the output or component with a given name."""
     stem = _base_output(name, outputs, mechanism)
     if not stem:
         labels = {other: output.component_labels(mechanism) for other, output in outputs.items()}
@@ -264,14 +264,14 @@ def _operand(key: str, name: str, outputs: Mapping[str, AbstractQuantity], mecha
 
 
 def _posed(output: Any) -> bool:
-    """Tell whether an output is a function of poses alone, without a reference position."""
+    """Return whether an output is a function of poses alone, without a reference position."""
     if not isinstance(output, AbstractOutput) or not belongs_to_package(type(output)):
         return False
     return not hasattr(output, "datum") or output.vector_i is not None
 
 
 def quotient_unit(of: str, by: str, order: int) -> str:
-    """Return the unit of a derivative with respect to a quantity, time last.
+    """Return the unit of a derivative with respect to a quantity, with seconds last.
 
     Examples
     --------

@@ -19,9 +19,9 @@ PERPENDICULAR = 1e-9  # cosine of the angle between unit vectors that are perpen
 class ProjectedAngleOutput(AbstractOutput):
     """Angle of the line from a point of body j to one of body m, projected on a plane of body i, rad.
 
-    The plane is perpendicular to `normal`; the angle is measured in it from the projection of `vector_i`, both on body
-    i, and is positive about the normal, by the right-hand rule. It is continuous over turns. Bodies j and m may be
-    the same. Where the line is perpendicular to the plane there is no angle.
+    The plane is perpendicular to `normal`. The angle is measured in the plane from the projection of `vector_i`,
+    positive about the normal by the right-hand rule, and continuous over turns. Both vectors are fixed on body i.
+    Bodies j and m may be the same. The angle is undefined where the line is perpendicular to the plane.
     """
 
     normal: Vector
@@ -55,10 +55,10 @@ class _CenterOutput(AbstractOutput):
 
 
 class InstantCenterOutput(_CenterOutput):
-    """Instant center of planar body j relative to body i, m: the point of both bodies that has one velocity.
+    """Instant center of planar body j relative to body i, m: the point at which both bodies have the same velocity.
 
-    In the frame `global`, or `body`: that of body i, in which it moves on the fixed centrode. Where the bodies do not
-    turn relative to each other there is none.
+    The frame is `global`, or `body` for that of body i, in which the center moves on the fixed centrode. The center is
+    undefined where the bodies do not turn relative to each other.
     """
 
     frame: str = field(static=True, default="global")
@@ -82,9 +82,9 @@ class InstantCenterOutput(_CenterOutput):
 class SpatialInstantCenterOutput(_CenterOutput):
     """Instant center of spatial body j relative to body i in a plane of body i, m.
 
-    The point of the plane, through `point_i` and perpendicular to `normal`, where the velocity of body j relative to
-    body i has no component in the plane. In the frame `global`, or `body`: that of body i. Where body j does not turn
-    about the normal there is none.
+    It is the point of the plane, through `point_i` and perpendicular to `normal`, at which the velocity of body j
+    relative to body i has no component in the plane. The frame is `global`, or `body` for that of body i. The center is
+    undefined where body j does not turn about the normal.
     """
 
     point_i: Vector  # m, in the frame of body i
@@ -99,7 +99,7 @@ class SpatialInstantCenterOutput(_CenterOutput):
     def evaluate(self, body_i: SpatialPose, body_j: SpatialPose) -> Jet:
         normal = body_i.direction(self.normal / length_of(self.normal)[None])
         position, turning = body_i.point(self.point_i), _spin(body_j) - _spin(body_i)
-        # both bodies have a point here, at rest in body i; that of body j moves on
+        # `position` is a point of body i; the coincident point of body j moves relative to it
         velocity = (
             body_j.position.differentiate()
             + _spin(body_j).cross(position - body_j.position)
@@ -116,12 +116,12 @@ class SpatialInstantCenterOutput(_CenterOutput):
 
 
 class RollCenterOutput(_CenterOutput):
-    """Roll center of an axle, m, in the global frame: of a body i, the chassis, on two wheels, bodies j and m.
+    """Roll center of an axle, m, in the global frame: of body i, the chassis, on two wheels, bodies j and m.
 
-    It is where the lines from the points of contact of the wheels to their instant centers meet, in the plane
+    It is the intersection of the lines from the contact points of the wheels to their instant centers, in the plane
     perpendicular to `normal`, the longitudinal direction of body i, through the middle of the contact points (SAE
-    J670). Each line is perpendicular to the velocity of its contact point, as a point of the body that carries the
-    wheel, relative to the chassis. Where the lines are parallel, or a contact point stands still, there is none.
+    J670). Each line is perpendicular to the velocity, relative to the chassis, of its contact point as a point of the
+    body that carries the wheel. The center is undefined where the lines are parallel, or a contact point stands still.
     """
 
     normal: Vector
@@ -140,11 +140,12 @@ class RollCenterOutput(_CenterOutput):
 
 
 class SymmetricRollCenterOutput(_CenterOutput):
-    """Roll center of an axle of which one wheel is modeled, m, in the global frame: the other is its mirror image.
+    """Roll center of an axle with one modeled wheel, m, in the global frame; the other wheel is its mirror image.
 
-    As that of two wheels, relative to the ground, with the image of the `point` of contact of the body in the plane
-    through the global origin perpendicular to `vector_i`, the lateral direction; `normal` is the longitudinal one,
-    perpendicular to it. So it is where the line of the wheel meets that plane, also where both lines are one.
+    It is the roll center of two wheels relative to the ground. The contact `point` of the body is mirrored in the plane
+    through the global origin perpendicular to `vector_i`, the lateral direction; `normal` is the longitudinal
+    direction, perpendicular to `vector_i`. The center is the intersection of the line of the wheel with that plane,
+    also where both lines coincide.
     """
 
     point: Vector  # m, in the frame of the body
@@ -180,13 +181,13 @@ def _in_frame(frame: SpatialPose, position: Jet) -> Jet:
 
 
 def _nan_without_rotation(center: Jet, turning: Jet) -> Jet:
-    """Return a center with NaN where the rate of turning that it was divided by vanishes."""
+    """Return a center with NaN where the angular rate by which it was divided vanishes."""
     batch = jnp.ndim(turning.coefficients[0])
     return nan_where_rounding(center, *rates_of(turning, jnp.ones_like(turning.coefficients[0]), batch))
 
 
 def _intersection(normal: Any, first: Jet, second: Jet, first_rate: Jet, second_rate: Jet) -> Jet:
-    """Return where lines through two points, perpendicular to velocities, meet in a plane midway between them."""
+    """Return the intersection of lines through two points, perpendicular to their velocities, in the plane midway."""
 
     def flat(vector: Jet) -> Jet:
         return vector - vector.dot(normal) * normal

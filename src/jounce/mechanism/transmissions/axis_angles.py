@@ -1,4 +1,4 @@
-"""Where angles about axes are counted from: the position in which a mechanism was assembled, and its turns."""
+"""Reference positions from which angles about axes are counted, and the whole turns of these angles."""
 
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
@@ -18,7 +18,7 @@ Coordinates = Mapping[str, Any]  # of all bodies, the ground first, by name: (..
 Quaternions = Float[np.ndarray, "4 *#rest"]
 Vectors = Float[np.ndarray, "3 *#rest"]
 Angles = Float[np.ndarray, "instance batch"]
-PARALLEL = 1e-9  # largest sine between axes that are one
+PARALLEL = 1e-9  # largest sine of the angle between coincident axes
 
 
 class PrescribedAngle(NamedTuple):
@@ -31,7 +31,7 @@ class PrescribedAngle(NamedTuple):
     axis : array of shape (3,)
         Unit axis in the global frame.
     angle : float
-        As the law says it, with its whole turns, rad.
+        Prescribed angle with its whole turns, rad.
     """
 
     bodies: tuple[int, int]
@@ -40,16 +40,16 @@ class PrescribedAngle(NamedTuple):
 
 
 class AttitudeHistory(NamedTuple):
-    """Attitudes that all bodies went through, so close to each other that no body makes half a turn in between.
+    """A sequence of attitudes of all bodies, so dense that no body makes half a turn between samples.
 
     Attributes
     ----------
     quaternion : array of shape (4, bodies, samples)
-        The ground first.
+        Euler parameters of all bodies, the ground first.
     time : array of shape (samples,)
-        When, s; zeros where it was no motion.
+        Instants, s; zeros for a path that is no motion.
     period, repeated : int
-        The last samples make a turn, of which so many more follow.
+        Number of the last samples that make up one turn, and number of repetitions of that turn that follow.
     between : callable, optional
         Returns the attitudes at any instants, (4, bodies, instants).
     """
@@ -63,7 +63,7 @@ class AttitudeHistory(NamedTuple):
     def sampled(
         self, measure: Callable[[Float[np.ndarray, "4 bodies sample"]], Float[np.ndarray, "angle sample"]]
     ) -> tuple[Float[np.ndarray, " sample"], Float[np.ndarray, "angle sample"]]:
-        """Return instants, and angles there that are known up to whole turns, so close that none is lost in between.
+        """Return instants and angles, known up to whole turns, so dense that no turn is missed between samples.
 
         Parameters
         ----------
@@ -73,18 +73,18 @@ class AttitudeHistory(NamedTuple):
         between, known = self.between, measure(self.quaternion)
         if between is None:
             return self.time, known
-        whole = np.zeros(len(self.time), int)  # one path, along which instants are measured
+        whole = np.zeros(len(self.time), int)  # a single path, with time as its parameter
         samples = refined_samples(lambda _, instants: measure(between(instants)), whole, self.time, known)
         return samples.share, samples.angle
 
     def angles(self, group: Group) -> tuple[Float[np.ndarray, " sample"], Float[np.ndarray, "instance sample"]]:
-        """Return instants, and the angles about axes that a group measures there, counted on from its datum."""
+        """Return instants, and the angles of a group about axes at these instants, counted from its datum."""
         time, raw = self.sampled(lambda quaternion: raw_angles([group], {"quaternion": quaternion})[0])
         begun = np.asarray(group.element.datum.near)[..., 0]
         return time, counted_on(np.column_stack([begun, raw]))[:, 1:]
 
     def last_angles(self, groups: Sequence[Group]) -> list[np.ndarray]:
-        """Return the angles at the end, (instances, 1) each, with the turns that are repeated."""
+        """Return the angles at the end, (instances, 1) each, including the repeated turns."""
         angles = [self.angles(group)[1] for group in groups if measures_angle(group)]
         if not self.repeated:
             return [angle[:, -1:] for angle in angles]
@@ -92,7 +92,7 @@ class AttitudeHistory(NamedTuple):
         return [last + self.repeated * whole_periods(last - before) for last, before in ends]
 
     def counting(self, groups: Sequence[Group], instants: Float[np.ndarray, " time"]) -> tuple[Group, ...]:
-        """Return groups that have the turns of each instant, from the sample nearest to it in time."""
+        """Return groups with the turns at each instant, taken from the sample nearest in time."""
         counted = []
         for time, angles in (self.angles(group) for group in groups if measures_angle(group)):
             backward = time[-1] < time[0]
@@ -102,7 +102,7 @@ class AttitudeHistory(NamedTuple):
 
 
 def measures_angle(group: Group) -> bool:
-    """Tell whether the elements of a group measure an angle about an axis."""
+    """Return whether the elements of a group measure an angle about an axis."""
     return hasattr(group.element, "datum")
 
 
@@ -118,13 +118,13 @@ def with_datums(
     Parameters
     ----------
     groups : sequence of Group
-        Those that measure no such angle stay as they are.
+        Groups; those that measure no such angle are returned unchanged.
     coordinates : dict of str to array
-        Of all bodies, the ground first, shape (..., bodies, 1).
+        Coordinates of all bodies, the ground first, shape (..., bodies, 1).
     prescribed : sequence of PrescribedAngle, optional
-        Angles known with their turns: one about the same axis between the same bodies has as many.
+        Angles with known turns; angles about the same axis between the same bodies get the same turns.
     keep : bool, default False
-        Whether angles go on from the datum of now, instead of those that the frames of the bodies have.
+        Whether angles continue from the present datum, instead of following from the body frames.
     """
     return tuple(
         _with_datum(group, coordinates, prescribed, keep=keep) if measures_angle(group) else group for group in groups
@@ -132,20 +132,20 @@ def with_datums(
 
 
 def raw_angles(groups: Sequence[Group], coordinates: Coordinates) -> list[np.ndarray]:
-    """Return the angles about axes that groups measure, up to whole turns, (instances, batch) each.
+    """Return the angles of groups about axes, up to whole turns, (instances, batch) each.
 
     Parameters
     ----------
     groups : sequence of Group
-        Those that measure no such angle have no entry.
+        Groups; those that measure no such angle have no entry in the result.
     coordinates : dict of str to array
-        Of all bodies, the ground first, shape (..., bodies, batch).
+        Coordinates of all bodies, the ground first, shape (..., bodies, batch).
     """
     return [_raw_angle(group, relative_attitude(group, coordinates)) for group in filter(measures_angle, groups)]
 
 
 def _raw_angle(group: Group, attitude: Quaternions) -> Angles:
-    """Return the angles that a group measures at attitudes of its second bodies relative to the first."""
+    """Return the angles of a group for attitudes of its second bodies relative to the first."""
     element, axis = group.element, axis_of(group)
     if element.vector_i is None:
         return since(element.datum, attitude, axis)
@@ -154,17 +154,17 @@ def _raw_angle(group: Group, attitude: Quaternions) -> Angles:
 
 
 def with_angles(groups: Sequence[Group], angles: Sequence[np.ndarray]) -> tuple[Group, ...]:
-    """Return groups of which the data hold other angles, for those that measure one about an axis."""
+    """Return groups whose data have other angles; `angles` holds one array for each group that measures angles."""
     return _with_data(groups, angles, lambda datum, angle: with_fields(datum, angle=angle, near=angle))
 
 
 def with_turns(groups: Sequence[Group], near: Sequence[Any]) -> tuple[Group, ...]:
-    """Return groups that measure angles about axes with the turns of these, (instances, batch) each; may be traced."""
+    """Return groups whose data have other turns, from angles of shape (instances, batch), which may be traced."""
     return _with_data(groups, near, lambda datum, turns: with_fields(datum, near=turns))
 
 
 def _with_data(groups: Sequence[Group], values: Sequence[Any], put: Callable[[Datum, Any], Datum]) -> tuple[Group, ...]:
-    """Return groups with other data, one value for each that measures an angle about an axis."""
+    """Return groups with changed data; `values` holds one value for each group that measures angles."""
     remaining = iter(values)
     return tuple(
         with_field(g, "datum", put(g.element.datum, next(remaining))) if measures_angle(g) else g for g in groups
@@ -172,12 +172,12 @@ def _with_data(groups: Sequence[Group], values: Sequence[Any], put: Callable[[Da
 
 
 def angles_of(groups: Sequence[Group]) -> tuple[Any, ...]:
-    """Return the angles about axes that groups measure, with their turns."""
+    """Return the angles of groups about axes, with their turns."""
     return tuple(group.element.datum.near for group in groups if measures_angle(group))
 
 
 def of_one_lane(groups: Sequence[Group], lane: int = 0) -> tuple[Group, ...]:
-    """Return groups whose angles about axes have the turns of a whole batch, for one lane of it."""
+    """Return groups with the turns of one lane of a batch."""
     return with_turns(groups, [angle[..., lane : lane + 1] for angle in angles_of(groups)])
 
 
@@ -199,7 +199,7 @@ def _with_datum(group: Group, coordinates: Coordinates, prescribed: Sequence[Pre
             if sign:
                 expected = sign * given.angle
                 angle[k] = expected + principal(angle[k] - expected)
-    # a driver or a force acts about the axis, wherever its vector on body j points beside it
+    # a driver or a force acts about the axis, whatever the component of its vector on body j along the axis
     acts = element.vector_i is not None and hasattr(element, "role")
     across = _across(np.asarray(element.vector_j), attitude, axis) if acts else None
     values = {"attitude": attitude, "angle": angle, "near": angle, "across": across}
@@ -207,7 +207,7 @@ def _with_datum(group: Group, coordinates: Coordinates, prescribed: Sequence[Pre
 
 
 def with_datum_of(group: Group, known: Group) -> Group:
-    """Return a group with its angles counted from where those of another are; its own vectors may be traced by JAX."""
+    """Return a group whose angles are counted from the datum of another group; its vectors may be traced by JAX."""
     datum = known.element.datum
     if datum.across is not None:
         across = _across(group.element.vector_j, np.asarray(datum.attitude), axis_of(known))
@@ -216,7 +216,7 @@ def with_datum_of(group: Group, known: Group) -> Group:
 
 
 def departure(before: Sequence[Group], after: Sequence[Group]) -> float:
-    """Return by how much the angles of drivers, and the directions of their axes, differ between two data, rad."""
+    """Return the largest difference of driver angles, and of their axis directions, between two data, rad."""
     largest = 0.0
     for old, new in zip(before, after, strict=True):
         if measures_angle(new):
@@ -231,7 +231,7 @@ def departure(before: Sequence[Group], after: Sequence[Group]) -> float:
 def prescribed_angles(
     groups: Sequence[Group], coordinates: Coordinates, laws: Sequence[np.ndarray]
 ) -> list[PrescribedAngle]:
-    """Return the angles that drivers prescribe at a position, in space; `laws` holds the values for each such group."""
+    """Return the angles that spatial drivers prescribe at a position; `laws` holds the law values of each group."""
     prescribed = []
     for group, values in zip((g for g in groups if measures_angle(g)), laws, strict=True):
         for k, bodies in enumerate(zip(*group.bodies, strict=True)):
@@ -241,9 +241,9 @@ def prescribed_angles(
 
 
 def lost_count(groups: Sequence[Group], history: AttitudeHistory) -> tuple[int, int, float] | None:
-    """Return where shafts of a ratio have lost count of their turns: group, instance, and instant, s; None if nowhere.
+    """Return the first loss of turns of spatial gears: group, instance and instant, s; None if no turn is lost.
 
-    Their residual knows angles up to whole turns. Along attitudes that are close to each other turns are counted.
+    The residual of a gear knows angles up to whole turns only. Along a dense history, turns can be counted.
     """
     for index, group in enumerate(groups):
         whole = getattr(group.element, "whole", None)
@@ -260,7 +260,7 @@ def lost_count(groups: Sequence[Group], history: AttitudeHistory) -> tuple[int, 
 
 
 def _shaft_angles(group: Group, quaternion: Float[np.ndarray, "4 bodies sample"]) -> Float[np.ndarray, "angle sample"]:
-    """Return how far shafts of a group are turned in their frames, up to whole turns: the first, then the second."""
+    """Return the angles of the shafts of a group in their frames, up to whole turns, the first shafts first."""
     element, frame, angles = group.element, quaternion[:, list(group.bodies[2])], []
     for bodies, axis, held in zip(
         group.bodies[:2], (element.axis_i, element.axis_j), (element.held_i, element.held_j), strict=True
@@ -271,14 +271,14 @@ def _shaft_angles(group: Group, quaternion: Float[np.ndarray, "4 bodies sample"]
 
 
 def axis_of(group: Group) -> Float[np.ndarray, "3 instance 1"]:
-    """Return the unit axes on body i of the elements of a group, (3, instances, 1)."""
+    """Return the unit axes, on body i, of the elements of a group, (3, instances, 1)."""
     element = group.element
     axis = np.asarray(element.axis if hasattr(element, "axis") else element.axis_i)
     return unit(axis)
 
 
 def unit(vectors: Float[np.ndarray, "component *batch"]) -> Float[np.ndarray, "component *batch"]:
-    """Return vectors over their lengths, as `numpy.linalg.norm` has them in twice the time."""
+    """Return unit vectors, in half the time of `numpy.linalg.norm`."""
     return vectors / np.sqrt(np.add.reduce(vectors * vectors, axis=0))
 
 
@@ -291,21 +291,21 @@ def relative_attitude(group: Group, coordinates: Coordinates) -> Quaternions:
 def attitudes_of(
     bodies: Sequence[int], quaternion: Float[np.ndarray, "4 bodies sample"]
 ) -> Float[np.ndarray, "4 sample"]:
-    """Return the Euler parameters, (4, samples), of a body, or of the second body relative to the first.
+    """Return the Euler parameters, (4, samples), of a body, or of a second body relative to a first.
 
     Parameters
     ----------
     bodies : sequence of int
         One or two indices of bodies.
     quaternion : array of shape (4, bodies, samples)
-        Of all bodies, the ground first.
+        Euler parameters of all bodies, the ground first.
     """
     *base, body = (quaternion[:, k] for k in bodies)
     return quaternion_product(conjugate(base[0]), body) if base else body
 
 
 def since(datum: Datum, attitude: Quaternions, axis: Vectors) -> Angles:
-    """Return the angle of an attitude, within half a turn of that of a datum."""
+    """Return the angle of an attitude, within half a turn of the angle of a datum."""
     return (
         np.asarray(datum.angle) + angle_of(quaternion_product(attitude, conjugate(np.asarray(datum.attitude))), axis)[0]
     )
@@ -319,30 +319,30 @@ def _between(attitude: Quaternions, axis: Vectors, first: Vectors, second: Vecto
 
 
 def _across(second: Numbers, attitude: Quaternions, axis: Vectors) -> Numbers:
-    """Return the part of vectors of bodies j across axes of bodies i."""
+    """Return the components of vectors of bodies j perpendicular to axes of bodies i."""
     along = turned(conjugate(attitude), axis)
     return second - (second * along).sum(axis=0) * along
 
 
 def _relative_sign(bodies: tuple[int, ...], axis: Float[np.ndarray, " 3"], given: PrescribedAngle) -> int:
-    """Return 1 where an angle follows that of a driver, -1 where it runs against it, else 0."""
+    """Return 1 if an angle equals that of a driver, -1 if it is its negative, 0 if they are unrelated."""
     if sorted(bodies) != sorted(given.bodies) or np.linalg.norm(_cross(axis, given.axis)) > PARALLEL:
         return 0
     return int(np.sign(axis @ given.axis)) * (1 if bodies == given.bodies else -1)
 
 
 def conjugate(p: Quaternions) -> Quaternions:
-    """Return the Euler parameters of the turns back."""
+    """Return the Euler parameters of the inverse rotations."""
     return np.concatenate([p[:1], -p[1:]])
 
 
 def quaternion_product(p: Quaternions, q: Quaternions) -> Quaternions:
-    """Return the Euler parameters of turns p after turns q."""
+    """Return the Euler parameters of rotations p after rotations q."""
     return _bilinear(_HAMILTON, p, q)
 
 
 def turned(p: Quaternions, vector: Vectors) -> Vectors:
-    """Return vectors given in the axes of bodies, by Euler parameters of these, in global ones."""
+    """Return vectors in global axes, given in the axes of bodies with Euler parameters p."""
     twice = 2 * _cross(p[1:], vector)
     return vector + p[:1] * twice + _cross(p[1:], twice)
 
@@ -353,12 +353,12 @@ def _cross(a: Vectors, b: Vectors) -> Any:
 
 
 def _bilinear(signs: np.ndarray, a: Numbers, b: Numbers) -> Any:
-    """Return sums of products of components along the first axis: five calls of NumPy, where each takes a microsecond.
+    """Return bilinear sums of components along the first axis, by few calls of NumPy.
 
     Parameters
     ----------
     signs : array of shape (components, components squared)
-        Of the product of component i of one and j of the other, in column i times components plus j.
+        Coefficient of the product of component i of `a` and component j of `b` in column i times components plus j.
     """
     products = np.asarray(a)[:, None] * np.asarray(b)[None]
     return (signs @ products.reshape(signs.shape[1], -1)).reshape(len(signs), *products.shape[2:])

@@ -1,4 +1,4 @@
-"""Whether gears, belts, cams and wheels have what they need: what carries and turns them, ratios and laws, a side."""
+"""Checks of gears, belts, cams and wheels: carriers, hinges, ratios, laws, and the side of a plane."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -15,19 +15,19 @@ from jounce.mechanism.transmissions.axis_angles import turned
 from jounce.mechanism.transmissions.gear_frames import LARGEST_WHOLE, is_toothed
 from jounce.mechanism.transmissions.rope_lengths import check_ropes
 
-LEAST_DIFFERENCE = 0.05  # of the radii of a belt's pulleys where no body carries both: less is a tiny part of a turn
-FLAT = 1e-6  # sine of the angle between the axis of a wheel and the normal of its plane: less, and it lies on it
+LEAST_DIFFERENCE = 0.05  # least difference of pulley radii without a common carrier, relative to one of them
+FLAT = 1e-6  # largest sine of the angle between the axis and the plane normal of a wheel that lies flat
 
 
 def check_gears(groups: Sequence[Group], names: Sequence[Sequence[str]]) -> None:
-    """Raise MechanismError unless what carries gears and turns cams was found, and ropes are as long as can be.
+    """Raise MechanismError unless gears have carriers, cams have hinges, and ropes have possible lengths.
 
     Parameters
     ----------
     groups : sequence of Group
-        Of joints and drivers.
+        Groups of joints and drivers.
     names : sequence of sequence of str
-        Of the elements of each, with their kinds before them.
+        Names of the elements of each group, with their kinds as prefixes.
     """
     check_ropes(groups, names)
     for group, members in zip(groups, names, strict=True):
@@ -62,7 +62,7 @@ def check_gears(groups: Sequence[Group], names: Sequence[Sequence[str]]) -> None
 
 
 def _check_driving(friction: GearFriction, names: Sequence[str]) -> None:
-    """Raise MechanismError where friction keeps gears from being driven by the first of them."""
+    """Raise MechanismError if friction keeps the first of two gears from driving the second."""
     forward = friction.efficiencies[0]
     if isinstance(forward, Tracer):
         return
@@ -76,7 +76,7 @@ def _check_driving(friction: GearFriction, names: Sequence[str]) -> None:
 
 
 def _check_belts(belts: planar.Belt, names: Sequence[str]) -> None:
-    """Raise MechanismError where belts cannot count the turns of their lines of centers."""
+    """Raise MechanismError if belts cannot count the turns of their lines of centers."""
     if isinstance(belts.ratio, Tracer):
         return
     differences = np.abs(1.0 - np.asarray(belts.ratio)).ravel()
@@ -91,7 +91,7 @@ def _check_belts(belts: planar.Belt, names: Sequence[str]) -> None:
 
 
 def _check_cams(cams: Cam, names: Sequence[str]) -> None:
-    """Raise MechanismError where an angle in space that leads or follows is that of no hinge."""
+    """Raise MechanismError if a spatial angle that leads or follows a cam is not the angle of a hinge."""
     for field, part in (("bodies", cams.follower), ("motion.of", cams.leader)):
         if turns_in_space(part) and part.datum is None:
             message = (
@@ -102,14 +102,14 @@ def _check_cams(cams: Cam, names: Sequence[str]) -> None:
 
 
 def check_wheels(groups: Sequence[Group], names: Sequence[Sequence[str]], guess: Mapping[str, Any]) -> None:
-    """Raise MechanismError where a wheel lies flat on its plane, or behind one of the ground, at the guess.
+    """Raise MechanismError if, at the guess, a wheel lies flat on its plane, or behind a plane of the ground.
 
     Parameters
     ----------
     groups : sequence of Group
-        Of joints and drivers.
+        Groups of joints and drivers.
     names : sequence of sequence of str
-        Of the elements of each, with their kinds before them.
+        Names of the elements of each group, with their kinds as prefixes.
     guess : dict of str to array
         Coordinates of all bodies, the ground first, (..., bodies, 1).
     """
@@ -126,11 +126,11 @@ def check_wheels(groups: Sequence[Group], names: Sequence[Sequence[str]], guess:
         sizes = np.linalg.norm(normal, axis=0) * np.linalg.norm(axis, axis=0)
         flat = np.linalg.norm(np.cross(normal, axis, axis=0), axis=0) <= FLAT * sizes
         height = ((center - on_plane) * normal).sum(axis=0) / np.linalg.norm(normal, axis=0)
-        for k, name in enumerate(members[: group.instances]):  # others name further rows of the same
+        for k, name in enumerate(members[: group.instances]):  # further entries name further rows of the same wheels
             if flat[k, 0]:
                 message = "the wheel lies flat on its plane, where no point of its rim touches alone: tilt the body"
                 raise MechanismError(message, name=f"{name}.axis")
-            if height[k, 0] < 0 and not group.bodies[0][k]:  # on the ground, which stands where it is
+            if height[k, 0] < 0 and not group.bodies[0][k]:  # a plane of the ground does not move
                 message = (
                     f"the center of the wheel is {-height[k, 0]:.4g} m behind its plane at the starting guess, and "
                     "the normal leads from the plane to the wheel: reverse it, or guess the body on its side"
@@ -139,7 +139,7 @@ def check_wheels(groups: Sequence[Group], names: Sequence[Sequence[str]], guess:
 
 
 def check_ratios(groups: Sequence[Group], names: Sequence[Sequence[str]]) -> None:
-    """Raise UnsupportedError if JAX differentiates by a ratio of turns in space: whole turns are not known to it."""
+    """Raise UnsupportedError if JAX traces the ratio of a spatial gear, because whole turns depend on it."""
     for group, members in zip(groups, names, strict=True):
         if isinstance(group.element, spatial.Gear) and isinstance(group.element.ratio, Tracer):
             message = "a ratio of turns in space is not differentiated, as whole turns go with it; vary it instead"

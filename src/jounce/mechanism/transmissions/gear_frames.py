@@ -1,8 +1,8 @@
-"""Frames of gears: the body that both centers are pinned to, and the axes of shafts in the frame that they turn in.
+"""Frames of gears: the body to which both centers are pinned, and the axes of shafts in the frame of their rotation.
 
-The centers of toothed gears, and of the pulleys of most belts, keep their distance where one body carries both. The
-pins show this body: a center is a point of every body that is pinned there. The joints that hold directions parallel
-show the axis of a shaft in the frame m, and that of a pinion on its rack.
+The centers of toothed gears, and of the pulleys of most belts, keep their distance if one body carries both. The pins
+show this body: a center is a point of every body that is pinned to it. The joints that hold directions parallel show
+the axis of a shaft in the frame m, and that of a pinion on its rack.
 """
 
 import dataclasses
@@ -41,18 +41,18 @@ from jounce.mechanism.transmissions.joined_points import (
 )
 from jounce.mechanism.transmissions.rope_lengths import check_ropes
 
-LARGEST_GAP = 1e-6  # of the distance of centers, as written numbers are rounded
-LARGEST_WHOLE = 1000  # of the whole numbers in a ratio of turns in space
-ACROSS = 1e-6  # largest cosine between the axis of a pinion and its rack, as written numbers are rounded
-WHOLE = 1e-9  # how near to a whole number a multiple of a ratio is
+LARGEST_GAP = 1e-6  # of the center distance, for the rounding of written numbers
+LARGEST_WHOLE = 1000  # largest whole number in a ratio of spatial gears
+ACROSS = 1e-6  # largest cosine between the axis of a pinion and its rack, for the rounding of written numbers
+WHOLE = 1e-9  # tolerance of a multiple of a ratio that counts as whole
 
 
 Grouped = tuple[tuple[Group, ...], tuple[tuple[str, ...], ...]]
-"""Groups, and the names of the elements of each, with their kinds before them."""
+"""Groups, and the names of the elements of each group, with their kinds as prefixes."""
 
 
 class Arm(NamedTuple):
-    """The body that has the centers of two gears, and the angle of the line between them in its frame, rad."""
+    """The body that carries the centers of two gears, and the angle of the line of centers in its frame, rad."""
 
     body: str
     angle: Any
@@ -64,18 +64,18 @@ def is_toothed(element: Any) -> bool:
 
 
 def on_line(element: Any) -> bool:
-    """Return whether an element, teeth or a belt, turns planar bodies relative to the line of their centers."""
+    """Return whether an element, toothed gears or a belt, turns planar bodies relative to their line of centers."""
     return may_have_frame(type(element)) and (is_toothed(element) or isinstance(element, planar.Belt))
 
 
 @lru_cache(maxsize=1000)
 def may_have_frame(kind: type) -> bool:
-    """Tell whether elements of a class need what only the whole mechanism shows: gears, belts, ropes, cams, racks."""
+    """Return whether elements of a class need information from the whole mechanism, such as gears, belts and ropes."""
     return issubclass(kind, (planar.Gear, planar.Belt, Rope, spatial.Gear, Cam, spatial.Rolling))
 
 
 def grouped_with_frames(mechanism: Mechanism, elements: Mapping[str, Any]) -> Grouped:
-    """Return the groups of some elements of a mechanism, by name with their kinds; gears with their frames."""
+    """Return the groups of some elements of a mechanism, named with their kinds; gears get their frames."""
     index = {name: k for k, name in enumerate((GROUND, *mechanism.bodies))}
     arms = _find_arms(mechanism, elements)
     given = _with_arms(_with_slots(elements), arms)
@@ -85,9 +85,7 @@ def grouped_with_frames(mechanism: Mechanism, elements: Mapping[str, Any]) -> Gr
 
 
 def check_distances(mechanism: Mechanism) -> None:
-    """Raise MechanismError where the center distance of gears differs from that of their radii, where pulleys overlap,
-    and where a rope is longer or shorter than it can be.
-    """
+    """Raise MechanismError for an impossible distance: of gear centers, of pulleys that overlap, or a rope length."""
     joints = {f"joints.{name}": joint for name, joint in mechanism.joints.items()}
     if any(isinstance(joint, Rope) for joint in joints.values()):
         check_ropes(*grouped_with_frames(mechanism, joints))
@@ -95,17 +93,17 @@ def check_distances(mechanism: Mechanism) -> None:
 
 
 def carriers(mechanism: Mechanism) -> set[str]:
-    """Return the bodies that carry gears with teeth, or both pulleys of a belt; the ground may be among them."""
+    """Return the bodies that carry toothed gears or both pulleys of a belt; the ground may be among them."""
     return {arm.body for arm in _find_arms(mechanism, mechanism.joints).values()}
 
 
 def _find_arms(mechanism: Mechanism, elements: Mapping[str, Any]) -> dict[str, Arm]:
-    """Return the arms that carry the toothed gears and the belts among some elements, by name, where there is one.
+    """Return the arms of the toothed gears and the belts among some elements, by name, without those that have none.
 
     Raises
     ------
     MechanismError
-        If a center distance differs from that of the pitch radii, or pulleys overlap.
+        If a center distance does not suit the pitch radii, or pulleys overlap.
     """
     toothed = {name: element for name, element in elements.items() if on_line(element)}
     if not toothed:
@@ -122,7 +120,7 @@ def _find_arm(name: str, gear: planar.Gear | planar.Belt, parameters: Mapping[st
             body_vector(body, p, parameters) for body, p in zip(gear.bodies, (gear.point_i, gear.point_j), strict=True)
         ]
     except JounceError:
-        return None  # the error is raised where all values of the gear are resolved
+        return None  # raised when the values of the gear are resolved
     plain = not any(isinstance(radius, Tracer) for radius in radii)
     if plain and not all(math.isfinite(radius) and radius for radius in radii):
         return None
@@ -154,7 +152,7 @@ def _find_arm(name: str, gear: planar.Gear | planar.Belt, parameters: Mapping[st
 
 
 def _check_gap(name: str, body: str, distance: float, radii: Sequence[float]) -> None:
-    """Raise MechanismError unless the distance of two centers on a body is that of the pitch radii."""
+    """Raise MechanismError unless the distance of two centers on a body suits the pitch radii."""
     center_distance = abs(sum(radii))
     if radii[0] < 0 and radii[1] < 0:
         raise MechanismError(
@@ -176,7 +174,7 @@ def _check_gap(name: str, body: str, distance: float, radii: Sequence[float]) ->
 
 
 def _check_overlap(name: str, body: str, distance: float, radii: Sequence[float]) -> None:
-    """Raise MechanismError unless pulleys on a body have room for each other."""
+    """Raise MechanismError if pulleys on a body overlap."""
     if not distance > sum(radii):
         message = (
             f"the centers are {distance:.9g} m apart on '{body}', and the pulleys overlap below {sum(radii):.9g} m, "
@@ -186,7 +184,7 @@ def _check_overlap(name: str, body: str, distance: float, radii: Sequence[float]
 
 
 def _with_slots(elements: Mapping[str, Any]) -> dict[str, Any]:
-    """Return elements in which a rope with several points on a body names the body once."""
+    """Return elements in which a rope names each body once, also one with several of its points."""
     changed = dict(elements)
     for name, element in elements.items():
         if may_have_frame(type(element)) and shares_points(element):
@@ -196,7 +194,7 @@ def _with_slots(elements: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _with_arms(elements: Mapping[str, Any], arms: Mapping[str, Arm]) -> dict[str, Any]:
-    """Return elements in which gears with teeth and belts have a third body, which carries them."""
+    """Return elements in which toothed gears and belts have a third body, their carrier."""
     changed = dict(elements)
     for name, arm in arms.items():
         changed[name] = unchecked_copy(changed[name], bodies=(*changed[name].bodies, arm.body))
@@ -204,7 +202,7 @@ def _with_arms(elements: Mapping[str, Any], arms: Mapping[str, Arm]) -> dict[str
 
 
 def unchecked_copy(element: Any, **changed: Any) -> Any:
-    """Return an element with other values in some fields, which are not checked."""
+    """Return an element with other values in some fields, without checks."""
     copy = object.__new__(type(element))
     for field in dataclasses.fields(element):
         object.__setattr__(copy, field.name, changed.get(field.name, getattr(element, field.name)))
@@ -214,7 +212,7 @@ def unchecked_copy(element: Any, **changed: Any) -> Any:
 def _with_carriers(
     group: Group, members: Sequence[str], arms: Mapping[str, Arm], mechanism: Mechanism, elements: Mapping[str, Any]
 ) -> Group:
-    """Return a group of gears with the frames that are known; other groups as they are."""
+    """Return a group of gears, belts, ropes or cams with its frames if they are known; other groups unchanged."""
     if not may_have_frame(type(group.element)):
         return group
     if on_line(group.element) and all(name in arms for name in members):
@@ -236,7 +234,7 @@ def _number(value: Any) -> Any:
 
 
 def _on_frames(group: Group, gears: Sequence[spatial.Gear], mechanism: Mechanism) -> Group:
-    """Return shafts with the axes that they turn about in their frames, where these are known, and whole turns."""
+    """Return spatial gears with the axes of their shafts in the frames, if known, and whole turns."""
     hinges, parameters = joined_vectors(mechanism, held_parallel), mechanism.parameter_values
     for slot, field in enumerate(("held_i", "held_j")):
         data = []
@@ -253,7 +251,7 @@ def _on_frames(group: Group, gears: Sequence[spatial.Gear], mechanism: Mechanism
 
 
 def _check_points_on_axes(gears: Mapping[str, spatial.Gear], mechanism: Mechanism) -> None:
-    """Raise MechanismError where a point on the axis of a gear is on that of no hinge of its body."""
+    """Raise MechanismError if a point on the axis of a gear is not on the axis of any hinge of its body."""
     parameters = mechanism.parameter_values
     hinges = [joint for joint in mechanism.joints.values() if _is_hinge(type(joint))]
     for name, gear in gears.items():
@@ -286,13 +284,13 @@ def _check_points_on_axes(gears: Mapping[str, spatial.Gear], mechanism: Mechanis
 
 
 def _is_hinge(kind: type[Any]) -> bool:
-    """Tell whether bodies turn about an axis through points of both."""
+    """Return whether a class of joints hinges bodies about an axis through points of both."""
     fields = {"point_i", "point_j", "axis_i", "axis_j"}
     return facts_of(kind).symbol in ("revolute", "cylindrical") and fields <= value_fields(kind).keys()
 
 
 def _check_racks(racks: Mapping[str, spatial.Rolling], mechanism: Mechanism) -> None:
-    """Raise MechanismError where a pinion does not turn about its axis on the rack, or this is not across the rack."""
+    """Raise MechanismError unless a pinion turns on the rack about its axis, which is perpendicular to the rack."""
     hinges, parameters = joined_vectors(mechanism, held_parallel), mechanism.parameter_values
     for name, rack in racks.items():
         on_rack, own, line = (
@@ -332,7 +330,7 @@ def _same_direction(first: Any, second: Any) -> bool:
 
 
 def _on_hinges(group: Group, cams: Sequence[Cam], mechanism: Mechanism) -> Group:
-    """Return cams whose parts that are angles in space have the axis on both bodies, where it is known."""
+    """Return cams whose spatial angles have their axes on both bodies, if known."""
     hinges = None
     for field in ("follower", "leader"):
         if not turns_in_space(getattr(group.element, field)):
@@ -347,7 +345,7 @@ def _on_hinges(group: Group, cams: Sequence[Cam], mechanism: Mechanism) -> Group
             continue
         first, second = (along_instances(*(as_array(x.value) for x in its if x)) for its in (axes, other_axes))
         part, datum = getattr(group.element, field), _coaxial(first, second)
-        if part.vector_j is not None:  # its component along the axis has no effect
+        if part.vector_j is not None:  # the component along the axis has no effect
             datum = with_fields(datum, across=_across(part.vector_j, second))
         group = with_field(group, field, with_fields(part, datum=datum))
     return group
@@ -363,13 +361,13 @@ _coaxial_of = compiled(brief=True)(coaxial)
 
 def _coaxial(axis: Any, there: Any) -> Datum:
     datum = _coaxial_of(axis, there)
-    if isinstance(datum.attitude, Tracer):  # all is within what JAX compiles
+    if isinstance(datum.attitude, Tracer):  # the call is inside a function that JAX compiles
         return datum
     return Datum(*(np.asarray(x) for x in (datum.attitude, datum.angle, datum.near)))
 
 
 def _whole_multiples(ratio: Any) -> Any:
-    """Return the smallest whole multiples, (instances, 1), that make ratios whole; NaN where there are none."""
+    """Return the smallest factors, (instances, 1), that make ratios whole; NaN if there is none."""
     namespace = jnp if isinstance(ratio, Tracer) else np
     counts = np.arange(1.0, LARGEST_WHOLE + 1)
     products = ratio[..., None] * counts

@@ -1,6 +1,6 @@
-"""Places and directions that joints hold together: a center that is pinned to several bodies, an axis they turn about.
+"""Points and directions that joints hold together, such as a center pinned to several bodies, or an axis of rotation.
 
-Where JAX traces values, points and directions are the same that are given by the same numbers or expressions.
+Traced values are the same if they are given by the same numbers or expressions.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -16,11 +16,11 @@ from jounce.errors import JounceError
 from jounce.mechanism.mechanism import Mechanism
 from jounce.mechanism.resolve import resolve
 
-SAME_DIRECTION = 1e-9  # largest sine
+SAME_DIRECTION = 1e-9  # largest sine of the angle between equal directions
 
 
 class BodyVector(NamedTuple):
-    """A point or a direction of a body: its components, and as they were given."""
+    """A point or a direction of a body: the components in numbers, and as given."""
 
     body: str
     value: tuple[Any, ...]
@@ -28,20 +28,20 @@ class BodyVector(NamedTuple):
 
 
 class Triad(NamedTuple):
-    """Three directions of a body at right angles, in the rows of a matrix."""
+    """Three orthonormal directions of a body, in the rows of a matrix."""
 
     body: str
     triad: Float[np.ndarray, "3 3"]
 
 
 Joined = Sequence[tuple[BodyVector, BodyVector]]
-"""Pairs of places that a joint holds together."""
+"""Pairs of points or directions that a joint holds together."""
 
 
 def joined_vectors(
     mechanism: Mechanism, pairs_of: Callable[[Any], Sequence[tuple[str, str]]]
 ) -> list[tuple[BodyVector, BodyVector]]:
-    """Return the places that joints hold together, by the pairs of fields that say so."""
+    """Return the points or directions that joints hold together; `pairs_of` returns the pairs of fields of a joint."""
     pairs = []
     for joint in mechanism.joints.values():
         for names in pairs_of(joint):
@@ -57,7 +57,7 @@ def joined_vectors(
 
 
 def constant_attitudes(mechanism: Mechanism) -> list[tuple[Triad, Triad]]:
-    """Return the bodies that do not turn against each other, by joints that hold two directions of each parallel."""
+    """Return pairs of bodies with a constant relative attitude, by joints that hold two directions of each parallel."""
     attitude_pairs = []
     for joint in mechanism.joints.values():
         pairs = held_parallel(joint)
@@ -79,7 +79,7 @@ def constant_attitudes(mechanism: Mechanism) -> list[tuple[Triad, Triad]]:
 
 
 def _triad(axis: Float[np.ndarray, " 3"], normal: Float[np.ndarray, " 3"]) -> Float[np.ndarray, "3 3"]:
-    """Return unit vectors, in rows, along an axis, toward a second direction across it, and across both."""
+    """Return orthonormal vectors, in rows: along an axis, toward a normal, and perpendicular to both."""
     with np.errstate(divide="ignore", invalid="ignore"):
         first = axis / np.linalg.norm(axis)
         second = normal - (normal @ first) * first
@@ -88,13 +88,13 @@ def _triad(axis: Float[np.ndarray, " 3"], normal: Float[np.ndarray, " 3"]) -> Fl
 
 
 def pinned(joint: Any) -> list[tuple[str, str]]:
-    """Return the fields of the points that a planar pin holds together; none of other joints."""
+    """Return the fields of the points that a planar revolute joint holds together; empty for other joints."""
     facts = facts_of(type(joint))
     return [("point_i", "point_j")] if facts.pair == "revolute" and PAIRS["revolute"] else []
 
 
 def held_parallel(joint: Any) -> Sequence[tuple[str, str]]:
-    """Return the pairs of fields of directions that a joint holds parallel."""
+    """Return the pairs of fields of the directions that a joint holds parallel."""
     return facts_of(type(joint)).held_parallel
 
 
@@ -105,7 +105,7 @@ def body_vector(body: str, given: Any, parameters: Mapping[str, Any]) -> BodyVec
 
 
 def same_component(a: Any, b: Any, given_a: Any, given_b: Any, near: Callable[[Any, Any], bool]) -> bool:
-    """Tell whether components are the same; what JAX traces is compared as it was given."""
+    """Return whether components are the same; traced values are compared as given."""
     if isinstance(a, Tracer) or isinstance(b, Tracer):
         traced = isinstance(given_a, Tracer) or isinstance(given_b, Tracer)
         return a is b or (not traced and bool(given_a == given_b))
@@ -113,7 +113,7 @@ def same_component(a: Any, b: Any, given_a: Any, given_b: Any, near: Callable[[A
 
 
 def parallel(a: BodyVector, b: BodyVector) -> int:
-    """Return 1 for the same direction, -1 for the opposite one, else 0."""
+    """Return 1 for equal directions, -1 for opposite ones, else 0."""
     if any(isinstance(x, Tracer) for x in (*a.value, *b.value)):
         pairs = zip(a.value, b.value, a.given, b.given, strict=True)
         return int(all(same_component(x, y, of_x, of_y, lambda p, q: p == q) for x, y, of_x, of_y in pairs))
@@ -127,18 +127,18 @@ def on_joined_bodies(
     alike: Callable[[BodyVector, BodyVector], int | bool],
     fixed: Sequence[tuple[Triad, Triad]] = (),
 ) -> dict[str, BodyVector]:
-    """Return where a place is on each body that joints hold to it, one after the other.
+    """Return a point or direction on each body to which a chain of joints connects it.
 
     Parameters
     ----------
     start : BodyVector
-        The place.
+        The point or direction on its own body.
     joined : sequence of tuple of BodyVector
-        Pairs of places that joints hold together.
+        Pairs of points or directions that joints hold together.
     alike : callable
-        Tells whether two places of a body are the same: 1, or -1 for the opposite direction.
+        Returns whether two vectors of a body are the same: 1, or -1 for opposite directions.
     fixed : sequence of tuple of Triad, optional
-        Of bodies that do not turn against each other: every direction stays the same.
+        Pairs of bodies whose relative attitude is constant: every direction is then known on both.
     """
     reached, waiting = {start.body: start}, [start]
     while waiting:
@@ -161,7 +161,7 @@ def on_joined_bodies(
 
 
 def as_array(value: tuple[Any, ...]) -> Any:
-    """Return components as an array, of JAX where it traces one of them."""
+    """Return components as an array, of JAX if one of them is traced."""
     return (
         jnp.stack([jnp.asarray(x, float) for x in value])
         if any(isinstance(x, Tracer) for x in value)

@@ -1,7 +1,7 @@
-"""How long ropes can be: bounds of the distances of their points, whatever the position of the mechanism.
+"""Bounds of rope lengths, from the distances of points that hold in every position of the mechanism.
 
-Points of one body keep their distance, those that a pin holds together have none, and rods have their length. What
-the triangle inequality makes of these bounds all other distances: bound smoothing, as of the geometry of molecules.
+Points of one body keep their distance, pinned points coincide, and rods have their length. The triangle inequality
+bounds all other distances: bound smoothing, as for the geometry of molecules.
 Crippen and Havel, Distance Geometry and Molecular Conformation, 1988.
 """
 
@@ -18,19 +18,19 @@ from jounce.constraints.facts import facts_of
 from jounce.constraints.ropes import Rope
 from jounce.errors import MechanismError
 
-ROUNDING = 1e-9  # of lengths, as written numbers are rounded
+ROUNDING = 1e-9  # of lengths, for the rounding of written numbers
 Bounds = Float[np.ndarray, "point point"]
 
 
 def check_ropes(groups: Sequence[Any], names: Sequence[Sequence[str]]) -> None:
-    """Raise MechanismError where a rope is longer, or shorter, than its points can be apart in any position.
+    """Raise MechanismError if a rope is longer, or shorter, than the path along its points can be in any position.
 
     Parameters
     ----------
     groups : sequence of Group
-        Of joints and drivers; nothing is checked where JAX traces their values.
+        Groups of joints and drivers; traced values are not checked.
     names : sequence of sequence of str
-        Of the elements of each, with their kinds before them.
+        Names of the elements of each group, with their kinds as prefixes.
     """
     ropes = [(group, its) for group, its in zip(groups, names, strict=True) if isinstance(group.element, Rope)]
     if not ropes:
@@ -51,7 +51,7 @@ def _is_traced(values: Any) -> bool:
 
 
 class _Points:
-    """Points of bodies, and which of them are held together or at a distance."""
+    """Points of bodies, and pairs of points with fixed distances."""
 
     def __init__(self) -> None:
         self.bodies: list[int] = []
@@ -59,7 +59,7 @@ class _Points:
         self.distances: list[tuple[int, int, float]] = []
 
     def hold(self, group: Any, distance: Any) -> None:
-        """Add the points of all joints of a group, which hold them at a distance."""
+        """Add the points of all joints of a group, which hold pairs of points at a distance."""
         element, size = group.element, len(self.bodies)
         distance = np.broadcast_to(distance, (group.instances, 1))
         for k in range(group.instances):
@@ -69,7 +69,7 @@ class _Points:
             self.distances.append((size + 2 * k, size + 2 * k + 1, float(distance[k, 0])))
 
     def bounds(self, bodies: Sequence[int], positions: Sequence[np.ndarray]) -> tuple[Bounds, Bounds]:
-        """Return the least and the largest distances of these and some more points, which come first, m."""
+        """Return lower and upper bounds of the distances of given points, which come first, and stored ones, m."""
         whole, points = np.array([*bodies, *self.bodies]), np.stack([*positions, *self.positions])
         same = whole[:, None] == whole[None]
         known = np.linalg.norm(points[:, None] - points[None], axis=-1)
@@ -113,6 +113,6 @@ def _check(group: Any, instance: int, name: str, points: _Points) -> None:
 
 
 def _fixed_distance(joint: Any) -> Any:
-    """Return how far apart joints hold their two points: zero for pins; None where they do not."""
+    """Return the distance at which a joint holds its two points: zero for pins; None if it holds none."""
     stated = facts_of(type(joint)).point_distance
     return 0.0 if stated == "zero" else getattr(joint, stated) if stated else None

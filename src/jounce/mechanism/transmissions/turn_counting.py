@@ -1,7 +1,7 @@
 """Whole turns of angles, which attitudes leave open, counted from sample to sample along paths.
 
-An angle may change by half a turn at once near an attitude that leaves it undefined: there, more samples are
-taken.
+Near an attitude at which an angle is undefined, the angle may change by half a turn at once: more samples are taken
+there.
 """
 
 from collections.abc import Callable
@@ -18,21 +18,21 @@ Shares = Float[np.ndarray, " sample"]
 Angles = Float[np.ndarray, "angle sample"]
 Measure = Callable[[Paths, Shares], Angles]
 
-LARGEST_CHANGE = np.pi / 4  # of an angle from sample to sample: more, and it is looked at between them
-HALVINGS = 24  # of the way between two samples: down to what passes 1e-9 beside an attitude that tells no angle
+LARGEST_CHANGE = np.pi / 4  # of an angle between samples, beyond which the interval is halved
+HALVINGS = 24  # of the interval between two samples: enough to pass an undefined angle at a distance of 1e-9
 
 
 class PathSamples(NamedTuple):
-    """Samples along paths, in their order, and angles there.
+    """Samples along paths, in order, and the angles at the samples.
 
     Attributes
     ----------
     path : array of int, shape (samples,)
-        On which path each sample is.
+        Path of each sample.
     share : array of shape (samples,)
-        How far along it, in whatever measures the path.
+        Position of each sample along its path, in the parameter of the path.
     angle : array of shape (angles, samples)
-        rad.
+        Angles, rad.
     """
 
     path: Paths
@@ -40,21 +40,21 @@ class PathSamples(NamedTuple):
     angle: Angles
 
     def near(self, path: Paths, share: Shares) -> Angles:
-        """Return the angles at the samples that are nearest to others on the same paths, with shares from 0 to 1."""
+        """Return the angles at the samples nearest to given positions on the same paths, with shares from 0 to 1."""
         return self.angle[:, nearest_instants(2.0 * self.path + self.share, 2.0 * path + share)]
 
 
 def refined_samples(measure: Measure, path: Paths, share: Shares, angle: Angles | None = None) -> PathSamples:
-    """Return samples between which no angle makes half a turn: those given, and more of them where an angle is fast.
+    """Return samples between which no angle makes half a turn, by bisection of the given ones where an angle is fast.
 
     Parameters
     ----------
     measure : callable
         Returns angles, up to whole turns, at samples given by path and share.
     path, share : array of shape (samples,)
-        Those to begin with, in their order.
+        Initial samples, in order.
     angle : array of shape (angles, samples), optional
-        What is measured there, if it is known.
+        Measured angles at the initial samples, if known.
     """
     angle = measure(path, share) if angle is None else angle
     for _ in range(HALVINGS):
@@ -72,23 +72,23 @@ def refined_samples(measure: Measure, path: Paths, share: Shares, angle: Angles 
 def counted_along(
     measure: Measure, run: Int[np.ndarray, " step"], begun: Float[np.ndarray, "angle step"], samples: int
 ) -> PathSamples:
-    """Count angles along the steps of many runs, each a path with shares from 0 to 1.
+    """Count angles along the steps of many runs; each step is a path with shares from 0 to 1.
 
     Parameters
     ----------
     measure : callable
         Returns angles, up to whole turns, at shares of steps.
     run : array of int, shape (steps,)
-        The run of each step; those of a run follow one another.
+        Run of each step; the steps of a run are consecutive.
     begun : array of shape (angles, steps)
-        The angles at the beginning of the first step of the same run, to within half a turn.
+        Angles at the beginning of the run of each step, to within half a turn.
     samples : int
-        In a step, at least.
+        Least number of samples in a step.
     """
     step, share = np.repeat(np.arange(len(run)), samples + 1), np.tile(np.arange(samples + 1) / samples, len(run))
     step, share, angle = refined_samples(measure, step, share)
     begins = np.append(True, np.diff(run[step]) != 0)
     rise = np.where(begins, 0.0, np.nan_to_num(principal(np.diff(angle, axis=1, prepend=angle[:, :1]))))
-    first = np.flatnonzero(begins)[np.cumsum(begins) - 1]  # the sample at which the run of each sample begins
+    first = np.flatnonzero(begins)[np.cumsum(begins) - 1]  # first sample of the run of each sample
     counted, known = np.cumsum(rise, axis=1), begun[:, step]
     return PathSamples(step, share, known + principal(angle[:, first] - known) + counted - counted[:, first])

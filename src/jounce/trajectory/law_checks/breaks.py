@@ -120,12 +120,12 @@ def _with_leaders(laws: Iterable[AbstractMotion]) -> Iterator[AbstractMotion]:
 
 
 def may_break(law: AbstractMotion) -> bool:
-    """Tell whether a law may jump or bend somewhere: all but expressions of smooth functions."""
+    """Return whether a law may jump or bend somewhere: all but expressions of smooth functions."""
     return not isinstance(law, ExpressionMotion) or _may_bend(law)
 
 
 def _may_bend(law: Any) -> bool:
-    """Tell whether a law may have a kink that is not known: one that is no spline, profile or smooth expression.
+    """Return whether a law may have a kink that is not known: one that is no spline, profile or smooth expression.
 
     Kinks of its leader are looked for there.
     """

@@ -191,7 +191,7 @@ def known_jumps(
 
 
 def _is_of_polynomials(law: AbstractMotion) -> bool:
-    """Tell whether a law is made of smooth pieces whose ends are known."""
+    """Return whether a law is made of smooth pieces whose ends are known."""
     if isinstance(law, PiecewiseMotion | IntegratedMotion):
         return all(map(_is_of_polynomials, law.parts))
     return isinstance(law, SplineMotion | AbstractProfile)

@@ -50,7 +50,7 @@ _OPERATIONS: dict[str, Any] = {
 
 
 def looks_like_degrees(value: float) -> bool:
-    """Tell whether a number of rad is likely one of degrees: many turns, or a round number of more than one.
+    """Return whether a number of rad is likely one of degrees: many turns, or a round number of more than one.
 
     Examples
     --------
@@ -187,7 +187,7 @@ def _round(value: float) -> str:
 
 
 def _is_round(values: Values) -> bool:
-    """Tell whether values go to a whole or half number of more than one turn, at most two; their vertex counts."""
+    """Return whether values go to a whole or half number of more than one turn, at most two; their vertex counts."""
     sizes = np.abs(values)
     top = int(np.argmax(sizes))
     left, largest, right = sizes[max(top - 1, 0)], sizes[top], sizes[min(top + 1, len(sizes) - 1)]
@@ -197,7 +197,7 @@ def _is_round(values: Values) -> bool:
 
 
 def _is_position(values: Values) -> bool:
-    """Tell whether values are those of something that is positioned: back and forth, or from rest to rest.
+    """Return whether values are those of something that is positioned: back and forth, or from rest to rest.
 
     Where the largest and the least stand side by side, on both sides of zero, they are those beside a pole.
     """

@@ -48,7 +48,7 @@ class CompositeLaw(AbstractMotion):
 
 
 def _is_known(part: AbstractMotion | Expression) -> bool:
-    """Tell whether a part has numbers already, and waits for no parameters."""
+    """Return whether a part has numbers already, and waits for no parameters."""
     if isinstance(part, CompositeLaw):
         return bool(part.parts) and not part.is_open
     return not getattr(part, "_open", ()) if isinstance(part, AbstractMotion) else part.names <= {"t"}

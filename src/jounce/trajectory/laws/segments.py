@@ -109,7 +109,7 @@ class SegmentedMotion(SplineMotion):
         return self.recipe.value[0]
 
     def lasts(self, duration: float) -> bool:
-        """Tell whether the segments go from zero to a duration, s, or an angle."""
+        """Return whether the segments go from zero to a duration, s, or an angle."""
         first = 1 if self.beyond == "continue" else 0  # the first and the last piece rest
         begin = float(np.asarray(self.breakpoints)[first])
         return abs(begin) <= CLOSED * duration and abs(float(self.stop) - duration) <= CLOSED * duration

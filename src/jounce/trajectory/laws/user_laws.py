@@ -136,7 +136,7 @@ def read_laws(tree: Any) -> Any:
 
 
 def is_users(law: Any) -> bool:
-    """Tell whether a law is a user's own."""
+    """Return whether a law is a user's own."""
     if not isinstance(law, AbstractMotion):
         return False
     kind = type(law)

@@ -92,7 +92,7 @@ def cam_types(space: str) -> dict[str, type[Any]]:
 
 
 def is_cam(space: str, entry: dict[str, Any]) -> bool:
-    """Tell whether an entry of the joints of a file is a cam: a driver of which the law is of another coordinate."""
+    """Return whether an entry of the joints of a file is a cam: a driver of which the law is of another coordinate."""
     kind = entry.get("type")
     if "motion" not in entry or not isinstance(kind, str) or kind not in cam_types(space):
         return False

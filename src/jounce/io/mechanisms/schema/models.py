@@ -197,7 +197,7 @@ def _annotation(kind: type[Any], key: FileKey, size: int) -> Any:
 
 
 def _has_free_laws(kind: type[Any]) -> bool:
-    """Tell whether the laws of a class may be of anything: those of a joint of a user's own, which is no driver."""
+    """Return whether the laws of a class may be of anything: those of a joint of a user's own, which is no driver."""
     return kind.role == "joint" and not belongs_to_package(kind)
 
 

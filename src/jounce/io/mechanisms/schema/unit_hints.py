@@ -145,7 +145,7 @@ def warn_of_variations(mechanism: Mechanism, forms: Mapping[str, str], option: s
 
 
 def is_plain(text: str) -> bool:
-    """Tell whether a text is a number without a unit."""
+    """Return whether a text is a number without a unit."""
     try:
         return math.isfinite(float(text))
     except ValueError:
@@ -162,7 +162,7 @@ def _doubt(dimensions: Iterable[Dimension], value: float, was: float, which: str
 
 
 def is_thousandfold(value: float, usual: float, times: float = FAR_OFF) -> bool:
-    """Tell whether a length is far larger than usual, and a usual one where it is in millimeters."""
+    """Return whether a length is far larger than usual, and a usual one where it is in millimeters."""
     return value > times * usual and usual / ALIKE < value / 1000 < ALIKE * usual
 
 
@@ -176,7 +176,7 @@ def _run(mechanism: Mechanism) -> tuple[float, float]:
 
 
 def _has_unit(source: Source, at: Location) -> bool:
-    """Tell whether the samples of a law say their unit."""
+    """Return whether the samples of a law say their unit."""
     raw = source.at(at)
     if not isinstance(raw, dict) or not isinstance(raw.get("samples"), str):
         return False
@@ -204,7 +204,7 @@ def _warn_of_length_laws(source: Source, mechanism: Mechanism, usual: float) -> 
 
 
 def _has_plain_number(source: Source, law: AbstractMotion, least: float) -> bool:
-    """Tell whether a formula has a number without a unit of a size, its parameters included; other laws may have."""
+    """Return whether a formula has a number without a unit of a size, its parameters included; other laws may have."""
     if not isinstance(law, ExpressionMotion):
         return True
     parameters = source.data.get("parameters") or {}

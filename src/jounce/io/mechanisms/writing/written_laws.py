@@ -157,7 +157,7 @@ class WrittenLaws:
 
 
 def _same(law: Any, leader: Any) -> bool:
-    """Tell whether a law of a driver is the leader: itself, or the same expression."""
+    """Return whether a law of a driver is the leader: itself, or the same expression."""
     texts = [x.text if isinstance(x, Expression) else x for x in (law, leader)]
     return law is leader or (isinstance(texts[0], str) and texts[0] == texts[1])
 

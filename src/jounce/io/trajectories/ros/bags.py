@@ -27,7 +27,7 @@ MOST = 20_000_000
 
 
 def is_bag(path: str) -> bool:
-    """Tell whether a path is that of a bag: its file, or the folder of one of ROS 2."""
+    """Return whether a path is that of a bag: its file, or the folder of one of ROS 2."""
     place = Path(path)
     try:
         return place.suffix.lower() in SUFFIXES or (place.is_dir() and (place / METADATA).is_file())

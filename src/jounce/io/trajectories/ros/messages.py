@@ -27,7 +27,7 @@ _INSIDE: tuple[tuple[str, ...], ...] = ((), ("trajectory",), ("joint_trajectory"
 
 
 def is_message(data: Any) -> bool:
-    """Tell whether the data of a file are those of a message of ROS, or of several."""
+    """Return whether the data of a file are those of a message of ROS, or of several."""
     first = data[0] if isinstance(data, list) and data else data
     if not isinstance(first, dict):
         return False
