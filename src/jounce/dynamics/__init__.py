@@ -1,4 +1,4 @@
-"""Energies, equations of motion, and forces with rates: of drivers, joints and everything that is applied."""
+"""Energies, equations of motion, and the forces of drivers, joints and applied loads, with their rates."""
 
 from jounce.dynamics.energy.balances import (
     gravity_forces as gravity_forces,

@@ -1,4 +1,4 @@
-"""The masses of all bodies of a mechanism as arrays, and the gravity that it feels."""
+"""The masses of all bodies of a mechanism as arrays, and gravity."""
 
 from typing import Any, NamedTuple
 
@@ -14,13 +14,13 @@ from jounce.mechanism.resolve import along_instances, resolved
 from jounce.mechanism.system import POSITION_COMPONENTS
 
 Gravity = Float[Numbers, "component 1 #batch"]
-"""Acceleration of free fall, m/s^2."""
+"""Gravitational acceleration, m/s^2."""
 
 
 class Masses(NamedTuple):
-    """Masses, kg, centers of mass, m, and second moments about them, kg m^2, of all bodies, the ground first.
+    """Masses, kg, centers of mass, m, and central second moments, kg m^2, of all bodies, the ground first.
 
-    The second moments are the integrals of rho rho^T dm along the axes of each body.
+    The second moments are the integrals of rho rho^T dm in body axes.
     """
 
     mass: Float[Numbers, "body #batch"]
@@ -28,12 +28,12 @@ class Masses(NamedTuple):
     moments: Float[Numbers, "component component body #batch"]
 
     def scale(self, length: float) -> np.float64:
-        """Return what masses are measured by: the largest, or the largest moment by the square of a length, kg."""
+        """Return the scale of the masses: the largest mass, or else the largest moment over length^2, kg."""
         return np.float64(np.max(self.mass) or np.max(self.moments) / length**2)
 
 
 def masses_of(mechanism: Mechanism) -> Masses:
-    """Return the masses of all bodies, zero where none are given; parameters may be traced by JAX.
+    """Return the masses of all bodies, zero by default; parameters may be traced by JAX.
 
     Raises
     ------
@@ -49,7 +49,7 @@ def masses_of(mechanism: Mechanism) -> Masses:
         mass, center, inertia = body_mass(name, body, mechanism.parameter_values, size, solid=False)
         columns.append((mass, center, inertia * np.eye(3) if tensor and np.ndim(inertia) < 2 else inertia))
     masses, centers, inertias = (along_instances(*part) for part in zip(*columns, strict=True))
-    # the two of a plane body about its axes are not known individually; only their sum counts
+    # for a planar body only the sum of the two second moments is known, and only it counts
     moments = second_moments(inertias) if tensor else np.eye(2)[..., None, None] * (0.5 * inertias)[None, None]
     return Masses(masses, centers, moments)
 
@@ -82,12 +82,12 @@ def check_loads(mechanism: Mechanism, name: str = "bodies") -> None:
 
 
 def gravity_of(mechanism: Mechanism) -> Gravity:
-    """Return the acceleration of free fall in a mechanism, m/s^2; zero unless given.
+    """Return the gravitational acceleration of a mechanism, m/s^2; zero by default.
 
     Raises
     ------
     MechanismError
-        If it is no vector of finite numbers.
+        If it is not a vector of finite numbers.
     """
     size = POSITION_COMPONENTS[mechanism.space]
     given = [0.0] * size if mechanism.gravity is None else mechanism.gravity

@@ -1,4 +1,4 @@
-"""Values along a motion: computed in chunks of instants, turned into plain derivatives, labeled."""
+"""Values along a motion: evaluation in chunks of instants, conversion to plain derivatives, and labels."""
 
 from collections.abc import Callable, Iterable, Mapping
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     import xarray
 
 Coordinates = Mapping[str, Float[Numbers, "_ ... _"]]
-"""Taylor coefficients of the coordinates of poses, by name: as `Motion.poses` has them."""
+"""Taylor coefficients of the coordinates of poses by name, as in `Motion.poses`."""
 
 Values = TypeVar("Values")
 
@@ -33,18 +33,18 @@ def check_motion(motion: object) -> None:
 
 
 def in_small_chunks(function: Callable[..., Values], size: int, *arrays: Any) -> Values:
-    """Return what a function of arrays with the instants last gives, for a few of these after another.
+    """Return the result of a function of arrays with the instants last, evaluated in small chunks of instants.
 
-    What is factored is read many times over: the matrices of a few instants stay in the processor's cache meanwhile.
+    A factorization reads its matrices many times; those of a small chunk stay in the processor's cache.
 
     Parameters
     ----------
     function : callable
-        Maps pytrees of arrays to a pytree of arrays, the instants last in all of them.
+        Function from pytrees of arrays to a pytree of arrays, with the instants last in all arrays.
     size : int
-        How many instants are computed together, unless that is done by a GPU.
+        Number of instants in a chunk; a GPU evaluates all instants together.
     *arrays : pytree of array
-        One axis of instants each, of the same length.
+        Arrays with the same number of instants.
     """
     count = jax.tree.leaves(arrays)[0].shape[-1]
     if count <= size or not on_processor():
@@ -63,7 +63,7 @@ def in_small_chunks(function: Callable[..., Values], size: int, *arrays: Any) ->
 
 
 def pose_of(coordinates: Coordinates, pose_type: type[Pose], order: int | None = None) -> Any:
-    """Return the pose of bodies; a place alone is one at rest, where an order is given."""
+    """Return the pose of bodies; if its order is below `order`, the bodies are at rest."""
     pose = pose_type.from_coordinates({name: Jet(tuple(c)) for name, c in coordinates.items()})
     if order is None:
         return pose
@@ -81,9 +81,9 @@ def cut(coordinates: Coordinates, order: int) -> dict[str, Any]:
 
 
 def part_of(coordinates: Coordinates, bodies: tuple[int, ...] | None, levels: int) -> dict[str, Any]:
-    """Return coordinates of some bodies to a number of coefficients; of the ground alone, which never moves, the place.
+    """Return coordinates of some bodies, or of all for None, to a number of coefficients.
 
-    All bodies are meant by None.
+    The ground alone has one coefficient, as it never moves.
     """
     if bodies is not None and not any(bodies):
         levels = 1
@@ -96,7 +96,7 @@ def part_of(coordinates: Coordinates, bodies: tuple[int, ...] | None, levels: in
 
 
 def derivatives_along(motion: Motion, coefficients: Float[Numbers, "order *shape time"]) -> Numbers:
-    """Return plain derivatives, the time first, from Taylor coefficients; NaN at instants that were not solved."""
+    """Return plain derivatives from Taylor coefficients, the time first; NaN at instants that were not solved."""
     if motion.traced:
         values: Any = jnp.moveaxis(plain_derivatives(coefficients), -1, 0)
         solved = (motion.status == Status.OK).reshape(-1, *[1] * (values.ndim - 1))
@@ -112,7 +112,7 @@ def labeled(
     units: str | None = None,
     **axes: Iterable[str],
 ) -> "xarray.DataArray":
-    """Return plain derivatives as an xarray.DataArray of dimensions time, derivative, and those that are named."""
+    """Return plain derivatives as an xarray.DataArray with dimensions time, derivative, and the named axes."""
     import xarray
 
     values = derivatives_along(motion, coefficients)

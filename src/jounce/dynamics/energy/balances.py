@@ -28,7 +28,7 @@ from jounce.robot.robot import Robot
 
 @Batched
 def _virtual_work(tree: Tree, arrays: tuple[Series], _: Any, inertial: bool) -> Any:
-    """Return the work of inertia, or of weight, along each coordinate."""
+    """Return the generalized forces that balance inertia, or weight, along each coordinate."""
     frames = body_frames(tree, arrays[0]).without_base()
     if not inertial:
         return to_coordinates(tree, work_of_weight(tree, frames))
@@ -40,7 +40,9 @@ def _virtual_work(tree: Tree, arrays: tuple[Series], _: Any, inertial: bool) -> 
 
 
 def _of_motion(motion: Motion, q: ArrayLike | None, rates: int, *, gravity: bool) -> Any:
-    """Return what inertia, and on request weight, asks of the drivers, or of the bodies where these prescribe less.
+    """Return the generalized forces that balance inertia, and weight if `gravity` is true, along a motion.
+
+    The coordinates are those of the drivers or, where drivers do not prescribe the whole motion, those of the bodies.
 
     Raises
     ------
@@ -55,8 +57,8 @@ def _of_motion(motion: Motion, q: ArrayLike | None, rates: int, *, gravity: bool
 def newton_euler(system: Robot | Motion, q: ArrayLike | None = None, rates: int = 0) -> Any:
     """Return the generalized inertia forces by recursive Newton-Euler on jets: `inverse_dynamics` without gravity.
 
-    For the motion of a mechanism the balances of momentum are those of all bodies together, by multipliers; where
-    drivers do not prescribe all that moves, those of each body.
+    For a mechanism whose drivers prescribe its whole motion, multipliers solve the momentum balances of all bodies
+    together. Otherwise each body is balanced by itself.
 
     Parameters
     ----------
@@ -90,9 +92,9 @@ def newton_euler(system: Robot | Motion, q: ArrayLike | None = None, rates: int 
 def virtual_work(system: Robot | Motion, q: ArrayLike | None = None, rates: int = 0) -> Any:
     """Return the generalized inertia forces by d'Alembert-Lagrange: Negrean 2025, equations 81, 123 and 124.
 
-    The work that inertia forces and moments of all bodies do along each coordinate, ``sum J^T F``. For the motion of
-    a mechanism, J is how the bodies move with the laws of the drivers: the transposed Jacobian of the constraints.
-    Where drivers do not prescribe all that moves, it is how a body moves with its own coordinates.
+    The virtual work of all inertia forces and moments along each coordinate, ``sum J^T F``. For a mechanism whose
+    drivers prescribe its whole motion, J is the Jacobian of the bodies with respect to the laws of the drivers.
+    Otherwise it is the Jacobian of each body with respect to its own coordinates.
 
     Parameters
     ----------
@@ -123,9 +125,9 @@ def virtual_work(system: Robot | Motion, q: ArrayLike | None = None, rates: int 
 
 
 def gravity_forces(system: Robot | Motion, q: ArrayLike | None = None, rates: int = 0) -> Any:
-    """Return the generalized forces that hold the robot against gravity, and their rates: Q_g of Negrean 2025, 125.
+    """Return the generalized forces that balance gravity, with rates: Q_g of Negrean 2025, equation 125.
 
-    With the inertia forces they make the driving forces, ``Q_m = Q_i + Q_g``.
+    Added to the inertia forces, they give the driving forces, ``Q_m = Q_i + Q_g``.
 
     Parameters
     ----------

@@ -1,8 +1,8 @@
-"""A mechanism in the coordinates of its bodies: equations of motion where drivers do not prescribe all that moves.
+"""Equations of motion in body coordinates, for mechanisms whose drivers do not prescribe the whole motion.
 
-The coordinates of a body are the place of its origin and, in the plane, its angle; in space, turns about the axes of
-the body, away from the motion. Each changes a whole motion by a constant, and how the points of the body change with
-it is a jet: the column of a Jacobian.
+The coordinates of a body are the position of its origin and, in the plane, its angle; in space, small rotations from
+the motion about the axes of the body. A coordinate changes the whole motion by a constant. The derivative of the
+points of the body with respect to it is a jet: a column of the Jacobian.
 """
 
 from typing import TYPE_CHECKING, Any
@@ -33,16 +33,16 @@ if TYPE_CHECKING:
 
 
 def in_body_coordinates(motion: Motion, form: Form, *, power: int = 0) -> "xarray.DataArray":
-    """Return a sum of slopes of energies in the coordinates of all bodies.
+    """Return a sum of energy slopes with respect to the coordinates of all bodies.
 
     Parameters
     ----------
     motion : Motion
-        Of a mechanism whose bodies have masses.
+        Motion of a mechanism whose bodies have masses.
     form : Form
         The sum, with its rates.
     power : int, default 0
-        By which power of s what the form gives is divided, in units of forces.
+        Power of s by which the unit of force is divided to give the unit of the sum.
 
     Returns
     -------
@@ -59,21 +59,21 @@ def in_body_coordinates(motion: Motion, form: Form, *, power: int = 0) -> "xarra
 
 
 def balanced_bodies(motion: Motion, rates: int, *, gravity: bool) -> "xarray.DataArray":
-    """Return what inertia asks of all that acts on each body, and on request weight too, by its balances of momentum.
+    """Return the inertia forces of each body, less its weight if `gravity` is true, from its momentum balances.
 
     Parameters
     ----------
     motion : Motion
-        Of a mechanism whose bodies have masses.
+        Motion of a mechanism whose bodies have masses.
     rates : int
-        How many rates are requested.
+        Number of rates.
     gravity : bool
-        Whether the bodies have weight.
+        Whether weight is subtracted.
 
     Returns
     -------
     xarray.DataArray
-        As of `in_body_coordinates`: forces, global, and moments about the origins, in space in the axes of the body.
+        As from `in_body_coordinates`: forces in global axes, and moments about the body origins, in space in body axes.
 
     Raises
     ------
@@ -88,7 +88,9 @@ def balanced_bodies(motion: Motion, rates: int, *, gravity: bool) -> "xarray.Dat
 def _of_bodies(
     motion: Motion, program: Mapped, shared: Any, needed: int, power: int = 0, **static: Any
 ) -> "xarray.DataArray":
-    """Return what a program of the coordinates of bodies, to an order, gives along a motion, labeled.
+    """Return the labeled values of a program of the body coordinates along a motion.
+
+    The program needs derivatives to order `needed`.
 
     Raises
     ------

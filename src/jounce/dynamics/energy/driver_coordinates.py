@@ -1,8 +1,8 @@
-"""A driven mechanism in the coordinates of its drivers: how its bodies move with changes of their laws.
+"""Equations of motion in driver coordinates: the laws of the drivers are the generalized coordinates.
 
-The laws of the drivers are generalized coordinates: with them, joints and loops determine all bodies. A constant is
-added to a law, and all poses follow from it to first order by the factored Jacobian, order after order, as in a solve:
-these are the columns of the Jacobian of the bodies, as jets.
+The laws, with joints and loops, determine all bodies. The columns of the Jacobian of the bodies, as jets, follow from
+adding a constant to a law: the factored constraint Jacobian gives the change of all poses to first order, one
+derivative order after the other, as in a solve.
 """
 
 import dataclasses
@@ -37,13 +37,13 @@ if TYPE_CHECKING:
 
 
 class ChangedLaw(Module):
-    """The laws of a group of drivers, changed by jets."""
+    """The laws of a group of drivers, with jets added."""
 
     law: Any
     change: Float[Numbers, "levels instance batch"]  # Taylor coefficients
 
     def __call__(self, time: Jet) -> Jet:
-        """Return the law at the instants of a jet."""
+        """Return the changed laws at the instants of a time jet."""
         return self.law(time) + Jet(tuple(self.change[: time.order + 1]))
 
 
@@ -53,16 +53,16 @@ def in_driver_coordinates(
     *,
     power: int = 0,
 ) -> "xarray.DataArray":
-    """Return a sum of slopes of energies in the coordinates of the drivers.
+    """Return a sum of energy slopes with respect to the coordinates of the drivers.
 
     Parameters
     ----------
     motion : Motion
-        Of a mechanism whose bodies have masses, and whose drivers prescribe all that moves.
+        Motion of a mechanism whose bodies have masses, and whose drivers prescribe its whole motion.
     form : Form
         The sum, with its rates.
     power : int, default 0
-        By which power of s what the form gives is divided, in units of forces.
+        Power of s by which the unit of force is divided to give the unit of the sum.
 
     Returns
     -------
@@ -87,7 +87,7 @@ def in_driver_coordinates(
 
 
 def _of_drivers(motion: Motion, values: Float[np.ndarray, "order driver time"], power: int = 0) -> Any:
-    """Return what acts along the coordinates of drivers, labeled, with the unit of each, N or N*m over s^power."""
+    """Return generalized forces of the drivers as a labeled array, with units N or N*m over s^power."""
     drivers = motion.mechanism.drivers
     efforts = ["N*m" if is_turning(driver) else "N" for driver in drivers.values()]
     units = [derivative_unit(unit, power) if power >= 0 else f"{unit}*s^{-power}" for unit in efforts]
@@ -95,21 +95,23 @@ def _of_drivers(motion: Motion, values: Float[np.ndarray, "order driver time"], 
 
 
 def is_driven(motion: Motion) -> bool:
-    """Tell whether drivers prescribe all that moves."""
+    """Return whether the drivers prescribe the whole motion."""
     system = motion.model.system
     rows, columns = system.shape if system.groups else (0, 1)
     return (rows if system.rank is None else system.rank) == columns and bool(motion.mechanism.drivers)
 
 
 def balanced(motion: Motion, rates: int, *, gravity: bool) -> "xarray.DataArray":
-    """Return what inertia asks of the drivers, and on request weight too, by multipliers: nothing applied acts.
+    """Return the driver forces that balance inertia, and weight if `gravity` is true, by multipliers.
+
+    Applied forces and friction do not act.
 
     Parameters
     ----------
     motion : Motion
-        Of a mechanism whose bodies have masses, and whose drivers prescribe all that moves.
+        Motion of a mechanism whose bodies have masses, and whose drivers prescribe its whole motion.
     rates : int
-        How many rates are requested.
+        Number of rates.
     gravity : bool
         Whether the bodies have weight.
 
@@ -146,7 +148,7 @@ def _evaluated(
     time = Jet.variable(instants[None], form.order)
 
     def pose_after(change: Any) -> Pose:
-        """Return the pose where constants are added to the laws."""
+        """Return the pose after constants are added to the laws."""
         levels = jnp.concatenate([change[None], jnp.zeros((form.order, *change.shape))])
         return movable(followed(with_changes(system, order, levels), start_pose, factor, time))
 
@@ -164,7 +166,7 @@ def _evaluated(
 def with_changes(
     system: System, order: tuple[tuple[int, int], ...], changes: Float[Numbers, "levels driver batch"]
 ) -> System:
-    """Return a system whose drivers, by group and instance, have laws that are changed."""
+    """Return the system with changed laws of its drivers, which `order` names by group and instance."""
     groups = list(system.groups)
     for index in {group for group, _ in order}:
         members = [order.index((index, instance)) for instance in range(groups[index].instances)]
@@ -174,10 +176,10 @@ def with_changes(
 
 
 def followed(system: System, start_pose: Pose, factor: Factor, time: Jet) -> Pose:
-    """Return the pose with all derivatives that the time jet has, right to first order in changes of the system.
+    """Return the pose with as many derivatives as the time jet, exact to first order in changes of the system.
 
-    The factors are those of the system without changes. What they leave of the residual is corrected by them once more,
-    which is all of it to first order: no derivative is taken of a factorization.
+    The factors are those of the unchanged system. A second solve with them removes the remaining residual to first
+    order, so that no factorization is differentiated.
     """
 
     def solved(pose: Any, solution: Any) -> Any:

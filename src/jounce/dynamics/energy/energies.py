@@ -88,7 +88,7 @@ def body_energy(
     mass : array_like
         Masses, kg, in the shape of the batch axes of the pose.
     center_of_mass : array of shape (3, ...) or (2, ...)
-        In the frames of the bodies, m.
+        Centers of mass in the frames of the bodies, m.
     second_moments : array of shape (3, 3, ...) or (2, 2, ...)
         Integral of rho rho^T dm about the center of mass, in the frames of the bodies, kg m^2.
     order : int, default 1
@@ -128,12 +128,12 @@ def body_energy(
 
 
 def axes_of(pose: Pose | Frames) -> tuple[Jet, ...]:
-    """Return the axes of the body frames, two in the plane, in components of the base frame."""
+    """Return the axes of the body frames in components of the base frame; two axes in the plane."""
     return tuple(pose.direction(unit) for unit in np.eye(2)) if isinstance(pose, PlanarPose) else pose.axes
 
 
 def differentiated(jet: Jet, times: int) -> Jet:
-    """Return a derivative of a jet.
+    """Return the derivative of a jet of order `times`.
 
     Raises
     ------
@@ -150,7 +150,7 @@ def differentiated(jet: Jet, times: int) -> Jet:
 def acceleration_energy(
     system: Robot | Motion, q: ArrayLike | None = None, *, order: int = 1, drives: bool = True
 ) -> Energy:
-    """Return the acceleration energy of order p of a robot or of a moving mechanism, and its rates.
+    """Return the acceleration energy of order p of a robot or a moving mechanism, with its rates.
 
     Negrean 2025, equations 73-77 for order 0, 83-115 for order 1, 107 for any order.
 
@@ -202,14 +202,14 @@ def energy_unit(order: int) -> str:
 
 
 def error_for(system: Any) -> type[JounceError]:
-    """Return the class of errors for a robot, or for the motion of a mechanism."""
+    """Return MechanismError for the motion of a mechanism, RobotError otherwise."""
     return MechanismError if isinstance(system, Motion) else RobotError
 
 
 def energies_of(
     system: Robot | Motion, q: ArrayLike | None, order: int, function: EnergyFunction, drives: bool = False
 ) -> tuple[Any, ...]:
-    """Return what `body_energy`, or a function like it, returns for a system, the names of its bodies, and the order.
+    """Return the results of `body_energy`, or a function like it, for a system, its body names, and the order.
 
     If `drives` is true, the energies of rotors are added to the last result of the function.
 
@@ -236,9 +236,9 @@ def energies_of(
 
 
 def rotors_of(robot: Robot, *, drives: bool) -> tuple[tuple[int, ...], tuple[int, ...], tuple[tuple[int, int], ...]]:
-    """Return the bodies to whose rotation the rotors are added: those that coordinates move, and the links of balls.
+    """Return the indices of the bodies that carry the rotors of joints, of ball drives, and of tendons.
 
-    Tendons with armature come last, by number, each with the body that the first of its coordinates moves.
+    Each tendon with armature is a pair: its index, and that of the body that its first coordinate moves.
     """
     if not drives:
         return (), (), ()
@@ -252,7 +252,7 @@ def rotors_of(robot: Robot, *, drives: bool) -> tuple[tuple[int, ...], tuple[int
 
 
 def kinetic_energy(system: Robot | Motion, q: ArrayLike | None = None, *, drives: bool = True) -> Energy:
-    """Return the kinetic energy of a robot or of a moving mechanism, and its rates: `acceleration_energy` of order 0.
+    """Return the kinetic energy of a robot or a moving mechanism, with its rates: `acceleration_energy` of order 0.
 
     Negrean 2025, equations 65-77 (Koenig's theorem). For a robot, the armature inertia of its joints is included unless
     `drives` is False.
@@ -304,7 +304,7 @@ def energies_of_tree(
 
 
 def energy_coefficients(motion: Motion, order: int, function: EnergyFunction = body_energy) -> tuple[Energies, ...]:
-    """Return the results of `body_energy`, or of a function like it, as Taylor coefficients; the ground comes first.
+    """Return the Taylor coefficients of `body_energy`, or of a function like it; the ground comes first.
 
     Raises
     ------

@@ -19,7 +19,7 @@ class AbstractEnergyOutput(AbstractMotionOutput):
 
     unit = "J"
     rate_names = ("energy", "first rate", "second rate", "third rate", "fourth rate")
-    source: ClassVar[str] = "mechanism"  # the key of a file that says what it is of
+    source: ClassVar[str] = "mechanism"  # the key of a file that names the owner of the energy
 
     @property
     def single_body(self) -> str | None:
@@ -27,7 +27,7 @@ class AbstractEnergyOutput(AbstractMotionOutput):
         return getattr(self, "body", None)
 
     def check(self, mechanism: Mechanism) -> None:
-        """Raise MechanismError unless the body exists and there are masses."""
+        """Raise MechanismError unless the body exists and has a mass, or for all bodies, unless one of them has."""
         bodies, name_of_body = mechanism.bodies, self.single_body
         if name_of_body is not None:
             check_name("moving body", name_of_body, bodies, MechanismError, name="body")
@@ -67,7 +67,7 @@ class AccelerationEnergyOutput(AbstractEnergyOutput):
 
     @property
     def lost_orders(self) -> int:  # type: ignore[override] - of an instance, as it depends on the order
-        """Derivatives by which it is shorter than the motion."""
+        """Number of derivatives of the motion that the energy uses up."""
         return int(self.order) + 1
 
     @property
@@ -118,4 +118,4 @@ ENERGY_OUTPUTS: tuple[tuple[str, type[AbstractEnergyOutput]], ...] = (
     ("potential_energy", PotentialEnergyOutput),
     ("potential_energy", BodyPotentialEnergyOutput),
 )
-"""The word for ``quantity`` in a file and the class of each energy as an output."""
+"""For each energy output, the value of ``quantity`` in a file, and its class."""

@@ -1,8 +1,8 @@
-"""The acceleration energy term by term, as Negrean 2025 builds it up: equations 83-106 and 112-115, and for any order.
+"""The acceleration energy term by term, as Negrean 2025 derives it: equations 83-106 and 112-115, and for any order.
 
-The derivative of order p + 1 of a point rho of a body is that of the origin, plus ``w^(p) x rho`` with the highest
-derivative of the angular velocity, plus what is left: ``sum C(p, j) w^(j) x rho^(p - j)`` over j < p, which for p = 1
-is ``w x (w x rho)`` (below equation 83). The square of the three is six terms.
+The derivative of order p + 1 of a point rho of a body is the sum of three: that of the origin; ``w^(p) x rho``, with
+the highest derivative of the angular velocity; and the remainder ``sum C(p, j) w^(j) x rho^(p - j)`` over j < p, which
+for p = 1 is ``w x (w x rho)`` (below equation 83). Their square has six terms.
 """
 
 import dataclasses
@@ -29,8 +29,8 @@ class EnergyTerms:
     """The terms of an acceleration energy of several bodies, with their rates.
 
     Each is an array of shape (..., rates + 1, bodies), kg m^2 / s^(2 p + 2) for order p, and its derivatives. In the
-    formulas for order 1, w and e are angular velocity and acceleration, a is the acceleration of the point of
-    reference, c the way from there to the center of mass, and I the inertia tensor about the point.
+    formulas for order 1, w and e are angular velocity and acceleration, a is the acceleration of the reference
+    point, c the vector from it to the center of mass, and I the inertia tensor about it.
 
     Parameters
     ----------
@@ -63,7 +63,7 @@ class EnergyTerms:
 
     @property
     def rotation(self) -> Any:
-        """The three terms of rotation together, shape (..., rates + 1, bodies)."""
+        """The sum of the three terms of rotation, shape (..., rates + 1, bodies)."""
         return self.leading + self.mixed + self.remaining
 
     @property
@@ -75,11 +75,11 @@ class EnergyTerms:
 def energy_terms(
     system: Robot | Motion, q: ArrayLike | None = None, *, order: int = 1, about: str = "center_of_mass"
 ) -> EnergyTerms:
-    """Return the terms of the acceleration energy of order p apart: translation, and the three of rotation; with rates.
+    """Return the terms of translation and rotation of the acceleration energy of order p, with rates.
 
-    Negrean 2025, equations 83-106 and 110-115 for order 1, whose terms they are; for any order the same split, exact,
-    in the place of equations 117-122, which lack terms. They are those of the links alone: the armature inertia of
-    joints, which `acceleration_energy` adds unless `drives` is False, has no such split.
+    For order 1 these are the terms of Negrean 2025, equations 83-106 and 110-115. For any other order the same split
+    is exact, and replaces equations 117-122, which lack terms. Only links count: the armature inertia of joints, which
+    `acceleration_energy` adds unless `drives` is False, has no such split.
 
     Parameters
     ----------
@@ -90,19 +90,19 @@ def energy_terms(
     order : int, default 1
         The order p; 0 is the kinetic energy (equations 66-71).
     about : {"center_of_mass", "origin"}, default "center_of_mass"
-        The point of each body whose motion counts as translation: equation 106, or the origin of its frame, where two
-        terms couple both: equation 105. The sum of all is the same.
+        The point of each body whose motion counts as translation: the center of mass (equation 106), or the origin of
+        the body frame (equation 105), about which two terms couple translation and rotation. The total is the same.
 
     Returns
     -------
     EnergyTerms
-        With K - p - 1 rates; for a motion of derivatives to order K, one for each instant.
+        With K - p - 1 rates; for a motion with derivatives to order K, at each instant.
 
     Raises
     ------
     RobotError, MechanismError
-        If derivatives are missing, q does not fit the robot, no body of the mechanism has a mass, or there is no such
-        point.
+        If derivatives are missing, q does not fit the robot, no body of the mechanism has a mass, or `about` is no
+        such point.
 
     Examples
     --------
@@ -137,7 +137,7 @@ def terms_about_origin(pose: Pose | Frames, mass: Any, center: Any, moments: Any
 
 
 def _rates(pose: Pose | Frames, order: int) -> tuple[list[Jet], list[Jet]]:
-    """Return the derivatives of the axes: what the last rate of the angular velocity adds, and what is left."""
+    """Return the derivatives of the axes in two parts: by the last rate of the angular velocity, and the remainder."""
     axes = axes_of(pose)
     if isinstance(pose, PlanarPose):
         spin = pose.angle.differentiate()

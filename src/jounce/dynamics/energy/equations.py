@@ -1,11 +1,11 @@
-"""The equations of motion from energies, in every form, for a reader to compare. Negrean 2025, equations 126-134.
+"""The energy forms of the equations of motion, for comparison. Negrean 2025, equations 126-134.
 
-All give the generalized inertia forces Q_i of a robot and their rates, and agree to rounding with those of
-`virtual_work` and `newton_euler`; for work, `jounce.inverse_dynamics` is the one to use. Each is a list of partial
-derivatives of energies with respect to ``q^(m)``, which `slopes` adds up in closed form: they differ in the weights of
-the same products, and what cancels is not computed. `energy_slope` gives one of them alone. The coordinates are those
-of a robot; of a driven mechanism the laws of its drivers (`driver_coordinates`); of one that moves freely those of its
-bodies (`body_coordinates`), in which ``Q + Phi_q^T lambda`` is what is applied.
+All give the generalized inertia forces Q_i and their rates, and agree with `virtual_work` and `newton_euler` to
+rounding; to compute forces, use `jounce.inverse_dynamics`. Each form is a sum of partial derivatives of energies with
+respect to ``q^(m)``, which `slopes` evaluates in closed form: the forms differ only in the weights of the same
+products, and products that cancel are not computed. `energy_slope` returns one such derivative. The coordinates are
+those of the robot; the laws of the drivers for a driven mechanism (`driver_coordinates`); or the coordinates of the
+bodies for a mechanism that moves freely (`body_coordinates`), where ``Q + Phi_q^T lambda`` is the applied force.
 """
 
 import math
@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 
 
 def catalan(p: int) -> int:
-    """Return the Catalan number C_p = 1, 2, 5, 14, 42, ... for p = 1, 2, ...: what equation 134 should have.
+    """Return the Catalan number C_p = 1, 2, 5, 14, 42, ... for p = 1, 2, ...: the correct coefficient of equation 134.
 
     Examples
     --------
@@ -46,7 +46,7 @@ def catalan(p: int) -> int:
 
 
 def printed_coefficient(p: int) -> int:
-    """Return ``p (p + 1) / 2 - delta_p`` as equation 134 is printed: right to p = 3 only.
+    """Return ``p (p + 1) / 2 - delta_p``, the coefficient that equation 134 prints: correct for p <= 3 only.
 
     Examples
     --------
@@ -64,9 +64,9 @@ def _of_robot(tree: Tree, arrays: tuple[Series], _: Any, form: Form) -> Any:
 
 
 def _evaluated(system: Robot | Motion, q: ArrayLike | None, *slopes: Slope, rates: int = 0, power: int = 0) -> Any:
-    """Return a sum of slopes for a robot, (..., rates + 1, n), or for the drivers or bodies of a motion, labeled.
+    """Return a sum of slopes for a robot, (..., rates + 1, n), or a labeled one for the drivers or bodies of a motion.
 
-    It is in units of forces, divided by a power of s.
+    Its unit is that of force, divided by s^power.
 
     Raises
     ------
@@ -95,37 +95,37 @@ def energy_slope(
 ) -> "Numbers | xarray.DataArray":
     """Return the derivative of a rate of an energy with respect to ``q^(m)``: the terms of Negrean 2025, 126-134.
 
-    ``dE_p^(n) / dq^(m)``, where ``E_p^(n)`` is a function of ``q, q', ..., q^(p + 1 + n)`` and all but one of them are
-    held.
+    ``dE_p^(n) / dq^(m)``, where ``E_p^(n)`` is a function of ``q, q', ..., q^(p + 1 + n)``, and all arguments but
+    ``q^(m)`` are held constant.
 
     Parameters
     ----------
     system : Robot or Motion
-        A robot; gravity does not count. Or the motion of a mechanism whose bodies have masses: its coordinates are the
-        laws of its drivers; where these do not prescribe all that moves, as in a simulation, those of its bodies:
-        places of their origins, global, and angles, in space turns about the axes of a body, away from the motion.
+        A robot, without gravity, or the motion of a mechanism whose bodies have masses. The coordinates of a mechanism
+        are the laws of its drivers. Where these do not prescribe the whole motion, as in a simulation, they are those
+        of its bodies: global positions of the origins, and angles; in space, small rotations about the body axes.
     q : array_like of shape (..., K + 1, n), optional
-        Coordinates of a robot and their derivatives; order + rate + rates + 1 are enough for K, and of those beyond
-        2 order + rate + rates + 2 - m the slope does not depend.
+        Coordinates of a robot and their derivatives. K = order + rate + rates + 1 suffices; the slope does not depend
+        on derivatives beyond 2 order + rate + rates + 2 - m.
     m : int
-        Which derivative of the coordinates it is differentiated by; beyond order + rate + 1 all slopes are zero.
+        Order of the derivative ``q^(m)``; beyond order + rate + 1 all slopes are zero.
     order : int, default 1
         The order p of the energy; 0 is the kinetic energy.
     rate : int, default 0
         The number n of time derivatives of the energy.
     rates : int, default 0
-        How many rates in time of the slope itself are requested.
+        Number of time derivatives of the slope.
 
     Returns
     -------
     array of shape (..., rates + 1, n)
-        For a motion an `xarray.DataArray` of dimensions time, derivative and driver, with the unit of each driver; or
-        column in the place of driver, "BODY.x", ..., as `constraint_equations` has them.
+        For a motion an `xarray.DataArray` with dimensions time, derivative and driver, and the unit of each driver; in
+        body coordinates with dimension column, "BODY.x", ..., as from `constraint_equations`, instead of driver.
 
     Raises
     ------
     RobotError, MechanismError
-        If q does not fit the robot, it or the motion has too few derivatives, or a number is none.
+        If q does not fit the robot, q or the motion has too few derivatives, or an order is not a whole number.
 
     Examples
     --------
@@ -151,21 +151,22 @@ def lagrange(system: Robot | Motion, q: ArrayLike | None = None, rates: int = 0)
     Parameters
     ----------
     system : Robot or Motion
-        A robot; gravity does not count. Or the motion of a mechanism whose bodies have masses: its coordinates are the
-        laws of its drivers, and the forces are those that the inertia of all bodies asks of the drivers. Where these do
-        not prescribe all that moves, as in a simulation, they are those of its bodies, and the forces are what inertia
-        asks of constraints, weight and applied forces: at the origins, global, and about the axes of the body.
+        A robot, without gravity, or the motion of a mechanism whose bodies have masses. The coordinates of a mechanism
+        are the laws of its drivers, and the forces are those that drivers exert against inertia. Where drivers do not
+        prescribe the whole motion, as in a simulation, the coordinates are those of the bodies, and the forces are the
+        inertia forces that constraints, weight and applied forces balance: at the body origins, forces in global axes,
+        moments in body axes.
     q : array_like of shape (..., K + 1, n), optional
         Coordinates of a robot and their derivatives, K at least rates + 2.
     rates : int, default 0
-        How many rates are requested.
+        Number of rates.
 
     Returns
     -------
     array of shape (..., rates + 1, n)
-        Forces and their rates, N m or N by s. For a motion an `xarray.DataArray` of dimensions time, derivative and
-        driver, with the unit of each driver; or column in the place of driver, "BODY.x", ..., as
-        `constraint_equations` has them.
+        Forces and their rates, N m or N by s. For a motion an `xarray.DataArray` with dimensions time, derivative and
+        driver, and the unit of each driver; in body coordinates with dimension column, "BODY.x", ..., as from
+        `constraint_equations`, instead of driver.
 
     Raises
     ------
@@ -188,21 +189,19 @@ def mangeron_nielsen(
 ) -> "Numbers | xarray.DataArray":
     """Return the generalized inertia forces by Mangeron's equations: Negrean 2025, equation 127.
 
-    ``Q_i = 1/m (dE_0^(m) / dq^(m) - (m + 1) dE_0 / dq)``; m = 1 are Nielsen's equations.
+    ``Q_i = 1/m (dE_0^(m) / dq^(m) - (m + 1) dE_0 / dq)``; m = 1 gives Nielsen's equations.
 
     Parameters
     ----------
     system, q, rates
-        As for `lagrange`; of higher derivatives than rates + 2 the sum does not depend.
+        As for `lagrange`; derivatives beyond rates + 2 do not enter.
     m : int, default 1
         Order of the derivatives, 1 or more.
 
     Returns
     -------
     array of shape (..., rates + 1, n)
-        Forces and their rates, N m or N by s. For a motion an `xarray.DataArray` of dimensions time, derivative and
-        driver, with the unit of each driver; or column in the place of driver, "BODY.x", ..., as
-        `constraint_equations` has them.
+        Forces and their rates, as from `lagrange`.
 
     Raises
     ------
@@ -231,16 +230,14 @@ def gibbs_appell(
     Parameters
     ----------
     system, q, rates
-        As for `lagrange`; of higher derivatives than rates + 2 the slope does not depend.
+        As for `lagrange`; derivatives beyond rates + 2 do not enter.
     m : int, default 2
         Order of the derivatives, 2 or more.
 
     Returns
     -------
     array of shape (..., rates + 1, n)
-        Forces and their rates, N m or N by s. For a motion an `xarray.DataArray` of dimensions time, derivative and
-        driver, with the unit of each driver; or column in the place of driver, "BODY.x", ..., as
-        `constraint_equations` has them.
+        Forces and their rates, as from `lagrange`.
 
     Raises
     ------
@@ -268,24 +265,24 @@ def higher_order(
     """Return the (k - 1)-th rate of the generalized inertia forces by the higher-order equations.
 
     Negrean 2025, equations 129-134, corrected: ``Q_i^(k-1) = (k-1)! m! / (m+k-1)! d/dq^(m) sum_p C_p
-    E_p^(m+k-2p-1)``, p = 1 to k, with the Catalan numbers C_p, which the paper prints wrongly from p = 4 on.
+    E_p^(m+k-2p-1)``, p = 1 to k, with the Catalan numbers C_p. The paper misprints them from p = 4 on.
 
     Parameters
     ----------
     system, q
-        As for `lagrange`, with K at least k + 1; of higher derivatives the sum does not depend.
+        As for `lagrange`, with K at least k + 1; higher derivatives do not enter.
     k : int, default 1
         1 gives the forces, 2 their first rate, and so on.
     m : int, optional
-        Order of the derivatives, k + 1 or more; k + 1 unless given.
+        Order of the derivatives, k + 1 or more; k + 1 by default.
     coefficients : callable, default catalan
-        Maps p to C_p, so that others can be tried.
+        Function from p to C_p, to try other coefficients.
 
     Returns
     -------
     array of shape (..., n)
-        N m or N by s^(k - 1). For a motion an `xarray.DataArray` of dimensions time and driver, or column, with the
-        unit of each.
+        N m or N by s^(k - 1). For a motion an `xarray.DataArray` with dimensions time and driver, or time and column,
+        and their units.
 
     Raises
     ------

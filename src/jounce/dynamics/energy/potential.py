@@ -1,4 +1,4 @@
-"""Potential energy of weight, with its rates, and the energy that forces store."""
+"""Potential energy in gravity, with its rates, and the energy that forces store."""
 
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
@@ -30,12 +30,12 @@ if TYPE_CHECKING:
 
 
 def potential_energy(motion: Motion) -> "xarray.DataArray":
-    """Return the potential energy of all bodies of a mechanism in its gravity, and its rates; zero at the origin.
+    """Return the potential energy of all bodies of a mechanism in gravity, with its rates; zero at the origin.
 
     Parameters
     ----------
     motion : Motion
-        Of a mechanism whose bodies have masses.
+        Motion of a mechanism whose bodies have masses.
 
     Returns
     -------
@@ -66,7 +66,7 @@ def potential_energy(motion: Motion) -> "xarray.DataArray":
 
 
 def potential_coefficients(motion: Motion) -> Energies:
-    """Return the potential energies of bodies as Taylor coefficients, the ground first."""
+    """Return the Taylor coefficients of the potential energies of all bodies, the ground first."""
     masses, (pose_type, coordinates) = required_masses(motion.mechanism), motion.poses
     shared = masses.center, gravity_of(motion.mechanism)
     heights = _heights.along(shared, coordinates, pose_type=pose_type)
@@ -82,12 +82,12 @@ def _heights(
 
 
 def stored_energy(motion: Motion) -> Any:
-    """Return the energy that springs, and other forces that give back what they take, have stored.
+    """Return the energy stored in springs and other conservative applied forces.
 
     Parameters
     ----------
     motion : Motion
-        Of any mechanism; without such forces it is zero.
+        Motion of a mechanism; the energy is zero without such forces.
 
     Returns
     -------

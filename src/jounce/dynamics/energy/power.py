@@ -1,4 +1,4 @@
-"""The power balance of a mechanism in motion: a check of all forces that needs no second solver."""
+"""The power balance of a moving mechanism: a check of all its forces without a second solver."""
 
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, Any
@@ -25,34 +25,34 @@ from jounce.rigid.pose import Pose
 if TYPE_CHECKING:
     import xarray
 
-FAINT = 1e-3  # of what turning bodies would move: coefficients that vanish have its rounding, 1e-12 of this or less
+FAINT = 1e-3  # share of the turning speeds in the scale: the rounding of vanishing coefficients is below 1e-12 of it
 
 
 def power_balance(motion: Motion) -> "xarray.Dataset":
-    """Return where the power in a moving mechanism comes from and goes to, with rates: a check of all its forces.
+    """Return the power balance of a moving mechanism, with rates: a check of all its forces.
 
-    What drivers and applied forces put in is what the kinetic energy of the bodies, and their potential energy in
-    gravity, gain, and what friction takes; joints do no other work. Both sides are computed apart: one from
-    multipliers, one from energies.
+    The power of drivers and applied forces equals the rates of kinetic and potential energy plus the power that
+    friction dissipates; joints do no other work. The two sides are computed independently, from multipliers and from
+    energies.
 
     Parameters
     ----------
     motion : Motion
-        Of a mechanism with masses or applied forces.
+        Motion of a mechanism with masses or applied forces.
 
     Returns
     -------
     xarray.Dataset
-        With dimensions time and derivative, in W, W/s, ...: ``drivers`` and ``forces``, the power that they put in;
-        ``friction``, the power that joints with friction put in, which is negative; ``kinetic`` and ``potential``, the
-        rates of the energies; ``residual``, the first three less the others, which is rounding; and ``scale``, the sum
-        of the sizes of all products that enter, by which to judge it at each instant and order: where these cancel, as
-        where the power grows evenly, its rates are rounding and this is not.
+        Dimensions time and derivative, in W, W/s, ...: ``drivers`` and ``forces``, their power; ``friction``, the
+        power of joint friction, which is negative; ``kinetic`` and ``potential``, the rates of the energies;
+        ``residual``, the first three less the other two, which is rounding; and ``scale``, the sum of the absolute
+        values of all products in the balance, with which to compare the residual at each instant and order. The scale
+        stays meaningful where the products cancel, as in the rates of a power that grows linearly.
 
     Raises
     ------
     MechanismError
-        If nothing has a mass and no force is applied, the motion has no accelerations, or the masses are not valid.
+        If no body has a mass and no force is applied, the motion has no accelerations, or the masses are not valid.
 
     Examples
     --------
@@ -95,7 +95,7 @@ def power_balance(motion: Motion) -> "xarray.Dataset":
 
 
 def _friction_powers(forces: MotionForces) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-    """Give the power of each joint with friction and the size of its products, (levels, time)."""
+    """Yield the power of each joint with friction and the size of its products, (levels, time)."""
     for name in forces.friction.names:
         place = forces.indices[name]
         of_group = forces.friction.resisted(place.group)
@@ -110,7 +110,7 @@ def _driver_power(forces: MotionForces, name: str) -> tuple[np.ndarray, np.ndarr
     group = forces.model.system.groups[index.group]
     motion = forces.motion
     laws = _law.along(group.element, motion.time, levels=forces.levels)
-    law = np.broadcast_to(laws, (len(laws), group.instances, laws.shape[-1]))[:, index.instance]  # equal ones are one
+    law = np.broadcast_to(laws, (len(laws), group.instances, laws.shape[-1]))[:, index.instance]  # equal: stored once
     rate, force = Jet(tuple(law)).differentiate(), Jet(tuple(forces.driver_force(name)[:, 0]))
     power, size = force * rate, force.map(np.abs) * rate.map(np.abs)
     return np.stack(power.dense().coefficients), np.stack(size.dense().coefficients)
@@ -156,7 +156,7 @@ def _powers(
 
 
 def _spin(pose: Pose) -> tuple[Jet, ...]:
-    """Return the components of the angular velocities of bodies, in their axes."""
+    """Return the components of the angular velocities of bodies in body axes."""
     if isinstance(pose, PlanarPose):
         return (pose.angle.differentiate(),)
     assert pose.angular_velocity is not None  # there are accelerations

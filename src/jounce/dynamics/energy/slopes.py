@@ -1,13 +1,13 @@
 """Slopes of acceleration energies, ``dE_p^(n) / dq^(m)``, in closed form: the terms of Negrean 2025, 126-134.
 
-The n-th rate of an energy is ``1/2 sum_l C(n, l) integral r^(p+1+l) . r^(p+1+n-l) dm``, and a derivative of a point
-changes with a derivative of a coordinate by ``dr^(s) / dq^(m) = C(s, m) (dr/dq)^(s-m)`` (Negrean 2025, 50-54). So
+The n-th rate of an energy is ``1/2 sum_l C(n, l) integral r^(p+1+l) . r^(p+1+n-l) dm``. The partial derivative of a
+derivative of a point is ``dr^(s) / dq^(m) = C(s, m) (dr/dq)^(s-m)`` (Negrean 2025, 50-54). So
 
     dE_p^(n) / dq^(m) = sum_l C(n, l) C(p+1+l, m) integral r^(p+1+n-l) . (dr/dq)^(p+1+l-m) dm,
 
-products of jets of the points and of the columns of the Jacobian, whose orders add up to the same number in all terms:
-a sum of slopes and of their rates is one row of weights of such products, exact fractions that are added up before
-anything is computed. What the paper's forms of the equations of motion have in common is thus one sum.
+products of derivatives of the points and of the columns of the Jacobian, whose orders add up to the same number in all
+terms. A sum of slopes and their rates is therefore one row of weights of such products: exact fractions that are added
+up before anything is evaluated. All of the paper's forms of the equations of motion are such a sum.
 """
 
 import math
@@ -40,19 +40,19 @@ class Slope(NamedTuple):
 
     @property
     def orders(self) -> int:
-        """The orders of point and column, added up."""
+        """The sum of the orders of point and column."""
         return 2 * self.p + 2 + self.n - self.m + self.rate
 
 
 class Form(NamedTuple):
-    """A sum of slopes, with rates: what all of `slopes` have in common is the sum of orders."""
+    """A sum of slopes that have the same sum of orders, with its rates."""
 
     slopes: tuple[Slope, ...]
     levels: int  # the value and its rates
 
     @property
     def orders(self) -> int:
-        """The orders of point and column of each product of the value, added up."""
+        """The sum of the orders of point and column in each product of the value."""
         return max(0, self.slopes[0].orders)
 
     @property
@@ -72,13 +72,13 @@ class Form(NamedTuple):
 
     @property
     def order(self) -> int:
-        """Highest derivative of the points, and so of the coordinates, that counts."""
+        """Highest derivative of the points, and so of the coordinates, that enters."""
         pairs = [(b, level) for level, row in enumerate(self.weights) for b in row]
         return max((max(b, self.orders + level - b) for b, level in pairs), default=0)
 
     @property
     def column_order(self) -> int:
-        """Highest derivative of the columns of the Jacobian that counts."""
+        """Highest derivative of the columns of the Jacobian that enters."""
         return max((b for row in self.weights for b in row), default=0)
 
 
@@ -89,7 +89,7 @@ def _terms(slope: Slope) -> dict[int, Fraction]:
 
 
 def _rate(terms: dict[int, Fraction]) -> dict[int, Fraction]:
-    """Return the weights of the rate in time: in each product, one factor or the other is differentiated."""
+    """Return the weights of the time derivative, by the product rule."""
     rates: dict[int, Fraction] = {}
     for b, weight in terms.items():
         for order in (b, b + 1):
@@ -98,10 +98,10 @@ def _rate(terms: dict[int, Fraction]) -> dict[int, Fraction]:
 
 
 class Columns(NamedTuple):
-    """How coordinates move bodies: jets of their velocities and angular velocities for a rate of one.
+    """Columns of the body Jacobian: jets of velocities and angular velocities for a unit rate of a coordinate.
 
-    Both are of shape (components, coordinates, bodies, batch), of the center of mass and in the axes of the base; in
-    the plane the angular velocity has one component.
+    Both have shape (components, coordinates, bodies, batch). Velocities are those of the centers of mass, in base
+    axes; in the plane the angular velocity has one component.
     """
 
     linear: Jet
@@ -109,7 +109,7 @@ class Columns(NamedTuple):
 
 
 def column_of(pose: Any, change: Any, center: Any, order: int) -> tuple[Any, Any]:
-    """Return how fast centers of mass move, and bodies turn, as a pose changes, (levels, components, bodies, batch)."""
+    """Return the columns of the body Jacobian for a change of the pose, (levels, components, bodies, batch)."""
     linear = change.point(center).truncate(order)
     if isinstance(pose, PlanarPose):
         return stacked(linear), stacked(change.angle.truncate(order)[None])
@@ -127,7 +127,7 @@ def slope_values(
     form : Form
         The sum.
     pose : SpatialPose, PlanarPose or Frames
-        Where the bodies are, as jets to `form.order`.
+        Poses of the bodies, as jets to `form.order`.
     columns : Columns
         Jets to `form.column_order`.
     mass, center, moments
@@ -151,7 +151,7 @@ def slope_values(
             sums.append(_along(linear[b], points[orders - b] * (mass[None] * weight)))
         for s in range(max(weights, default=-1) + 1):
             pairs = [(b - s, orders - b, weight) for b, weight in weights.items() if b >= s]
-            moment = [products.of(i, k) * weight for i, k, weight in pairs if i != k]  # of one with itself it is zero
+            moment = [products.of(i, k) * weight for i, k, weight in pairs if i != k]  # a cross a is zero
             if moment:
                 sums.append(_along(angular[s], total(moment)))
         values.append(total(sums))
@@ -159,17 +159,17 @@ def slope_values(
 
 
 def _of_coefficients(weight: Fraction, a: int, b: int, level: int) -> float:
-    """Return a weight of plain derivatives a and b, for the plain derivative `level`, as that of coefficients."""
+    """Return the weight of Taylor coefficients a and b from that of plain derivatives, for the derivative `level`."""
     return float(weight * math.factorial(a) * math.factorial(b) / math.factorial(level))
 
 
 def _along(columns: Float[Numbers, "component coordinate body batch"], vectors: Any) -> Any:
-    """Return the products of columns and of a vector of each body, added up over the bodies."""
+    """Return the dot products of columns and body vectors, summed over the bodies."""
     return jnp.sum(dot(columns, vectors[:, None]), axis=1)
 
 
 class _Products:
-    """Products ``sum S_ik a_i x a_k`` of coefficients of the axes of bodies; each is computed once."""
+    """Products ``sum S_ik a_i x a_k`` of coefficients of body axes, each computed once."""
 
     def __init__(self, axes: list[Float[Numbers, "component axis body batch"]], moments: Any):
         self.axes = axes
@@ -177,7 +177,7 @@ class _Products:
         self.known: dict[tuple[int, int], Any] = {}
 
     def of(self, first: int, second: int) -> Any:
-        """Return the product of two coefficients, (components, bodies, batch); it changes its sign with their order."""
+        """Return the antisymmetric product of two coefficients, (components, bodies, batch)."""
         if first > second:
             return -self.of(second, first)
         if (first, second) not in self.known:

@@ -49,34 +49,34 @@ from jounce.rigid.spatial import quaternion_change
 
 Instants = Float[Numbers, "1 batch"]
 Lanes = Float[Numbers, " batch"]
-"""One number for each run of a batch; of `Flags` and `Indices` alike."""
+"""One number for each run of a batch, as in `Flags` and `Indices`."""
 Flags = Bool[Numbers, " batch"]
 Indices = Int[Numbers, " batch"]
 Factor = DenseFactor | SaddleFactor | ReducedFactor
 Inverse = DenseInverse | SaddleInverse
-"""Of the equations' matrix, for many right sides that come one by one."""
+"""Inverse matrix of the equations of motion, for many right-hand sides that arrive one after the other."""
 Matrices = Float[Numbers, "size size batch"]
-"""Of the equations of motion."""
+"""Matrices of the equations of motion."""
 Rows = Float[Numbers, "row batch"]
 Shifts = Float[Numbers, "shift body batch"]
 """One vector for each body, such as a position or a velocity."""
 Turns = Float[Numbers, "turn body batch"]
-"""One turn, or rate of it, for each body: of one component in the plane, three in space."""
+"""One rotation, or rate of it, for each body: one component in the plane, three in space."""
 Attitudes = Float[Numbers, "attitude body batch"]
-"""Angles, of one component, or Euler parameters, of four."""
+"""Angles, with one component, or Euler parameters, with four."""
 
 
 class State(NamedTuple):
-    """Where the moving bodies are and how they move; shapes (components, bodies, batch).
+    """Positions and velocities of the moving bodies; shapes (components, bodies, batch).
 
     Attributes
     ----------
     position, velocity : array
-        Of the origins of the body frames, in the global frame, m and m/s.
+        Positions and velocities of the origins of the body frames, in the global frame, m and m/s.
     attitude : array
         Angles, (1, bodies, batch) in rad, or Euler parameters, (4, bodies, batch).
     spin : array
-        Rate of the angle, or angular velocity in the axes of the body, rad/s.
+        Rate of the angle, or angular velocity in body axes, rad/s.
     """
 
     position: Numbers
@@ -90,7 +90,7 @@ class State(NamedTuple):
 
 
 class Expansion(NamedTuple):
-    """Taylor coefficients of a motion about an instant: what a step of an integrator needs, and leaves behind."""
+    """Taylor coefficients of a motion about an instant, as a step of an integrator uses and stores them."""
 
     state: State  # arrays of shape (order + 1, components, bodies, batch)
     acceleration: Float[Numbers, "order coordinate body batch"]
@@ -103,17 +103,17 @@ class Equations(Module):
     Parameters
     ----------
     system : System
-        Its joints, drivers and forces.
+        Joints, drivers and forces.
     masses : Masses
-        Of all bodies, the ground first.
+        Masses of all bodies, the ground first.
     gravity : array of shape (components, 1, 1)
         m/s^2.
     scale : float
-        Of the masses, by which the equations are divided, kg.
+        Scale of the masses, by which the equations are divided, kg.
     pose_type : type
         PlanarPose or SpatialPose.
     saddle : SaddleFronts, optional
-        How the matrix of a large mechanism is eliminated.
+        Plan of elimination for the matrix of a large mechanism.
     """
 
     system: System
@@ -129,9 +129,9 @@ class Equations(Module):
         return self.pose_type.shifts + self.pose_type.turns
 
     def near(self, angles: tuple[Float[Numbers, "_ batch"], ...]) -> "Equations":
-        """Return the equations where the angles about axes that forces measure have the turns of these.
+        """Return the equations whose forces count revolutions from the given angles about their axes.
 
-        There is one array of shape (instances, batch) for each group of such forces, rad.
+        `angles` has one array of shape (instances, batch), rad, for each group of forces that measure such angles.
         """
         if not angles:
             return self
@@ -139,11 +139,11 @@ class Equations(Module):
         return dataclasses.replace(self, system=system)
 
     def pose(self, state: State) -> Pose:
-        """Return the pose of all bodies, the ground first, with velocities."""
+        """Return the pose of all bodies with velocities, the ground first."""
         return self.extended(self.pose_at_rest(state.position, state.attitude), state.velocity, state.spin)
 
     def extended(self, pose: Pose, shift: Shifts, turn: Turns) -> Pose:
-        """Return a pose with one more Taylor coefficient of the moving bodies."""
+        """Return a pose with one more Taylor coefficient for the moving bodies."""
         return pose.extended(with_ground(shift), with_ground(turn))
 
     def pose_at_rest(self, position: Shifts, attitude: Attitudes) -> Pose:
@@ -154,7 +154,7 @@ class Equations(Module):
         )
 
     def attitude_of(self, pose: Pose) -> Attitudes:
-        """Return the attitude of the moving bodies, as a state has it, from a pose of order zero."""
+        """Return the attitude of the moving bodies, as `State` stores it, from a pose of order zero."""
         if isinstance(pose, PlanarPose):
             return pose.angle.coefficients[0][None, 1:]
         return pose.quaternion.coefficients[0][:, 1:]
@@ -162,19 +162,19 @@ class Equations(Module):
     def balance(
         self, state: State, acceleration: ByBody, multipliers: Rows, time: Instants
     ) -> tuple[ByBody, Rows, Attitudes]:
-        """Return what must vanish, and how the attitude moves.
+        """Return the residuals of the equations of motion, and the rate of the attitude.
 
         Returns
         -------
         forces : array of shape (coordinates, bodies, batch)
             ``M q'' - Q + Phi_q^T lambda``, over the scale of the masses.
         second : array of shape (rows, batch)
-            ``Phi''``, of the scaled rows.
+            ``Phi''`` of the scaled rows.
         attitude_rate : array
-            Of the shape of the attitude.
+            Rate of the attitude, in its shape.
         """
         shifts = self.pose_type.shifts
-        # made once: what repeats is summed once, if it is the same
+        # built once, so that common subexpressions are the same objects and are evaluated once
         at_rest = self.pose_at_rest(state.position, state.attitude)
         moving = self.extended(at_rest, state.velocity, state.spin)
         pose = self.extended(moving, acceleration[:shifts] / 2.0, acceleration[shifts:] / 2.0)
@@ -197,15 +197,15 @@ class Equations(Module):
         return forces, second, self.attitude_rate(state)
 
     def attitude_rate(self, state: State) -> Attitudes:
-        """Return how the attitude of a state moves."""
+        """Return the rate of the attitude of a state."""
         return state.spin if self.pose_type is PlanarPose else quaternion_change(state.attitude, state.spin)
 
     def matrix(self, state: State, time: Instants) -> Matrices:
-        """Return the matrix of the unknown accelerations and multipliers, scaled; of redundant rows, combinations."""
+        """Return the scaled matrix of accelerations and multipliers; combinations of rows if some are redundant."""
         return _matrix(self, state, time)
 
     def factored(self, state: State, time: Instants) -> Factor:
-        """Return the factors of that matrix, which solve for all rows."""
+        """Return the factors of `matrix`, which solve for the multipliers of all rows."""
         if self.system.rank is not None:
             jacobian = self.jacobian(state, time)
             return ReducedFactor.of(self.mass_matrix(state), jacobian, range_basis(jacobian, self.system.rank))
@@ -215,7 +215,7 @@ class Equations(Module):
         return self.saddle.factored(self._masses(state), entries, self.system.column_scale, self.system.row_scale)
 
     def blank_factor(self, lanes: int) -> Factor:
-        """Return a placeholder for the factors of a batch, to start a loop with."""
+        """Return a placeholder for the factors of a batch, as the initial value of a loop."""
         if self.system.rank is not None:
             return ReducedFactor.blank(self.system.shape, self.system.rank, lanes)
         size = sum(self.system.shape)
@@ -234,14 +234,14 @@ class Equations(Module):
         return mass_matrices(self.pose_at_rest(state.position, state.attitude), self.masses)[:, :, 1:] / self.scale
 
     def unknowns(self, solve: Callable[[Rows], Rows], forces: ByBody, second: Rows) -> tuple[ByBody, Rows]:
-        """Return the changes of accelerations and multipliers that make what `balance` returns vanish.
+        """Return the changes of accelerations and multipliers that make the residuals of `balance` vanish.
 
         Parameters
         ----------
         solve : callable
-            Solves for right sides with the matrix of the equations, scaled.
+            Solver of the scaled equations for right-hand sides.
         forces, second : array
-            As `balance` returns them.
+            Residuals, as `balance` returns them.
         """
         scale, columns = self.system.column_scale, self.system.shape[1]
         solution = -solve(jnp.concatenate([as_column(forces, scale), second]))
@@ -255,9 +255,9 @@ class Equations(Module):
         Parameters
         ----------
         solve, forces, second
-            As `unknowns` takes them, of no accelerations and no multipliers.
+            As for `unknowns`; the residuals are those at zero accelerations and multipliers.
         state : State
-            Of the bodies.
+            State of the bodies.
         time : array of shape (1, batch)
             The instant, s.
         """
@@ -273,19 +273,19 @@ class Equations(Module):
         return with_friction(solved, frictionless, friction, felt)
 
     def least_change(self, factor: Factor, gap: Rows) -> Column:
-        """Return the change of coordinates of least kinetic energy that closes a gap of the scaled rows, scaled."""
+        """Return the scaled change of coordinates, of least kinetic energy, that closes a gap of the scaled rows."""
         columns = self.system.shape[1]
         return factor.solve(-jnp.concatenate([jnp.zeros((columns, gap.shape[-1])), gap]))[:columns]
 
     def with_rates(self, factor: Factor, state: State, time: Instants) -> State:
-        """Return the state with the least change of its velocities that fulfills the rates of all constraints."""
+        """Return the state with the least change of its velocities that satisfies the rates of all constraints."""
         rate = self.system.residual(self.pose(state), Jet.variable(time, 1)).dense().coefficients[1]
         change = by_body(self.least_change(factor, rate), self.system.column_scale)
         shifts = self.pose_type.shifts
         return state._replace(velocity=state.velocity + change[:shifts], spin=state.spin + change[shifts:])
 
 
-# Programs of the start, of steps and of the motion within them have these in common: JAX traces them once for all.
+# Functions that several programs share (the start, the steps, dense output) are jitted, so that JAX traces them once.
 
 
 @jax.jit
@@ -303,16 +303,16 @@ def _balance(
 
 
 def conjugate(variation: Callable[[Pose], Any], pose: Pose, weights: Any) -> ByBody:
-    """Return the forces by which weights act on the bodies.
+    """Return the generalized forces on the bodies by the transposed variation, such as ``Phi_q^T lambda``.
 
     Parameters
     ----------
     variation : callable
-        How what the weights are conjugate to varies with a change of the pose; linear.
+        Linear function from a change of the pose to the variation of the quantities conjugate to the weights.
     pose : SpatialPose or PlanarPose
-        Of order zero.
-    weights : array, or list of them
-        Of the shapes of the variation.
+        Pose of order zero.
+    weights : array, or list of arrays
+        Weights, such as multipliers, in the shapes of the variation.
     """
     shifts = pose.shifts
     example = jax.ShapeDtypeStruct((shifts + pose.turns, *pose.position.shape[1:]), jnp.float64)
@@ -321,7 +321,7 @@ def conjugate(variation: Callable[[Pose], Any], pose: Pose, weights: Any) -> ByB
 
 
 def inverted(factor: Factor) -> Inverse:
-    """Return what solves with factors for many right sides that come one by one."""
+    """Return the inverse of factors, for many right-hand sides that arrive one after the other."""
     return factor.inverted() if isinstance(factor, SaddleFactor) else DenseInverse(factor.inverse())
 
 
@@ -339,17 +339,17 @@ def expand(
     Parameters
     ----------
     equations : Equations
-        Of the mechanism.
+        Equations of motion of the mechanism.
     state : State
-        That fulfills the constraints and their rates.
+        State that satisfies the constraints and their rates.
     time : array of shape (1, batch)
         The instant, s.
     order : int
         Highest coefficient of positions and velocities, at least 1.
     inverse : DenseInverse or SaddleInverse, optional
-        Of the equations' matrix at this state, where it is known.
+        Inverse matrix of the equations at this state, if it is known.
     reversible : bool, default False
-        Whether JAX may differentiate it in reverse mode.
+        Whether JAX can differentiate the result in reverse mode.
     """
     count, bodies, lanes = equations.coordinates, *state.position.shape[1:]
     known = inverted(equations.factored(state, time)) if inverse is None else inverse

@@ -1,4 +1,4 @@
-"""The state a simulation starts from: consistent positions and velocities from partial ones, and what can move."""
+"""The initial state of a simulation: consistent positions and velocities from partial ones, and the mobility."""
 
 import dataclasses
 from collections.abc import Callable
@@ -30,25 +30,25 @@ from jounce.mechanism.building.builder import with_reference
 
 TOLERANCE = 1e-12  # of the assembled positions, rad or sizes of the mechanism
 ROUNDING = 1e-15  # of residuals, rad or sizes of the mechanism
-LARGEST_CHANGE = 1e-2  # of velocities, as a part of them, by what rounding leaves open of the position
+LARGEST_CHANGE = 1e-2  # relative change of velocities within the uncertainty of the position by rounding
 
 
 @dataclasses.dataclass(frozen=True)
 class ConsistentStart:
-    """A mechanism ready to move.
+    """A mechanism with a consistent initial state.
 
     Attributes
     ----------
     model : Model
-        The numeric model, its rows scaled.
+        The numeric model, with scaled rows.
     equations : Equations
-        Its equations of motion.
+        Equations of motion.
     state : State
-        That fulfills joints, drivers and initial conditions with their rates; a batch of one.
+        Positions and velocities that satisfy joints, drivers and initial conditions; a batch of one.
     jacobian : HostJacobian
-        Of its constraints there.
+        Jacobian of the constraints at the state.
     sound : array of bool, shape (forces,)
-        Which applied forces are finite there.
+        Whether each applied force is finite at the state.
     """
 
     model: Model
@@ -72,32 +72,32 @@ def consistent_start(
 ) -> ConsistentStart:
     """Return a consistent state at an instant, from the starting guess and the initial conditions.
 
-    Initial conditions are drivers: each fixes one coordinate and its rate, as its law gives them at the instant. What
-    they leave open is chosen: positions nearest to the guess of the bodies, velocities of least kinetic energy.
+    Initial conditions are drivers: each fixes one coordinate and its rate at the instant by its law. Where these leave
+    freedom, positions are nearest to the guess of the bodies, and velocities have the least kinetic energy.
 
     Parameters
     ----------
     mechanism : Mechanism
-        Its bodies need masses; joints and drivers may leave degrees of freedom.
+        Mechanism whose bodies have masses; joints and drivers may leave degrees of freedom.
     instant : float
         s.
     built : callable, optional
-        Called with the model before it is assembled, initial conditions among its drivers.
+        Called with the model before assembly, with the initial conditions among its drivers.
 
     Raises
     ------
     MechanismError
-        If a value is not valid, no body has a mass, one that can move has none, or a motion that is free would have
-        negative kinetic energy.
+        If a value is not valid, no body has a mass, a movable body has none, or a free motion would have negative
+        kinetic energy.
     AssemblyError
-        If joints, drivers and initial conditions cannot all be fulfilled, or redundant ones have other rates.
+        If joints, drivers and initial conditions cannot all be satisfied, or the rates of redundant ones contradict.
     MobilityError
-        If the start is a singular position, or one at which rates would come out as rounding has it.
+        If the start is a singular position, or one at which rounding would decide the rates.
     """
     mechanism = chosen(mechanism, instant)
     masses = required_masses(mechanism, "the equations of motion")
     model, gravity, state, together = build(mechanism, initial=True), gravity_of(mechanism), None, None
-    exact = True  # whether the state is known to fulfill the rates of what is left without the initial conditions
+    exact = True  # whether the state satisfies the rates of the rows that remain without the initial conditions
     if built is not None:
         built(model)
     if mechanism.initial:
@@ -105,7 +105,7 @@ def consistent_start(
         model = model.released
         driven = equations_of(whole, masses, gravity)
         state = _set_in_motion(driven, whole, coordinates, instant)
-        if whole.system.rank is not None:  # rows may contradict each other by less than is refused
+        if whole.system.rank is not None:  # redundant rows may contradict each other by less than is refused
             _check_rates(whole, state, _facts(driven, state, instant).rates, instant)
             exact = False
         system = with_fields(model.system, forces=whole.system.forces, outputs=whole.system.outputs)
@@ -156,9 +156,10 @@ def _assembled(model: Model, instant: float) -> tuple[Model, dict[str, np.ndarra
 def _without_initial_conditions(
     model: Model, whole: Model, instant: float
 ) -> tuple[Model, dict[str, np.ndarray]] | None:
-    """Return the model without initial conditions as `assemble` does, where they were assembled; None if it is unlike.
+    """Return the model without initial conditions, with the assembled coordinates, as `assemble` does.
 
-    The rows that are left are fulfilled there, and independent if all were.
+    The assembled coordinates satisfy the remaining rows, which are independent if all rows were. None if the model
+    needs an assembly of its own: its length or rows differ, or rows are redundant.
     """
     remaining = [k for k, name in enumerate(whole.rows) if not name.startswith("initial.")]
     alike = model.length == whole.length and model.rows == tuple(whole.rows[k] for k in remaining)
@@ -175,7 +176,7 @@ def initial_as_drivers(mechanism: Mechanism) -> Mechanism:
 
 
 def at_rest(model: Model, coordinates: dict[str, np.ndarray]) -> State:
-    """Return the state of bodies at rest, from the coordinates of their assembled pose."""
+    """Return the state of bodies at rest in an assembled pose."""
     position = np.asarray(coordinates["position"])[:, 1:]
     if model.pose_type.turns == 1:
         attitude = np.asarray(coordinates["angle"])[None, 1:]
@@ -188,19 +189,19 @@ def at_rest(model: Model, coordinates: dict[str, np.ndarray]) -> State:
 
 @compiled(narrow=True, brief=True)
 def with_rates(equations: Equations, state: State, time: Instants) -> State:
-    """Return the state with the least change of its velocities that fulfills the rates of all constraints."""
+    """Return the state with the least change of its velocities that satisfies the rates of all constraints."""
     return _moving(equations, state, time)
 
 
 @compiled(narrow=True, brief=True)
 def _with_row_rates(equations: Equations, state: State, time: Instants) -> tuple[State, Any, Any]:
-    """Return the state of bodies at rest with velocities, what rates they fulfill, and how the attitude moves."""
+    """Return the state with consistent velocities, the rates of the rows at rest, and the rate of the attitude."""
     moving = _moving(equations, state, time)
     return moving, _row_rates(equations, state, time), equations.attitude_rate(moving)
 
 
 class _Facts(NamedTuple):
-    """What decides whether a mechanism can start from a state; arrays of NumPy once it was computed."""
+    """The values that decide whether a mechanism can start from a state; NumPy arrays once computed."""
 
     matrix: Float[Any, "size size"]  # of the equations of motion
     entries: Float[Any, " entry"]  # of the Jacobian
@@ -210,7 +211,7 @@ class _Facts(NamedTuple):
 
 @compiled(narrow=True, brief=True)
 def _computed_facts(equations: Equations, state: State, time: Instants) -> _Facts:
-    """Return these facts from a program of their own: in that of the velocities they would change its last digits."""
+    """Return the facts by a program of their own: as part of the velocities' program they would change last digits."""
     pose = equations.pose_at_rest(state.position, state.attitude)
     matrix, entries = equations.matrix(state, time)[..., 0], equations.system.entries(pose, Jet([time]))[..., 0]
     sound = equations.system.finite_forces(equations.pose(state), Jet.variable(time, 1))
@@ -222,16 +223,21 @@ def _facts(equations: Equations, state: State, instant: float) -> _Facts:
 
 
 def _moving(equations: Equations, state: State, time: Instants) -> State:
-    """Return a state with velocities, corrected once: masses that gears weight unlike each other cost digits."""
+    """Return a state with velocities, corrected once: masses that gears weight very differently cost digits."""
     factor = equations.factored(state, time)
     return jax.lax.fori_loop(0, 2, lambda _, moving: equations.with_rates(factor, moving, time), state)
 
 
 def _set_in_motion(equations: Equations, model: Model, coordinates: dict[str, np.ndarray], instant: float) -> State:
-    """Return the assembled bodies with the velocities that laws prescribe, or raise where rounding would decide them.
+    """Return the assembled bodies with the velocities that laws prescribe.
 
-    At a limit position, such as an arm stretched out, a residual changes with the square of a displacement: what
-    rounding leaves of it hides a place 1e-8 away, at which the velocities are others, and finite.
+    At a limit position, such as a stretched arm, a residual changes with the square of a displacement. Rounding of
+    the residual then hides a displacement of 1e-8, after which the velocities are different, and finite.
+
+    Raises
+    ------
+    MobilityError
+        If rounding would decide the velocities.
     """
     start, time = at_rest(model, coordinates), np.array([[instant]])
     state, rates, turning = jax.tree.map(np.asarray, _with_row_rates(equations, start, time))
@@ -258,7 +264,7 @@ def _row_rates(equations: Equations, state: State, time: Instants) -> Float[Numb
 
 
 def _check_rates(model: Model, state: State, rates: Float[np.ndarray, "row 1"], instant: float) -> None:
-    """Raise AssemblyError, by name, where redundant rows contradict each other in their rates."""
+    """Raise AssemblyError, with the names of the rows, if the rates of redundant rows contradict each other."""
     gaps = np.abs(rates)[:, 0]
     size = max(float(np.max(np.abs(state.velocity))) / model.length, float(np.max(np.abs(state.spin))))
     if gaps.max() > LARGEST_CONTRADICTION * size:
@@ -268,7 +274,15 @@ def _check_rates(model: Model, state: State, rates: Float[np.ndarray, "row 1"], 
 
 
 def _checked_jacobian(equations: Equations, model: Model, facts: _Facts, instant: float) -> HostJacobian:
-    """Return the Jacobian, or raise for a body whose acceleration nothing determines, or of negative energy."""
+    """Return the Jacobian of a start whose equations of motion determine all accelerations.
+
+    Raises
+    ------
+    MechanismError
+        If a movable body has no mass or inertia, or a free motion has negative kinetic energy.
+    MobilityError
+        If the equations of motion are singular.
+    """
     whole, system = facts.matrix, model.system
     jacobian = HostJacobian.of(system.pattern, facts.entries).scaled(np.asarray(system.row_scale)[:, 0])
     columns = jacobian.shape[1]
@@ -292,7 +306,7 @@ def _checked_jacobian(equations: Equations, model: Model, facts: _Facts, instant
 
 
 def _undetermined_motions(whole: Float[np.ndarray, "size size"], columns: int) -> Float[np.ndarray, "direction size"]:
-    """Return the null space of the matrix of the equations; the first entries of its vectors belong to columns."""
+    """Return the null space of the matrix of the equations; its vectors begin with the `columns` coordinates."""
     scale, tolerance = even_scale(whole, columns), 1e-3 * RANK_TOLERANCE
     even = whole * scale * scale[:, None]
     if is_clearly_regular(even, tolerance):
@@ -305,9 +319,9 @@ def _undetermined_motions(whole: Float[np.ndarray, "size size"], columns: int) -
 
 
 def _is_solid(masses: Masses) -> bool:
-    """Return whether no body has a negative mass or moment of inertia: then no motion has a negative kinetic energy.
+    """Return whether no body has a negative mass or moment of inertia, so that no kinetic energy is negative.
 
-    The least moment about an axis through the center of mass is the sum of the two lowest second moments.
+    The least moment of inertia about an axis through the center of mass is the sum of the two least second moments.
     """
     mass, _, moments = map(np.asarray, masses)
     planar = len(moments) == 2
@@ -316,7 +330,7 @@ def _is_solid(masses: Masses) -> bool:
 
 
 def _check_energy(model: Model, mass: Float[np.ndarray, "column column"], jacobian: HostJacobian) -> None:
-    """Refuse masses and moments by which a motion that is free would have negative kinetic energy."""
+    """Raise MechanismError if a free motion has negative kinetic energy."""
     count = len(model.bodies)
     by_body = np.einsum("bibj->bij", mass.reshape(count, -1, count, mass.shape[0] // count))
     lowest = np.linalg.eigvalsh(by_body)
@@ -329,7 +343,7 @@ def _check_energy(model: Model, mass: Float[np.ndarray, "column column"], jacobi
             return
         motion = (motions[:, 0] @ free).reshape(count, -1)
         energies = np.einsum("bi,bij,bj->b", motion, by_body, motion)
-    else:  # too many to look at all of them
+    else:  # too many free directions to list all of them
         energies = lowest.min(axis=1)
     name = model.bodies[int(np.argmin(energies))]
     message = "the body can move so that its kinetic energy is negative; correct its mass and its moments of inertia"

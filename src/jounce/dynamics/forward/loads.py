@@ -1,7 +1,7 @@
-"""What the constraints of a mechanism have to balance: inertia, weight and applied forces of all bodies, on jets.
+"""Loads that the constraints of a mechanism balance: inertia, weight and applied forces of all bodies, on jets.
 
-Forces act in the coordinates of virtual displacements: a shift of the origin of a body along the global axes, and a
-turn about the axes of the body.
+Forces are conjugate to virtual displacements: a shift of the body origin along the global axes, and a rotation about
+the body axes.
 """
 
 from typing import Any
@@ -21,16 +21,16 @@ from jounce.rigid.pose import Pose
 
 
 def inertia_forces(pose: Pose, masses: Masses, gravity: Gravity | float) -> tuple[Jet, Jet]:
-    """Return inertia less weight of all bodies: force, global, and moment about the origin, in axes of the body.
+    """Return inertia forces less weight: force in global axes, and moment about the body origin in body axes.
 
-    Both are two orders shorter than the pose; shapes (c, bodies, batch) and (turns, bodies, batch).
+    Both have two orders less than the pose; shapes (c, bodies, batch) and (turns, bodies, batch).
 
     Parameters
     ----------
     pose : SpatialPose or PlanarPose
         Jets of all bodies, of shape (..., bodies, batch).
     masses : Masses
-        Of these bodies.
+        Masses of these bodies.
     gravity : array of shape (c, 1, 1)
         m/s^2.
     """
@@ -50,16 +50,16 @@ def inertia_forces(pose: Pose, masses: Masses, gravity: Gravity | float) -> tupl
 
 
 def mass_matrices(pose: Pose, masses: Masses) -> BodyMatrices:
-    """Return the mass matrix of each body at a pose of order zero: how its forces of inertia follow its accelerations.
+    """Return the mass matrix of each body at a pose of order zero.
 
-    It is written out, as the same from `inertia_forces` takes machine code thirty times as many operations.
+    It is written out: differentiating `inertia_forces` would take thirty times as many operations in machine code.
     """
     center, mass = masses.center, masses.mass[None, None]
     if isinstance(pose, PlanarPose):
         levers = [perpendicular(pose.direction(center)).coefficients[0]]
     else:
         (x, y, z), (a, b, c) = (axis.coefficients[0] for axis in pose.axes), components(center)
-        levers = [b * z - c * y, c * x - a * z, a * y - b * x]  # how it moves as the body turns about each axis
+        levers = [b * z - c * y, c * x - a * z, a * y - b * x]  # center velocity per unit rate about each axis
     moments = masses.moments + mass * center[:, None] * center[None]  # about the origin
     about = total(moments[i, i] for i in range(len(center)))[None, None]
     turning = about if len(levers) == 1 else about * jnp.eye(3)[:, :, None, None] - moments
@@ -76,25 +76,25 @@ def mass_matrices(pose: Pose, masses: Masses) -> BodyMatrices:
 def loads(
     system: System, pose: Pose, time: Jet, masses: Masses, gravity: Gravity
 ) -> Float[Numbers, "order coordinate moving batch"]:
-    """Return applied forces and weight less inertia of all moving bodies, as Taylor coefficients.
+    """Return the Taylor coefficients of applied forces and weight less inertia, for all moving bodies.
 
     Parameters
     ----------
     system : System
-        Its applied forces count.
+        System whose applied forces are included.
     pose : SpatialPose or PlanarPose
         Jets of all bodies, the ground first.
     time : Jet
-        Of shape (1, batch).
+        Time jet of shape (1, batch).
     masses : Masses
-        Of all bodies.
+        Masses of all bodies.
     gravity : array of shape (c, 1, 1)
         m/s^2.
 
     Returns
     -------
     array of shape (order - 1, coordinates, moving bodies, batch)
-        The order is that of the pose; force, global, and moment about the origin, in axes of the body.
+        The order is that of the pose; force in global axes, and moment about the body origin in body axes.
     """
     load = -jnp.concatenate([stacked(x) for x in inertia_forces(pose, masses, gravity)], axis=1)
     if system.forces:
@@ -105,5 +105,5 @@ def loads(
 def constraint_loads(
     system: System, pose: Pose, time: Jet, multipliers: Float[Numbers, "order row batch"]
 ) -> Float[Numbers, "order coordinate moving batch"]:
-    """Return ``Phi_q^T lambda`` of all moving bodies, as Taylor coefficients, from those of the multipliers."""
+    """Return the Taylor coefficients of ``Phi_q^T lambda`` for all moving bodies, from those of the multipliers."""
     return stacked(system.constraint_forces(pose, time, multipliers))[:, :, 1:]

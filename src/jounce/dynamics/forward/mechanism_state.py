@@ -1,4 +1,4 @@
-"""One state of a mechanism as a user gives it, which need not fulfill its joints."""
+"""A single state of a mechanism as the user gives it; it need not satisfy the joints."""
 
 import dataclasses
 from collections.abc import Mapping
@@ -22,11 +22,11 @@ from jounce.rigid.pose import Pose
 
 
 class MotionAtState(Motion):
-    """One state of a mechanism, consistent or not, as a motion of one instant: `at_state` makes it."""
+    """A single state of a mechanism, consistent or not, as a motion of one instant; `at_state` builds it."""
 
 
 def at_state(given: object, state: object, time: object) -> tuple[Motion, int]:
-    """Return a state as a motion of one instant, and how many derivatives are known of it."""
+    """Return a state as a motion of one instant, and the number of its known derivatives."""
     if not isinstance(given, Motion | Mechanism):
         raise MechanismError("must be a jn.Motion or a jn.Mechanism", name="motion", value=given)
     mechanism = dataclasses.replace(given if isinstance(given, Mechanism) else given.mechanism, outputs={})
@@ -35,7 +35,7 @@ def at_state(given: object, state: object, time: object) -> tuple[Motion, int]:
     coordinates = _guessed(model) if state is None else _coordinates(mechanism, model, state)
     order = len(coordinates["position"]) - 1
     check_laws(mechanism, instant[None], order + 1, forces=order > 1)
-    if isinstance(given, Motion):  # angles about axes are counted as along it
+    if isinstance(given, Motion):  # revolutions about axes are counted as along the motion
         system = dataclasses.replace(given.model.system, outputs=())
         model = dataclasses.replace(given.model, system=system, outputs=())
     else:
@@ -56,7 +56,7 @@ def _guessed(model: Model) -> Coordinates:
 
 
 def _coordinates(mechanism: Mechanism, model: Model, state: object) -> Coordinates:
-    """Return the Taylor coefficients of the coordinates of all bodies, the ground first, from a state as given."""
+    """Return the Taylor coefficients of the coordinates of all bodies, the ground first, from a user's state."""
     if not isinstance(state, Mapping):
         raise MechanismError(
             "must be a mapping of bodies to where they are and how they move", name="state", value=state
@@ -116,7 +116,7 @@ def _check_order(name: str, given_order: int, order: int) -> None:
 
 
 def _array(name: str, value: Any, shape: tuple[int, ...]) -> Float[np.ndarray, "..."]:
-    """Return finite numbers: of a shape, or where it is not empty, one of them or a list of them."""
+    """Return finite numbers: a scalar for an empty shape, otherwise a stack of arrays, from one array or a list."""
     array = np.array(real_numbers(name, by_component(name, value, MechanismError), MechanismError))
     if shape:
         scalar = shape == (1,)

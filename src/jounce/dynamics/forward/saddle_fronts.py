@@ -1,8 +1,9 @@
-"""The matrix of constrained motion, eliminated body by body: the multiplier of a row is assigned to one of its bodies.
+"""Frontal elimination, body by body, of the saddle-point matrix of constrained motion.
 
-So the equations of motion of a large mechanism go through the same fronts as its Jacobian: the columns of a body are
-its coordinates and the multipliers of a few rows, and its rows are its balance of forces and those rows. Bodies with
-fewer multipliers than others are padded with zeros.
+The multiplier of each row is assigned to one of the bodies of the row. The equations of motion of a large mechanism
+then go through the same fronts as its Jacobian: the columns of a body are its coordinates and the assigned
+multipliers, and its rows are its force balance and the assigned constraint rows. Bodies with fewer multipliers than
+others are padded with zeros.
 """
 
 import itertools
@@ -23,25 +24,25 @@ from jounce.linear_algebra.frontal_inverse import FrontalInverse, InversePlan
 from jounce.linear_algebra.fronts import Fronts
 from jounce.linear_algebra.pattern import Pattern
 
-FRONT_COST = 20.0  # of an operation in fronts, by that of one in dense elimination, as measured for one run
-MOST_NEIGHBORS = 16  # of a body; with more, its rows would be long
+FRONT_COST = 20.0  # of an operation in fronts over one in dense elimination, as measured for one run
+MOST_NEIGHBORS = 16  # of a body; rows with more would be too long
 
 Unknowns = Float[Numbers, "size batch"]
 
 
 class SaddleFronts(Module):
-    """Which entries of masses and Jacobian meet in which front.
+    """Plan of the frontal elimination of a saddle-point matrix.
 
     Attributes
     ----------
     plan : InversePlan
-        Of a matrix whose entries are those of the mass matrices, of the Jacobian, and one.
+        Plan for the padded matrix, whose entries are those of the mass matrices, of the Jacobian, and one.
     positions : array of int, shape (size,)
-        Where each unknown, the coordinates first, and its equation stand in it.
-    unknowns : array of int, shape (rows of the whole matrix,)
-        Which unknown is there; one beyond the last where there is none.
+        Position of each unknown, the coordinates first, and of its equation in the padded matrix.
+    unknowns : array of int, shape (rows of the padded matrix,)
+        The unknown at each position of the padded matrix; one beyond the last for padding.
     rows : array of int, shape (entries,)
-        The row of each entry of the Jacobian, any where it is of the ground.
+        Row of each entry of the Jacobian; arbitrary for entries of the ground.
     """
 
     plan: InversePlan
@@ -51,19 +52,19 @@ class SaddleFronts(Module):
 
     @property
     def fronts(self) -> Fronts:
-        """Those of the whole matrix."""
+        """Fronts of the padded matrix."""
         return self.plan.fronts
 
     @classmethod
     def of(cls, pattern: Pattern) -> "SaddleFronts | None":
-        """Plan the elimination from the pattern of the Jacobian; None where a dense one is less work."""
+        """Return the cached plan for a pattern of the Jacobian; None if dense elimination is less work."""
         arrays = (np.asarray(pattern.bodies), np.asarray(pattern.entry_indices))
         key = tuple((x.shape, x.dtype.str, x.tobytes()) for x in arrays)
         return _planned(key, pattern.body_count, pattern.entry_count, FRONT_COST)
 
     @classmethod
     def planned(cls, pattern: Pattern) -> "SaddleFronts | None":
-        """Plan it, as `of` does, which keeps the plans."""
+        """Return a new plan for a pattern of the Jacobian; None if dense elimination is less work."""
         size, width, count = sum(pattern.shape), pattern.width, pattern.body_count
         bodies, positions = np.asarray(pattern.bodies), np.asarray(pattern.entry_indices)
         owners = _owners(bodies.tolist(), count)
@@ -96,7 +97,7 @@ class SaddleFronts(Module):
         scale: Float[Numbers, " coordinate"],
         row_scale: Float[Numbers, "row 1"],
     ) -> "SaddleFactor":
-        """Factor the matrices with these mass matrices of all bodies, not scaled, and entries of the Jacobian."""
+        """Return the factors for unscaled mass matrices of all bodies and entries of the Jacobian."""
         masses = masses * (scale[:, None] * scale[None])[:, :, None, None]
         lanes = entries.shape[-1]
         flat = jnp.broadcast_to(masses, (*masses.shape[:-1], lanes)).reshape(-1, lanes)
@@ -104,27 +105,27 @@ class SaddleFronts(Module):
         return SaddleFactor(FrontalFactor.of(self.fronts, whole, jnp.ones((self.fronts.row_count, 1))), self)
 
     def blank(self, lanes: int) -> "SaddleFactor":
-        """Return a placeholder for the factors of a batch, to start a loop with."""
+        """Return a placeholder for the factors of a batch, as the initial value of a loop."""
         return SaddleFactor(FrontalFactor.blank(self.fronts, lanes), self)
 
     def spread(self, right: Unknowns) -> Float[Numbers, "row batch"]:
-        """Return right sides in the order of the coordinates and rows as those of the whole matrix."""
+        """Return right-hand sides, in the order of coordinates and rows, in the order of the padded matrix."""
         right = jnp.concatenate([right, jnp.zeros((1, right.shape[-1]))])
         return right.at[self.unknowns].get(mode="promise_in_bounds")
 
 
 class SaddleFactor(Module):
-    """The factors of a batch of such matrices."""
+    """The factors of a batch of saddle-point matrices."""
 
     factor: FrontalFactor
     saddle: SaddleFronts
 
     def solve(self, right: Unknowns) -> Unknowns:
-        """Return the solutions for right sides in the order of the coordinates and rows."""
+        """Return the solutions for right-hand sides in the order of coordinates and rows."""
         return self.factor.solve(self.saddle.spread(right))[self.saddle.positions]
 
     def inverse(self) -> Float[Numbers, "size size batch"]:
-        """Return the inverse matrices as dense ones."""
+        """Return the dense inverse matrices."""
         size = len(self.saddle.positions)
 
         def one(lane: Any) -> Any:
@@ -134,25 +135,25 @@ class SaddleFactor(Module):
         return jnp.moveaxis(jax.lax.map(one, jnp.arange(self.factor.inverted.shape[-1])), 0, -1)
 
     def inverted(self) -> "SaddleInverse":
-        """Return what solves for many right sides that come one by one."""
+        """Return the inverse for many right-hand sides that arrive one after the other."""
         return SaddleInverse(FrontalInverse.of(self.saddle.plan, self.factor), self.saddle)
 
 
 class SaddleInverse(Module):
-    """The inverses of a batch of such matrices, whose size grows with the number of bodies, not with its square."""
+    """The inverses of a batch of saddle-point matrices, in memory linear in the number of bodies."""
 
     inverse: FrontalInverse
     saddle: SaddleFronts
 
     def solve(self, right: Unknowns) -> Unknowns:
-        """Return the solutions for right sides in the order of the coordinates and rows."""
+        """Return the solutions for right-hand sides in the order of coordinates and rows."""
         return self.inverse.solve(self.saddle.spread(right))[self.saddle.positions]
 
     def responses(self, columns: int) -> tuple[Float[Numbers, "column batch"], Float[Numbers, " batch"]]:
-        """Return the largest response to a force on each coordinate, or more, and to a gap of the rows.
+        """Return upper bounds of the largest response to a force on each coordinate, and to a gap of the rows.
 
-        The inverse is not negative on the coordinates, and not positive on the rows: no entry of a column is larger
-        than the root of the product of its diagonal entry and of the largest of those.
+        The inverse is positive semidefinite on the coordinates and negative semidefinite on the rows. No entry of a
+        column therefore exceeds the root of the product of its diagonal entry and the largest diagonal entry.
         """
         diagonal = jnp.abs(self.inverse.diagonal()[self.saddle.positions])
         forces = diagonal[:columns]
@@ -164,7 +165,7 @@ class SaddleInverse(Module):
 def _planned(
     key: tuple[tuple[tuple[int, ...], str, bytes], ...], body_count: int, entry_count: int, _: float
 ) -> SaddleFronts | None:
-    """Return the plan for a pattern of these arrays, which does not depend on values."""
+    """Return the plan for a pattern given by its arrays as bytes."""
     bodies, positions = (np.frombuffer(data, kind).reshape(shape) for shape, kind, data in key)
     fronts = SaddleFronts.planned(Pattern(bodies, positions, body_count, entry_count))
     for array in jax.tree.leaves(fronts):
@@ -173,20 +174,20 @@ def _planned(
 
 
 Meeting = list[dict[int, dict[int, int]]]
-"""Of each row, the bodies that it touches, and in which of their columns it has which entry."""
+"""For each row, the bodies that it touches, and for each their columns with the indices of the entries."""
 
 
 def _meeting(pattern: Pattern, where: Int[np.ndarray, " row"], whole: int) -> Meeting:
-    """Return the rows of the whole matrix; entries are those of the masses, of the Jacobian, and one.
+    """Return the rows of the padded matrix; its entries are those of the masses, of the Jacobian, and one.
 
     Parameters
     ----------
     pattern : Pattern
-        Of the Jacobian.
+        Pattern of the Jacobian.
     where : array of int, shape (rows,)
-        The position of each multiplier, and of its row.
+        Position of each multiplier and of its row.
     whole : int
-        Columns of a body, its multipliers included.
+        Number of columns of a body, with its multipliers.
     """
     width, count = pattern.width, pattern.body_count
     mass = width * width * count
@@ -207,7 +208,7 @@ def _meeting(pattern: Pattern, where: Int[np.ndarray, " row"], whole: int) -> Me
 
 
 def _as_pattern(entries: Meeting, count: int, whole: int, nothing: int) -> Pattern:
-    """Return what meets in rows as a pattern; `nothing` is the number of entries."""
+    """Return the pattern of the padded matrix; `nothing` is the number of entries."""
     slots = max(map(len, entries))
     bodies = np.full((len(entries), slots), count, np.int32)
     positions = np.full((len(entries), slots, whole), nothing, np.int32)
@@ -219,7 +220,7 @@ def _as_pattern(entries: Meeting, count: int, whole: int, nothing: int) -> Patte
 
 
 def _owners(bodies: Sequence[Sequence[int]], count: int) -> list[int]:
-    """Return the body that the multiplier of each row is assigned to: that of the fewest multipliers in the row."""
+    """Return the body that the multiplier of each row is assigned to: that with the fewest multipliers so far."""
     load, owners = [0] * count, []
     for touched in bodies:
         owner = min((body for body in touched if body < count), key=load.__getitem__)
@@ -229,7 +230,7 @@ def _owners(bodies: Sequence[Sequence[int]], count: int) -> list[int]:
 
 
 def _ranks(owners: Sequence[int]) -> Int[np.ndarray, " row"]:
-    """Return how many rows before it each row shares its body with."""
+    """Return for each row the number of earlier rows with the same owner."""
     seen: dict[int, int] = {}
     ranks = []
     for owner in owners:

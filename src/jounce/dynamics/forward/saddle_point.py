@@ -1,6 +1,6 @@
-"""The matrix of constrained motion, ``[[M, Phi_q^T], [Phi_q, 0]]``, and how its columns belong to the bodies.
+"""The saddle-point matrix of constrained motion, ``[[M, Phi_q^T], [Phi_q, 0]]``, with columns ordered by body.
 
-Coordinates of bodies are shifts and turns, those of one body after those of another; the ground has none.
+The coordinates of a body are shifts, then rotations; the ground has none.
 """
 
 from typing import Any
@@ -34,10 +34,10 @@ def saddle_point(mass: MassMatrix, jacobian: Jacobian) -> Float[Numbers, "size s
 
 
 def even_scale(whole: Float[np.ndarray, "size size"], columns: int) -> Float[np.ndarray, " size"]:
-    """Return the scales of rows and columns of such a matrix for a test of its rank.
+    """Return the scales of rows and columns of a saddle-point matrix for a test of its rank.
 
-    The scale of each of the first columns follows from its own mass, or moment of inertia, and that of each row of the
-    Jacobian from its size then: a small mass among large ones does not count as zero.
+    Each coordinate is scaled by its own mass or moment of inertia, and each row of the Jacobian by its norm in scaled
+    coordinates, so that a small mass among large ones does not count as zero.
     """
     mass = np.abs(np.diag(whole))[:columns]
     scale = np.ones(len(whole))
@@ -48,7 +48,7 @@ def even_scale(whole: Float[np.ndarray, "size size"], columns: int) -> Float[np.
 
 
 def block_diagonal(blocks: BodyMatrices, scale: Float[Numbers, " coordinate"]) -> MassMatrix:
-    """Return the mass matrix of all bodies from those of each, both its rows and its columns scaled."""
+    """Return the mass matrix of all bodies, rows and columns scaled, from those of each body."""
     size, _, bodies, lanes = blocks.shape
     blocks = blocks * (scale[:, None] * scale[None])[:, :, None, None]
     whole = jnp.eye(bodies)[:, None, :, None, None] * jnp.moveaxis(blocks, 2, 0)[:, :, None]
@@ -56,45 +56,45 @@ def block_diagonal(blocks: BodyMatrices, scale: Float[Numbers, " coordinate"]) -
 
 
 def as_column(forces: ByBody, scale: Float[Numbers, " coordinate"]) -> Column:
-    """Return what acts on the coordinates of bodies as a scaled column."""
+    """Return generalized forces on the bodies as a scaled column."""
     return jnp.swapaxes(forces * scale[:, None, None], 0, 1).reshape(-1, forces.shape[-1])
 
 
 def by_body(column: Column, scale: Float[Numbers, " coordinate"]) -> ByBody:
-    """Return a scaled column of unknown coordinates by body."""
+    """Return the coordinates of each body from a scaled column."""
     return jnp.swapaxes(column.reshape(-1, len(scale), column.shape[-1]), 0, 1) * scale[:, None, None]
 
 
 class ReducedFactor(Module):
-    """The factors of such matrices where rows are redundant: of as many combinations of rows as are independent.
+    """The factors of saddle-point matrices with redundant rows, reduced to independent combinations of the rows.
 
-    Right sides and solutions have all rows; of the multipliers, which are not unique, they are those of least norm.
+    Right-hand sides and solutions have all rows. The multipliers, which are not unique, are those of least norm.
     """
 
     factor: DenseFactor
-    basis: Float[Numbers, "row rank batch"]  # orthonormal, of what the Jacobian maps to
+    basis: Float[Numbers, "row rank batch"]  # orthonormal, of the range of the Jacobian
 
     @classmethod
     def of(cls, mass: MassMatrix, jacobian: Jacobian, basis: Float[Numbers, "row rank batch"]) -> "ReducedFactor":
-        """Factor the matrix bordered by the Jacobian in a basis of what it maps to."""
+        """Return the factors for a mass matrix, a Jacobian, and an orthonormal basis of the range of the Jacobian."""
         return cls(DenseFactor.of(saddle_point(mass, in_basis(basis, jacobian))), basis)
 
     @classmethod
     def blank(cls, shape: tuple[int, int], rank: int, lanes: int) -> "ReducedFactor":
-        """Return a placeholder for the factors of a batch, to start a loop with."""
+        """Return a placeholder for the factors of a batch, as the initial value of a loop."""
         rows, columns = shape
         size = columns + rank
         return cls(DenseFactor.blank((size, size), lanes), np.zeros((rows, rank, lanes)))
 
     def solve(self, right: Float[Numbers, "size batch"]) -> Float[Numbers, "size batch"]:
-        """Return the solutions for right sides of all coordinates and rows."""
+        """Return the solutions for right-hand sides of all coordinates and rows."""
         columns = len(right) - len(self.basis)
         below = jnp.sum(self.basis * right[columns:][:, None], axis=0)
         solution = self.factor.solve(jnp.concatenate([right[:columns], below]))
         return jnp.concatenate([solution[:columns], jnp.sum(self.basis * solution[columns:][None], axis=1)])
 
     def inverse(self) -> Float[Numbers, "size size batch"]:
-        """Return what takes right sides of all coordinates and rows to solutions."""
+        """Return the matrix from right-hand sides of all coordinates and rows to solutions."""
         inverse, (_, rank, _) = self.factor.inverse(), self.basis.shape
         columns = len(inverse) - rank
         rows = jnp.sum(self.basis[:, :, None] * inverse[columns:][None], axis=1)
@@ -104,12 +104,12 @@ class ReducedFactor(Module):
 
 
 class DenseInverse(Module):
-    """The inverses of a batch of such matrices as they are."""
+    """The dense inverses of a batch of saddle-point matrices."""
 
     matrix: Float[Numbers, "size size batch"]
 
     def solve(self, right: Float[Numbers, "size batch"]) -> Float[Numbers, "size batch"]:
-        """Return the solutions for right sides of all coordinates and rows."""
+        """Return the solutions for right-hand sides of all coordinates and rows."""
         return multiplied(self.matrix, right)
 
     def responses(self, columns: int) -> tuple[Float[Numbers, "column batch"], Float[Numbers, " batch"]]:
@@ -119,16 +119,17 @@ class DenseInverse(Module):
 
 
 def in_basis(basis: Float[Numbers, "row rank batch"], jacobian: Jacobian) -> Float[Numbers, "rank column batch"]:
-    """Return the combinations of the rows of a Jacobian by the vectors of a basis."""
+    """Return the rows of a Jacobian combined by the vectors of a basis."""
     return jnp.sum(basis[:, :, None] * jacobian[:, None], axis=0)
 
 
 def multiplied(
     matrix: Float[Numbers, "row size batch"], column: Float[Numbers, "size batch"]
 ) -> Float[Numbers, "row batch"]:
-    """Return the product of matrices and columns, in a loop over the size.
+    """Return the product of matrices and columns, by a loop over the size.
 
-    XLA would otherwise compute the column anew for every row: a loop has its arguments made before it starts.
+    The arguments of a loop are evaluated before it starts. Without the loop, XLA would fuse the computation of the
+    column into every row and repeat it.
     """
     rows, size, lanes = matrix.shape
     block = min(8, (size + 1) // 2)

@@ -1,15 +1,15 @@
-"""Friction of joints in the equations of motion: forces in proportion to reactions, which they change.
+"""Joint friction in the equations of motion: forces proportional to reactions, which in turn depend on them.
 
-The normal forces N of joints with friction are unknowns in addition to the multipliers, and the friction of a normal
-force of one is known from the motion: bodies feel it as they feel a residual held by a multiplier. So
+The normal forces N of joints with friction are unknowns in addition to the multipliers. The friction for a unit normal
+force is known from the motion, and acts on the bodies as a multiplier acts through its row. So
 
     J^T lambda + V N = load,    N = |R(lambda)|,
 
-where R is the reaction force of the joint; of gears N is the torque that they lose, of their multiplier alone. What
-solves for multipliers without friction, lambda = S load, leaves for the normal forces a system of their number,
-``N = |R(S load - S V N)|``: a few unknowns, solved by Newton's method from those without friction, or as friction grows
-from none where it goes astray; and for their higher Taylor coefficients a linear one, with the same matrix at every
-order.
+where R is the reaction force of the joint; for gears N is the torque loss, a function of their multiplier alone. With
+the solution of the frictionless equations, lambda = S load, there remains one equation for each normal force,
+``N = |R(S load - S V N)|``. Newton's method solves these few equations, starting from no friction; where it diverges,
+by continuation in the friction. The higher Taylor coefficients follow from linear equations with the same matrix at
+every order.
 """
 
 from collections.abc import Callable, Sequence
@@ -32,11 +32,11 @@ from jounce.mechanism.building.builder import Model, group_rows
 from jounce.mechanism.system import Group, System, movable
 from jounce.rigid.pose import Pose
 
-SHARES = (0.25, 0.5, 0.75, 1.0)  # of friction, at which its matrix is looked at
-STEPS = 30  # of Newton's method, which takes four or five where friction is far from locking
-RAMP, EACH = 16, 6  # where it goes astray, friction grows in so many shares, with so many steps each
+SHARES = (0.25, 0.5, 0.75, 1.0)  # of friction, at which the sign of the determinant is checked
+STEPS = 30  # of Newton's method; four or five suffice far from locking
+RAMP, EACH = 16, 6  # of the continuation: number of increments of friction, and of Newton steps for each
 CLOSE = 1e-15  # of the largest normal force: a smaller change is rounding
-ROUNDING = 1e-14  # of the largest multiplier, which normal forces of gears without loss are made of
+ROUNDING = 1e-14  # of the largest multiplier: rounding of the torque loss of lossless gears
 
 NormalForces = Float[Numbers, "joint batch"]
 
@@ -52,12 +52,12 @@ def has_flanks(group: Group) -> bool:
 
 
 def pressing_teeth(system: System) -> list[Group]:
-    """Return the groups of teeth with a pressure angle where joints have friction, which tooth forces press."""
+    """Return the groups of teeth with a pressure angle if joints have friction, which tooth forces press."""
     return [group for group in system.groups if has_flanks(group)] if any(map(has_friction, system.groups)) else []
 
 
 def loses_torque(element: Any) -> bool:
-    """Tell whether the friction of joints follows the torque that they pass on, as that of gears does."""
+    """Return whether the friction of joints is a loss of transmitted torque, as that of gears."""
     return isinstance(getattr(element, "friction", None), GearFriction)
 
 
@@ -68,7 +68,7 @@ def joints_with_friction(model: Model, system: System) -> list[str]:
 
 
 def check_unique_pressing(model: Model, system: System) -> None:
-    """Raise UnsupportedError where joints have friction and redundant constraints leave open what presses them."""
+    """Raise UnsupportedError if joints have friction and redundant constraints leave their reactions undetermined."""
     if system.rank is not None and (names := joints_with_friction(model, system)):
         message = (
             "friction follows reactions, and redundant constraints leave these open: free the mechanism of constraints "
@@ -78,7 +78,7 @@ def check_unique_pressing(model: Model, system: System) -> None:
 
 
 def check_no_friction(mechanism: Mechanism, what: str) -> None:
-    """Raise UnsupportedError, by name, where a joint has friction, which something cannot have yet."""
+    """Raise UnsupportedError, with the name of the joint, if a joint has friction and `what` does not support it."""
     for name, joint in mechanism.joints.items():
         if getattr(joint, "friction", None) is not None:
             message = f"{what} of a mechanism whose joints have friction cannot be computed yet; leave friction out"
@@ -86,21 +86,21 @@ def check_no_friction(mechanism: Mechanism, what: str) -> None:
 
 
 def friction_slope(element: Any, poses: Sequence[Pose], slot: int) -> Slope:
-    """Return what the friction of a normal force of one does along displacements of the body in a slot, as jets.
+    """Return the generalized friction force on the body in a slot for a unit normal force, as jets.
 
     Parameters
     ----------
     element : AbstractConstraint
-        With friction; its values have shape (..., instances, 1).
+        Joints with friction; the values have shape (..., instances, 1).
     poses : sequence of SpatialPose or PlanarPose
-        Of the bodies in each slot, shape (..., instances, batch), with one order more than the result.
+        Poses of the bodies in each slot, shape (..., instances, batch), with one order more than the result.
     slot : int
-        Which of the bodies is displaced.
+        Slot of the body.
 
     Returns
     -------
     array of shape (order, coordinates, 1, instances, batch)
-        As `slopes` of a residual of one row, whose multiplier is the normal force.
+        As from `slopes` for a residual with one row, whose multiplier is the normal force.
     """
     factor = resisting(element, poses)
     bodies = tuple(pose.truncate(pose.order - 1) for pose in poses)
@@ -115,31 +115,31 @@ def friction_slope(element: Any, poses: Sequence[Pose], slot: int) -> Slope:
 
 
 def pressed(element: Any, poses: Sequence[Pose], force: Float[Jet, "component *batch"]) -> Jet:
-    """Return the normal force of joints, (instances, batch), from what they exert on their second body, global."""
+    """Return the normal force of joints, (instances, batch), from their global force on the second body."""
     return normal_force(element, tuple(pose.truncate(force.order) for pose in poses), force)
 
 
 def resisting(element: Any, poses: Sequence[Pose]) -> Float[Jet, "direction instance batch"]:
-    """Return which part of what presses resists slip, one order shorter than the poses."""
+    """Return the part of the normal force that resists slip in each direction, with one order less than the poses."""
     return element.friction.resisting(slip_velocity(element, poses))
 
 
 def torque_lost(
     element: Any, own: Float[Jet, "row instance batch"], resisting: Float[Jet, "direction instance batch"]
 ) -> Jet:
-    """Return the torque that gears lose where they turn fast, (instances, batch), of their multipliers."""
+    """Return the torque loss of turning gears, (instances, batch), from their multipliers."""
     return element.friction.lost(element.passed_on(own[0]), resisting[0])
 
 
 class Coupling(Module):
-    """How normal forces follow from loads of order zero, and what that leaves of the equations of higher orders.
+    """The solved normal forces of order zero, and the linear equations of the higher orders.
 
     Parameters
     ----------
     response : array of shape (joints, rows, batch)
-        By how much multipliers are less for a normal force of one in each joint.
+        Decrease of the multipliers for a unit normal force in each joint.
     factor : DenseFactor
-        Of the matrix of the normal forces, ``1 + dN/dlambda S V``.
+        Factors of the matrix of the normal forces, ``1 + dN/dlambda S V``.
     """
 
     response: Float[Numbers, "joint row batch"]
@@ -152,24 +152,24 @@ class Coupling(Module):
         free: Float[Numbers, "row batch"],
         response: Float[Numbers, "joint row batch"],
     ) -> tuple["Coupling", Float[Numbers, "row batch"], NormalForces]:
-        """Solve for the normal forces.
+        """Return the coupling, multipliers and normal forces of order zero, by Newton's method.
 
         Parameters
         ----------
         normal : callable
-            Returns normal forces, (joints, batch), from multipliers, (rows, batch).
+            Function from multipliers, (rows, batch), to normal forces, (joints, batch).
         free : array of shape (rows, batch)
-            The multipliers without friction.
+            Multipliers without friction.
         response : array of shape (joints, rows, batch)
-            Of the multipliers.
+            Decrease of the multipliers for a unit normal force in each joint.
 
         Returns
         -------
         coupling : Coupling
         multipliers : array of shape (rows, batch)
         forces : array of shape (joints, batch)
-            NaN, as the multipliers are, where friction locks: where no normal forces fulfill the equations, or the
-            matrix has passed a singular one on the way from no friction.
+            Normal forces. NaN, as the multipliers, where friction locks: where no normal forces satisfy the equations,
+            or the matrix becomes singular as friction grows from none.
         """
 
         def with_friction(forces: Any, free: Any, response: Any) -> Any:
@@ -187,7 +187,7 @@ class Coupling(Module):
             return plain(multipliers, *held)
 
         def gap_of(normal: Callable[[Any], Any], forces: Any, free: Any, response: Any) -> tuple[Any, Any]:
-            """Return what forces lack, and the matrix by which that changes with them."""
+            """Return the residual of the normal forces, and its negative Jacobian."""
             multipliers = with_friction(forces, free, response)
             return normal(multipliers) - forces, matrix(normal, multipliers, response)
 
@@ -197,7 +197,7 @@ class Coupling(Module):
             return near & _is_regular_from_none(whole)
 
         def solved(moving: Any, forces: Any, shares: int) -> Any:
-            """Improve forces where they move, as friction grows in a number of shares."""
+            """Return forces after Newton steps in the lanes that move, as friction grows in a number of shares."""
 
             def improved(carry: Any) -> Any:
                 forces, moving, step = carry
@@ -214,7 +214,7 @@ class Coupling(Module):
             return jax.lax.while_loop(unsolved, improved, (forces, moving, jnp.zeros((), jnp.int32)))[0]
 
         start = normal_now(fixed[0])
-        # from none: the first step takes what presses on the side on which it does without friction
+        # start from no friction, so that joints are pressed on the same side as without friction in the first step
         forces = solved(jnp.ones(start.shape[-1], bool), jnp.zeros_like(start), 1)
         gap, whole = gap_of(normal_now, forces, *fixed)
         lost = ~is_found(gap, forces, whole)
@@ -222,25 +222,25 @@ class Coupling(Module):
         gap, whole = gap_of(normal, forces, free, response)
         factor = DenseFactor.of(whole)
         converged = is_found(*map(jax.lax.stop_gradient, (gap, forces, whole)))
-        forces = jnp.where(converged, forces + factor.solve(gap), jnp.nan)  # the last step has the derivatives of all
+        forces = jnp.where(converged, forces + factor.solve(gap), jnp.nan)  # the last step carries all derivatives
         return cls(response, factor), with_friction(forces, free, response), forces
 
     def solved(self, free: Float[Numbers, "row batch"], lower: NormalForces) -> tuple[Any, NormalForces]:
-        """Return coefficients of multipliers and normal forces of an order.
+        """Return the coefficients of multipliers and normal forces of an order.
 
         Parameters
         ----------
         free : array of shape (rows, batch)
-            Of the multipliers, without the normal forces of this order.
+            Coefficients of the multipliers without the normal forces of this order.
         lower : array of shape (joints, batch)
-            Of the normal forces that these multipliers have.
+            Coefficients of the normal forces for these multipliers.
         """
         forces = self.factor.solve(lower)
         return free - jnp.sum(self.response * forces[:, None], axis=0), forces
 
 
 def _is_regular_from_none(matrix: Float[Numbers, "joint joint batch"]) -> Any:
-    """Return where the matrix of normal forces keeps its sign as friction grows from none, (batch,)."""
+    """Return whether the determinant of the matrix of normal forces stays positive as friction grows, (batch,)."""
     size, _, lanes = matrix.shape
     unit = jnp.eye(size)[..., None]
     shares = jnp.concatenate([unit + share * (matrix - unit) for share in SHARES], axis=-1)

@@ -1,13 +1,13 @@
-"""How much friction at rest can do at most, for and against what holds a mechanism.
+"""Bounds of static friction: the largest contribution of friction to a holding force.
 
-At rest friction is any within its cone: in each joint the force f along its slip, no larger than ``mu |p|``, p being
-what presses its surfaces. That follows from the friction of all joints, ``p = p_0 - S f``, and what holds the mechanism
-from ``k f``. The set of such f is not convex, as a joint may be pressed either way.
+At rest the friction force f of a joint lies anywhere in its cone: along the slip directions, no larger than ``mu |p|``
+with the normal force p. Normal forces depend on the friction of all joints, ``p = p_0 - S f``, and the contribution to
+the holding force is ``k f``. The set of such f is not convex, as a joint may be pressed either way.
 
-Where every slip has one direction, the most of ``k f`` is at a vertex, where all joints have all of their friction:
-with any of them short of it, what is left is a convex function of the others, whose largest value is at an end. What is
-a vertex follows from the signs of the friction; those of the largest are mostly found by going from one to a better
-one. That none is better is proven by a Lagrangian that is concave, or else by looking at all of them.
+If every joint slips in one direction, ``k f`` is largest at a vertex, where the friction of all joints is full: as a
+function of the friction of one joint, the others being full, the contribution is convex and largest at an end. The
+signs of the friction determine a vertex. Going from a vertex to a better one mostly finds the best one. A concave
+Lagrangian proves that none is better; otherwise all vertices are compared.
 """
 
 import itertools
@@ -23,21 +23,21 @@ from jounce.dynamics.friction.coupling import Coupling
 from jounce.execution.chunks import in_chunks
 from jounce.execution.compilation import compiled
 
-IMPROVEMENTS = 100  # of the directions of friction, one after the other
-ALL_SIGNS = 12  # joints: as many have 4096 combinations of signs
-STARTS = 64  # of searches, where directions are not signs
-LOADS = 4  # of chance, where nothing presses the joints
-HALVINGS = 45  # of the share of friction at which it locks
-LOCKED = 1e12  # times what presses without friction: as large only by rounding where friction locks
-LARGE = 1e6  # times the size of friction without locking
+IMPROVEMENTS = 100  # largest number of iterations of the directions of friction
+ALL_SIGNS = 12  # joints for which all signs are compared: 4096 combinations
+STARTS = 64  # random starts of searches, where directions are not only signs
+LOADS = 4  # random loads, where no normal force acts without friction
+HALVINGS = 45  # bisections for the share of friction at which it locks
+LOCKED = 1e12  # times the normal force without friction: only rounding gives more, where friction locks
+LARGE = 1e6  # times the friction without locking: counts as infinite
 CONCAVE = 1e-11  # of the largest curvature: less is rounding
-ALONG = 1e-8  # rad, within which friction has the direction that does most
-SMALLEST = 1e-150  # N: what presses less does not press
+ALONG = 1e-8  # rad: tolerance of the optimal direction of friction
+SMALLEST = 1e-150  # N: smaller normal forces count as zero
 
 
 @compiled(brief=True)
 def _pressed(pressing: Numbers, columns: Numbers) -> tuple[Any, Any]:
-    """Return what presses joints and its size, where each has all of its friction, whose columns are given."""
+    """Return the normal forces of joints and their sizes for full friction, given by its columns."""
     joints, components, lanes = pressing.shape
 
     def sizes(rows: Any) -> Any:
@@ -49,18 +49,18 @@ def _pressed(pressing: Numbers, columns: Numbers) -> tuple[Any, Any]:
 
 
 class ExtremeFriction:
-    """The friction that joints of a mechanism at rest can have, at some instants.
+    """The possible static friction in the joints of a mechanism, at several instants.
 
     Parameters
     ----------
     pressing : array of shape (joints, components, instants)
-        What presses the surfaces of each joint together without friction, N.
+        Normal force of each joint without friction, N.
     changes : array of shape (directions, joints, components, instants)
-        By how much that is less for friction of one in each direction of slip.
+        Decrease of the normal forces for unit friction in each slip direction.
     joints : sequence of int
-        The joint of each direction, in their order.
+        Joint of each slip direction, in ascending order.
     coefficients : array of shape (joints,)
-        Of friction.
+        Friction coefficients.
     """
 
     def __init__(
@@ -80,17 +80,17 @@ class ExtremeFriction:
     def most(
         self, along: Float[np.ndarray, "direction lane"]
     ) -> tuple[Float[np.ndarray, " lane"], Bool[np.ndarray, " lane"]]:
-        """Return the most that friction does along a direction, and whether that is proven.
+        """Return the largest contribution of friction to a quantity, and whether it is proven to be the largest.
 
         Parameters
         ----------
         along : array of shape (directions, instants)
-            What friction of one in each direction adds to what is requested.
+            Contribution of unit friction in each slip direction.
 
         Returns
         -------
         most : array of shape (instants,)
-            Infinite where friction locks, so that friction has no bound; NaN where it is not determined.
+            Infinite where friction locks and has no bound; NaN where it is not determined.
         proven : array of bool, shape (instants,)
         """
         along = along[self._given]
@@ -105,7 +105,7 @@ class ExtremeFriction:
         return value, proven
 
     def _locks_unloaded(self, along: np.ndarray, lane: int) -> bool:
-        """Return whether friction without a normal force locks: whether it does so under some loads."""
+        """Return whether friction of unloaded joints locks, as it does under any of several random loads."""
         loads = np.random.default_rng(0).normal(size=(*self.pressing.shape[:2], LOADS))
         loads = np.concatenate([loads, -loads], axis=-1)
         changes = np.repeat(self.changes[..., lane : lane + 1], 2 * LOADS, axis=-1)
@@ -119,7 +119,7 @@ class ExtremeFriction:
         return sums
 
     def _directions_of(self, along: np.ndarray, otherwise: np.ndarray) -> np.ndarray:
-        """Return unit vectors along, for each joint; where nothing is along, as otherwise given."""
+        """Return the unit vector of `along` for each joint, or that of `otherwise` where `along` is zero."""
         size = np.sqrt(self._blocks(along**2))[self.joints]
         others = otherwise / np.sqrt(self._blocks(otherwise**2))[self.joints]
         largest = size.max(axis=0, initial=0.0)
@@ -127,7 +127,7 @@ class ExtremeFriction:
         return np.where(clear, along / np.where(clear, size, 1.0), others)
 
     def _held(self, directions: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return what presses joints, its size, and the friction, where all of it is along some directions."""
+        """Return the normal forces, their sizes, and the friction, for full friction along given directions."""
         joints, components, lanes = self.pressing.shape
         most = self.coefficients[self.joints][:, None] * directions
         columns = np.zeros((joints, joints, components, lanes))
@@ -138,7 +138,7 @@ class ExtremeFriction:
         return pressing, sizes, most * sizes[self.joints]
 
     def _improved(self, directions: np.ndarray, along: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return directions that do more, what they do, and whether nothing does more."""
+        """Return improved directions of friction, their contribution, and whether it is proven to be the largest."""
         for _ in range(IMPROVEMENTS):
             gain, sizes, regular = self._gain(directions, along)
             better = np.where(regular, self._directions_of(gain, directions), directions)
@@ -152,7 +152,9 @@ class ExtremeFriction:
         return directions, np.sum(along * self._held(directions)[2], axis=0), proven
 
     def _gain(self, directions: np.ndarray, along: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return what more friction in each direction does, with all that it changes; what presses; and where known."""
+        """Return the total derivative of the contribution by the friction in each direction, the normal forces, and
+        whether both are regular.
+        """
         pressing, sizes, _ = self._held(directions)
         known = np.isfinite(sizes).all(axis=0)
         pressing, sizes = np.where(known, pressing, 0.0), np.where(known, sizes, 0.0)
@@ -165,7 +167,7 @@ class ExtremeFriction:
         return np.linalg.solve(matrix.transpose(2, 1, 0), right.T[..., None])[..., 0].T, sizes, regular
 
     def _is_concave(self, gain: np.ndarray, sizes: np.ndarray, regular: np.ndarray) -> np.ndarray:
-        """Tell whether the Lagrangian of the squared cones is concave, so that what is stationary is the most."""
+        """Return whether the Lagrangian with squared cones is concave, so that a stationary point is the maximum."""
         least = self.coefficients[:, None] * np.maximum(sizes, SMALLEST)
         weights = np.where(regular, np.sqrt(self._blocks(gain**2)) / (2 * least), 0.0)
         curved = np.einsum("jl,j,djcl,ejcl->lde", weights, self.coefficients**2, self.changes, self.changes)
@@ -175,7 +177,7 @@ class ExtremeFriction:
         return fit & (lowest >= -CONCAVE * weights.max(axis=0, initial=0.0))
 
     def _searched(self, lane: int, along: np.ndarray, chosen: np.ndarray) -> tuple[float, bool]:
-        """Return the most that friction does at an instant, by looking at all signs, or from many directions."""
+        """Return the largest contribution at an instant by comparing all signs, or by a search from many directions."""
         if not np.isfinite(along).all():
             return np.nan, True
         count = len(self.joints)
@@ -199,7 +201,7 @@ class ExtremeFriction:
         return (np.nan, False) if np.isnan(value).any() else (float(value.max()), every)
 
     def _at_lock(self, directions: np.ndarray, along: np.ndarray) -> np.ndarray:
-        """Return where what friction does goes as its share grows to where it locks: to infinity, or NaN."""
+        """Return the limit of the contribution as friction grows until it locks: infinite with its sign, or NaN."""
         share, locked = np.zeros(along.shape[1]), np.ones(along.shape[1])
         value = np.zeros(along.shape[1])
         for _ in range(HALVINGS):

@@ -1,8 +1,8 @@
-"""Friction where a motion follows from forces: what it adds to the equations of motion, and their solution with it.
+"""Friction in forward dynamics: its terms in the equations of motion, and their solution.
 
-Teeth press bearings, too. What a tooth force adds to the torque that the residual of gears exerts moves nothing: a part
-in proportion to the multiplier of the gears, and one in proportion to its absolute value. Both count as normal forces:
-in the place of ``N = |R(lambda)|`` they are ``N = lambda`` and ``N = |lambda|``.
+Teeth press bearings, too. Beyond the torque of the residual of gears, a tooth force has two parts that do no work: one
+proportional to the multiplier of the gears, and one proportional to its absolute value. Both count as normal forces,
+with ``N = lambda`` and ``N = |lambda|`` instead of ``N = |R(lambda)|``.
 """
 
 from collections.abc import Callable
@@ -38,11 +38,11 @@ class FreeFriction:
     Parameters
     ----------
     system : System
-        The mechanism.
+        System of the mechanism.
     pose : SpatialPose or PlanarPose
-        Of all bodies, the ground first, of order one.
+        Poses of all bodies, the ground first, of order one.
     time : Jet
-        Of order zero, shape (1, batch).
+        Time of order zero, shape (1, batch).
     """
 
     def __init__(self, system: System, pose: Pose, time: Jet):
@@ -52,7 +52,7 @@ class FreeFriction:
 
     @property
     def count(self) -> int:
-        """How many normal forces there are, of joints and of teeth."""
+        """Number of normal forces of joints and teeth."""
         return sum(group.instances for group in self.groups) + 2 * sum(group.instances for group in self.meshes)
 
     @cached_property
@@ -60,9 +60,7 @@ class FreeFriction:
         return movable(self.pose.truncate(0))
 
     def normal_forces(self, multipliers: Rows) -> Float[Numbers, "joint batch"]:
-        """Return what presses the surfaces of all joints with friction together, and teeth, from multipliers of scaled
-        rows.
-        """
+        """Return the normal forces of joints with friction, then of teeth, from multipliers of scaled rows."""
         unscaled, normals, teeth, first = multipliers * self.system.row_scale, [], [], 0
         for group in self.system.groups:
             bodies = tuple(self._at_rest.take(indices) for indices in group.bodies)
@@ -96,9 +94,9 @@ class FreeFriction:
         return pressed(group.element, bodies, Jet([force])).coefficients[0]
 
     def slips(self, change: Pose) -> list[Any]:
-        """Return by how much the surfaces of each group slip on each other as all bodies are displaced by a change.
+        """Return the slip of the surfaces of each group for a displacement of all bodies.
 
-        For teeth, return how far those part that do not turn.
+        For teeth, return the displacements conjugate to the parts of the tooth force that do no work.
         """
         slips = []
         for group in self.groups:
@@ -107,7 +105,7 @@ class FreeFriction:
         return slips + [self._parted(group, change) for group in self.meshes]
 
     def _parted(self, group: Group, change: Pose) -> Any:
-        """Return what a tooth force acts along besides the residual of gears, as the multiplier and as its size."""
+        """Return the displacements conjugate to the parts of a tooth force that follow the multiplier and its size."""
         of_residual, one, other = (
             each.variation(self._at_rest, change, self.time).coefficients[0]
             for each in (group, with_field(group, "flank", 1.0), with_field(group, "flank", -1.0))
@@ -115,7 +113,7 @@ class FreeFriction:
         return jnp.concatenate([(one + other) / 2.0 - of_residual, (one - other) / 2.0])
 
     def resisting(self, normal: Float[Numbers, "joint batch"]) -> list[Any]:
-        """Return what resists the slip of each group, conjugate to `slips`, for normal forces of all joints."""
+        """Return the friction forces of each group, conjugate to `slips`, for normal forces of all joints."""
         forces, first = [], 0
         for group in self.groups:
             factor = self._resisting(group).coefficients[0]
@@ -133,18 +131,18 @@ def with_friction(
     friction: FreeFriction,
     felt: Callable[[Any], Any],
 ) -> tuple[Any, Any, Callable[[Any, Any], tuple[Any, Any]]]:
-    """Return accelerations and multipliers with friction, and what solves for those of higher orders.
+    """Return accelerations and multipliers with friction, and the solver for their higher orders.
 
     Parameters
     ----------
     unknowns : callable
-        Solves the equations without friction for what `Equations.balance` returns.
+        Solver of the frictionless equations for the residuals of `Equations.balance`.
     free : tuple of array
         Accelerations and multipliers without friction.
     friction : FreeFriction
-        Of the mechanism.
+        Friction of the mechanism.
     felt : callable
-        Returns what bodies feel of normal forces, as `Equations.balance` has forces.
+        Function from normal forces to generalized forces on the bodies, as in `Equations.balance`.
     """
     acceleration, multipliers = free
     count, lanes = friction.count, multipliers.shape[-1]
@@ -163,5 +161,5 @@ def with_friction(
 
 
 def _along(columns: Any, weights: Any) -> Any:
-    """Return the sum of columns, (joints, ..., batch), by weights, (joints, batch)."""
+    """Return the sum of columns, (joints, ..., batch), with weights, (joints, batch)."""
     return jnp.sum(columns * weights.reshape(len(weights), *[1] * (columns.ndim - 2), -1), axis=0)

@@ -1,4 +1,4 @@
-"""The equations of a mechanism as numbers: residual, Jacobian, right sides, multipliers. Sommer 2024, 1-8.
+"""The equations of a mechanism as arrays: residual, Jacobian, right-hand sides, multipliers. Sommer 2024, 1-8.
 
 They come from the same residuals on jets as those of the solver, but in SI units and in the order of the file; the
 solver scales rows and columns, and groups joints by type.
@@ -194,7 +194,7 @@ def in_si_units(model: Model) -> System:
 
 
 def _numbers(motion: Motion, order: int) -> dict[str, np.ndarray]:
-    """Return residual, Jacobian and right sides at all instants, the time first."""
+    """Return residual, Jacobian and right-hand sides at all instants, the time first."""
     pose_type, coordinates = motion.poses
     plain = in_si_units(motion.model)
 
@@ -211,13 +211,13 @@ def _numbers(motion: Motion, order: int) -> dict[str, np.ndarray]:
 
 
 def _without_unknowns(coordinates: Coordinates, order: int) -> Coordinates:
-    """Return copies of the coordinates along the batch: in the k-th copy those of order k are zero."""
+    """Return copies of the coordinates along the batch; the k-th copy has zero coefficients of order k."""
     elements = {}
     for name, values in coordinates.items():
-        first = name == "angular_velocity"  # its coefficients are those of rates
+        first = name == "angular_velocity"  # its coefficients begin with the rate
         levels = list(values[: order + 1 - first])
         levels += [jnp.zeros(values.shape[1:])] * (order + 1 - first - len(levels))
-        unknown = name != "quaternion"  # the attitude follows from where it is and from how it turns
+        unknown = name != "quaternion"  # the attitude follows from its value and the angular velocity
         copies = [
             [jnp.zeros_like(level) if unknown and k + first == copy else level for copy in range(1, order + 1)]
             for k, level in enumerate(levels)
@@ -244,10 +244,10 @@ def _position_equations(
 def right_sides(
     system: System, bodies: Coordinates, instants: Lanes, pose_type: type[Pose]
 ) -> Float[Numbers, "derivative row instant"]:
-    """Return the right sides, from states in which the coefficient of the respective order is zero.
+    """Return the right-hand sides, from states in which the coefficient of the respective order is zero.
 
     The coefficient of order k of the residual is affine in that of the coordinates, and the Jacobian is its slope. Its
-    value for a coefficient of zero is minus the right side divided by k!.
+    value for a coefficient of zero is minus the right-hand side divided by k!.
     """
     order = len(bodies["position"]) - 1
     residual = system.residual(pose_of(bodies, pose_type, order), Jet.variable(instants[None], order)).dense()
@@ -312,7 +312,7 @@ def _forces(motion: Motion, jacobian: Float[np.ndarray, "time row column"]) -> d
 def _determined(
     motion: Motion, jacobian: Float[np.ndarray, "row column"], mass: Float[np.ndarray, "column column"]
 ) -> bool:
-    """Tell whether the multipliers are determined at a state; those of a motion always are."""
+    """Return whether the equations determine the multipliers at a state; for a motion they always do."""
     scale = np.tile(motion.model.system.column_scale, len(motion.mechanism.bodies))
     sizes = np.max(np.abs(jacobian * scale), axis=1, keepdims=True)
     whole = jacobian * scale / np.where(sizes > 0, sizes, 1.0)

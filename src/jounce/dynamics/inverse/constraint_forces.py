@@ -1,9 +1,9 @@
-"""Forces of constraints and their rates: Lagrange multipliers from the transposed factor, to any order.
+"""Constraint forces and their rates: Lagrange multipliers by the transposed factor of the Jacobian, to any order.
 
-The equations of motion ``M q'' + Phi_q^T lambda = Q`` are a balance of jets. With the motion known, each coefficient of
-the multipliers follows from the factored Jacobian of the positions, transposed; where the motion is free in some
-directions, from the matrix of masses and Jacobian together. The jets of the Jacobian are how the residuals change with
-virtual displacements of the bodies: none is written anywhere, and a joint of one's own has its reactions.
+The equations of motion ``M q'' + Phi_q^T lambda = Q`` are a balance of jets. For a known motion, each coefficient of
+the multipliers follows from the transposed factor of the Jacobian; if the motion has free directions, from the
+saddle-point matrix of masses and Jacobian. The jets of the Jacobian are derivatives of the residuals with respect to
+virtual displacements of the bodies. No Jacobian is written by hand, so user-defined joints have reactions, too.
 """
 
 from collections.abc import Callable, Sequence
@@ -36,7 +36,7 @@ from jounce.rigid.pose import Pose
 from jounce.trajectory import AbstractMotion
 
 Slopes = Sequence[Sequence[Float[Numbers, "order coordinate _ _ batch"]]]
-"""For each group, those of each of its moving slots."""
+"""For each group, the slopes of each of its moving slots."""
 
 Multipliers = Float[Numbers, "order row instance batch"]
 """Taylor coefficients of the multipliers of a group."""
@@ -48,27 +48,27 @@ def work_along(
     level: int,
     lowest: int = 0,
 ) -> Float[Numbers, "coordinate instance batch"]:
-    """Return the Taylor coefficient of what multipliers do along the coordinates of the bodies: slope times them.
+    """Return the Taylor coefficient of the generalized forces of multipliers: the product of slope and multipliers.
 
     Parameters
     ----------
     slope : array of shape (levels, coordinates, rows, instances, batch)
-        As `slopes` gives it.
+        Slope, as `slopes` returns it.
     forces : array of shape (levels, rows, instances, batch)
         Coefficients of the multipliers.
     level : int
-        Which coefficient of the product.
+        Index of the coefficient of the product.
     lowest : int
-        The coefficients of the slope below this one are left out.
+        Index of the first coefficient of the slope that is included.
     """
     return total(jnp.sum(slope[j] * forces[level - j][None], axis=1) for j in range(lowest, level + 1))
 
 
 def balancing(mass: MassMatrix | None, jacobian: Jacobian) -> Callable[[Column], Float[Numbers, "row batch"]]:
-    """Return what solves for the multipliers that balance loads.
+    """Return the solver for the multipliers that balance loads.
 
-    Where there is no mass matrix, the Jacobian is square and balances all; with one, what accelerates the bodies freely
-    is left out.
+    Without a mass matrix, the Jacobian must be square, and the multipliers balance the whole load. With one, the part
+    of the load that accelerates the bodies freely is left out.
     """
     if mass is None:
         factor = DenseFactor.of(jax.lax.stop_gradient(jacobian))
@@ -85,29 +85,29 @@ def multipliers(
     load: Float[Numbers, "levels coordinate body batch"],
     mass: BodyMatrices | None = None,
 ) -> Float[Numbers, "levels row batch"]:
-    """Return the multipliers of all rows, not scaled, as Taylor coefficients.
+    """Return the Taylor coefficients of the multipliers of all rows, unscaled.
 
     Parameters
     ----------
     system : System
-        The mechanism.
+        System of the mechanism.
     blocks : sequence of sequence of array
         For each group, `slopes` for each of its moving slots.
     load : array of shape (levels, coordinates of a body, bodies, batch)
-        What the constraints have to balance, without the ground.
+        Load on the constraints, without the ground.
     mass : array of shape (coordinates, coordinates, bodies, batch), optional
-        As `mass_matrices` gives them, without the ground; for mechanisms that are not driven in all directions.
+        Mass matrices, as `mass_matrices` returns them, without the ground; for mechanisms with free directions.
     """
     if not blocks:
         return jnp.zeros((load.shape[0], 0, load.shape[-1]))
     solve, count = load_solver(system, blocks, mass), len(load)
 
     def level(latest: Any, level_and_load: Any) -> tuple[Any, Any]:
-        """Find the next coefficient from those found, the latest first and zero before the lowest."""
+        """Return the coefficients with the next one: the latest first, zeros before the lowest."""
         k, missing = level_and_load
         for group, parts, forces in by_group(system, blocks, latest):
             for slot, slope in zip(group.moving_slots, parts, strict=True):
-                # what the order k does not need may not be finite
+                # coefficients that order k does not need may not be finite
                 needed = [jnp.where(j <= k, slope[j], 0.0) for j in range(1, count)]
                 work = total(jnp.sum(c * f[None], axis=1) for c, f in zip(needed, forces, strict=True))
                 missing -= onto_bodies(work, group.bodies[slot], system.body_count)
@@ -121,9 +121,7 @@ def multipliers(
 def load_solver(
     system: System, blocks: Slopes, mass: BodyMatrices | None
 ) -> Callable[[Float[Numbers, "coordinate body batch"]], Float[Numbers, "row batch"]]:
-    """Return what finds the multipliers, not scaled, that balance a load, all of an order and given as `multipliers`
-    has them.
-    """
+    """Return the solver for unscaled multipliers that balance a load, both of one order and as in `multipliers`."""
     solve, scale = _solver(system, blocks, mass), jnp.asarray(system.column_scale)
     return lambda load: solve(as_column(load, scale)) * system.row_scale
 
@@ -138,11 +136,11 @@ def _solver(system: System, blocks: Slopes, mass: BodyMatrices | None) -> Callab
     if mass is None:
         return balancing(None, jacobian)
     whole = block_diagonal(mass, jnp.asarray(system.column_scale))
-    return balancing(whole / jnp.max(jnp.abs(whole)), jacobian)  # their size does not matter to the multipliers
+    return balancing(whole / jnp.max(jnp.abs(whole)), jacobian)  # multipliers do not depend on its scale
 
 
 def _transposed(system: System, entries: Float[Numbers, "entry batch"], rows: Any) -> Any:
-    """Return the products of the transposed matrices with these entries, in scaled rows."""
+    """Return the products of the transposed, row-scaled matrices, given by their entries, with a vector of rows."""
 
     def product(columns: Any) -> Any:
         return system.pattern.product(entries, columns) * system.row_scale
@@ -162,7 +160,7 @@ def _entries(system: System, blocks: Slopes) -> Float[Numbers, "entry batch"]:
 
 
 def by_group(system: System, blocks: Slopes, latest: list[Float[Numbers, "row batch"]]) -> list[Any]:
-    """Return groups with their blocks and those of the multipliers found so far, each (rows, instances, batch)."""
+    """Return the groups with their blocks and their latest multipliers, each (rows, instances, batch)."""
     if not latest:
         return []
     results, first = [], 0
@@ -177,12 +175,12 @@ def by_group(system: System, blocks: Slopes, latest: list[Float[Numbers, "row ba
 def onto_bodies(
     work: Float[Numbers, "coordinate instance batch"], bodies: tuple[int, ...], count: int
 ) -> Float[Numbers, "coordinate {count} batch"]:
-    """Return what acts on each moving body from what acts on the bodies of the instances."""
+    """Return the generalized forces on each moving body, summed over the instances of a group."""
     return jnp.zeros((work.shape[0], count + 1, work.shape[-1])).at[:, np.array(bodies)].add(work)[:, 1:]
 
 
 class _Shifted(AbstractMotion):
-    """A law moved by a constant: the change of the residual with it gives the force of the driver."""
+    """A law with a constant added, whose derivative of the residual gives the driver force."""
 
     law: Callable[[Jet], Jet]
     shift: Any
@@ -198,16 +196,16 @@ def _as_measured(value: Jet, _: Jet) -> Jet:
 def exerted(
     driver: Any, poses: Sequence[Pose], time: Jet, forces: Multipliers
 ) -> Float[Numbers, "order instance batch"]:
-    """Return the forces that drivers exert along what they prescribe, with rates.
+    """Return the forces of drivers along their prescribed coordinates, with rates.
 
-    Conjugate to the law f: ``lambda^T dPhi/df``, whose product with f' is the power that goes into the mechanism.
+    The force conjugate to the law f is ``lambda^T dPhi/df``; its product with f' is the power put into the mechanism.
 
     Parameters
     ----------
     driver : AbstractConstraint
-        Its values have shape (..., instances, 1). Where its law is left out, the poses give its value.
+        Drivers, with values of shape (..., instances, 1). If their law is omitted, the poses give its value.
     poses, time
-        As `slopes` takes them.
+        As for `slopes`.
     forces : array of shape (levels, rows, instances, batch)
         Coefficients of the multipliers; the order of the poses is one less than the levels.
     """
@@ -225,5 +223,5 @@ def exerted(
 
 
 def wrench(slope: Slope, forces: Multipliers) -> Float[Numbers, "order coordinate instance batch"]:
-    """Return what joints do to the bodies of one slot: global force, and moment about its origin in its axes."""
+    """Return the wrenches of joints on the bodies in a slot: global force, and moment about the origin in body axes."""
     return jnp.stack([-work_along(slope, forces, k) for k in range(len(forces))])

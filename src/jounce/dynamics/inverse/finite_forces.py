@@ -20,7 +20,7 @@ def check_finite_values(forces: Any, values: Numbers, name: str | None = None) -
     values : array of shape (levels, ..., time)
         Taylor coefficients.
     name : str, optional
-        Name of the force; that of an applied force that is not finite there unless given.
+        Name of the force; by default that of the applied force that is not finite.
     """
     if forces.motion.traced:
         return
@@ -43,7 +43,7 @@ def check_finite_values(forces: Any, values: Numbers, name: str | None = None) -
 
 
 def check_finite_forces(forces: Any, finite: Any) -> None:
-    """Raise MechanismError for the first instant that was solved and at which an applied force is not finite."""
+    """Raise MechanismError for the first solved instant at which an applied force is not finite."""
     if forces.motion.traced:
         return
     bad = np.argwhere((~np.asarray(finite) & (forces.motion.status == Status.OK)).T)

@@ -35,7 +35,7 @@ from jounce.rigid.spatial import SpatialPose
 SMALL, ALL = 16, 10_000  # numbers of the largest array that is single values in the machine code of a balance
 MOST_COLUMNS = 48  # coordinates of a mechanism in space for which all arrays are single values
 SMALL_CHUNK = 16  # number of instants whose dense matrices are factored together
-Acting = tuple[Sequence[Coordinates], Sequence[Any]]  # the poses of bodies, and the angles about axes between them
+Acting = tuple[Sequence[Coordinates], Sequence[Any]]  # poses of bodies, and the angles about axes between them
 
 
 def element_slopes(
@@ -74,8 +74,8 @@ def resisted(element: Any, poses: Sequence[Coordinates], *, pose_type: type[Pose
 def responses(system: System, lanes: tuple[Coordinates, Any, Lanes, Any], *, pose_type: type[Pose]) -> Any:
     """Return the multipliers that balance each of several loads, (loads, rows, time), in a fully driven system.
 
-    For the instant are given the coordinates of all bodies, the loaded tooth flanks, the time, and the loads, of shape
-    (loads, coordinates, bodies, batch).
+    `lanes` has the coordinates of all bodies, the loaded tooth flanks, the time, and the loads, of shape (loads,
+    coordinates, bodies, batch).
     """
     bodies, flanks, instants, loads = lanes
     groups = with_flanks(system.groups, flanks)
@@ -99,8 +99,8 @@ def pressing(
 ) -> Any:
     """Return the normal forces of joints with friction, (components, instances, time), at order zero.
 
-    For gears, return the torque that they transmit. For the instant are given the poses of the bodies, the time, the
-    loaded tooth flanks or None, and the multipliers of their rows.
+    For gears, return the transmitted torque. `lanes` has the poses of the bodies, the time, the loaded tooth flanks or
+    None, and the multipliers of the rows of the joints.
     """
     poses, instants, flank, forces = lanes
     if loses_torque(element):
@@ -114,10 +114,10 @@ def pressing(
 
 
 def largest_array(model: Model) -> int:
-    """Return of how many numbers an array may be single values in the machine code of a balance; larger ones are loops.
+    """Return the largest array size that the machine code of a balance unrolls; larger arrays are loops.
 
-    In space, most changes of a residual with a displacement are zero for certain: single values leave them out. Dense
-    matrices take loops: those of redundant rows, and those with masses where a motion is free.
+    In space, most derivatives of residuals are known zeros, which unrolled code skips. Dense matrices take loops: those
+    of redundant rows, and those with masses for free motions.
     """
     rows, columns = model.system.shape
     few = model.pose_type is SpatialPose and columns <= MOST_COLUMNS
@@ -126,9 +126,9 @@ def largest_array(model: Model) -> int:
 
 @Mapped
 def balanced(shared: Any, lanes: Any, *, pose_type: type[Pose]) -> tuple[Any, Any]:
-    """Return the multipliers of an instant for several cases, and normal forces, and which applied forces are finite.
+    """Return the multipliers and normal forces of an instant for several cases, and which applied forces are finite.
 
-    The multipliers are Taylor coefficients, (cases, levels, rows, time).
+    The multipliers are Taylor coefficients, (cases, levels, rows, time), with those of the normal forces below them.
 
     Parameters
     ----------
@@ -136,8 +136,7 @@ def balanced(shared: Any, lanes: Any, *, pose_type: type[Pose]) -> tuple[Any, An
         The system, the system of its forces alone, masses and gravity. If rows are redundant, also the arguments of
         `_least_multipliers` other than the load; otherwise None, and there is one case.
     lanes : tuple
-        For the instant: the coordinates of all bodies, the angles about axes that forces measure, the loaded tooth
-        flanks, and the time.
+        Coordinates of all bodies, the angles about axes that forces measure, the loaded tooth flanks, and the time.
     pose_type
         Type of the poses.
     """
@@ -246,8 +245,8 @@ def joint_wrench(
     element : AbstractConstraint
         The joints.
     lanes : tuple
-        For the instant: the poses of their bodies, the time, the loaded tooth flanks or None, the multipliers of their
-        rows, and of joints with friction the poses to one order more and the normal forces, else None.
+        Poses of the bodies, the time, the loaded tooth flanks or None, the multipliers of the rows of the joints, and
+        for joints with friction the poses to one more order and the normal forces, otherwise None.
     pose_type, slot, levels
         Type of the poses, the slot of the body, and the number of Taylor coefficients.
     """
@@ -277,7 +276,7 @@ def force_wrench(
         changes = (*unchanged[:slot], change, *unchanged[slot + 1 :])
         return stacked(with_rows(element.variation(built, changes, time)))
 
-    return constraint_forces.wrench(along_displacements(built[slot], displaced), -sizes)  # a residual is held against
+    return constraint_forces.wrench(along_displacements(built[slot], displaced), -sizes)  # opposite to a multiplier
 
 
 @Mapped

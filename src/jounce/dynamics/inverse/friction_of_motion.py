@@ -1,4 +1,4 @@
-"""Friction in a motion that is known: multipliers and normal forces together, order after order."""
+"""Friction in inverse dynamics: multipliers and normal forces together, order after order."""
 
 from collections.abc import Callable, Sequence
 from typing import Any
@@ -19,8 +19,8 @@ from jounce.mechanism.system import Group, System
 from jounce.rigid.pose import Pose
 
 Rubbed = tuple[Sequence[Float[Numbers, "order coordinate _ _ batch"]], Sequence[Pose], Any]
-"""Of a group of joints with friction: `friction_slope` for each moving slot, where the bodies are, and of gears which
-part of the torque lost resists, (levels, 1, instances, batch); None of others.
+"""For a group of joints with friction: `friction_slope` for each moving slot, the poses of the bodies, and for gears
+the resisting part of the torque loss, (levels, 1, instances, batch), otherwise None.
 """
 
 
@@ -30,17 +30,17 @@ class FrictionGroup(Module):
     Parameters
     ----------
     group : Group
-        Of the joints.
+        The joints.
     poses : sequence of SpatialPose or PlanarPose
-        Of their bodies, (..., instances, batch).
+        Poses of their bodies, (..., instances, batch).
     slopes : sequence of array
-        Of their residuals, for each moving slot.
+        Slopes of their residuals, for each moving slot.
     friction : sequence of array
-        As `friction_slope` gives it, for each moving slot.
+        Slopes from `friction_slope`, for each moving slot.
     resisting : array of shape (levels, 1, instances, batch), or None
-        Of gears, which part of the torque lost is against their turning.
+        For gears, the resisting part of the torque loss.
     first : int
-        The first row of the group.
+        First row of the group.
     """
 
     group: Group
@@ -51,7 +51,7 @@ class FrictionGroup(Module):
     first: int = field(static=True)
 
     def normal_forces(self, multipliers: Sequence[Any]) -> Float[Numbers, "order instance batch"]:
-        """Return the normal forces of multipliers of all rows, given by Taylor coefficients, (rows, batch)."""
+        """Return the Taylor coefficients of the normal forces from those of all multipliers, (rows, batch) each."""
         sign = -1.0 if self.group.moving_slots[-1] else 1.0
         slope = self.slopes[-1][:, : self.poses[0].shifts]
         _, _, rows, instances, lanes = slope.shape
@@ -82,12 +82,12 @@ def with_friction(
     mass: BodyMatrices | None,
     rubbing: Sequence[FrictionGroup],
 ) -> Float[Numbers, "levels row batch"]:
-    """Return the multipliers of all rows, not scaled, and below them the normal forces, as Taylor coefficients.
+    """Return the Taylor coefficients of the unscaled multipliers of all rows, and below them of the normal forces.
 
     Parameters
     ----------
     system, blocks, load, mass
-        As `constraint_forces.multipliers` takes them.
+        As for `constraint_forces.multipliers`.
     rubbing : sequence of FrictionGroup
         All joints with friction.
     """
@@ -97,7 +97,7 @@ def with_friction(
     joints = [its.group.instances for its in rubbing]
 
     def on_bodies(level: Callable[[Slope, Any], Any], parts: Sequence[Any], forces: Any) -> Any:
-        """Return what forces of all rows do to bodies, by what a level of slopes makes of them."""
+        """Return the generalized forces of all rows on the bodies; `level` multiplies a slope by the forces."""
         done, first = 0.0, 0
         for by_slot in parts:
             _, _, count, instances, lanes = by_slot[0][0].shape
@@ -123,10 +123,10 @@ def with_friction(
 
     def level(coefficients: Any, order_and_load: Any) -> tuple[Any, None]:
         k, missing = order_and_load
-        earlier = coefficients[(k - below) % levels]  # those not computed yet are zero, also where the index runs round
+        earlier = coefficients[(k - below) % levels]  # zero if not computed yet, also where the index wraps
 
         def lower(slope: Slope, forces: Any) -> Any:
-            needed = jnp.where((below <= k).reshape(-1, 1, 1, 1, 1), slope[1:], 0.0)  # others may not be finite
+            needed = jnp.where((below <= k).reshape(-1, 1, 1, 1, 1), slope[1:], 0.0)  # the rest may not be finite
             return jnp.sum(needed * forces[:, None], axis=(0, 2))
 
         missing = missing - on_bodies(lower, felt, earlier[:, :rows]) - on_bodies(lower, resisted, earlier[:, rows:])

@@ -13,7 +13,7 @@ NOTHING = 1e-9  # of the largest multiplier: less is rounding
 
 
 def checked(forces: Any) -> Any:
-    """Return forces, or raise MechanismError where torques would spin a body about an axis that no joint holds.
+    """Return the forces, or raise MechanismError if torques would spin a body about an axis that no joint holds.
 
     Parameters
     ----------
@@ -44,7 +44,7 @@ def checked(forces: Any) -> Any:
 
 
 def _rate(forces: Any, solved: Numbers) -> float:
-    """Return how fast the motion changes, 1/s, from the sizes of its Taylor coefficients."""
+    """Return the rate of change of the motion, 1/s, from the sizes of its Taylor coefficients."""
     parts = {"position": forces.model.length, "angle": 1.0, "quaternion": 1.0}
     sizes = [
         np.nan_to_num(np.abs(forces.coordinates[name][1:, ..., solved])).reshape(forces.levels + 1, -1) / scale

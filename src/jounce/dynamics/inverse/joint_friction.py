@@ -63,16 +63,16 @@ class JointFriction:
 
     @property
     def coefficients(self) -> Float[np.ndarray, " joint"]:
-        """Coefficients of friction, of gears the mean share that they lose, of joints in the order of their groups."""
+        """Friction coefficients, for gears the mean share of torque loss, of joints in the order of their groups."""
         return self._of_joints(lambda gear: gear.losses[0], lambda friction: friction.coefficient)
 
     @property
     def differences(self) -> Float[np.ndarray, " joint"]:
-        """Half the difference of the shares that gears lose forward and backward; zero for other joints."""
+        """Half the difference of the forward and backward loss of gears; zero for other joints."""
         return self._of_joints(lambda gear: gear.losses[1], lambda _: 0.0)
 
     def _of_joints(self, of_gears: Callable[[Any], Any], of_others: Callable[[Any], Any]) -> np.ndarray:
-        """Return a value of the friction of each joint, in their order by their groups."""
+        """Return a value of the friction of each joint, in the order of their groups."""
         groups = [self.forces.joined.groups[k] for k in self.first_rows]
         values = [(of_gears if loses_torque(g.element) else of_others)(g.element.friction) for g in groups]
         pairs = zip(values, groups, strict=True)
@@ -125,7 +125,7 @@ class JointFriction:
     def pressing(self, multipliers: Float[Numbers, "row time"]) -> Float[np.ndarray, "joint component time"]:
         """Return the components of the normal force of each joint, N, at order zero, padded with zeros.
 
-        For gears, return the torque that they transmit, N m.
+        For gears, return the transmitted torque, N m.
         """
         forces = self.forces
 

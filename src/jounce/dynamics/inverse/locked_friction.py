@@ -1,4 +1,4 @@
-"""Where friction in a motion locks, and where its rates are not determined, by the names of joints."""
+"""Checks of joint friction in a motion: instants at which it locks, and at which its rates are not determined."""
 
 import copy
 from typing import Any
@@ -22,7 +22,7 @@ def friction_left_out(group: Group) -> Group:
 
 
 def check_not_locked(motion: Motion, system: System, multipliers: Float[Numbers, "order row time"]) -> None:
-    """Raise SolveError where no forces fulfill the laws of friction, with the motion, of the status LOCKED there."""
+    """Raise SolveError, with the motion marked LOCKED, if at some instants no forces satisfy the laws of friction."""
     names = [] if motion.traced else joints_with_friction(motion.model, system)
     if not names:
         return
@@ -39,7 +39,7 @@ def check_not_locked(motion: Motion, system: System, multipliers: Float[Numbers,
 
 
 def _locked_at(motion: Motion, locked: Bool[np.ndarray, " time"]) -> Motion:
-    """Return a motion with the status of instants at which friction locks."""
+    """Return a copy of the motion with the status LOCKED at given instants."""
     twin = copy.copy(motion)
     twin.__dict__.pop("dataset", None)
     twin.derived, twin._known_outputs = {}, {}
@@ -48,10 +48,10 @@ def _locked_at(motion: Motion, locked: Bool[np.ndarray, " time"]) -> Motion:
 
 
 def without_undetermined_rates(forces: Any, multipliers: Float[Numbers, "case order row time"]) -> Numbers:
-    """Return multipliers and normal forces with rates NaN where the force that presses a joint passes zero.
+    """Return multipliers and normal forces, with NaN rates where the force in a joint passes through zero.
 
-    Its magnitude has no derivative there. Where it is zero with all its rates, there is no friction, and its rates are
-    zero.
+    The magnitude of the force has no derivative at such an instant. Where the force and all its rates are zero, so are
+    friction and its rates.
 
     Parameters
     ----------
@@ -81,7 +81,7 @@ def without_undetermined_rates(forces: Any, multipliers: Float[Numbers, "case or
 
 
 def passing_words(forces: Any) -> str:
-    """Return words for instants where `without_undetermined_rates` leaves rates of friction open; empty if none."""
+    """Return a sentence on the instants at which rates of friction are not determined; empty if there are none."""
     phrases = [
         f"what presses {name} passes zero at t = {listed(times)}: rates of its friction are not determined"
         for name, times in forces.passing.items()

@@ -1,4 +1,4 @@
-"""Whether teeth with a pressure angle mesh where the bodies are: racks at pitch radii, gears in space at a point."""
+"""Checks that teeth with a pressure angle mesh: racks at their pitch radii, gears in space at their pitch point."""
 
 import math
 from collections.abc import Callable, Mapping, Sequence
@@ -20,13 +20,13 @@ from jounce.kinematics import Motion, Status
 from jounce.mechanism.building.builder import group_rows
 from jounce.mechanism.system import Group, movable, with_field
 
-FAR = 300.0  # times the distance of crossed axes: no gears have such radii, but numbers in mm without their unit do
-LEAD = math.radians(0.5)  # by which a lead angle that is given to friction may be rounded
-OFF_PITCH = 1e-6  # of the pitch radius: further from the pitch line, a wheel does not mesh
+FAR = 300.0  # times the distance of crossed axes: larger radii are no gears, but numbers in mm without a unit
+LEAD = math.radians(0.5)  # largest rounding of a lead angle that is given to friction
+OFF_PITCH = 1e-6  # of the pitch radius: farther from the pitch line, a wheel does not mesh
 
 
 def check_meshing(motion: Motion, groups: Sequence[Group], coordinates: Callable[..., Any]) -> None:
-    """Raise MechanismError where teeth with a pressure angle do not mesh.
+    """Raise MechanismError if teeth with a pressure angle do not mesh.
 
     Parameters
     ----------
@@ -35,7 +35,7 @@ def check_meshing(motion: Motion, groups: Sequence[Group], coordinates: Callable
     groups : sequence of Group
         Groups of joints and drivers.
     coordinates : callable
-        Returns the coordinates of bodies, given by their indices, to a number of coefficients.
+        Function of the indices of bodies and a number of coefficients that returns the coordinates of the bodies.
     """
     if motion.traced:
         return
@@ -51,7 +51,7 @@ def check_meshing(motion: Motion, groups: Sequence[Group], coordinates: Callable
 
 
 def _check_pitch_line(motion: Motion, element: Any, poses: Sequence[Any], names: Sequence[str]) -> None:
-    """Raise MechanismError where wheels are not at their pitch radius from the line they roll on."""
+    """Raise MechanismError if a wheel is not at its pitch radius from the line it rolls on."""
     slope = np.tan(np.asarray(element.pressure_angle))
     away = np.asarray(_parted.along(element, (poses, motion.time), pose_type=motion.poses[0]))
     away = np.where(slope > 0, away / np.where(slope > 0, slope, 1.0), 0.0)
@@ -69,7 +69,7 @@ def _check_pitch_line(motion: Motion, element: Any, poses: Sequence[Any], names:
 
 
 def _check_pitch_points(motion: Motion, gears: Any, poses: Sequence[Any], names: Sequence[str]) -> None:
-    """Raise MechanismError where gears in space do not touch at their pitch point as their ratio says."""
+    """Raise MechanismError if the contact of gears in space at their pitch point does not fit their ratio."""
     its = _meshing.along(gears, poses, pose_type=motion.poses[0])
     (first, second), drift, speed = its["radii"], its["drift"], its["speed"]
     helix = 0.0 if gears.helix_angle is None else np.asarray(gears.helix_angle)
@@ -135,7 +135,7 @@ def _check_pitch_points(motion: Motion, gears: Any, poses: Sequence[Any], names:
 
 @Mapped
 def _meshing(gears: Any, poses: Sequence[Any], *, pose_type: Any) -> Mapping[str, Any]:
-    """Return how gears in space touch, (instances, time): lengths in m, for turns of gear i by one rad."""
+    """Return the contact geometry of gears in space, (instances, time): lengths in m, per rad of rotation of gear i."""
     moving = [pose_of(pose, pose_type, 1) for pose in poses]
     bodies, rates = [movable(pose.truncate(0)) for pose in moving], velocities([movable(pose) for pose in moving])
     mesh = PitchPoint.of(gears, tuple(bodies))

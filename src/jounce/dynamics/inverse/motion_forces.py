@@ -66,7 +66,7 @@ class MotionForces:
         self.gravity = gravity_of(mechanism) * float(gravity)
         self.forces = motion.forces if applied else ()
         self.indices = element_indices(self.model)
-        system = self.model.system  # programs without laws serve all of them, also those that a motion has found
+        system = self.model.system  # a program without laws serves all laws, also those that a motion has found
         groups = system.groups if friction else map(friction_left_out, system.groups)
         self.joined = dataclasses.replace(system, groups=tuple(map(law_left_out, groups)), outputs=())
         check_unique_pressing(self.model, self.joined)
@@ -91,7 +91,7 @@ class MotionForces:
         """
         multipliers = self._balancing[0][:, : len(self.model.rows)]
         passages, time = self.motion.passages, self.motion.time
-        if passages:  # a distance d away they grow as 1 / d, and so does what rounding makes of them
+        if passages:  # at a distance d from a change point, multipliers and their rounding grow as 1 / d
             unknown = [spoiled(passages, time, level + 1) for level in range(len(multipliers))]
             multipliers = np.where(np.array(unknown)[:, None], np.nan, multipliers)
         return multipliers
@@ -105,15 +105,13 @@ class MotionForces:
         multipliers, known, self._reversals = teeth.multipliers_on_flanks(
             self._balanced, self.flanks, self.model, self.motion
         )
-        if (
-            self._seeks_undetermined
-        ):  # undetermined forces press on no known flank: random ones tell what depends on them
+        if self._seeks_undetermined:  # undetermined forces load no known flank: random ones show what depends on them
             multipliers = np.stack([multipliers[0], self._balanced(teeth.random_for_flanks(known))[1]])
         self.flanks = known
         return multipliers
 
     def prepare(self) -> None:
-        """Compile the program that balances loads, for any motion of this form."""
+        """Compile the program that balances loads, for all motions with the same shapes."""
         cases, rows = 1 + self._seeks_undetermined, len(self.model.rows)
         choice = np.zeros(rows), np.zeros(cases), np.zeros((cases, rows))
         shared = self._balance(None if self.model.system.rank is None else choice)
@@ -132,13 +130,13 @@ class MotionForces:
         return without_undetermined_rates(self, multipliers)
 
     def _balance(self, choice: tuple[Numbers, Numbers, Numbers] | None) -> Any:
-        """Return what a balance has at all instants, for a choice among the multipliers of redundant rows."""
+        """Return the arguments of a balance that all instants share, for a choice of redundant multipliers."""
         free = programs.without_constraints(self.joined, of_one_lane(self.forces))
         return self.joined, free, self.masses, self.gravity, choice
 
     @property
     def balance(self) -> Any:
-        """The arguments of a balance that each instant has for itself."""
+        """The arguments of a balance that differ between instants."""
         bodies, angles, instants = self.acting
         return bodies, angles if self.forces else (), tuple(self.flanks.values()), instants
 
@@ -149,7 +147,7 @@ class MotionForces:
 
     @property
     def _choice(self) -> tuple[Numbers, Numbers, Numbers]:
-        """What chooses multipliers of redundant rows: their compliance; of each case, weight of the load and bend."""
+        """The choice of redundant multipliers: compliance, and for each case weight of the load and misalignment."""
         bends = [np.zeros(len(self.model.rows)), *([self.open.random_right_side()] if self._seeks_undetermined else [])]
         return self.open.compliance, np.array([1.0, 0.0][: len(bends)]), np.array(bends)
 
@@ -207,7 +205,7 @@ class MotionForces:
     @cached_property
     def open(self) -> OpenMultipliers:
         """Forces that redundant constraints do not determine, at the first solved instant."""
-        lanes = np.array([np.argmax(self.motion.status == Status.OK)])  # 0 where none is
+        lanes = np.array([np.argmax(self.motion.status == Status.OK)])  # 0 if none is solved
         bodies, instants = at_lanes((self.coordinates_of(None, 1), self.motion.time), lanes)
         scaled = programs.scaled_jacobian(dataclasses.replace(self.joined, forces=()), bodies, instants, self.pose_type)
         mechanism = self.motion.mechanism
@@ -243,7 +241,8 @@ class MotionForces:
         The forces on all bodies, the ground included, have no resultant. The force on the ground is therefore the
         opposite of the sum of those on the moving bodies, also for residuals that depend on more than relative poses,
         such as a coordinate of one body or a ratio of angles, because these are measured in the frame of the ground.
-        What turns a rotor that stands for inertia of a coordinate alone is left out: the ground does not feel it.
+        The torque on a rotor that stands for the inertia of a coordinate alone is left out: it does not act on the
+        ground.
 
         Parameters
         ----------
@@ -252,7 +251,7 @@ class MotionForces:
         body, frame : int
             Indices of the body, and of the body along whose axes the result is expressed: 0 is the ground, None global.
         point : array of shape (c,)
-            In the frame of the body, m.
+            Point in the frame of the body, m.
 
         Returns
         -------
@@ -261,7 +260,7 @@ class MotionForces:
         """
         group, instance = self._member(name)
         element, whole = group.element, [slot[instance] for slot in group.bodies]  # 0 is the ground
-        # the carriage of a joint, which has a hidden coordinate, is no body
+        # the carriage of a joint with a hidden coordinate does not count as a body
         joined = enumerate(whole[: len(whole) - bool(getattr(element, "hidden", ()))])
         if body:
             work = total(self._wrench(name, slot) for slot, its in joined if its == body)
@@ -328,7 +327,7 @@ class MotionForces:
         return self._once(programs.applied, self._free(index), lanes, index, levels=self.levels)
 
     def _free(self, index: int) -> Group:
-        """Return the forces of a group, whose angles about axes are those of one instant."""
+        """Return the forces of a group, with angles about axes of one instant."""
         return of_one_lane((self.motion.forces[index],))[0]
 
     def _acting(self, index: int, levels: int) -> tuple[programs.Acting, Any]:
@@ -349,13 +348,13 @@ class MotionForces:
         return program.along(shared, lanes, pose_type=self.pose_type, **static)
 
     def _expressed(self, work: Numbers, body: int, frame: int | None, point: Numbers) -> tuple[Any, Any]:
-        """Return force and moment about a point of a body, as `reaction` does, from a wrench as `_wrench` has it."""
+        """Return force and moment about a point of a body, as `reaction` does, from a wrench of `_wrench`."""
         bodies = (body,) if frame is None else (body, frame)
         poses = [self.coordinates_of((b,), self.levels) for b in bodies]
         return self.along(programs.expressed, point[:, None, None], (work, poses))
 
     def coordinates_of(self, bodies: tuple[int, ...] | None, levels: int) -> dict[str, Any]:
-        """Return coordinates of bodies, to a number of coefficients, as `part_of` has them."""
+        """Return coordinates of bodies, to a number of coefficients, as `part_of` does."""
         return part_of(self.coordinates, bodies, levels)
 
     def joint(self, index: int) -> tuple[Any, Any, Any]:

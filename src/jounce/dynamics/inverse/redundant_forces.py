@@ -1,14 +1,14 @@
-"""Multipliers of redundant constraints: the few that are unique, and a choice of the others by norm or by stiffness.
+"""Multipliers of redundant constraints: the unique ones, and a choice of the others by norm or by stiffness.
 
-With more rows than the Jacobian has independent ones, the balance ``Phi_q^T lambda = load`` leaves multipliers open by
-the null space of ``Phi_q^T`` (Wojtyra 2005, Joint reaction forces in multibody systems with redundant constraints). Of
-all that balance the load, one has the least energy ``lambda^T C lambda / 2`` in joints of a compliance C, as elastic
-ones have it (Wojtyra and Fraczek 2013); C may also be a mere weight, and that energy a norm. It obeys
+If rows are redundant, the balance ``Phi_q^T lambda = load`` determines multipliers only up to the null space of
+``Phi_q^T`` (Wojtyra 2005, Joint reaction forces in multibody systems with redundant constraints). One solution has the
+least energy ``lambda^T C lambda / 2``, with the compliance C of elastic joints (Wojtyra and Fraczek 2013), or with mere
+weights C for a least norm. It obeys
 
     C lambda + Phi_q mu = 0,    Phi_q^T lambda = load,
 
-on jets: coefficient after coefficient with one matrix, so that its rates are those of the choice at every instant. With
-a right side of chance instead of the load it gives what is open: no unique force has a part there.
+on jets, coefficient after coefficient with one matrix, so that its rates are derivatives of the chosen solution. A
+random right-hand side without load gives self-balanced multipliers, to which no unique force contributes.
 """
 
 import math
@@ -31,7 +31,7 @@ from jounce.mechanism import Model
 from jounce.mechanism.system import System
 
 RowNumbers = Float[np.ndarray, " row"]
-OPEN = 1e-7  # of the largest force that is open: what is less is none
+OPEN = 1e-7  # of the largest undetermined force: less is rounding
 
 
 def least_multipliers(
@@ -41,19 +41,18 @@ def least_multipliers(
     compliance: Float[Numbers, " row"],
     bent: Float[Numbers, " row"],
 ) -> Float[Numbers, "levels row batch"]:
-    """Return the multipliers of least energy that balance a load, not scaled, as Taylor coefficients.
+    """Return the Taylor coefficients of the unscaled multipliers of least energy that balance a load.
 
     Parameters
     ----------
     system : System
-        With redundant rows.
+        System with redundant rows.
     blocks, load
-        As `multipliers` takes them.
+        As for `multipliers`.
     compliance : array of shape (rows,)
-        Zero where a row is rigid.
+        Compliance of each row; zero for a rigid row.
     bent : array of shape (rows,)
-        What replaces zero on the right side of the first equation; zero, or anything to find what is
-        open under no load.
+        Misalignment: the right-hand side of the first equation; zero, or random to find self-balanced multipliers.
     """
     scale, rows = jnp.asarray(system.column_scale), system.shape[0]
     jacobian = jacobian_of(system, blocks)
@@ -81,7 +80,7 @@ def least_multipliers(
 def _jacobian_times_displacements(
     system: System, blocks: Slopes, strains: Sequence[Any], level: int
 ) -> Float[Numbers, "row batch"]:
-    """Return the Taylor coefficient of Jacobian times displacements, without that of the Jacobian of order zero."""
+    """Return the Taylor coefficient of Jacobian times displacements, without the term of the Jacobian of order zero."""
     parts = []
     for group, slopes in zip(system.groups, blocks, strict=True):
         product: Any = 0.0
@@ -95,16 +94,16 @@ def _jacobian_times_displacements(
 
 
 class OpenMultipliers:
-    """What redundant rows leave open at one position, and how much force a multiplier of each row is.
+    """The undetermined multipliers of redundant rows at one position, and the choice among them.
 
     Parameters
     ----------
     model : Model
-        Of a mechanism with redundant rows.
+        Model of a mechanism with redundant rows.
     jacobian : array of shape (rows, columns)
-        At that position, rows and columns scaled.
+        Jacobian at that position, rows and columns scaled.
     selection : str or mapping
-        As `Mechanism.redundant_reactions` has it.
+        Choice of reactions, as in `Mechanism.redundant_reactions`.
     """
 
     def __init__(self, model: Model, jacobian: Float[np.ndarray, "row column"], selection: Any):
@@ -114,23 +113,23 @@ class OpenMultipliers:
 
     @cached_property
     def words(self) -> str:
-        """Words for the joints that repeat equations of others."""
+        """A text that names the joints that repeat equations of others."""
         return "; ".join(map(str, repetitions(self.model.rows, self._basis)))
 
     @cached_property
     def weights(self) -> RowNumbers:
-        """The force, N, or else the couple over the size of the mechanism, of a multiplier of one, for each row."""
+        """The force of a unit multiplier of each row, N, or its couple over the size of the mechanism."""
         forces, couples = self._sizes
         return forces + couples / self.model.length
 
     @cached_property
     def compliance(self) -> RowNumbers:
-        """The compliance of each row: of a norm, the squares of `weights`, or of joints of a stiffness.
+        """The compliance of each row: the squares of `weights` for a norm, or that of joints with given stiffnesses.
 
         Raises
         ------
         MechanismError
-            If the stiffnesses leave multipliers open.
+            If the stiffnesses leave multipliers undetermined.
         """
         if not isinstance(self.selection, Mapping):
             return self.weights**2
@@ -151,18 +150,18 @@ class OpenMultipliers:
         return compliances
 
     def random_right_side(self) -> RowNumbers:
-        """Return a right side that leaves nothing out of what is open; the same each time."""
+        """Return a random right-hand side, the same each time, that excites all self-balanced multipliers."""
         normal = np.random.default_rng(0).standard_normal(len(self.model.rows))
         return normal * self.weights * self._row_scale[:, 0]
 
     @cached_property
     def _basis(self) -> Float[np.ndarray, "row combination"]:
-        """An orthonormal basis of the multipliers, of scaled rows, that balance no load."""
+        """An orthonormal basis of the self-balanced multipliers of scaled rows."""
         return np.linalg.svd(self._jacobian)[0][:, self.model.system.rank :]
 
     @cached_property
     def _sizes(self) -> tuple[RowNumbers, RowNumbers]:
-        """Force and couple of a unit multiplier on a body: a row has a force, or only a couple."""
+        """Force and couple of a unit multiplier on a body: each row has either a force or a pure couple."""
         scale = np.asarray(self.model.system.column_scale)
         shifts = self.model.pose_type.shifts
         scaled = np.abs((self._jacobian / self._row_scale).reshape(len(self._jacobian), -1, len(scale)) / scale)

@@ -1,9 +1,10 @@
-"""Flanks of teeth that bear the load: the direction of the component of a tooth force along the line of centers.
+"""Loaded tooth flanks: the direction of the radial component of a tooth force.
 
-That component separates the gears for either direction of the load, so that it follows the absolute value of the
-multiplier. With the flank known, the tooth force is along its line of action, and its residual gives all forces and
-rates as any other. It moves nothing, as the centers keep their distance: the multipliers of gears are the same with
-either flank, those of bearings are not. Where the multiplier passes zero, its absolute value has no derivative.
+The radial component separates the gears for either direction of the load: it is proportional to the absolute value of
+the multiplier. For a known flank, the tooth force acts along its line of action, and its residual gives all forces and
+rates like any other. The radial component does no work, as the centers keep their distance, so the multipliers of gears
+do not depend on the flank; those of bearings do. Where the multiplier passes zero, its absolute value has no
+derivative.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -22,11 +23,11 @@ from jounce.mechanism.building.builder import group_rows
 from jounce.mechanism.system import Group, with_field
 
 Flanks = Mapping[int, Float[Numbers, "instance time"]]
-"""1 or -1 for each pair of teeth, by the index of its group."""
+"""For each group index, 1 or -1 for each pair of teeth."""
 
 NONE = 1e-11  # of the largest multiplier, or of its largest scaled rate: less is rounding
 SLOWEST = 1e-3  # 1/s: lower bound of the rate of motions in scales of rates
-MOST_CHANGES = 8  # of flanks, where the multipliers of redundant constraints depend on them
+MOST_CHANGES = 8  # iterations of flanks, if multipliers of redundant constraints depend on them
 MOST_LISTED = 4  # instants
 
 
@@ -42,7 +43,7 @@ def with_flanks(groups: Sequence[Group], flanks: Sequence[Numbers]) -> tuple[Gro
 
 
 def random_for_flanks(flanks: Flanks) -> dict[int, Any]:
-    """Return random numbers for flanks: forces that change with them depend on the distribution of loads."""
+    """Return random values of flanks, which change exactly the forces that depend on the distribution of loads."""
     random = np.random.default_rng(1)
     return {k: random.uniform(0.3, 0.7, flank.shape[:1])[:, None] * flank for k, flank in flanks.items()}
 
@@ -50,12 +51,12 @@ def random_for_flanks(flanks: Flanks) -> dict[int, Any]:
 def multipliers_on_flanks(
     solve: Callable[[Flanks], Numbers], flanks: Flanks, model: Model, motion: Motion
 ) -> tuple[Numbers, Flanks, dict[int, Any]]:
-    """Return multipliers with the flanks that they press on, and the first rates that are not determined.
+    """Return multipliers, the flanks that they load, and the first undetermined rates.
 
     Parameters
     ----------
     solve : callable
-        Returns multipliers, (cases, levels, rows, time), for flanks.
+        Function from flanks to multipliers, (cases, levels, rows, time).
     flanks : mapping
         Initial flanks.
     model : Model
@@ -66,9 +67,9 @@ def multipliers_on_flanks(
     Returns
     -------
     multipliers, flanks
-        NaN where a load that passes zero leaves rates open.
+        NaN rates where a load passes zero.
     reversals : dict of int to array of int, shape (instances, time)
-        The first level whose rate is open, the number of levels where there is none.
+        For each group index, the first level whose rate is undetermined; the number of levels if there is none.
     """
     rows, multipliers = group_rows(model), solve(flanks)
 
@@ -99,12 +100,12 @@ def multipliers_on_flanks(
 
 
 def without_undetermined_rates(work: Numbers, first: Numbers | None, instance: int) -> Numbers:
-    """Return the force of teeth on a body, (levels, coordinates, time), NaN for rates that a reversal leaves open."""
+    """Return the tooth force on a body, (levels, coordinates, time), NaN for rates that a reversal leaves open."""
     return work if first is None else np.where(np.arange(len(work))[:, None, None] >= first[instance], np.nan, work)
 
 
 def rate_of(motion: Motion) -> Float[np.ndarray, " time"]:
-    """Return how fast a motion changes, 1/s: the largest root of a Taylor term, in rad or sizes of the mechanism."""
+    """Return the rate of change of a motion, 1/s: the largest k-th root of a Taylor term of order k, dimensionless."""
     rate = np.full(len(motion.time), SLOWEST)
     for name, series in motion.poses[1].items():
         scale = motion.model.length if name == "position" else 1.0
@@ -127,7 +128,10 @@ def _signs(own: Numbers, whole: Numbers, rate: Float[np.ndarray, " time"]) -> tu
 
 
 def flank_words(forces: Any, bodies: set[str]) -> str:
-    """Return words for where loads of teeth of some bodies change flanks, from `MotionForces`; empty if none does."""
+    """Return a remark on the instants at which tooth loads of some bodies change flanks; empty if none does.
+
+    `forces` are `MotionForces`.
+    """
     motion, words = forces.motion, []
     for name, place in forces.indices.items():
         if place.group in forces.flanks and bodies & {*motion.mechanism.joints[name].bodies}:
@@ -136,7 +140,7 @@ def flank_words(forces: Any, bodies: set[str]) -> str:
 
 
 def _reversal_words(name: str, forces: Numbers, motion: Motion) -> str:
-    """Return words for where the load of teeth changes flanks, from multipliers, (time,); empty if it does not."""
+    """Return a remark on the instants at which multipliers, (time,), change flanks; empty if they do not."""
     solved = (motion.status == Status.OK) & np.isfinite(forces)
     times, sign = motion.time[solved], np.sign(forces[solved])
     sign[np.abs(forces[solved]) <= NONE * np.max(np.abs(forces[solved]), initial=0.0)] = 0.0
@@ -152,5 +156,5 @@ def _reversal_words(name: str, forces: Numbers, motion: Motion) -> str:
 
 
 def listed(times: Float[np.ndarray, " time"]) -> str:
-    """List the first of some instants."""
+    """Return a text that lists the first few instants."""
     return ", ".join(f"{t:.4g} s" for t in times[:MOST_LISTED]) + (", ..." if len(times) > MOST_LISTED else "")

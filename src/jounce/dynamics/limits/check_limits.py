@@ -25,14 +25,14 @@ FIELDS = ("position", "velocity", "acceleration", "jerk", "effort", "effort_rate
 TURNING = dict(zip(FIELDS, ("rad", "rad/s", "rad/s^2", "rad/s^3", "N m", "N m/s"), strict=True))
 SLIDING = dict(zip(FIELDS, ("m", "m/s", "m/s^2", "m/s^3", "N", "N/s"), strict=True))
 ACCELERATION = 2
-EFFORTS = (4, 5)  # which of them the dynamics give
+EFFORTS = (4, 5)  # fields that follow from dynamics
 ORDER = 3  # of the motion: jerk, and with it the rate of the torque
 
-REST = 1e-9  # of the largest velocity of a joint, below which it is at rest
-INSTANTS = 2000  # at least, over the trajectory
-BETWEEN = 4  # intervals at least, from one instant of the trajectory to the next
-POINTS = 9  # instants around each
-ROUNDS = 8  # times the step is divided
+REST = 1e-9  # of the largest velocity of a joint: a slower joint is at rest
+INSTANTS = 2000  # least number over the trajectory
+BETWEEN = 4  # least number of intervals between two instants of the trajectory
+POINTS = 9  # instants around each peak
+ROUNDS = 8  # divisions of the step
 
 
 def check_limits(
@@ -201,7 +201,7 @@ class _Bounds:
         return factors
 
     def sides(self, values: Any, at: Any = ...) -> tuple[Any, Any]:
-        """Return the ratios of weighted values to the upper and to the lower bound, -inf where there is none."""
+        """Return the ratios of weighted values to the upper and to the lower bound, -inf if there is none."""
         upper, lower, scale = self.upper[at], self.lower[at], self.scale[at]
         return (values - upper + scale) / scale, (lower - values + scale) / scale
 
@@ -212,7 +212,7 @@ class _Bounds:
     def or_infinite(
         self, infinite: Infinite, quantity: int, joint: int, time: float, value: float, weight: float
     ) -> tuple[float, float, float]:
-        """Return the instant, value and weight of a quantity; those of its first infinite value if there is one."""
+        """Return the instant, value and weight of a quantity, or those of its first infinite value."""
         weights = self.weights(infinite.before, infinite.times)[:, quantity, joint]
         at = np.flatnonzero((infinite.signs[:, quantity, joint] != 0) & (weights > 0))
         if not len(at):
@@ -222,7 +222,7 @@ class _Bounds:
         return float(infinite.times[first]), float(value), float(weights[first])
 
     def shares(self, values: np.ndarray, times: np.ndarray) -> np.ndarray:
-        """Return the ratios with the sign of the nearer bound, NaN where there is no limit."""
+        """Return the ratios with the sign of the nearer bound, NaN if there is no limit."""
         above, below = self.sides(values * self.weights(values, times))
         return np.where(self.limited, np.where(above >= below, np.maximum(above, 0), -np.maximum(below, 0)), np.nan)
 
@@ -234,7 +234,7 @@ def worst_instants(
     values: np.ndarray,
     limited: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return the worst instant of each limited curve, the value there and its weight.
+    """Return the worst instant of each limited curve, its value and its weight.
 
     Around each peak that may be the highest, a grid search is refined: the best of a few instants becomes the middle of
     a shorter interval, repeatedly. A jump between two instants is approached from the side with the worse value.
@@ -242,13 +242,13 @@ def worst_instants(
     Parameters
     ----------
     curves : callable
-        Maps instants, (time,), to values, (time, quantities, joints).
+        Function from instants, (time,), to values, (time, quantities, joints).
     bounds : object
-        Has `weights` and `measure`, as the bounds of this module have.
+        Object with the methods `weights` and `measure` of `_Bounds`.
     grid, values
-        Initial instants, and the values of `curves` there.
+        Initial instants, and their values of `curves`.
     limited : array of shape (curves, 2)
-        Quantity and joint of each.
+        Quantity and joint of each curve.
     """
     at = tuple(limited.T)
     weights = bounds.weights(values, grid)
@@ -269,7 +269,7 @@ def worst_instants(
         top = np.argmax(measured, axis=0)
         chosen = np.argmax(np.max(measured, axis=0), axis=0)  # of the peaks of each curve
         new = (top[chosen, every], chosen, every)
-        better = measured[new] > sizes + 1e-12 * np.abs(sizes)  # else the instant on the grid, which has a round number
+        better = measured[new] > sizes + 1e-12 * np.abs(sizes)  # otherwise keep the instant of the grid, a round number
         pairs = ((measured, sizes), (around, times), (own, maxima), (weights, weight))
         sizes, times, maxima, weight = (np.where(better, x[new], y) for x, y in pairs)
         low = np.take_along_axis(around, np.maximum(top - 1, 0)[None], axis=0)[0]
@@ -292,7 +292,7 @@ def _row(
 def _ends(
     followed: FollowedTrajectory, values: Float[np.ndarray, "time derivative joint"], bounds: _Bounds, drives: bool
 ) -> tuple[TrajectoryEnd, ...]:
-    """Return the jumps at both ends, and the limits that are exceeded there."""
+    """Return the jumps at both ends of the trajectory, and the limits that they exceed."""
     robot, jumps = followed.robot, end_jumps(followed, values)
     if np.array_equal(jumps.before, jumps.after):
         return ends_of_jumps(robot.joint_names, jumps)
@@ -308,7 +308,7 @@ def _ends(
 
 
 def word_of(robot: Robot, quantity: int, joint: int) -> tuple[str, str]:
-    """Return the word for a quantity of a joint, and its unit."""
+    """Return the name of a quantity of a joint, and its unit."""
     turning = robot.joints[robot.joint_names[joint]].turning
     field = FIELDS[quantity]
     word = field.replace("effort", "torque" if turning else "force").replace("_", " ")
@@ -326,7 +326,7 @@ def _merged(robot: Robot, limits: Mapping[str, Limits] | None) -> dict[str, Limi
 
 
 def _grid(trajectory: JointTrajectory) -> Float[np.ndarray, " time"]:
-    """Return the instants of a trajectory, its ends, and further ones between each two."""
+    """Return the instants of a trajectory with its ends, and evenly spaced ones between each two."""
     own = np.unique(np.concatenate([[trajectory.start], trajectory.times, [trajectory.stop]]))
     steps = max(BETWEEN, -(-INSTANTS // (len(own) - 1)))
     between = own[:-1, None] + np.diff(own)[:, None] * (np.arange(steps) / steps)

@@ -1,4 +1,4 @@
-"""Where derivatives of a trajectory jump, and which quantities of a robot are infinite there."""
+"""Jumps of derivatives of a trajectory, and the robot quantities that they make infinite."""
 
 import dataclasses
 
@@ -11,21 +11,21 @@ from jounce.trajectory.law_checks.smoothness import LeaderValues, known_jumps
 from jounce.trajectory.laws.stacking import law_derivatives
 
 SMALL = 1e-9  # of the largest value of a derivative: a smaller jump is rounding
-NONE = 1e-12  # of the largest torque there: a smaller change is rounding
+NONE = 1e-12  # of the largest torque at the jump: a smaller change is rounding
 SAME = 1e-9  # of the duration: instants nearer to each other, or to an end, are one
-EFFORT, EFFORT_RATE = 4, 5  # among the quantities
+EFFORT, EFFORT_RATE = 4, 5  # indices of quantities
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Jumps:
-    """Where coordinates of a robot, or derivatives of them, jump.
+    """Jumps of the coordinates of a robot, or of their derivatives.
 
     Parameters
     ----------
     times : ndarray of shape (jump,)
         s, increasing.
     before, after : ndarray of shape (jump, derivative, joint)
-        Coordinates and derivatives of all joints on both sides; the same where nothing jumps.
+        Coordinates and derivatives of all joints on both sides of each jump; equal where they do not jump.
     """
 
     times: Float[np.ndarray, " jump"]
@@ -33,7 +33,7 @@ class Jumps:
     after: Float[np.ndarray, "jump derivative joint"]
 
     def above(self, level: int) -> Float[np.ndarray, "jump joint"]:
-        """Return the sign of the lowest jump below a derivative, which is infinite there; 0 where there is none."""
+        """Return the sign of the lowest jump below a derivative, which makes it infinite; 0 if there is none."""
         signs = np.sign(self.after - self.before)[:, :level]
         lowest = np.argmax(signs != 0, axis=1)
         return np.take_along_axis(signs, lowest[:, None], axis=1)[:, 0]
@@ -41,16 +41,16 @@ class Jumps:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Infinite:
-    """Which quantities of joints are infinite where.
+    """The infinite quantities of joints at jumps.
 
     Parameters
     ----------
     times : ndarray of shape (jump,)
         s.
     signs : ndarray of shape (jump, 6, joint)
-        Of position to torque rate: 0 where it is finite, else the sign.
+        For position to torque rate: 0 if the quantity is finite, otherwise its sign.
     before : ndarray of shape (jump, 6, joint)
-        Velocities before the jumps, and signs, which show whether an acceleration slows a joint down.
+        Velocities before the jumps, and signs of accelerations, which show whether a joint slows down.
     """
 
     times: Float[np.ndarray, " jump"]
@@ -63,7 +63,7 @@ def jumps_of(
     grid: Float[np.ndarray, " time"],
     values: Float[np.ndarray, "time derivative joint"],
 ) -> Jumps:
-    """Return the jumps between the first and the last of some instants.
+    """Return the jumps strictly between the first and the last instant of a grid.
 
     Parameters
     ----------
@@ -72,7 +72,7 @@ def jumps_of(
     grid : array of shape (time,)
         Increasing instants, s.
     values : array of shape (time, derivative, joint)
-        Coordinates there; jumps of all derivatives but the highest are known.
+        Coordinates on the grid; the jumps of all derivatives but the highest are found.
     """
     trajectory, order, joints = followed.trajectory, values.shape[1] - 1, values.shape[2]
     first, last = float(grid[0]), float(grid[-1])
@@ -92,7 +92,7 @@ def jumps_of(
             unknown.append(column)
 
     def evaluate(times: np.ndarray) -> np.ndarray:
-        """Return coordinates as `followed` does, not finite where a law is not."""
+        """Return coordinates as `followed` does, without a check that they are finite."""
         derivatives = law_derivatives(list(trajectory.laws.values()), times, order)
         q = np.repeat(values[:1], len(times), axis=0)
         q[:, :, followed.columns] = np.moveaxis(derivatives, -1, 0)
@@ -109,7 +109,7 @@ def jumps_of(
     inside = (where > first + SAME * duration) & (where < last - SAME * duration) & heights.any(axis=(1, 2))
     where, heights = where[inside], heights[inside]
     after = evaluate(where + SAME * duration / 2) if len(where) else np.zeros((0, order + 1, joints))
-    after = np.where(np.isfinite(after), after, 0.0)  # next to a kink without derivatives, as of asin(sin(t))
+    after = np.where(np.isfinite(after), after, 0.0)  # not finite next to a kink, as of asin(sin(t))
     before = after.copy()
     before[:, :-1] -= heights
     return Jumps(where, before, after)
@@ -118,7 +118,7 @@ def jumps_of(
 def _joined(
     instants: np.ndarray, sizes: np.ndarray, gap: float
 ) -> tuple[Float[np.ndarray, " jump"], Float[np.ndarray, "jump level joint"]]:
-    """Return jumps in their sequence, those at the same instant as one."""
+    """Return jumps in order of time, with those at the same instant merged."""
     if not len(instants):
         return instants, sizes
     sequence = np.argsort(instants, kind="stable")
@@ -131,17 +131,17 @@ def _joined(
 def infinite_quantities(followed: FollowedTrajectory, jumps: Jumps, drives: bool) -> Infinite:
     """Return which quantities are infinite at jumps.
 
-    A derivative above one that jumps is. A torque is where a position or a velocity that moves mass jumps, since the
-    momentum changes in no time. A torque rate is where the torque jumps, or is infinite.
+    All derivatives above one that jumps are infinite. A torque is infinite if a position or velocity that moves a mass
+    jumps, since the momentum jumps. A torque rate is infinite if the torque jumps or is infinite.
 
     Parameters
     ----------
     followed : FollowedTrajectory
         The robot on its trajectory.
     jumps : Jumps
-        Of coordinates, velocities and accelerations.
+        Jumps of coordinates, velocities and accelerations.
     drives : bool
-        Whether torques contain armature inertia, damping and friction of the drives.
+        Whether torques include armature inertia, damping and friction of the drives.
     """
     count, joints = len(jumps.times), jumps.after.shape[2]
     signs, before = np.zeros((count, 6, joints)), np.zeros((count, 6, joints))
@@ -167,7 +167,7 @@ def infinite_quantities(followed: FollowedTrajectory, jumps: Jumps, drives: bool
 
 
 def _pushed(steady: np.ndarray, jumps: Jumps, level: int) -> Float[np.ndarray, "jump derivative joint"]:
-    """Return a steady motion with an acceleration along the jump of a derivative, the largest of a joint 1."""
+    """Return a steady motion with an acceleration along the jump of a derivative, scaled to a largest entry of 1."""
     jump = jumps.after[:, level] - jumps.before[:, level]
     size = np.abs(jump).max(axis=1, keepdims=True)
     pushed = steady.copy()

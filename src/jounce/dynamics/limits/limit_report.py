@@ -1,4 +1,4 @@
-"""What a comparison of a trajectory with limits finds: the worst instants of each joint, and what its ends meet."""
+"""The report of a comparison of a trajectory with limits: the worst instants of each joint, and jumps at the ends."""
 
 import dataclasses
 from collections.abc import Mapping
@@ -24,18 +24,18 @@ class LimitRow:
     quantity : str
         position, velocity, acceleration, jerk, torque, torque rate; force and force rate of a prismatic joint.
     unit : str
-        Of the value and the limit.
+        Unit of the value and the limit.
     value : float
-        What the trajectory has there; infinite where a lower derivative jumps.
+        Value at the worst instant; infinite where a lower derivative jumps.
     time : float
         The instant, s.
     limit : float or None
-        The bound to which the value comes nearest, with its sign; None where there is no limit: the value is then the
-        one of largest magnitude.
+        The bound that the value comes nearest to, with its sign; None without a limit, in which case the value is that
+        of largest magnitude.
     ratio : float or None
-        How far from the middle of what is allowed, relative to half of it: the magnitude over the limit, and for a
-        range of positions 0 in its middle, 1 at its ends. Where only one end is given, 1 at that end, growing by one
-        for each time the size of the bound (1 rad or m if it is zero) beyond.
+        Distance from the middle of the allowed range over half its width: the magnitude over the limit, and for a range
+        of positions 0 in its middle, 1 at its ends. If only one end is given, 1 at that end, growing by one for each
+        multiple of the magnitude of the bound (1 rad or m if it is zero) beyond it.
     """
 
     joint: str
@@ -48,12 +48,12 @@ class LimitRow:
 
     @property
     def broken(self) -> bool:
-        """Whether the limit is broken, by more than rounding."""
+        """Whether the limit is exceeded by more than rounding."""
         return self.ratio is not None and self.ratio > 1 + ROUNDING
 
     @property
     def infinite(self) -> bool:
-        """Whether the value is infinite, as where a lower derivative jumps."""
+        """Whether the value is infinite, because a lower derivative jumps."""
         return not np.isfinite(self.value)
 
 
@@ -74,48 +74,48 @@ class LimitRows:
 
     @property
     def broken(self) -> tuple[LimitRow, ...]:
-        """Rows whose limit is broken, the worst first."""
+        """Rows whose limit is exceeded, the worst first."""
         return tuple(sorted((row for row in self.rows if row.broken), key=_ratio, reverse=True))
 
     @property
     def kept(self) -> bool:  # a public name
-        """Whether no limit is broken."""
+        """Whether no limit is exceeded."""
         return not self.broken
 
     @property
     def worst(self) -> LimitRow | None:
-        """The row of the largest ratio; None if nothing has a limit."""
+        """The row with the largest ratio; None if no quantity has a limit."""
         return max(self.limited, key=_ratio, default=None)
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class LimitReport(LimitRows, Displayed):
-    """What `check_limits` found.
+    """The report of `check_limits`.
 
     Parameters
     ----------
     robot : str
         Name of the robot.
     joint_names : tuple of str
-        Its moving joints.
+        Moving joints of the robot.
     rows : tuple of LimitRow
         Joint by joint, position to torque rate.
     held : dict of str to float
-        Joints that the trajectory does not name, and the coordinates at which they stand still, rad or m.
+        Joints that the trajectory does not name, with the coordinates at which they rest, rad or m.
     times : ndarray of shape (time,)
-        Instants that were looked at; the worst ones were then searched between them.
+        Evaluated instants; the worst instants are then searched between them.
     values : ndarray of shape (time, 6, joints)
-        Position, velocity, acceleration, jerk, torque and torque rate there.
+        Position, velocity, acceleration, jerk, torque and torque rate at these instants.
     shares : ndarray of shape (time, 6, joints)
-        The same as shares of their limits: from -1 at the lower to 1 at the upper one, NaN where there is no limit.
+        The values relative to their limits: from -1 at the lower to 1 at the upper one, NaN without a limit.
     drives : bool, default True
-        Whether torques contain armature, damping and friction.
+        Whether torques include armature inertia, damping and friction.
     ends : tuple of TrajectoryEnd
-        What is met at the start and at the stop, and which limits a jump from rest, or to it, breaks there.
+        Jumps from rest at the start and to rest at the stop, and the limits that they exceed.
     hand_over : bool
-        Whether the robot moves before the start and after the stop as the trajectory does there: nothing jumps then.
+        Whether the robot already moves at the start and continues to move at the stop, so that nothing jumps.
     loads : tuple of LoadChange
-        Where what the robot carries changes, and what that does.
+        Changes of the carried loads, and their effects.
     """
 
     robot: str
@@ -132,7 +132,7 @@ class LimitReport(LimitRows, Displayed):
 
     @property
     def kept(self) -> bool:  # a public name
-        """Whether no limit is broken, neither within the motion nor by a jump from rest, or to it, at its ends."""
+        """Whether no limit is exceeded, within the motion or by a jump from or to rest at its ends."""
         return not self.broken and (self.hand_over or not any(end.breaks for end in self.ends))
 
     def __repr__(self) -> str:

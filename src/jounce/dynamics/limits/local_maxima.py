@@ -1,15 +1,15 @@
-"""The largest values of curves that are known at instants."""
+"""Local maxima of sampled curves."""
 
 import numpy as np
 from jaxtyping import Float, Int
 
-LEAST, MOST = 3, 50  # local maxima of a curve
+LEAST, MOST = 3, 50  # number of local maxima of a curve
 
 
 def local_maxima(measures: Float[np.ndarray, "time curve"]) -> Int[np.ndarray, "peak curve"]:
-    """Return the indices of local maxima of curves, the best first: all that may be higher than every sample, or three.
+    """Return the indices of local maxima of curves that may exceed every sample, or of three, the highest first.
 
-    How high a curve is between instants that are about evenly spaced is read off the parabola through three of them.
+    The height between about evenly spaced instants is estimated by the parabola through three of them.
     """
     height = local_heights(measures) + _above_samples(measures)
     reaching = np.sum(height >= measures.max(axis=0), axis=0).max(initial=0)
@@ -19,7 +19,7 @@ def local_maxima(measures: Float[np.ndarray, "time curve"]) -> Int[np.ndarray, "
 
 
 def _above_samples(measures: Float[np.ndarray, "time curve"]) -> Float[np.ndarray, "time curve"]:
-    """Return how far the tops of parabolas are above their middle samples, 0 at the ends and where they have none."""
+    """Return the heights of parabola vertices above their middle samples, 0 at the ends and without a vertex."""
     heights = np.zeros_like(measures)
     before, middle, after = measures[:-2], measures[1:-1], measures[2:]
     with np.errstate(invalid="ignore", divide="ignore"):
@@ -29,16 +29,16 @@ def _above_samples(measures: Float[np.ndarray, "time curve"]) -> Float[np.ndarra
 
 
 def local_heights(measures: Float[np.ndarray, "time curve"]) -> Float[np.ndarray, "time curve"]:
-    """Return curves where they have a local maximum, of a plateau its first instant, and -inf elsewhere."""
+    """Return the values of local maxima, at the first instant of a plateau, and -inf elsewhere."""
     edge = np.full((1, measures.shape[1]), -np.inf)
     before, after = np.concatenate([edge, measures[:-1]]), np.concatenate([measures[1:], edge])
     return np.where((measures > before) & (measures >= after), measures, -np.inf)
 
 
 def largest_indices(height: Float[np.ndarray, "time curve"], count: int) -> Int[np.ndarray, "{count} curve"]:
-    """Return the indices of the highest values of curves, the best first, of equal ones the earlier.
+    """Return the indices of the highest values of curves, the highest first, the earlier of equal ones first.
 
-    Where fewer are finite than are requested, an index may stand twice.
+    Indices repeat if fewer values are finite than are requested.
     """
     left, every, order = height.copy(), np.arange(height.shape[1]), []
     for _ in range(count):

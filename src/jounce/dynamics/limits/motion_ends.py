@@ -1,4 +1,4 @@
-"""What a controller meets at the ends of a trajectory: joints that do not rest there jump from rest, or to it."""
+"""Jumps at the ends of a trajectory: a joint that moves at an end jumps from rest, or to rest."""
 
 import dataclasses
 from collections.abc import Mapping, Sequence
@@ -14,31 +14,31 @@ from jounce.trajectory.law_checks.seen_jumps import level_sizes
 
 ORDER = 3  # up to jerk
 SMALL = 1e-6  # of the size of a derivative: less is rest
-LEAST = np.array([0.0, 1e-9, 1e-6, 1e-3])  # the same, by s to the power of the order: rad or m
-LOOKS = 201
-INSIDE = 1e-10  # of the duration: how long before the stop it is looked at, too
-UNSUPPORTED = 0.5  # of its peak: the error of a derivative that samples do not support
-SAFE = 3.0  # times the estimated error: less is none
-SLOW, FAR = 0.02, 4.0  # of the largest velocity, and deviations: less is none where noise hides what splines say
-FITTED, PART = 12, 20  # samples at each end that give its velocity: this number, or this small a part of all
-FEW = 2  # times the degree: with fewer samples not noise but the spline decides the derivatives
+LEAST = np.array([0.0, 1e-9, 1e-6, 1e-3])  # absolute thresholds of rest by order, rad or m by s^order
+LOOKS = 201  # instants that show the sizes of derivatives
+INSIDE = 1e-10  # of the duration: distance of the additional instant before the stop
+UNSUPPORTED = 0.5  # of its peak: error above which samples do not support a derivative
+SAFE = 3.0  # times the estimated error: less is rest
+SLOW, FAR = 0.02, 4.0  # of the largest velocity, and of standard deviations: less is rest for noisy samples
+FITTED, PART = 12, 20  # samples of a fit at an end: at least this number, or one in so many
+FEW = 2  # times the degree: with fewer samples, the spline and not noise decides the derivatives
 
 
 @dataclasses.dataclass(frozen=True)
 class TrajectoryEnd:
-    """The first or the last instant of a trajectory, and which joints do not rest there.
+    """The first or the last instant of a trajectory, and the joints that move at it.
 
     Parameters
     ----------
     end : {"start", "stop"}
-        Which of both.
+        Which end.
     time : float
         s.
     velocities, accelerations, jerks : dict of str to float
-        Of the joints for which they do not vanish: by how much these jump, if the robot rests before the start and
-        after the stop; rad or m by s to the power of the order.
+        Nonzero derivatives by joint: the heights of the jumps of a robot that rests before the start and after the
+        stop; rad or m by s to the power of the order.
     breaks : tuple of (str, str)
-        Joints, or links, and the quantities of theirs that have a limit and are infinite by such a jump.
+        Joints, or links, with the limited quantities that such a jump makes infinite.
 
     Examples
     --------
@@ -64,14 +64,14 @@ class TrajectoryEnd:
 
 
 def trajectory_ends(robot: Robot, trajectory: JointTrajectory) -> tuple[TrajectoryEnd, TrajectoryEnd]:
-    """Return what a controller meets at the start and at the stop of a trajectory, if the robot rests before and after.
+    """Return the jumps at the start and stop of a trajectory for a robot that rests before and after it.
 
     Parameters
     ----------
     robot : Robot
         The robot.
     trajectory : JointTrajectory
-        Of some or all of its joints.
+        Trajectory of some or all of its joints.
 
     Raises
     ------
@@ -100,7 +100,7 @@ def end_jumps(followed: FollowedTrajectory, values: Float[np.ndarray, "time deri
     followed : FollowedTrajectory
         The robot on its trajectory.
     values : array of shape (time, derivative, joint)
-        Coordinates and derivatives to jerk at least at many instants, which show their sizes.
+        Coordinates and derivatives, at least to jerk, at many instants, which show their sizes.
     """
     trajectory, order = followed.trajectory, values.shape[1] - 1
     times = np.array([trajectory.start, trajectory.stop])
@@ -113,7 +113,7 @@ def end_jumps(followed: FollowedTrajectory, values: Float[np.ndarray, "time deri
     near[:-1] = np.maximum(near[:-1], 2 * inside * sizes[1:])
     near = np.stack([near, near])
     duration = float(times[1] - times[0])
-    # a law may be another one from its last instant on, as polynomials between points are
+    # at its last instant a piecewise law, such as polynomials between points, may already be on its next piece
     moving = np.stack([moving[0], np.where(np.abs(moving[1] - before) > near[1], before, moving[1])])
     for column, name in zip(followed.columns, trajectory.names, strict=True):
         law = trajectory.laws[name]
@@ -122,7 +122,7 @@ def end_jumps(followed: FollowedTrajectory, values: Float[np.ndarray, "time deri
         if len(law.samples.value[0]) <= FEW * law.degree + 1:
             continue
         errors = trajectory.estimate_error(order, [name])[:, 0]
-        # as errors count peaks
+        # the estimated errors are relative to peaks
         wave = np.ptp(values[:, 0, column]) / 2 * (2 * np.pi / duration) ** np.arange(order + 1)
         noise = np.where(errors > UNSUPPORTED, np.inf, SAFE * errors * np.maximum(sizes[:, column], wave))
         near[:, :, column] = np.maximum(near[:, :, column], noise)
@@ -138,7 +138,7 @@ def end_jumps(followed: FollowedTrajectory, values: Float[np.ndarray, "time deri
 
 
 def _fitted_speed(times: Float[np.ndarray, " sample"], values: Float[np.ndarray, " sample"]) -> tuple[float, float]:
-    """Return the velocity at the first of samples by a parabola through the noise of some, and its deviation."""
+    """Return the velocity at the first sample by a least-squares parabola, and its standard deviation."""
     count = min(len(times), max(FITTED, len(times) // PART))
     reach = times[count - 1] - times[0]
     table = np.vander((times[:count] - times[0]) / reach, 3, increasing=True)
@@ -149,7 +149,7 @@ def _fitted_speed(times: Float[np.ndarray, " sample"], values: Float[np.ndarray,
 
 
 def ends_of_jumps(names: Sequence[str], jumps: Jumps) -> tuple[TrajectoryEnd, TrajectoryEnd]:
-    """Return the ends of a trajectory from the jumps of joints at both ends."""
+    """Return both ends of a trajectory from the jumps of its joints."""
     states = jumps.after[0], jumps.before[1]
 
     def nonzero(k: int, level: int) -> dict[str, float]:

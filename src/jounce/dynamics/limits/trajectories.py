@@ -1,4 +1,4 @@
-"""A robot on a trajectory: its coordinates with derivatives, and the torques and rates that they need."""
+"""A robot that follows a trajectory: coordinates with derivatives, and the required torques with rates."""
 
 import warnings
 from collections.abc import Callable, Sequence
@@ -21,39 +21,38 @@ from jounce.units.shown_units import derivatives_of, time_axes
 if TYPE_CHECKING:
     import xarray
 
-BLOCK = 2048  # instants evaluated at once, always as many, so that all is compiled once
+BLOCK = 2048  # instants evaluated at once; a fixed number, so that programs are compiled once
 QUANTITIES = ("position", "velocity", "acceleration", "jerk")
 EFFORTS = ("effort", "effort rate")
 
 
 class FollowedTrajectory:
-    """The coordinates of a robot that follows a trajectory; joints that it does not name stand still.
+    """The coordinates of a robot that follows a trajectory; joints that it does not name rest.
 
     Parameters
     ----------
     robot : Robot
         The robot.
     trajectory : JointTrajectory
-        Of some or all of its joints.
+        Trajectory of some or all of its joints.
     given : bool, default True
-        Whether a user gave it: then a warning says where angles are likely in degrees.
+        Whether the trajectory is a user's, so that angles that are likely in degrees give a warning.
     loads : sequence of CarriedLoad, optional
-        What links carry during parts of it, by time.
+        Loads that links carry during parts of the trajectory, by time.
 
     Attributes
     ----------
     resting_joints : dict of str to float
-        Joints that the trajectory does not name, and where they stand: at zero, or at the end of their range that is
-        nearest to it.
+        Joints that the trajectory does not name, with their coordinates: zero, or the end of their range nearest to it.
     loaded : LoadedRobot
-        The robot with its loads, and where they change.
+        The robot with its loads and their changes.
     doubts : list of str
         Warnings about samples that do not support requested derivatives.
 
     Raises
     ------
     RobotError, TrajectoryError
-        If the robot has no joints, or the trajectory names one that it does not have, or that moves otherwise.
+        If the robot has no joints, or the trajectory names a joint that it does not have or that cannot be commanded.
     """
 
     def __init__(
@@ -97,7 +96,7 @@ class FollowedTrajectory:
     def torques(
         self, q: Float[np.ndarray, "time derivative joint"], times: Float[np.ndarray, " time"], drives: bool
     ) -> Float[np.ndarray, "time derivative-2 joint"]:
-        """Return torques and rates for coordinates that `coordinates` gave.
+        """Return torques and rates for coordinates from `coordinates`.
 
         Raises
         ------
@@ -109,7 +108,7 @@ class FollowedTrajectory:
         return torques
 
     def load_changes(self, drives: bool) -> tuple[LoadChange, ...]:
-        """Return what each change of the loads does to the robot."""
+        """Return the effect of each change of the loads on the robot."""
         changes = self.loaded.changes
         return self.loaded.at_changes(self.coordinates(changes, 2), drives) if len(changes) else ()
 
@@ -123,7 +122,7 @@ class FollowedTrajectory:
 
 
 def in_time(loads: Sequence[CarriedLoad]) -> Sequence[CarriedLoad]:
-    """Return loads, once all are by time, as those of a trajectory are."""
+    """Return the loads, or raise TrajectoryError unless all change at instants."""
     for load in loads:
         if not isinstance(load, CarriedLoad):
             raise TrajectoryError("must be CarriedLoads", name="loads", value=type(load).__name__)
@@ -134,7 +133,7 @@ def in_time(loads: Sequence[CarriedLoad]) -> Sequence[CarriedLoad]:
 
 
 def warn_of_degrees(robot: Robot, trajectory: JointTrajectory) -> None:
-    """Warn of joints that turn and whose values are likely meant in degrees, unless they came with a unit.
+    """Warn of revolute joints whose values have no unit and are likely in degrees.
 
     Warns
     -----
@@ -152,7 +151,7 @@ def warn_of_degrees(robot: Robot, trajectory: JointTrajectory) -> None:
 
 
 def drives_note(drives: bool) -> str:
-    """Return in words what torques of a robot contain."""
+    """Return a text on the parts of the drives that torques include."""
     kinds = "armature, damping and friction"
     return f"{kinds}, as far as the robot file has them" if drives else f"the bare bodies, without {kinds}"
 
@@ -166,38 +165,38 @@ def trajectory_torques(
     drives: bool = True,
     loads: Sequence[CarriedLoad] = (),
 ) -> "xarray.Dataset":
-    """Return the torques and forces that a trajectory needs of the joints of a robot, with rates, labeled.
+    """Return the joint torques and forces that a trajectory of a robot requires, with rates, as a labeled data set.
 
     Parameters
     ----------
     robot : Robot
-        The robot, with what it holds.
+        The robot, with its loads.
     trajectory : JointTrajectory
-        Joints that it does not name stand still at zero, or at the end of their range that is nearest to it.
+        Joints that it does not name rest at zero, or at the end of their range nearest to zero.
     rates : int, default 0
-        How many rates of the torques are requested.
+        Number of rates of the torques.
     times : array_like of shape (time,), optional
-        Instants, s; those of the trajectory unless given.
+        Instants, s; by default those of the trajectory.
     drives : bool, default True
-        Whether torques contain armature inertia, damping and friction of the drives.
+        Whether torques include armature inertia, damping and friction of the drives.
     loads : sequence of CarriedLoad, optional
-        What links carry during parts of the motion; at the instant of a change it is what is carried after it.
+        Loads that links carry during parts of the motion; at the instant of a change, the load after it counts.
 
     Returns
     -------
     xarray.Dataset
-        One variable for each joint, of dimensions time and derivative; N m, or N for prismatic joints, by s.
+        One variable for each joint, with dimensions time and derivative; N m, or N for prismatic joints, by s.
 
     Raises
     ------
     RobotError, TrajectoryError
-        If the robot has no joints or closed loops, it does not have a joint of the trajectory, or a value is not
+        If the robot has no joints or has closed loops, it does not have a joint of the trajectory, or a value is not
         finite.
 
     Warns
     -----
     SampleWarning
-        If the samples of the trajectory do not support the derivatives that are needed.
+        If the samples of the trajectory do not support the required derivatives.
 
     Examples
     --------
@@ -228,12 +227,12 @@ def trajectory_torques(
 
 
 def _in_blocks(function: Callable[[np.ndarray], Any], values: np.ndarray) -> np.ndarray:
-    """Return what a function gives for values along their first axis, the last block filled up."""
+    """Return the results of a function for values along their first axis, in blocks of one padded size."""
     return in_chunks(lambda some: function(values[some]), len(values), (BLOCK,), axis=0)
 
 
 def reason_not_movable(robot: Robot, name: str) -> str:
-    """Say why a name is not that of a joint that can be moved."""
+    """Return the reason why a name is not that of a joint that can be commanded."""
     joint = robot.joints.get(name)
     if joint is None:
         return no_such(f"moving joint of {robot.name}", name, robot.joint_names)
@@ -243,7 +242,7 @@ def reason_not_movable(robot: Robot, name: str) -> str:
 
 
 def check_measures(robot: Robot, trajectory: JointTrajectory) -> None:
-    """Raise TrajectoryError where the units of a trajectory are not those of the joints of the robot."""
+    """Raise TrajectoryError unless the units of a trajectory fit the joints of the robot."""
     for name, measured in trajectory.measures.items():
         turning = robot.joints[name].turning
         if measured != ("angle" if turning else "length"):
@@ -256,6 +255,6 @@ def check_measures(robot: Robot, trajectory: JointTrajectory) -> None:
 
 
 def _rest(limits: Limits) -> float:
-    """Return zero, or what is nearest to it in the range of a joint."""
+    """Return zero, or the value nearest to zero in the range of a joint."""
     low = 0.0 if limits.lower is None else max(limits.lower, 0.0)
     return low if limits.upper is None else min(limits.upper, low)

@@ -1,13 +1,13 @@
-"""Natural motions of ``M y'' + C y' + K y = 0``: eigenvalues and shapes, zero where they are zero but for rounding."""
+"""Eigenmodes of ``M y'' + C y' + K y = 0``: eigenvalues and shapes, with rounding of zero eigenvalues removed."""
 
 from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Bool, Complex, Float
 
-SYMMETRIC = 1e-9  # of a matrix: what is not symmetric and smaller is rounding
+SYMMETRIC = 1e-9  # of a matrix: a smaller asymmetry is rounding
 EPSILON = np.finfo(float).eps
-REAL = 1e-9  # of an eigenvalue: an imaginary part that is smaller
+REAL = 1e-9  # of an eigenvalue: a smaller imaginary part is rounding
 
 Square = Float[np.ndarray, "coordinate coordinate"]
 
@@ -20,7 +20,8 @@ class Eigenmodes(NamedTuple):
     eigenvalues : array of shape (modes,)
         1/s; the imaginary part is not negative.
     shapes : array of shape (coordinates, modes)
-        Of unit modal mass, ``shape^H M shape = 1``; the largest component of each, weighted by the masses, is positive.
+        Mode shapes of unit modal mass, ``shape^H M shape = 1``; the largest mass-weighted component of each is
+        positive.
     """
 
     eigenvalues: Complex[np.ndarray, " mode"]
@@ -28,14 +29,14 @@ class Eigenmodes(NamedTuple):
 
 
 def eigenmodes(mass: Square, damping: Square, stiffness: Square, noise: tuple[Square, Square]) -> Eigenmodes:
-    """Return the natural motions of a system that is linear and does not change in time.
+    """Return the eigenmodes of a linear time-invariant system.
 
     Parameters
     ----------
     mass, damping, stiffness : array of shape (coordinates, coordinates)
-        The mass matrix is symmetric and positive definite.
+        Matrices of the system; the mass matrix is symmetric and positive definite.
     noise : tuple of array
-        Of damping and stiffness: sizes of entries that are rounding.
+        Rounding errors of the entries of damping and stiffness.
 
     Raises
     ------
@@ -75,32 +76,32 @@ def is_symmetric(matrix: Square, noise: Square) -> bool:
 
 
 def zeros(matrix: Square, noise: Square) -> tuple[Float[np.ndarray, "c k"], Float[np.ndarray, "c k"]]:
-    """Return what a matrix takes to zero from the left and from the right, but for rounding; orthonormal columns."""
+    """Return orthonormal bases of the left and the right null space of a matrix, up to rounding."""
     left, sizes, right = np.linalg.svd(matrix)
     null = sizes <= _along(left, noise, right.T)
     return left[:, null], right.T[:, null]
 
 
 def _with_rounding(noise: Square, matrix: Square) -> Square:
-    """Return the noise of a matrix with that of a decomposition of it."""
+    """Return the noise of a matrix, with the rounding of its decomposition added."""
     return noise + 4 * EPSILON * np.linalg.norm(matrix, 2) if len(matrix) else noise
 
 
 def _along(left: Square, noise: Square, right: Square) -> Float[np.ndarray, " vector"]:
-    """Return the noise of products of a matrix with vectors from both sides: a soft direction keeps its digits."""
+    """Return the noise of the products ``left^T matrix right`` of vectors, small along soft directions."""
     return np.einsum("ik,ij,jk->k", np.abs(left), noise, np.abs(right))
 
 
 def _of_state_matrix(
     c: Square, k: Square, c_noise: Square, k_noise: Square
 ) -> tuple[Complex[np.ndarray, " mode"], Complex[np.ndarray, "coordinate mode"]]:
-    """Return eigenvalues with an imaginary part of at least zero and shapes, from the matrix of a state.
+    """Return eigenvalues with a nonnegative imaginary part, and shapes, from the state matrix.
 
-    Its zero eigenvalues come in chains, which rounding spreads over a circle: they are counted from the null vectors
-    of the stiffness, and of the damping between these, and set to zero.
+    The zero eigenvalues of the state matrix have Jordan chains, which rounding spreads over a circle. They are counted
+    by the null vectors of the stiffness, and of the damping among these, and set to zero.
     """
     count = len(k)
-    rate = max(float(np.sqrt(np.linalg.norm(k, 2))), float(np.linalg.norm(c, 2)), 1e-300)  # 1/s, so that parts are even
+    rate = max(float(np.sqrt(np.linalg.norm(k, 2))), float(np.linalg.norm(c, 2)), 1e-300)  # 1/s, for balance
     state = np.block([[np.zeros((count, count)), np.eye(count)], [-k / rate**2, -c / rate]])
     values, vectors = (x.astype(complex) for x in np.linalg.eig(state))
     left, right = zeros(k, k_noise)
@@ -114,12 +115,12 @@ def _of_state_matrix(
 
 
 def _upper(values: Complex[np.ndarray, " value"]) -> Bool[np.ndarray, " value"]:
-    """Return which eigenvalues represent a pair: those that are real, and the upper ones of the others."""
+    """Return which eigenvalues represent their conjugate pair: real ones, and those in the upper half-plane."""
     return np.imag(values) >= -REAL * np.abs(values)
 
 
 def _without_rounding(values: Complex[np.ndarray, " value"]) -> Complex[np.ndarray, " value"]:
-    """Return eigenvalues without real and imaginary parts that are rounding."""
+    """Return eigenvalues with real and imaginary parts that are rounding set to zero."""
     fastest = np.abs(values).max(initial=0.0)
     undamped = np.abs(np.real(values)) <= 8 * len(values) * EPSILON * fastest
     values = np.where(undamped, 1j * np.imag(values), values)
@@ -127,7 +128,7 @@ def _without_rounding(values: Complex[np.ndarray, " value"]) -> Complex[np.ndarr
 
 
 def _real(vectors: Complex[np.ndarray, "c k"]) -> Complex[np.ndarray, "c k"]:
-    """Return vectors that are real but for a factor as real ones."""
+    """Return the real multiples of vectors that are real up to a complex factor."""
     largest = vectors[np.abs(vectors).argmax(axis=0), np.arange(vectors.shape[1])]
     turned = vectors * np.conj(largest) / np.where(largest == 0, 1.0, np.abs(largest))
     return np.real(turned).astype(complex)

@@ -1,4 +1,4 @@
-"""Where a mechanism can stand still: positions of equilibrium by a damped Newton method along the constraints."""
+"""The search for an equilibrium of a mechanism: a damped Newton method along the constraints."""
 
 import dataclasses
 from typing import Any, NamedTuple
@@ -22,25 +22,25 @@ from jounce.mechanism.building.element_indices import force_names
 from jounce.mechanism.building.starting_guess import pose_at
 
 MAX_STEPS = 300
-LONGEST = 0.25  # rad or sizes of the mechanism, of a step
-ADRIFT = 50  # of the longest steps along what no stiffness resists, one after the other: it flies off
-CLOSED = 1e-11  # rad or sizes of the mechanism: a step as short leaves nothing to find
-BALANCED = 1e-9  # of the loads: what may be left of them
-FLAT = 1e-10  # of the stiffness: what is smaller counts as none in a step
-WORTH = 1e-14  # of the loads: what is smaller is rounding
+LONGEST = 0.25  # rad or sizes of the mechanism: bound of a step
+ADRIFT = 50  # longest steps in a row without resisting stiffness, after which the search has diverged
+CLOSED = 1e-11  # rad or sizes of the mechanism: a shorter step ends the search
+BALANCED = 1e-9  # of the loads: largest residual of an equilibrium
+FLAT = 1e-10  # of the stiffness: less counts as zero in a step
+WORTH = 1e-14  # of the loads: less is rounding
 
 
 class SearchResult(NamedTuple):
-    """Where a search ended.
+    """The end of a search.
 
     Attributes
     ----------
     point : OperatingPoint
-        The mechanism at rest there.
+        The mechanism at rest at the end of the search.
     left : array of shape (directions,)
-        Generalized forces that nothing balances, in free directions of the scaled coordinates.
+        Unbalanced generalized forces, in free directions of the scaled coordinates.
     balanced : bool
-        Whether they are zero but for rounding.
+        Whether the unbalanced forces are zero up to rounding.
     """
 
     point: OperatingPoint
@@ -49,14 +49,14 @@ class SearchResult(NamedTuple):
 
 
 def rest_point(mechanism: Mechanism, model: Model, coordinates: Coordinates, instant: float) -> OperatingPoint:
-    """Return a mechanism that stands still, the laws of its drivers and forces held at an instant."""
+    """Return the operating point of a mechanism at rest, with the laws of drivers and forces frozen at an instant."""
     system = with_fields(model.system, outputs=())
     equations = Equations(system, masses_of(mechanism), gravity_of(mechanism), 1.0, model.pose_type)
     return OperatingPoint(mechanism, model, equations, at_rest(coordinates), clock_at(instant, stopped=True))
 
 
 def driven(point: OperatingPoint) -> OperatingPoint:
-    """Return a mechanism that its drivers hold whole with the velocities and accelerations that their laws give."""
+    """Return a fully driven operating point with the velocities and accelerations that the driver laws prescribe."""
     coordinates = {name: x.copy() for name, x in point.coordinates.items()}
     clock, shifts = clock_at(point.instant, stopped=False), point.model.pose_type.shifts
     for level in (1, 2):  # the residual of each order is affine in the coordinates of that order
@@ -72,15 +72,15 @@ def driven(point: OperatingPoint) -> OperatingPoint:
 
 
 def search(start: OperatingPoint, *, settle: bool) -> SearchResult:
-    """Return where the mechanism can stand still, or how near to it a search from a position came.
+    """Return the equilibrium that a search from a position finds, or its last position without success.
 
     Parameters
     ----------
-    start : Place
-        At rest, its constraints fulfilled.
+    start : OperatingPoint
+        The mechanism at rest, with its constraints satisfied.
     settle : bool
-        Go where the forces do work, as a mechanism does that creeps to rest: only positions that are stable, or those
-        that the start is on already, are found. Otherwise Newton's method, to any position nearby.
+        Descend along the work of the forces, as a mechanism that creeps to rest: this finds stable equilibria, or the
+        start itself if it is one. Otherwise Newton's method finds any equilibrium nearby.
     """
     point, drifted, scale = start, 0, 1.0
     for _ in range(MAX_STEPS):
@@ -104,7 +104,7 @@ def search(start: OperatingPoint, *, settle: bool) -> SearchResult:
 
 
 def _is_flat(stiffness: np.ndarray, step: np.ndarray, left: np.ndarray) -> bool:
-    """Return whether the forces left hardly change along the longest permitted step."""
+    """Return whether the unbalanced forces hardly change along the longest permitted step."""
     change = stiffness @ step * (LONGEST / np.abs(step).max())
     return bool(np.linalg.norm(change) < 1e-3 * np.linalg.norm(left))
 
@@ -115,7 +115,7 @@ def _ended(point: OperatingPoint, scale: float) -> SearchResult:
 
 
 def load_scale(point: OperatingPoint) -> float:
-    """Return the size of the largest load, or of those that a unit of displacement would make, N m."""
+    """Return the size of the largest load, or of the load of a unit displacement if it is larger, N m."""
     return _scale(point, _stiffness(point) if point.free.shape[1] else np.zeros((0, 0)))
 
 
@@ -129,7 +129,7 @@ def _stiffness(point: OperatingPoint) -> Float[np.ndarray, "direction direction"
 
 
 def _largest_load(point: OperatingPoint) -> float:
-    """Return the size of the largest load: of weight, of any applied force, or of what the constraints bear, N m."""
+    """Return the size of the largest load: weight, an applied force, or a constraint force, N m."""
     borne = point.jacobian.T @ point.multipliers
     return float(max(np.abs([*point.loads, borne]).max(initial=0.0), point.pushed.max(initial=0.0)))
 
@@ -141,7 +141,7 @@ def _step(
     *,
     settle: bool,
 ) -> Float[np.ndarray, " direction"]:
-    """Return Newton's step; to settle, one along which the forces do work, whatever the stiffness is."""
+    """Return the Newton step; to settle, a step along which the forces do positive work for any stiffness."""
     values, vectors = np.linalg.eigh((stiffness + stiffness.T) / 2)
     floor = FLAT * scale
     if values[0] > floor or not settle:
@@ -157,7 +157,7 @@ def _step(
 def _shortened(
     point: OperatingPoint, step: Float[np.ndarray, " column"], left: Any, *, settle: bool
 ) -> OperatingPoint | None:
-    """Return the operating point after a step, or after a part of it in which the forces do work, or balance better."""
+    """Return the point after a step, halved until the forces do work or balance better; None if they never do."""
     size = float(np.max(np.abs(step)))
     for _ in range(30):
         trial = _moved(point, step)
@@ -178,9 +178,9 @@ def _shortened(
 
 
 def _moved(point: OperatingPoint, step: Float[np.ndarray, " column"]) -> OperatingPoint | None:
-    """Return the mechanism after a step of the scaled coordinates, assembled; None where that does not go.
+    """Return the mechanism assembled after a step of the scaled coordinates; None if it cannot be assembled.
 
-    Angles about axes go on from those before the step, and so count their turns.
+    Angles about axes continue from those before the step, and so count their revolutions.
     """
     coordinates = point.closed(point.displaced(point.changes(step[None, :, None])[0]))
     if coordinates is None:
@@ -192,7 +192,7 @@ def _moved(point: OperatingPoint, step: Float[np.ndarray, " column"]) -> Operati
 
 
 def check_forces(point: OperatingPoint) -> None:
-    """Raise SolveError where an applied force has no finite value at rest."""
+    """Raise SolveError if an applied force has no finite value at rest."""
     system = point.equations.system
     if not system.forces:
         return
@@ -208,7 +208,7 @@ def check_forces(point: OperatingPoint) -> None:
 
 
 def remains(result: SearchResult) -> str:
-    """Say what nothing balances at the end of a search: which force or moment on which body, and how large it is."""
+    """Return a text on the largest unbalanced force and moment at the end of a search, and its body."""
     point = result.point
     model, shifts = point.model, point.model.pose_type.shifts
     by_body = -(point.free @ result.left).reshape(len(model.bodies), -1)

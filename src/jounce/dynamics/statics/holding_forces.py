@@ -1,4 +1,4 @@
-"""The force of a driver that holds a mechanism at rest: with friction, any within a range."""
+"""The driver force that holds a mechanism at rest; with friction, a range of forces."""
 
 import copy
 from typing import TYPE_CHECKING, Any
@@ -23,43 +23,42 @@ from jounce.units.shown_units import time_axes
 if TYPE_CHECKING:
     import xarray
 
-SMALLEST = 1e-12  # determinant: nearer to zero friction locks
+SMALLEST = 1e-12  # determinant: friction locks if it is smaller
 BOUNDS = ("least", "frictionless", "greatest")
-PROVEN = np.empty(0, int)  # instants at which a range is not
+PROVEN = np.empty(0, int)  # no instants with an unproven range
 
 
 def holding_forces(motion: Motion) -> "xarray.Dataset":
-    """Return between which forces of each driver a mechanism stays at rest, in the positions of a motion.
+    """Return the range of each driver force in which a mechanism stays at rest, in the positions of a motion.
 
-    The mechanism is held still in each of these positions, under weights and applied forces as they are at that instant
-    and without velocity. In each joint, friction at rest is any within its cone, ``|f| <= mu |R|``, and gears lose any
-    torque between what they lose forward and backward; what all this can do at most, for and against the driver, is
-    found over all joints together. Where zero lies between, the
-    mechanism stays without the driver: it locks by itself. A force beyond the range moves it.
+    The mechanism is at rest in each position, under weight and the applied forces of that instant at zero velocity. The
+    static friction of each joint lies anywhere in its cone, ``|f| <= mu |R|``, and the torque loss of gears anywhere
+    between their backward and forward losses. The bounds of the driver force are optimal over all joints together. If
+    zero is within the range, the mechanism is self-locking: it stays at rest without the driver. A force outside the
+    range moves it.
 
-    Of several drivers each has its own range, whatever the others exert meanwhile. What is least and greatest is mostly
-    what slow motions one way and the other take, but not where a joint hardly slips in these motions.
+    Each of several drivers has its own range, for any forces of the others. The bounds are mostly the driver forces of
+    slow motions in both directions, but not if a joint hardly slips in these motions.
 
     Parameters
     ----------
     motion : Motion
-        As `solve` or `Equilibrium.motion` give it, of a mechanism with masses or applied forces, whose drivers hold
-        all that can move.
+        Motion from `solve` or `Equilibrium.motion` of a fully driven mechanism with masses or applied forces.
 
     Returns
     -------
     xarray.Dataset
-        One variable for each driver, N m where its law is an angle, else N; dimensions time and bound: ``least``,
-        ``frictionless`` and ``greatest``. Infinite where friction locks, so that no force moves the mechanism that way.
-        NaN at instants that were not solved, and where the range is not known, with the reason as the attribute
-        ``comment``.
+        One variable for each driver, N m if its law is an angle, otherwise N; dimensions time and bound: ``least``,
+        ``frictionless`` and ``greatest``. Infinite where friction locks, so that no force moves the mechanism in that
+        direction. NaN at instants that were not solved, and where the range is not known, with the reason as the
+        attribute ``comment``.
 
     Raises
     ------
     MechanismError
-        If nothing has a mass and no force is applied, or there is no driver.
+        If the mechanism has neither masses nor applied forces, or no driver.
     UnsupportedError
-        If some motion is free, constraints are redundant, or teeth press on their flanks, where joints have friction.
+        If joints have friction and a motion is free, constraints are redundant, or teeth have a pressure angle.
 
     Examples
     --------
@@ -105,7 +104,7 @@ def holding_forces(motion: Motion) -> "xarray.Dataset":
 
 
 def _comment(time: np.ndarray, values: np.ndarray, unproven: np.ndarray, solved: np.ndarray) -> str:
-    """Say where a range is infinite or not known, if anywhere."""
+    """Return a text on the instants at which a range is infinite or not known; empty if there are none."""
     unknown = np.isnan(values[unproven]).any(axis=1)
     words = {
         "friction locks, no force moves it one way": np.flatnonzero(np.isinf(values).any(axis=1)),
@@ -117,7 +116,7 @@ def _comment(time: np.ndarray, values: np.ndarray, unproven: np.ndarray, solved:
 
 
 def _at_rest(motion: Motion) -> Motion:
-    """Return a motion that stands still in all positions of another one."""
+    """Return a motion at rest in all positions of another motion."""
     still = at_rest({name: values[0] for name, values in motion.poses[1].items() if name != "angular_velocity"})
     nothing = tuple(() for _ in motion.model.outputs)
     return Motion(
@@ -127,7 +126,7 @@ def _at_rest(motion: Motion) -> Motion:
 
 
 def _check_determined(forces: MotionForces, name: str) -> None:
-    """Raise UnsupportedError, by the name of a friction, where holding forces do not follow from friction alone."""
+    """Raise UnsupportedError, with the name of a friction, if friction alone does not determine holding forces."""
     model, reasons = forces.model, []
     if forces.joined.shape[0] != forces.joined.shape[1]:
         reasons.append("drivers do not hold all that can move: drive it, and look whether zero is within the range")
@@ -145,7 +144,7 @@ def _check_determined(forces: MotionForces, name: str) -> None:
 
 
 def _ranges(forces: MotionForces, plain: dict[str, Numbers]) -> dict[str, Any]:
-    """Return the bounds of the force of each driver, and the instants at which they are not proven."""
+    """Return the bounds of each driver force, and the instants at which they are not proven."""
     friction = forces.friction
     middle, responses = _about_the_middle(forces.friction, np.asarray(forces.multipliers[0]))
     changes = np.array([friction.pressing(response) for response in responses])
@@ -163,11 +162,11 @@ def _ranges(forces: MotionForces, plain: dict[str, Numbers]) -> dict[str, Any]:
 def _about_the_middle(
     friction: JointFriction, free: Float[np.ndarray, "row time"]
 ) -> tuple[Float[np.ndarray, "row time"], Float[np.ndarray, "direction row time"]]:
-    """Return multipliers at which each friction is in the middle of its range, and by how much they are less for one.
+    """Return multipliers with all friction in the middle of its range, and their decrease for unit friction.
 
-    The middle is zero, but of gears a share d of the torque T that they pass on, half the difference of what they lose
-    forward and backward. So ``T = (1 + R d)^-1 (T_0 - R f)`` with the torque T_0 without friction, the response R of
-    the torques to what is lost, and any further loss f.
+    The middle is zero; for gears it is a share d of the transmitted torque T, half the difference of forward and
+    backward losses. So ``T = (1 + R d)^-1 (T_0 - R f)`` with the frictionless torque T_0, the response R of the torques
+    to losses, and the further loss f.
     """
     responses, differences = friction.responses(), friction.differences
     if not differences.any():
@@ -185,7 +184,7 @@ def _about_the_middle(
 
 
 def _with_multipliers(forces: MotionForces, multipliers: Numbers) -> MotionForces:
-    """Return the forces in a mechanism at rest whose multipliers are these, (rows, time)."""
+    """Return the forces in a mechanism at rest for given multipliers, (rows, time)."""
     twin = copy.copy(forces)
     twin._numbers = {}
     twin.__dict__["multipliers"] = multipliers[None]

@@ -1,8 +1,8 @@
-"""Small motions in independent coordinates: which ones, and how all bodies move as each of them does.
+"""Small motions in independent coordinates: the choice of coordinates, and the changes of all bodies with them.
 
-The independent coordinates are named: drivers that are released, outputs, or coordinates of bodies. Together with the
-constraints they determine every change of a motion, order after order: the k-th Taylor coefficient of the change
-follows from one matrix, the Jacobian of the constraints above the gradients of the coordinates, as in a solve.
+The independent coordinates are released drivers, outputs, or coordinates of bodies. With the constraints they determine
+every change of a motion, order after order: the k-th Taylor coefficient of the change follows from one matrix, the
+constraint Jacobian stacked on the gradients of the coordinates, as in a solve.
 """
 
 import dataclasses
@@ -22,10 +22,10 @@ from jounce.mechanism.building.element_indices import element_indices
 from jounce.mechanism.laws.driver_outputs import is_turning
 
 COLUMNS = {"planar": ("x", "y", "angle"), "spatial": ("x", "y", "z", "turn_x", "turn_y", "turn_z")}
-TIE = 0.99  # of the largest: candidates as good as that are taken in the order of the mechanism
-SHIFT = 0.9  # by which shifts count less than turns where coordinates are chosen: angles read better
-NOWHERE = 1e-8  # of the largest that must balance: less is none
-ROUNDING = 1e-12  # of the sum of the sizes of what enters a sum
+TIE = 0.99  # of the best candidate: equally good coordinates are taken in the order of the mechanism
+SHIFT = 0.9  # weight of shifts relative to rotations in the choice of coordinates: angles read better
+NOWHERE = 1e-8  # of the largest force: less is balanced
+ROUNDING = 1e-12  # of the sum of the absolute values of all terms
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -35,18 +35,20 @@ class Reduction:
     Parameters
     ----------
     point : OperatingPoint
-        About what motion.
+        Motion about which the equations are linearized.
     names, units : tuple of str
-        Of the coordinates.
+        Names and units of the coordinates.
     released : tuple of str
-        Drivers among them, the first coordinates.
+        Released drivers, the first coordinates.
+    held : tuple of str
+        Drivers that are not released.
     changes : array of shape (3, columns, lanes)
-        Taylor coefficients of the changes of all bodies, scaled, for a unit of each coordinate, of its rate and of its
-        second derivative, one after the other, then for those of each driver that holds.
+        Taylor coefficients of the scaled changes of all bodies. Lanes are a unit of each coordinate, then of each rate,
+        then of each second derivative, followed by those of each held driver.
     matrices : array of shape (coordinates, lanes)
-        Generalized forces of the coordinates that these changes need.
+        Generalized forces along the coordinates that these changes require.
     sizes : array of shape (coordinates, lanes)
-        The same with absolute values of all terms: a scale for rounding.
+        The generalized forces with absolute values of all terms, as a scale of rounding.
     """
 
     point: OperatingPoint
@@ -59,22 +61,22 @@ class Reduction:
     sizes: Float[np.ndarray, "coordinate lane"]
 
     def part(self, level: int) -> Float[np.ndarray, "coordinate coordinate"]:
-        """Return stiffness, damping or mass matrix, by the level of the derivative that it belongs to."""
+        """Return the stiffness, damping or mass matrix, for level 0, 1 or 2."""
         return self.matrices[:, self.lanes(level)]
 
     def noise(self, level: int) -> Float[np.ndarray, "coordinate coordinate"]:
-        """Return by how much that matrix may be off by rounding."""
+        """Return the rounding error of the matrix of a level."""
         return ROUNDING * self.sizes[:, self.lanes(level)]
 
     def lanes(self, level: int, *, drivers: bool = False) -> slice:
-        """Return the lanes of one level of the coordinates, or of the drivers that hold."""
+        """Return the lanes of one level of the coordinates, or of the held drivers."""
         own, other = len(self.names), len(self.held)
         first, count = (LEVELS * own + level * other, other) if drivers else (level * own, own)
         return slice(first, first + count)
 
     @property
     def basis(self) -> Float[np.ndarray, "column coordinate"]:
-        """How the scaled coordinates of all bodies change with each coordinate."""
+        """The derivatives of the scaled coordinates of all bodies with respect to the independent coordinates."""
         return self.changes[0][:, self.lanes(0)]
 
 
@@ -91,20 +93,20 @@ def reduced(
     Parameters
     ----------
     point : OperatingPoint
-        The motion.
+        Motion about which the equations are linearized.
     names : sequence of str, optional
-        Names of coordinates, those of released drivers left out; chosen unless given.
+        Names of coordinates other than released drivers; chosen automatically by default.
     released : sequence of str
-        Drivers whose force stays as it is, instead of their coordinate.
+        Drivers that keep their force instead of their coordinate.
     prefer_outputs : bool, default False
         Choose among outputs instead of the coordinates of bodies.
     drivers : bool, default True
-        Look at changes of the laws of the drivers that hold too.
+        Include changes of the laws of held drivers.
 
     Raises
     ------
     MechanismError
-        If a name is not one of a coordinate, or the coordinates named are not independent.
+        If a name is not that of a coordinate, or the named coordinates are not independent.
     """
     free = point.free
     chosen = _chosen(point, free, prefer_outputs) if names is None else tuple(names)
@@ -134,17 +136,17 @@ def reduced(
 
 
 def rolls(point: OperatingPoint) -> bool:
-    """Return whether rows of joints constrain velocities: then there are more positions than small motions."""
+    """Return whether joints are nonholonomic, so that there are more positions than small motions."""
     return any(joint.nonholonomic for joint in point.mechanism.joints.values())
 
 
 def _check_nowhere(
     point: OperatingPoint, names: tuple[str, ...], reduction: tuple[Any, Any, Any, Any], released: int
 ) -> None:
-    """Raise MechanismError unless small motions are the same wherever wheels have rolled to.
+    """Raise MechanismError unless small motions are independent of the positions to which wheels have rolled.
 
-    Positions that the coordinates do not determine, such as the place and heading of a bicycle, are changed one after
-    the other, with the velocities that the rows then require: the balance of forces must not change.
+    Positions that the coordinates do not determine, such as the place and heading of a bicycle, are varied one by one,
+    with the velocities that the constraints then require: the balance of forces must not change.
     """
     gradients, inverse, basis, sizes = reduction
     count, chosen = len(point.scale), names[released:]
@@ -167,9 +169,9 @@ def _check_nowhere(
 
 
 def _magnitudes(point: OperatingPoint, basis: Float[np.ndarray, "column coordinate"]) -> list[np.ndarray]:
-    """Return what stiffness and damping by all loads and velocities would be if they did not cancel within a body.
+    """Return the sizes of the terms of loads in the stiffness and of velocities in the damping, without cancellation.
 
-    Applied forces count one by one: the stiffness by the force of a spring may cancel that of another, and its own.
+    Applied forces count one by one, since the geometric stiffness of a spring may cancel that of another, or its own.
     """
     bodies = len(point.model.bodies)
     borne = np.abs(point.jacobian).T @ np.abs(point.multipliers)
@@ -183,7 +185,7 @@ def _magnitudes(point: OperatingPoint, basis: Float[np.ndarray, "column coordina
 
 
 def with_joints(reduction: Reduction, names: Sequence[str]) -> Reduction:
-    """Return a reduction whose coordinates have the names of joints."""
+    """Return the reduction with its coordinates named after joints."""
     return dataclasses.replace(reduction, names=tuple(names), released=tuple(names))
 
 
@@ -200,7 +202,7 @@ def chosen_outputs(point: OperatingPoint) -> tuple[str, ...]:
 def _chosen(
     point: OperatingPoint, free: Float[np.ndarray, "column direction"], prefer_outputs: bool
 ) -> tuple[str, ...]:
-    """Choose coordinates that are well independent: the largest part left in turn, as in a pivoted elimination."""
+    """Return well-conditioned independent coordinates, chosen by pivoting on the largest remaining row."""
     if prefer_outputs:
         names = list(point.output_gradients)
         rows = np.array([point.output_gradients[name] for name in names]).reshape(-1, len(free)) @ free
@@ -210,7 +212,7 @@ def _chosen(
         width = len(COLUMNS[point.mechanism.space])
         turns = np.arange(width) >= point.model.pose_type.shifts
         rows = free * np.tile(np.where(turns, 1.0, SHIFT), len(point.model.bodies))[:, None]
-        if rolls(point):  # the axes of a wheel that turns are other ones at any other instant
+        if rolls(point):  # the axes of a turning wheel differ at every instant
             spin = np.abs(point.coordinates["angular_velocity"][0, :, 1:, 0]).max(axis=0)
             rows[np.repeat(spin > NOWHERE * spin.max(initial=0.0), width)] *= 1e-3
     columns: list[int] = []
@@ -229,7 +231,13 @@ def _chosen(
 def _gradients(
     point: OperatingPoint, names: Sequence[str], free: Float[np.ndarray, "column direction"]
 ) -> Float[np.ndarray, "coordinate column"]:
-    """Return the gradients of coordinates by the scaled ones of the bodies, or raise where they do not fit."""
+    """Return the gradients of named coordinates with respect to the scaled coordinates of the bodies.
+
+    Raises
+    ------
+    MechanismError
+        If a name is not that of a coordinate, or the coordinates are not independent.
+    """
     columns = column_names(point)
     rows = []
     for name in names:
@@ -279,7 +287,7 @@ def _laws_varied(point: OperatingPoint, names: Sequence[str], laws: np.ndarray) 
 def _measured(
     point: OperatingPoint, names: Sequence[str], changes: Lanes, level: int
 ) -> Float[np.ndarray, "coordinate lane"]:
-    """Return the Taylor coefficients of coordinates under changes, which may be incomplete at this level."""
+    """Return the Taylor coefficients of coordinates for changes, which may be incomplete at this level."""
     varied = point.outputs_varied(changes)
     components, columns = point.components([x.shape[1] for x in varied]), column_names(point)
     rows = []

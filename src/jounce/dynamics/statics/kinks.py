@@ -1,4 +1,4 @@
-"""Applied forces that have a kink or a jump where a mechanism is: no linear law stands for them there."""
+"""Detection of applied forces with a kink or a jump at an operating point, where they cannot be linearized."""
 
 import numpy as np
 
@@ -6,15 +6,16 @@ from jounce.dynamics.statics.independent_coordinates import ROUNDING, Reduction
 from jounce.dynamics.statics.variations import sizes_of_forces
 
 STEPS = (1e-4, 1e-6)  # rad or sizes of the mechanism, and as much by s
-BENT = 0.1  # of the larger step: where slopes still differ by so much over a step a hundred times shorter
-FAINT = 1e-6  # of the slope: a difference of slopes that is smaller is rounding
-COUNTS = 1e-9  # of the stiffness: what a force may add to it unseen
+BENT = 0.1  # share of the difference of slopes that remains at a kink with the shorter step
+FAINT = 1e-6  # of the slope: a smaller difference of slopes is rounding
+COUNTS = 1e-9  # of the stiffness: a smaller difference of slopes does not matter
 
 
 def kinked(reduction: Reduction) -> list[str]:
     """Return the names of applied forces whose slopes differ on the two sides of a small motion.
 
-    A smooth law bends less the shorter the step is; a kink stays. Each coordinate and each velocity is looked at.
+    The difference of the slopes of a smooth law shrinks with the step; that of a kink stays. Each coordinate and each
+    velocity is tested.
     """
     point, count = reduction.point, len(reduction.names)
     if not point.equations.system.forces or not count:
@@ -37,9 +38,9 @@ def kinked(reduction: Reduction) -> list[str]:
     names = []
     for group, members, large, small in zip(point.equations.system.forces, point.model.forces, *bends, strict=True):
         lever = point.model.length if group.element.unit == "N" else 1.0
-        slope = small[1].max(axis=2, keepdims=True)  # the steepest: what rounding of the position costs follows from it
+        slope = small[1].max(axis=2, keepdims=True)  # the steepest, which multiplies rounding of positions
         bent = (small[0] > BENT * large[0]) & (small[0] > FAINT * slope) & (small[0] * lever > counts)
-        # what grows as the step shrinks is a jump, and nothing but rounding if it is small
+        # a difference that grows as the step shrinks is a jump, or rounding if it is small
         bent &= (small[0] < large[0] / BENT) | (small[0] * STEPS[1] * lever > COUNTS * np.abs(point.loads).max())
         bad = (bent | ~np.isfinite(small[0])).any(axis=(0, 2))
         names += [name for name, is_bad in zip(members, bad, strict=True) if is_bad]
@@ -47,7 +48,7 @@ def kinked(reduction: Reduction) -> list[str]:
 
 
 def _significant_difference(reduction: Reduction, sizes: np.ndarray) -> np.ndarray:
-    """Return the least difference of slopes that matters among stiffness and damping, N m and N m s, for each lane."""
+    """Return the least difference of slopes that matters for stiffness and damping, N m and N m s, for each lane."""
     count = len(reduction.names)
     stiffness, mass = (
         float(np.max(np.diag(reduction.noise(level)) / ROUNDING / sizes[:count] ** 2, initial=1e-300))

@@ -126,7 +126,7 @@ def _closed(start: OperatingPoint, coordinates: Coordinates) -> OperatingPoint |
 
 
 def _same(one: OperatingPoint, other: OperatingPoint) -> bool:
-    """Tell whether two positions are equal up to rounding; whole turns matter only if a force depends on them."""
+    """Return whether two positions are equal up to rounding; revolutions count only if a force depends on them."""
     a, b = one.coordinates, other.coordinates
     if np.abs(a["position"][0] - b["position"][0]).max() > SAME * one.model.length:
         return False

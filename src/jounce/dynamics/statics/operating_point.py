@@ -1,4 +1,4 @@
-"""A mechanism in a motion at one instant, where small changes of that motion are looked at."""
+"""A mechanism at one instant of a motion, as the operating point of small motions."""
 
 import dataclasses
 from collections.abc import Sequence
@@ -30,20 +30,20 @@ Lanes = Float[np.ndarray, "3 column lane"]
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class OperatingPoint:
-    """A mechanism in a motion at one instant, where small changes of that motion are looked at.
+    """A mechanism at one instant of a motion, as the operating point of small motions.
 
     Parameters
     ----------
     mechanism : Mechanism
-        What moves.
+        The mechanism.
     model : Model
-        Its numbers, the rows scaled.
+        The numeric model, with scaled rows.
     equations : Equations
-        Its forces there, with the turns that angles about axes have.
+        Equations of motion at the instant, with the revolutions of angles about axes.
     coordinates : dict of str to array
         Taylor coefficients to order 2 of the coordinates of all bodies, the ground first; a batch of one.
     clock : array of shape (3, 1, 1)
-        Those of time; of rate zero where the laws of time are held.
+        Taylor coefficients of time; the rate is zero if the laws are frozen.
     """
 
     mechanism: Mechanism
@@ -54,7 +54,7 @@ class OperatingPoint:
 
     @property
     def instant(self) -> float:
-        """When it is, s."""
+        """The instant, s."""
         return float(self.clock[0, 0, 0])
 
     @property
@@ -63,11 +63,11 @@ class OperatingPoint:
         return {name: x[0] for name, x in self.coordinates.items() if name != "angular_velocity"}
 
     def displaced(self, change: Float[np.ndarray, "coordinate all 1"]) -> dict[str, np.ndarray]:
-        """Return the coordinates of all bodies after shifts and turns, as `changes` has them."""
+        """Return the coordinates of all bodies after shifts and rotations from `changes`."""
         return {name: np.asarray(x) for name, x in displaced(self.place, change, self.model.pose_type).items()}
 
     def closed(self, coordinates: dict[str, np.ndarray]) -> dict[str, np.ndarray] | None:
-        """Return coordinates near others at which all constraints hold; None where none are found."""
+        """Return nearby coordinates that satisfy all constraints; None if none are found."""
         if not self.model.rows:
             return coordinates
         trial = assemble_from_guess(self.model, self.instant, TOLERANCE, coordinates)
@@ -80,22 +80,22 @@ class OperatingPoint:
 
     @property
     def loads(self) -> Float[np.ndarray, "2 column"]:
-        """Inertia less weight, and applied forces with the minus sign, in scaled coordinates: N m, or N by size."""
+        """Inertia less weight, and applied forces with the minus sign, in scaled coordinates, N m."""
         return self.as_columns(self._loads_and_jacobian[0][..., None])[..., 0]
 
     @property
     def jacobian(self) -> Float[np.ndarray, "row column"]:
-        """Of all constraints, scaled on both sides."""
+        """Jacobian of all constraints, with rows and columns scaled."""
         return self._loads_and_jacobian[1]
 
     @property
     def scale(self) -> Float[np.ndarray, " column"]:
-        """Of the coordinates of the moving bodies, m or rad."""
+        """Scales of the coordinates of the moving bodies, m or rad."""
         return np.tile(np.asarray(self.model.system.column_scale), len(self.model.bodies))
 
     @cached_property
     def multipliers(self) -> Float[np.ndarray, " row"]:
-        """Of the scaled rows: the shortest ones that balance the loads."""
+        """Multipliers of the scaled rows, of least norm, that balance the loads."""
         load = self.loads.sum(axis=0)
         if not len(self.jacobian):
             return np.zeros(0)
@@ -103,11 +103,11 @@ class OperatingPoint:
         if not pressing_teeth(self.equations.system):
             return first
         borne = np.asarray(constraint_forces_at(self.equations, self.coordinates, self.clock, first[:, None]))
-        return first + self._balancing(load + self.as_columns(borne[..., None])[:, 0])  # those of teeth are the same
+        return first + self._balancing(load + self.as_columns(borne[..., None])[:, 0])  # multipliers of teeth stay
 
     @cached_property
     def pushed(self) -> Float[np.ndarray, " body"]:
-        """Sizes of the applied forces on each moving body, added up as if none canceled another, N m."""
+        """Sum of the absolute applied forces on each moving body, N m."""
         sums = np.zeros(1 + len(self.model.bodies))
         groups = self.equations.system.forces
         if groups:
@@ -130,37 +130,37 @@ class OperatingPoint:
 
     @cached_property
     def masses(self) -> Float[np.ndarray, "coordinate coordinate body"]:
-        """Mass matrices of the moving bodies, their rows and columns scaled, kg m^2."""
+        """Mass matrices of the moving bodies, with rows and columns scaled, kg m^2."""
         scale = np.asarray(self.model.system.column_scale)
         return np.asarray(masses_at(self.equations, self.coordinates)) * (scale[:, None] * scale)[..., None]
 
     def as_columns(self, by_body: Float[np.ndarray, "... coordinate body lane"]) -> np.ndarray:
-        """Return what acts on the coordinates of bodies in the order of the scaled columns."""
+        """Return generalized forces by body in the order of the scaled columns."""
         scaled = by_body * np.asarray(self.model.system.column_scale)[:, None, None]
         return np.swapaxes(scaled, -3, -2).reshape(*scaled.shape[:-3], -1, scaled.shape[-1])
 
     def changes(
         self, columns: Float[np.ndarray, "level column lane"]
     ) -> Float[np.ndarray, "level coordinate all lane"]:
-        """Return changes of the scaled coordinates as shifts and turns of all bodies, the ground first, m and rad."""
+        """Return scaled changes as shifts, m, and rotations, rad, of all bodies, the ground first."""
         count = len(self.model.system.column_scale)
         parts = (columns * self.scale[:, None]).reshape(len(columns), -1, count, columns.shape[-1])
         return np.pad(np.swapaxes(parts, 1, 2), ((0, 0), (0, 0), (1, 0), (0, 0)))
 
     def varied(self, columns: Lanes) -> tuple[Float[np.ndarray, "3 column lane"], Float[np.ndarray, "3 row lane"]]:
-        """Return how loads, with those of the joints, and the rows vary with changes of the scaled coordinates."""
+        """Return the variations of loads, constraint forces and rows with changes of the scaled coordinates."""
         arguments = self.equations, self.coordinates, self.clock, self.multipliers[:, None], self.changes(columns)
         forces, rows = (np.asarray(x) for x in variations(*arguments))
         return self.as_columns(forces), rows
 
     def outputs_varied(self, columns: Lanes) -> list[Float[np.ndarray, "_ _ _ lane"]]:
-        """Return how outputs, group by group, vary with changes of the scaled coordinates."""
+        """Return the variations of outputs, group by group, with changes of the scaled coordinates."""
         groups, pose_type = self.model.system.outputs, self.model.pose_type
         return [np.asarray(x) for x in output_variations(groups, self.coordinates, pose_type, self.changes(columns))]
 
     @cached_property
     def output_gradients(self) -> dict[str, Float[np.ndarray, " column"]]:
-        """Gradients, by the scaled coordinates, of the components of outputs that are positions or angles, by name."""
+        """Gradients by the scaled coordinates of output components that are functions of the poses, by name."""
         count = len(self.scale)
         varied = self.outputs_varied(changes_of_coordinates(np.eye(count)))
         components = self.components([x.shape[1] for x in varied])
@@ -178,18 +178,18 @@ class OperatingPoint:
         return {name: components[name] for name in sorted(components, key=self._order)}
 
     def _order(self, component: str) -> int:
-        """Return the position of the output that a component belongs to in the order of the mechanism."""
+        """Return the index of the output of a component, in the order of the mechanism."""
         names = list(self.mechanism.outputs)
         return max(k for k, name in enumerate(names) if component == name or component.startswith(f"{name}_"))
 
 
 def changes_of_coordinates(columns: Float[np.ndarray, "column lane"]) -> Lanes:
-    """Return changes of the scaled coordinates alone, and of none of their rates."""
+    """Return changes of the scaled coordinates without changes of their rates."""
     return np.stack([columns, *[np.zeros_like(columns)] * (LEVELS - 1)])
 
 
 def null_space(jacobian: Float[np.ndarray, "row column"]) -> Float[np.ndarray, "column direction"]:
-    """Return an orthonormal basis of the directions that a scaled Jacobian takes to zero."""
+    """Return an orthonormal basis of the null space of a scaled Jacobian."""
     if not len(jacobian):
         return np.eye(jacobian.shape[1])
     _, sizes, right = np.linalg.svd(jacobian)

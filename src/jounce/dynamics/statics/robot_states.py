@@ -1,4 +1,4 @@
-"""Robots as mechanisms that stand still, or that move through a state: what equilibria and small motions start from."""
+"""Robots as mechanisms at rest or in a state of motion, for equilibria and small motions."""
 
 import dataclasses
 from collections.abc import Mapping, Sequence
@@ -26,15 +26,16 @@ from jounce.trajectory.labels import in_order
 DRIVE = "_drive"
 
 GivenState = TypeAliasType("GivenState", Mapping[str, float] | ArrayLike | None)
-"""Coordinates, with or without their rates and second derivatives, or by name of the joint; others are zero."""
+"""Coordinates, optionally with rates and second derivatives, or coordinates by joint name; the rest is zero."""
 
 
 def as_held_mechanism(
     robot: Robot, q: GivenCoordinates, hold: str | Sequence[str], torques: Mapping[str, float] | None, drives: bool
 ) -> Mechanism:
-    """Return a robot as a mechanism, joints held at their coordinates, constant torques or forces in others.
+    """Return a robot as a mechanism with held joints, and constant torques or forces in other joints.
 
-    With `drives` it has their armature and damping; Coulomb friction, which would hold it anywhere near, is left out.
+    With `drives` the joints have armature inertia and damping. Coulomb friction is left out: it would hold the robot
+    anywhere nearby.
 
     Raises
     ------
@@ -72,18 +73,18 @@ def as_held_mechanism(
 def through_state(
     robot: Robot, state: GivenState, coordinates: Sequence[str] | None, drives: bool
 ) -> tuple[OperatingPoint, tuple[str, ...]]:
-    """Return a robot in a state, driven in independent joints, and their names.
+    """Return a robot in a state, driven in independent joints, and the names of these joints.
 
     Parameters
     ----------
     robot : Robot
-        With loops or without.
+        Robot with or without loops.
     state : array_like of shape (n,), or (k, n) with k to 3
-        Coordinates, their rates and second derivatives; those of joints that are not independent are left out.
+        Coordinates, their rates and second derivatives; those of dependent joints are ignored.
     coordinates : sequence of str, optional
-        Independent joints; all of a tree, and chosen where there are loops, unless given.
+        Independent joints; by default all joints of a tree, or chosen ones if there are loops.
     drives : bool
-        Whether the joints have their armature and damping; Coulomb friction, which has no slope, is left out.
+        Whether the joints have armature inertia and damping; Coulomb friction, which has no slope, is left out.
 
     Raises
     ------
@@ -112,7 +113,7 @@ def _frictionless(robot: Robot) -> Robot:
 
 
 def _levels(robot: Robot, state: GivenState) -> Float[np.ndarray, "3 joint"]:
-    """Return coordinates, rates and second derivatives, zero where they are not given."""
+    """Return coordinates, rates and second derivatives, zero by default."""
     count = len(robot.joint_names)
     values = robot.coordinates(**state) if isinstance(state, Mapping) else np.zeros(count) if state is None else state
     given = np.atleast_2d(np.asarray(floats("q", in_order("q", values, robot.joint_names, RobotError))))
@@ -126,7 +127,7 @@ def _levels(robot: Robot, state: GivenState) -> Float[np.ndarray, "3 joint"]:
 
 
 def _independent(robot: Robot, q: Float[np.ndarray, " joint"]) -> tuple[str, ...]:
-    """Return joints that determine the position of a robot with loops, chosen where its loops are closed near q."""
+    """Return independent joints of a robot with loops, chosen in the closed position near q."""
     mechanism = robot.mechanism(q, drives=False)
     model, coordinates = assemble(build(mechanism), 0.0, TOLERANCE, free=True)
     return chosen_outputs(rest_point(mechanism, model, coordinates, 0.0))

@@ -1,4 +1,4 @@
-"""Whether small motions about an equilibrium stay small, judged from the matrices of their equations."""
+"""Stability of an equilibrium from the matrices of its small motions."""
 
 from typing import NamedTuple
 
@@ -6,18 +6,18 @@ import numpy as np
 
 from jounce.dynamics.statics.eigenmodes import EPSILON, Square, eigenmodes, is_symmetric
 
-DECAY = 1e-9  # of the fastest rate: growth that is slower is rounding
+DECAY = 1e-9  # of the fastest rate: slower growth is rounding
 
 
 class Verdict(NamedTuple):
-    """What small motions do.
+    """The stability of small motions.
 
     Attributes
     ----------
     word : str
-        ``stable``, ``unstable``, ``indifferent``, ``undetermined``, or ``held`` where nothing can move.
+        ``stable``, ``unstable``, ``indifferent``, ``undetermined``, or ``held`` if nothing can move.
     reason : str
-        In words.
+        The reason in words.
     direction : array of shape (coordinates,) or None
         The motion that grows, or that no force resists.
     """
@@ -28,10 +28,10 @@ class Verdict(NamedTuple):
 
 
 def stability_of(stiffness: Square, noise: Square, damping: Square, damping_noise: Square, mass: Square) -> Verdict:
-    """Return whether an equilibrium is stable.
+    """Return the stability of an equilibrium.
 
-    Where the forces have an energy, by the sign of the stiffness (Lagrange and Dirichlet; Kelvin and Tait with
-    damping). Elsewhere by the eigenvalues of the linear equations, for which the mass matrix must be regular.
+    Conservative forces are judged by the definiteness of the stiffness (Lagrange and Dirichlet; Kelvin and Tait with
+    damping), other forces by the eigenvalues of the linear equations, which need a regular mass matrix.
     """
     if not len(stiffness):
         return Verdict("held", "nothing can move")
@@ -54,9 +54,9 @@ def stability_of(stiffness: Square, noise: Square, damping: Square, damping_nois
 
 
 def _equilibration_factors(noise: Square) -> Square:
-    """Return factors of the entries by which those of all coordinates come near to one: m and rad count alike.
+    """Return factors that scale the entries of all coordinates to about one, so that m and rad count alike.
 
-    They follow from what the entries are sums of, as a stiffness may be zero but for rounding.
+    They follow from the sizes of the summed terms, since a stiffness itself may be mere rounding.
     """
     size = np.sqrt(np.diag(noise))
     size = np.where(size > 0, size, size.max(initial=0.0) or 1.0)

@@ -79,17 +79,17 @@ class Equilibrium(Displayed):
 
     @property
     def stable(self) -> bool | None:
-        """Whether the mechanism stays there, true also if nothing can move; None if that is not determined."""
+        """Whether the mechanism stays in this position, also because nothing can move; None if not determined."""
         return {"stable": True, "held": True, "unstable": False}.get(self.stability)
 
     @property
     def stability(self) -> str:
-        """Whether small motions stay small, in a word."""
+        """The stability in a word."""
         return self._verdict.word
 
     @cached_property
     def reason(self) -> str:
-        """Why the equilibrium is stable or not, in words."""
+        """The reason for the stability in words."""
         verdict = self._verdict
         if verdict.direction is None:
             return verdict.reason
@@ -117,7 +117,7 @@ class Equilibrium(Displayed):
 
     @property
     def _friction(self) -> tuple[str, ...]:
-        """That friction of joints, which is smoothed by a speed, does not stick."""
+        """A message that smoothed joint friction does not stick."""
         rubbing = [name for name, joint in self.mechanism.joints.items() if getattr(joint, "friction", None)]
         if not rubbing or not self.degrees_of_freedom:
             return ()
@@ -129,7 +129,7 @@ class Equilibrium(Displayed):
 
     @cached_property
     def _slack(self) -> tuple[str, ...]:
-        """Messages on ropes that would have to push, which no rope does."""
+        """Messages on slack ropes, which would have to push."""
         ropes = [name for name, joint in self.mechanism.joints.items() if isinstance(joint, Rope)]
         tensions = {name: float(JointForceOutput(name).coefficients(self.motion)[0, 0, 0]) for name in ropes}
         size = max(map(abs, tensions.values()), default=0.0)
@@ -176,7 +176,7 @@ class Equilibrium(Displayed):
 
     @cached_property
     def _all_poses(self) -> dict[str, dict[str, Any]]:
-        """The poses of all moving bodies, those of carriages included."""
+        """Poses of all moving bodies, carriages included."""
         poses = {}
         for k, name in enumerate(self.point.model.bodies, 1):
             position, attitude = (self.point.coordinates[key][0, ..., k, 0] for key in self._keys)
@@ -226,9 +226,9 @@ def equilibrium(
     Parameters
     ----------
     mechanism : Mechanism or Robot
-        With masses or applied forces. The search begins at the assembled position nearest to the starting guess. A
-        robot, with loops or without, is converted to a mechanism (`Robot.mechanism`), whose outputs are the coordinates
-        of its joints.
+        A mechanism with masses or applied forces; the search begins at the assembled position nearest to the starting
+        guess. A robot, with loops or without, is converted to a mechanism (`Robot.mechanism`), whose outputs are the
+        coordinates of its joints.
     time : float, optional
         The instant, s; by default the first of the mechanism, or 0 if it has none.
     without : sequence of str, optional
@@ -357,7 +357,13 @@ def _instant(mechanism: Mechanism, time: Any) -> float:
 
 
 def equilibrium_of(result: SearchResult, start: OperatingPoint, *, of_robot: bool = False) -> Equilibrium:
-    """Return the result; a position in which the constraints restrain fewer motions than elsewhere is singular."""
+    """Return the equilibrium at the end of a search; it is singular if it has more free directions than the start.
+
+    Raises
+    ------
+    SolveError
+        If bodies come to rest only beyond an end of a curve.
+    """
     singular = result.point.free.shape[1] > start.free.shape[1]
     coordinates = {"position": result.point.coordinates["position"][0]}
     if beyond := beyond_end(ends_of(result.point.model), coordinates):

@@ -1,8 +1,8 @@
-"""How forces, constraints and outputs change, to first order, as the bodies of a mechanism move a little otherwise.
+"""First-order variations of forces, constraints and outputs with changes of a motion.
 
-A change of a motion is itself a motion: for each body a shift along the global axes and a turn about its own, as Taylor
-coefficients in time. All that is linear in it follows by differentiating the expressions on jets along it: no Jacobian
-of a force is written, and a change of position, of velocity and of acceleration are three coefficients of one jet.
+A change of a motion is itself a motion: for each body a shift along the global axes and a rotation about its own axes,
+as Taylor coefficients in time. Changes of position, velocity and acceleration are three coefficients of one jet. All
+variations are directional derivatives of the expressions on jets; no Jacobian of a force is written by hand.
 """
 
 from collections.abc import Mapping, Sequence
@@ -28,23 +28,22 @@ from jounce.rigid.pose import Pose
 
 LEVELS = 3  # position, velocity and acceleration
 Changes = Float[Numbers, "level coordinate all lane"]
-"""Taylor coefficients of shifts and turns of all bodies, the ground first, one change for each lane."""
+"""Taylor coefficients of shifts and rotations of all bodies, the ground first, with one change in each lane."""
 Coordinates = Mapping[str, Float[Numbers, "_ ... 1"]]
 Clock = Float[Numbers, "3 1 1"]
-"""Taylor coefficients of time; of zero rate where the laws of time are held."""
+"""Taylor coefficients of time; the rate is zero if the laws are frozen."""
 
 
 @compiled()
 def loads_at(equations: Equations, coordinates: Coordinates, clock: Clock) -> tuple[Any, Any]:
-    """Return what acts on the bodies in a motion, and the scaled Jacobian.
+    """Return the loads on the moving bodies in a motion, and the scaled Jacobian.
 
     Returns
     -------
     loads : array of shape (2, coordinates, bodies)
-        Inertia less weight, and applied forces with the minus sign: force, global, and moment in the axes of the body,
-        N and N m, of the moving bodies.
+        Inertia less weight, and applied forces with the minus sign: global forces, N, and moments in body axes, N m.
     jacobian : array of shape (rows, columns)
-        Scaled on both sides.
+        Jacobian with rows and columns scaled.
     """
     pose, time = _moving(equations, coordinates), Jet(tuple(clock))
     system = equations.system
@@ -60,27 +59,27 @@ def variations(
     multipliers: Float[Numbers, "row 1"],
     changes: Changes,
 ) -> tuple[Float[Numbers, "3 coordinate moving lane"], Float[Numbers, "3 row lane"]]:
-    """Return how what the bodies have to balance, and the residuals, vary with changes of a motion.
+    """Return the variations of loads, constraint forces and residuals with changes of a motion.
 
     Parameters
     ----------
     equations : Equations
-        Of the mechanism.
+        Equations of motion of the mechanism.
     coordinates : dict of str to array
         Taylor coefficients to order 2 of the coordinates of all bodies, the ground first.
     clock : array of shape (3, 1, 1)
-        Those of time.
+        Taylor coefficients of time.
     multipliers : array of shape (rows, 1)
-        Of the scaled rows, held while the bodies change: friction follows them, and where nothing slips, their own
-        changes do not count in it.
+        Multipliers of the scaled rows, held constant. Friction depends on them; without slip, their variations do not
+        contribute to it.
     changes : array of shape (3, coordinates, bodies, lanes)
         Taylor coefficients, in m and rad.
 
     Returns
     -------
     forces : array of shape (3, coordinates, bodies, lanes)
-        Inertia less weight, applied forces with the minus sign, and ``Phi_q^T lambda`` with the friction of joints, of
-        the moving bodies.
+        For the moving bodies: inertia less weight, applied forces with the minus sign, and ``Phi_q^T lambda`` with
+        joint friction.
     rows : array of shape (3, rows, lanes)
         Taylor coefficients of the variation of the scaled residuals.
     """
@@ -97,7 +96,7 @@ def variations(
 def constraint_forces_at(
     equations: Equations, coordinates: Coordinates, clock: Clock, multipliers: Float[Numbers, "row 1"]
 ) -> Float[Numbers, "coordinate moving"]:
-    """Return ``Phi_q^T lambda`` with the friction of joints and the tooth forces that press them, of moving bodies."""
+    """Return ``Phi_q^T lambda`` on moving bodies, with joint friction and the tooth forces that press the joints."""
     return _constraint_wrenches(equations, _moving(equations, coordinates), Jet(tuple(clock)), multipliers)[:, 1:, 0]
 
 
@@ -105,7 +104,7 @@ def constraint_forces_at(
 def output_variations(
     groups: Sequence[Group], coordinates: Coordinates, pose_type: type[Pose], changes: Changes
 ) -> tuple[Float[Numbers, "_ _ _ lane"], ...]:
-    """Return how outputs and their rates vary with changes of a motion, as Taylor coefficients."""
+    """Return the Taylor coefficients of the variations of outputs with changes of a motion."""
     pose: Any = movable(pose_of(coordinates, pose_type))
 
     def evaluated(moved: Pose) -> tuple[Any, ...]:
@@ -122,12 +121,12 @@ def law_variations(
     order: tuple[tuple[int, int], ...],
     changes: Float[Numbers, "3 driver lane"],
 ) -> Float[Numbers, "3 row lane"]:
-    """Return how the scaled residuals vary with changes of the laws of drivers, as Taylor coefficients.
+    """Return the Taylor coefficients of the variations of scaled residuals with changes of driver laws.
 
     Parameters
     ----------
     equations, coordinates, clock
-        As `variations` takes them.
+        As for `variations`.
     order : tuple of tuple of int
         The group and the instance of each driver.
     changes : array of shape (3, drivers, lanes)
@@ -145,7 +144,7 @@ def law_variations(
 
 @compiled()
 def reaches(equations: Equations, coordinates: Coordinates, clock: Clock, changes: Changes) -> tuple[Any, ...]:
-    """Return how far each applied force acts along as bodies move by changes, (components, instances, lanes)."""
+    """Return the displacements conjugate to each applied force for changes, (components, instances, lanes)."""
     pose, time = _moving(equations, coordinates), Jet(tuple(clock)).truncate(0)
 
     def along(change: Any) -> tuple[Any, ...]:
@@ -161,7 +160,7 @@ def reaches(equations: Equations, coordinates: Coordinates, clock: Clock, change
 def sizes_of_forces(
     equations: Equations, coordinates: Coordinates, clock: Clock, changes: Changes
 ) -> tuple[Float[Numbers, "component instance lane"], ...]:
-    """Return the applied forces where the bodies have moved, and move otherwise, by small changes."""
+    """Return the applied forces after small changes of positions and velocities."""
     pose, time = _moving(equations, coordinates), Jet(tuple(clock)).truncate(1)
 
     def at(change: Any) -> tuple[Any, ...]:
@@ -184,19 +183,19 @@ def residuals_at(equations: Equations, coordinates: Coordinates, clock: Clock) -
 
 @compiled()
 def masses_at(equations: Equations, coordinates: Coordinates) -> Float[Numbers, "coordinate coordinate body"]:
-    """Return the mass matrix of each moving body, about the origin of its frame."""
+    """Return the mass matrix of each moving body about the origin of its frame."""
     return mass_matrices(_moving(equations, coordinates).truncate(0), equations.masses)[:, :, 1:, 0]
 
 
 @compiled("pose_type")
 def displaced(coordinates: Mapping[str, Numbers], change: Numbers, pose_type: type[Pose]) -> dict[str, Any]:
-    """Return coordinates of order zero after all bodies, the ground first, have shifted, m, and turned, rad."""
+    """Return coordinates of order zero after shifts, m, and rotations, rad, of all bodies, the ground first."""
     pose = pose_at(coordinates, pose_type).displaced(change[: pose_type.shifts], change[pose_type.shifts :])
     return {name: jet.coefficients[0] for name, jet in pose.coordinates().items()}
 
 
 def at_rest(coordinates: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
-    """Return Taylor coefficients to order 2 of bodies that stand still, from coordinates of order zero."""
+    """Return Taylor coefficients to order 2 of bodies at rest, from coordinates of order zero."""
     extended = {name: np.stack([np.asarray(x), *[np.zeros_like(x)] * 2]) for name, x in coordinates.items()}
     if "quaternion" in extended:
         extended["angular_velocity"] = np.zeros((2, *np.shape(coordinates["position"])))
@@ -204,7 +203,7 @@ def at_rest(coordinates: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
 
 
 def clock_at(instant: float, *, stopped: bool) -> np.ndarray:
-    """Return the Taylor coefficients of time at an instant; stopped, the laws of time stand still."""
+    """Return the Taylor coefficients of time at an instant; `stopped` freezes the laws."""
     return np.array([instant, 0.0 if stopped else 1.0, 0.0]).reshape(3, 1, 1)
 
 
@@ -213,14 +212,14 @@ def _moving(equations: Equations, coordinates: Coordinates) -> Any:
 
 
 def _loads(equations: Equations, pose: Pose, time: Jet) -> tuple[Any, Any]:
-    """Return inertia less weight, and applied forces with the minus sign, of all bodies."""
+    """Return inertia less weight, and applied forces with the minus sign, for all bodies."""
     inertia = jnp.concatenate([f.coefficients[0] for f in inertia_forces(pose, equations.masses, equations.gravity)])
     applied = equations.system.applied_forces(pose.truncate(1), time.truncate(1)).coefficients[0]
     return inertia, -applied
 
 
 def _constraint_wrenches(equations: Equations, pose: Pose, time: Jet, multipliers: Float[Numbers, "row 1"]) -> Any:
-    """Return what joints exert on all bodies, with the minus sign of forces."""
+    """Return ``Phi_q^T lambda`` with joint friction for all bodies: the negative wrenches of the joints."""
     system, now = equations.system, time.truncate(0)
     friction = FreeFriction(system, pose.truncate(1), now)
 
@@ -234,7 +233,7 @@ def _constraint_wrenches(equations: Equations, pose: Pose, time: Jet, multiplier
 
 
 def _tangent(pose: Pose, change: Float[Numbers, "level coordinate body"]) -> Any:
-    """Return the change of a pose whose bodies shift and turn as given by Taylor coefficients."""
+    """Return the change of a pose from the Taylor coefficients of shifts and rotations."""
     parts = change[..., None]
     shift, turn = Jet(tuple(parts[:, : pose.shifts])), Jet(tuple(parts[:, pose.shifts :]))
     return movable(pose.varied(shift, turn))

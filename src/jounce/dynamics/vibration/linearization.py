@@ -1,4 +1,4 @@
-"""Equations of small motions about an equilibrium or along a motion, and what control and vibration take of them."""
+"""Equations of small motions about an equilibrium or along a motion, for control and vibration."""
 
 from collections.abc import Sequence
 from functools import cached_property
@@ -25,9 +25,9 @@ class StateSpace(NamedTuple):
     Attributes
     ----------
     A, B, C, D : numpy.ndarray
-        SI.
+        Matrices in SI units.
     states, inputs, outputs : tuple of str
-        Names along their axes; a rate has ``_d1`` behind the name.
+        Names along the axes; the name of a rate ends in ``_d1``.
     """
 
     A: Float[np.ndarray, "state state"]
@@ -42,28 +42,29 @@ class StateSpace(NamedTuple):
 class Linearization(Displayed):
     """The equations of small motions ``M y'' + C y' + K y = B u`` of independent coordinates y.
 
-    They hold about an equilibrium, or about one instant of a motion, with all terms of its velocities: of inertia, of
-    joints and of forces. Coordinates, names and units are in ``coordinates`` and ``units``.
+    They hold about an equilibrium, or about one instant of a motion, with all velocity terms of inertia, joints and
+    forces.
 
     Attributes
     ----------
     mechanism : Mechanism
-        What moves.
+        The mechanism.
     equilibrium : Equilibrium or None
-        About which it moves; None along a motion.
+        The equilibrium; None along a motion.
     time : float
         The instant, s.
     coordinates, units : tuple of str
-        Of y: drivers that were released, outputs, or coordinates of bodies such as ``rod.angle``.
+        Names and units of y: released drivers, outputs, or coordinates of bodies such as ``rod.angle``.
     mass, damping, stiffness : numpy.ndarray of shape (coordinates, coordinates)
-        SI. The stiffness holds that of applied forces, of weight, and of all that joints and drivers bear.
+        Matrices in SI units. The stiffness includes that of applied forces and weight, and the geometric stiffness of
+        joint and driver reactions.
     inputs : tuple of str
         Names of u: forces of released drivers in addition to their force in the motion, N or N m, and components of
         applied forces in addition to their law.
     input_matrix : numpy.ndarray of shape (coordinates, inputs)
-        Generalized forces by those.
+        Generalized forces for a unit of each input.
     held : tuple of str
-        Drivers that hold; they may be inputs of `state_space` too.
+        Drivers that are not released; they may also be inputs of `state_space`.
     """
 
     def __init__(self, reduction: Reduction, about: Equilibrium | None, *, by_forces: bool = True):
@@ -79,7 +80,7 @@ class Linearization(Displayed):
 
     @cached_property
     def modes(self) -> Modes:
-        """Natural frequencies, damping ratios and shapes; along a motion, of the equations at the instant."""
+        """Natural frequencies, damping ratios and shapes; along a motion, those of the equations at the instant."""
         return Modes(self._reduction)
 
     @cached_property
@@ -112,7 +113,7 @@ class Linearization(Displayed):
 
     @property
     def input_matrix(self) -> Float[np.ndarray, "coordinate input"]:
-        """Generalized forces of the coordinates by each input, shape (coordinates, inputs)."""
+        """Generalized forces for a unit of each input, shape (coordinates, inputs)."""
         return self._inputs[1]
 
     def state_space(self, inputs: Sequence[str] | None = None, outputs: Sequence[str] | None = None) -> StateSpace:
@@ -121,11 +122,11 @@ class Linearization(Displayed):
         Parameters
         ----------
         inputs : sequence of str, optional
-            Of `inputs`, all unless given; or drivers that hold. The input of one of these is the second derivative of
-            what it prescribes, rad/s^2 or m/s^2; its change and the rate of it are states then.
+            Names from `inputs`, by default all, or from `held`. The input of a held driver is the second derivative of
+            its coordinate, rad/s^2 or m/s^2; the change of the coordinate and its rate are then states.
         outputs : sequence of str, optional
-            Outputs of the mechanism, or components of them such as ``C_x``, that are functions of the poses; all unless
-            given. Each gives its change and the rate of that.
+            Outputs of the mechanism that are functions of the poses, or their components such as ``C_x``; by default
+            all. Each gives its change and the rate of the change.
 
         Returns
         -------
@@ -156,27 +157,27 @@ class Linearization(Displayed):
 
     @property
     def A(self) -> Float[np.ndarray, "state state"]:  # noqa: N802 - the field's name
-        """Of the coordinates and their rates: ``[[0, 1], [-M^-1 K, -M^-1 C]]``."""
+        """State matrix of the coordinates and their rates, ``[[0, 1], [-M^-1 K, -M^-1 C]]``."""
         return self.state_space(outputs=()).A
 
     @property
     def B(self) -> Float[np.ndarray, "state input"]:  # noqa: N802 - the field's name
-        """By all `inputs`."""
+        """Input matrix of all `inputs`."""
         return self.state_space(outputs=()).B
 
     @property
     def C(self) -> Float[np.ndarray, "output state"]:  # noqa: N802 - the field's name
-        """Of all outputs and their rates."""
+        """Output matrix of all outputs and their rates."""
         return self.state_space().C
 
     @property
     def D(self) -> Float[np.ndarray, "output input"]:  # noqa: N802 - the field's name
-        """Of all outputs and their rates, by all `inputs`."""
+        """Feedthrough matrix from all `inputs` to all outputs and their rates."""
         return self.state_space().D
 
 
 def named(kind: str, names: str | Sequence[str] | Refused) -> tuple[str, ...]:
-    """Return names, given as a sequence or as a single one, or raise MechanismError."""
+    """Return names from a sequence or a single name, or raise MechanismError."""
     if isinstance(names, str):
         return (names,)
     if not isinstance(names, Sequence) or not all(isinstance(name, str) for name in names):
@@ -191,12 +192,12 @@ def _state_space(
     drivers: Sequence[str],
     outputs: tuple[str, ...] | None,
 ) -> StateSpace:
-    """Return the system; what drivers do is a force of their change, of its rate and of its second derivative."""
+    """Return the state space, in which a driver acts by the generalized forces of its change and two rates."""
     r, own, other = of._reduction, len(of.coordinates), len(drivers)
     chosen = [r.held.index(name) for name in drivers]
     by_law = [-r.matrices[:, r.lanes(level, drivers=True)][:, chosen] for level in range(3)]
     by_force = of.input_matrix[:, [of.inputs.index(name) for name in forces]]
-    # the second derivatives of the coordinates by coordinates, laws, their rates, and inputs
+    # second derivatives of the coordinates by coordinates, laws, their rates, and inputs
     right = np.concatenate([-of.stiffness, by_law[0], -of.damping, by_law[1], by_force, by_law[2]], axis=1)
     second = np.linalg.solve(of.mass, right) if own else right
     size = own + other
@@ -216,7 +217,7 @@ def _state_space(
 def _outputs(
     of: Linearization, selection: tuple[str, ...] | None, drivers: Sequence[int], state: tuple[np.ndarray, np.ndarray]
 ) -> tuple[np.ndarray, np.ndarray, tuple[str, ...]]:
-    """Return how outputs and their rates follow from states and inputs, and their names."""
+    """Return the matrices C and D of outputs and their rates, and the names of the rows."""
     r, (a, b) = of._reduction, state
     size = len(a) // 2
     point = r.point
@@ -227,7 +228,7 @@ def _outputs(
     varied = point.outputs_varied(r.changes)
     components = point.components([x.shape[1] for x in varied])
     names = _components(of.mechanism, components, selection)
-    # by the coordinates and the laws of drivers, by their rates, and by their second derivatives
+    # lanes of coordinates and driver laws, of their rates, and of their second derivatives
     lanes = [[*np.arange(r.lanes(k).start, r.lanes(k).stop), *(r.lanes(k, drivers=True).start + x for x in drivers)]
              for k in range(3)]  # fmt: skip
     c, d = [], []
@@ -242,7 +243,7 @@ def _outputs(
 
 
 def _components(mechanism: Mechanism, components: Any, selection: tuple[str, ...] | None) -> list[str]:
-    """Return the names of the components of the selected outputs, or raise for one that is not there."""
+    """Return the names of the components of the selected outputs, or raise MechanismError for an unknown one."""
     if selection is None:
         return list(components)
     selected = []

@@ -1,4 +1,4 @@
-"""A mode as a motion to look at: the bodies swing about the equilibrium, large enough to be seen, joints closed."""
+"""A mode as a visible motion: the bodies swing about the equilibrium with closed joints."""
 
 import math
 
@@ -19,20 +19,20 @@ def mode_motion(
     instants: Float[np.ndarray, " time"],
     name: str,
 ) -> Motion:
-    """Return a mode as a motion of order 0, one swing long.
+    """Return one swing of a mode as a motion of order 0.
 
     Parameters
     ----------
     reduction : Reduction
-        About an equilibrium.
+        Equations of small motions about an equilibrium.
     shape : array of shape (coordinates,)
-        Of the mode.
+        Shape of the mode.
     amplitude : float
-        Of the body that moves most, rad or sizes of the mechanism.
+        Amplitude of the body that moves most, rad or sizes of the mechanism.
     instants : array of shape (time,)
-        Of the motion, s; the last one is a whole swing after the first.
+        Instants of the motion, s; the last one is a whole swing after the first.
     name : str
-        Of the mode, for messages.
+        Name of the mode, for messages.
 
     Raises
     ------
@@ -43,7 +43,7 @@ def mode_motion(
     columns = reduction.basis @ shape
     columns = columns * (amplitude / np.abs(columns).max())
     phases = np.exp(2j * math.pi * np.linspace(0.0, 1.0, len(instants)))
-    moved = np.real(columns[:, None] * phases / 1j)  # a swing begins in the middle
+    moved = np.real(columns[:, None] * phases / 1j)  # begins at the equilibrium
     model, changes, frames = point.model, point.changes(moved[None])[0], []
     for k in range(len(instants)):
         coordinates = point.closed(point.displaced(changes[..., k : k + 1]))

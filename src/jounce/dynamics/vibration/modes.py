@@ -15,26 +15,26 @@ from jounce.kinematics import Motion
 
 
 class Modes(Displayed):
-    """Natural motions of a mechanism about a state, the slowest first: ``y = shape exp(eigenvalue t)``.
+    """Natural modes of a mechanism about a state, the slowest first: ``y = shape exp(eigenvalue t)``.
 
-    Each stands for a pair of conjugate eigenvalues, or for one real one. Where nothing is damped, a motion that grows
-    stands for the one that dies away as fast too.
+    Each mode represents a pair of conjugate eigenvalues, or a real eigenvalue. Without damping, a growing mode also
+    represents the mode that decays at the same rate.
 
     Attributes
     ----------
     eigenvalues : numpy.ndarray of shape (modes,)
-        1/s, complex; the real part is positive where the motion grows.
+        1/s, complex; the real part of a growing mode is positive.
     angular_frequencies, frequencies : numpy.ndarray of shape (modes,)
-        Natural ones, the size of the eigenvalue: rad/s, and Hz. Zero for motions that no force resists.
+        Natural frequencies, the magnitudes of the eigenvalues: rad/s, and Hz. Zero for rigid modes.
     damped_frequencies : numpy.ndarray of shape (modes,)
-        At which the mechanism swings, Hz; zero where it does not.
+        Frequencies of oscillation, Hz; zero for modes that do not oscillate.
     damping_ratios : numpy.ndarray of shape (modes,)
-        Minus the real part over the size of the eigenvalue: 1 for motions that creep back, negative for those that
-        grow, 0 for those without damping or stiffness.
+        Minus the real part over the magnitude of the eigenvalue: 1 for creeping modes, negative for growing ones, 0
+        without damping or stiffness.
     shapes : numpy.ndarray of shape (coordinates, modes)
-        In the coordinates of the linearization, of unit modal mass; complex where there is damping.
+        Mode shapes of unit modal mass in the coordinates of the linearization; complex with damping.
     coordinates, bodies : tuple of str
-        Names of these coordinates, and of the bodies that move.
+        Names of the coordinates, and of the moving bodies.
     """
 
     def __init__(self, reduction: Reduction):
@@ -63,25 +63,25 @@ class Modes(Displayed):
 
     @property
     def damped_frequencies(self) -> Float[np.ndarray, " mode"]:
-        """Frequencies at which the mechanism swings, Hz."""
+        """Frequencies of oscillation, Hz."""
         return np.imag(self.eigenvalues) / (2 * np.pi)
 
     @property
     def damping_ratios(self) -> Float[np.ndarray, " mode"]:
-        """Minus the real part over the size of the eigenvalues."""
+        """Minus the real part over the magnitude of the eigenvalues."""
         size = self.angular_frequencies
         return np.where(size > 0, -np.real(self.eigenvalues) / np.where(size > 0, size, 1.0), 0.0) + 0.0
 
     @property
     def kinds(self) -> tuple[str, ...]:
-        """What each is: ``oscillation``, ``rigid`` (no force resists it), ``creeping`` back, or ``growing``."""
+        """The kind of each mode: ``oscillation``, ``rigid`` (no force resists it), ``creeping``, or ``growing``."""
         return tuple(map(_kind, self.eigenvalues))
 
     @cached_property
     def body_shapes(self) -> Complex[np.ndarray, "mode body coordinate"]:
-        """How each body moves in each mode: shifts of its origin, m, global, and turns about its own axes, rad.
+        """Displacements of each body in each mode: global shifts of its origin, m, and rotations in body axes, rad.
 
-        Of shape (modes, bodies, 3) in the plane: x, y, angle; (modes, bodies, 6) in space.
+        Shape (modes, bodies, 3) in the plane: x, y, angle; (modes, bodies, 6) in space.
         """
         columns = (self._reduction.basis @ self.shapes) * self._reduction.point.scale[:, None]
         width = len(COLUMNS[self._reduction.point.mechanism.space])
@@ -96,25 +96,25 @@ class Modes(Displayed):
         return energy / energy.sum(axis=1, keepdims=True)
 
     def motion(self, mode: int, amplitude: float = 0.1, *, duration: float | None = None, frames: int = 61) -> Motion:
-        """Return a mode as a motion to be looked at: one swing about the equilibrium, its joints closed.
+        """Return one swing of a mode about the equilibrium as a motion with closed joints, for an animation.
 
-        Growth and decay are left out. It has the frames of an animation (`jounce.plot.animate`), and no derivatives.
+        Growth and decay are left out. The motion has frames for `jounce.plot.animate`, and no derivatives.
 
         Parameters
         ----------
         mode : int
-            Counted from 1, as in tables.
+            Number of the mode from 1, as in tables.
         amplitude : float, default 0.1
-            Of the body that moves most, rad or sizes of the mechanism.
+            Amplitude of the body that moves most, rad or sizes of the mechanism.
         duration : float, optional
-            Of the swing, s: its period unless given, and 1 s where the mode does not swing.
+            Duration of the swing, s; by default the period, or 1 s for a mode that does not oscillate.
         frames : int, default 61
             Number of instants; the last shows the same position as the first.
 
         Raises
         ------
         MechanismError
-            If there is no such mode, a value is not valid, or it is a mode about a motion.
+            If there is no such mode, a value is not valid, or the modes are about a motion.
         SolveError
             If joints cannot be closed so far from the equilibrium.
         """
@@ -132,7 +132,7 @@ class Modes(Displayed):
 
     @property
     def rows(self) -> list[dict[str, Any]]:
-        """One row of a table for each mode: what it is, and what moves most by its kinetic energy."""
+        """One table row for each mode: kind, frequencies, and the body with the largest kinetic energy."""
         most = [int(np.argmax(shares)) for shares in self.participation]
         values = zip(self.kinds, self.frequencies, self.damped_frequencies, self.damping_ratios, strict=True)
         return [

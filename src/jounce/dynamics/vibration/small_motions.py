@@ -27,7 +27,7 @@ from jounce.mechanism.building.preconditions import concrete
 from jounce.mechanism.transmissions.axis_angles import of_one_lane
 from jounce.robot import Robot
 
-INSTANT = 1e-9  # of the time between the ends of a motion: an instant as near to one of its own is that one
+INSTANT = 1e-9  # of the duration of a motion: a requested instant this near to one of the motion is that one
 
 
 @concrete
@@ -129,17 +129,17 @@ def _of_robot(robot: Robot, q: GivenState, coordinates: Sequence[str] | None, dr
     point, names = through_state(robot, q, joint_coordinates, drives)
     reduction = reduced(point, released=[name + DRIVE for name in names], drivers=False)
     _check(reduction)
-    return Linearization(with_joints(reduction, names), None, by_forces=False)  # the dampers of joints are none
+    return Linearization(with_joints(reduction, names), None, by_forces=False)  # joint dampers are no inputs
 
 
 def point_along(motion: Motion, time: Real | None) -> OperatingPoint:
-    """Return a mechanism at an instant of its motion.
+    """Return the operating point of a mechanism at an instant of its motion.
 
     Raises
     ------
     MechanismError
-        If the motion has no such instant or failed there, has no accelerations, or does not satisfy the equations of
-        motion.
+        If the motion has no such instant, was not solved at it, has no accelerations, or does not satisfy the equations
+        of motion.
     """
     motion, lane = _at(motion, time)
     pose_type, coordinates = motion.poses

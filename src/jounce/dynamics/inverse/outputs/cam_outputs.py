@@ -1,4 +1,4 @@
-"""What cams press their followers with, as outputs: along the coordinate of the follower, with rates and sign."""
+"""Contact forces of cams as outputs: signed, along the coordinate of the follower, with rates."""
 
 from typing import Any
 
@@ -29,24 +29,24 @@ class _CamOutput(AbstractForceOutput):
             raise MechanismError(f"the follower of this cam {kind}; take its {word}", name="quantity")
 
     def coefficients(self, motion: Motion) -> Numbers:
-        """Return the Taylor coefficients of what the cam exerts on its follower, (levels, 1, time)."""
+        """Return the Taylor coefficients of the contact force or torque on the follower, (levels, 1, time)."""
         size = motion.model.length if self.unit == "N*m" else 1.0
         return MotionForces.of(motion).unique(lambda forces: forces.driver_force(self.joint), size)
 
     def remark(self, motion: Motion, values: np.ndarray) -> str:
-        """Return why values are NaN, or where the follower lifts off."""
+        """Return the reason for NaN values, or the instants at which the follower lifts off."""
         return super().remark(motion, values) or lift_off_words(motion.time, values[:, 0])
 
 
 class CamForceOutput(_CamOutput):
-    """Force of a cam on its follower along the coordinate that follows, N; positive where it makes that larger."""
+    """Force of a cam along the coordinate of its follower, N; positive if it increases the coordinate."""
 
     unit = "N"
     rate_names = ("force", *RATES)
 
 
 class CamTorqueOutput(_CamOutput):
-    """Torque of a cam on its follower about the angle that follows, N m; positive where it makes that larger."""
+    """Torque of a cam along the angle of its follower, N m; positive if it increases the angle."""
 
     unit = "N*m"
     rate_names = ("torque", *RATES)

@@ -1,4 +1,4 @@
-"""Springs that keep a follower on its cam: how far they must be compressed at the speed of a motion."""
+"""Springs that keep a follower on its cam: the preload required at the speed of a motion."""
 
 import dataclasses
 from typing import Any
@@ -16,23 +16,23 @@ from jounce.mechanism.resolve import resolve
 from jounce.mechanism.time import TimeLike
 from jounce.trajectory.law_checks.breaks import with_sides
 
-SHARE = 0.1  # of a size, by which the spring is changed to see what it does
-EXACT = 1e-7  # of the largest contact: what may be left of it at its least
-PEAKS, POINTS, ROUNDS = 3, 15, 5  # highest maxima, instants on both sides of each, and how often these close in
+SHARE = 0.1  # relative change of the spring for its slope
+EXACT = 1e-7  # of the largest contact force: tolerance of the least one
+PEAKS, POINTS, ROUNDS = 3, 15, 5  # maxima that are refined, instants on both sides of each, and rounds of refinement
 
 
 @dataclasses.dataclass(frozen=True)
 class ContactSpring:
-    """The spring with which the least contact force of a cam is zero.
+    """The spring for which the least contact force of a cam is zero.
 
     Attributes
     ----------
     free : float
-        Its `length`, m, or `angle`, rad, where it is at rest: with more compression the follower stays on its cam.
+        Free `length`, m, or `angle`, rad; with more compression the follower stays on its cam.
     instant : float
-        When the contact force is zero then, s.
+        Instant at which the contact force with this spring is zero, s.
     margin : float
-        The least contact force with the spring as it is, N or N m; negative where the follower lifts off.
+        Least contact force with the given spring, N or N m; negative if the follower lifts off.
     """
 
     free: float
@@ -43,25 +43,25 @@ class ContactSpring:
 def contact_spring(mechanism: Mechanism, cam: str, spring: str, time: TimeLike | None = None) -> ContactSpring:
     """Return the spring with the least preload that keeps a follower on its cam in a driven motion.
 
-    The contact force is linear in where the spring is free, so two motions determine it. It presses in the sense that
-    it has in the mean with the spring as it is. Besides the instants of the grid, those just before and after the knots
-    of laws count, and around the highest maxima of the preload further instants, which close in on them.
+    The contact force is linear in the free length or angle of the spring, so two motions determine it. Its pressing
+    sense is that of the mean contact force with the given spring. The instants are those of the grid, those just before
+    and after the knots of laws, and refined ones around the highest maxima of the preload.
 
     Parameters
     ----------
     mechanism : Mechanism
-        Driven, with masses.
+        Driven mechanism with masses.
     cam : str
         Name of a joint that is a cam.
     spring : str
         Name of a force with a stiffness and a `length` or an `angle`.
     time : array_like or TimeGrid, optional
-        Instants, s; those of the mechanism unless given.
+        Instants, s; by default those of the mechanism.
 
     Raises
     ------
     MechanismError
-        If they are no cam and no such spring, or the spring does nothing to the contact.
+        If the joint is no cam, the force is no such spring, or the spring has no effect on the contact.
 
     Examples
     --------
@@ -93,7 +93,7 @@ def contact_spring(mechanism: Mechanism, cam: str, spring: str, time: TimeLike |
     sense = 1.0 if np.mean(now) >= 0 else -1.0
 
     def required(now: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return where the spring must be free at each instant, and its preload, up to a constant."""
+        """Return the required free length or angle at each instant, and the preload up to a constant."""
         slope = (contact(given + step) - now) / step
         if (sense * slope).max() * (sense * slope).min() <= 0:
             message = "does nothing to the contact force, or presses at some instants and pulls at others"
@@ -116,7 +116,7 @@ def contact_spring(mechanism: Mechanism, cam: str, spring: str, time: TimeLike |
 
 
 def _refined_at_maxima(instants: np.ndarray, values: np.ndarray) -> np.ndarray:
-    """Return instants with further ones on both sides of the highest local maxima of values."""
+    """Return the instants, with more on both sides of the highest local maxima of values."""
     edge = [-np.inf]
     before, after = np.concatenate([edge, values[:-1]]), np.concatenate([values[1:], edge])
     maxima = np.flatnonzero((values > before) & (values >= after))

@@ -1,4 +1,4 @@
-"""Forces as outputs: of drivers along what they prescribe, of joints on their bodies, and applied ones, with rates."""
+"""Forces as outputs, with rates: driver forces, joint reactions, and applied forces."""
 
 from collections.abc import Iterable
 from typing import Any, ClassVar
@@ -37,14 +37,14 @@ RATES = ("yank", "second rate", "third rate", "fourth rate")
 
 
 class AbstractForceOutput(AbstractMotionOutput):
-    """A force or torque in a mechanism: two derivatives shorter than the motion, as accelerations are."""
+    """A force or torque in a mechanism; like accelerations, it has two derivatives fewer than the motion."""
 
     lost_orders = 2
     of_forces = True
-    source: ClassVar[str] = ""  # the field that names what exerts it: driver, joint or force
+    source: ClassVar[str] = ""  # the field that names the exerting element: driver, joint or force
 
     def check(self, mechanism: Mechanism) -> None:
-        """Raise MechanismError unless the mechanism has what is named, and masses or applied forces."""
+        """Raise MechanismError unless the mechanism has the named element, and masses or applied forces."""
         kinds = {"driver": ("drivers",), "joint": ("joints", "drivers", "forces"), "force": ("forces",)}[self.source]
         known = {name: element for kind in kinds for name, element in getattr(mechanism, kind).items()}
         name = getattr(self, self.source)
@@ -53,14 +53,14 @@ class AbstractForceOutput(AbstractMotionOutput):
         self._check_named(known[name])
 
     def prepare(self, motion: Motion) -> None:
-        """Make the program of the balance of forces."""
+        """Compile the program of the balance of forces."""
         MotionForces.of(motion).prepare()
 
     def _check_named(self, element: Any) -> None:
-        """Raise MechanismError unless the quantity is one of what is named."""
+        """Raise MechanismError unless the named element has the quantity."""
 
     def remark(self, motion: Motion, values: np.ndarray) -> str:
-        """Return why values are NaN at instants that were solved: redundant constraints leave them open."""
+        """Return the reason for NaN values at solved instants: redundant constraints, or undetermined friction."""
         forces = MotionForces.of(motion)
         solved = motion.status == Status.OK
         if np.isfinite(values[solved]).all():
@@ -79,12 +79,12 @@ class _DriverOutput(AbstractForceOutput):
     source = "driver"
 
     def coefficients(self, motion: Motion) -> Numbers:
-        """Return the Taylor coefficients of what the driver exerts, (levels, 1, time)."""
+        """Return the Taylor coefficients of the driver force or torque, (levels, 1, time)."""
         size = motion.model.length if self.unit == "N*m" else 1.0
         return MotionForces.of(motion).unique(lambda forces: forces.driver_force(self.driver), size)
 
     def remark(self, motion: Motion, values: np.ndarray) -> str:
-        """Return why values are NaN, or where the force of a cam on its follower changes its sign."""
+        """Return the reason for NaN values, or the instants at which the force of a cam changes its sign."""
         if why := super().remark(motion, values):
             return why
         if isinstance(getattr(motion.mechanism.drivers[self.driver], "motion", None), FollowingMotion):
@@ -93,7 +93,7 @@ class _DriverOutput(AbstractForceOutput):
 
 
 class DriverForceOutput(_DriverOutput):
-    """Force of a driver along the length that it prescribes, N; its product with the rate of the law is the power."""
+    """Force of a driver along its prescribed length, N; its product with the rate of the law is the power."""
 
     unit = "N"
     rate_names = ("force", *RATES)
@@ -104,7 +104,7 @@ class DriverForceOutput(_DriverOutput):
 
 
 class DriverTorqueOutput(_DriverOutput):
-    """Torque of a driver about the angle that it prescribes, N m; its product with the rate of the law is the power."""
+    """Torque of a driver along its prescribed angle, N m; its product with the rate of the law is the power."""
 
     unit = "N*m"
     rate_names = ("torque", *RATES)
@@ -116,13 +116,13 @@ class DriverTorqueOutput(_DriverOutput):
 
 class _Reaction(AbstractForceOutput):
     def is_vector(self, mechanism: Mechanism) -> bool:
-        """Return whether the reaction has components, as a torque in space."""
+        """Return whether the reaction has components, as all but planar torques do."""
         return self.unit == "N" or mechanism.space == "spatial"
 
 
 class _JointOutput(_Reaction):
     joint: str = field(static=True)
-    body: str | None = field(static=True, default=None)  # on which it acts; the second one of the joint unless given
+    body: str | None = field(static=True, default=None)  # on which it acts; the second body of the joint by default
     frame: str = field(static=True, default="global")  # global, body, or the name of any body
 
     source = "joint"
@@ -138,7 +138,7 @@ class _JointOutput(_Reaction):
         check_choice("frame", self.frame, ("global", "body", GROUND, *mechanism.bodies), MechanismError)
 
     def remark(self, motion: Motion, values: np.ndarray) -> str:
-        """Return why values are NaN, which gears load no bearing of their bodies, and where loads change flanks."""
+        """Return remarks: the reason for NaN values, contact forces that reactions leave out, and changes of flanks."""
         joints = motion.mechanism.joints
         bodies = {*_exerting(motion.mechanism, self.joint).bodies} - {GROUND}
         gears = [name for name, x in joints.items() if is_bare_ratio(x) and bodies & {*x.bodies}]
@@ -153,7 +153,7 @@ class _JointOutput(_Reaction):
         return "; ".join(filter(None, words))
 
     def _values(self, motion: Motion, point: ArrayLike | None, part: int, size: float) -> Numbers:
-        """Return force or moment about a point of the body, with rates; about that of the joint unless given."""
+        """Return force or moment about a point of the body, by default that of the joint, with rates."""
         mechanism, forces = motion.mechanism, MotionForces.of(motion)
         element = _exerting(mechanism, self.joint)
         body = element.bodies[min(1, len(element.bodies) - 1)] if self.body is None else self.body
@@ -168,12 +168,12 @@ class _JointOutput(_Reaction):
 
 
 def _exerting(mechanism: Mechanism, name: str) -> Any:
-    """Return the joint or driver of a name, or the applied force if there is none."""
+    """Return the driver, joint or applied force of a name, in this order."""
     return {**mechanism.forces, **mechanism.joints, **mechanism.drivers}[name]
 
 
 def _is_load(element: Any) -> bool:
-    """Return whether a force comes from outside: it acts on one body, without a reaction on another."""
+    """Return whether an element is an external load: an applied force on one body, without a reaction."""
     return isinstance(element, AbstractForce) and len(element.bodies) == 1
 
 
@@ -187,8 +187,9 @@ def _along_line(forces: MotionForces, name: str) -> Numbers:
 class JointForceOutput(_JointOutput):
     """Reaction force of a joint, driver or force between bodies on one of its bodies, or on the ground, N.
 
-    Of a rope, unless the body is given, it is the tension; of a belt, the pull of the strand on the left of the line
-    of centers, seen from the first pulley to the second where it leaves that, less the pull of the other strand.
+    For a rope without a given body it is the tension. For a belt without a given body it is the pull of the strand that
+    leaves the first pulley on the left of the line of centers, seen toward the second pulley, less that of the other
+    strand.
     """
 
     unit = "N"
@@ -198,7 +199,7 @@ class JointForceOutput(_JointOutput):
         return self.body is None and hasattr(mechanism.joints.get(self.joint), "line_force")
 
     def is_vector(self, mechanism: Mechanism) -> bool:
-        """Return whether the force has components; that along a rope or a belt has none."""
+        """Return whether the force has components; a rope tension or belt pull has none."""
         return not self._is_line(mechanism)
 
     def check(self, mechanism: Mechanism) -> None:
@@ -215,7 +216,7 @@ class JointForceOutput(_JointOutput):
         return self._values(motion, None, 0, 1.0)
 
     def remark(self, motion: Motion, values: np.ndarray) -> str:
-        """Return why values are NaN, what they leave out, and where a rope is slack."""
+        """Return remarks: the reason for NaN values, forces that they leave out, and instants of a slack rope."""
         if not self._is_line(motion.mechanism):
             return super().remark(motion, values)
         rope = isinstance(motion.mechanism.joints[self.joint], Rope)
@@ -224,9 +225,9 @@ class JointForceOutput(_JointOutput):
 
 
 def slack_ropes(motion: Motion) -> dict[str, str]:
-    """Return the ropes without an output of their tension that are slack in a motion, with words for the instants.
+    """Return the slack ropes of a motion that have no output of their tension, with a text on the instants.
 
-    All results that rest on a rope that would have to push are wrong there. The tension is not checked in a mechanism
+    While a rope would have to push, all results that depend on it are wrong. The tension is not checked in a mechanism
     without masses and applied forces, nor in a motion without accelerations.
     """
     mechanism, slack = motion.mechanism, {}
@@ -245,7 +246,7 @@ def slack_ropes(motion: Motion) -> dict[str, str]:
 class JointTorqueOutput(_JointOutput):
     """Reaction torque of a joint, driver or force on one of its bodies, or the ground, about a point of that body, N m.
 
-    The point is that of the joint unless given, or the origin of the body where the joint has none there.
+    By default the point is that of the joint, or the origin of a body on which the joint has none.
     """
 
     point: Vector = None  # m, in the frame of the body
@@ -262,7 +263,7 @@ class JointTorqueOutput(_JointOutput):
 
 
 class _GroundOutput(_Reaction):
-    source = "mechanism"  # the key of a file that says what it is of
+    source = "mechanism"  # the key of a file that names the owner of the force
 
     def check(self, mechanism: Mechanism) -> None:
         """Raise MechanismError unless there are masses or applied forces."""
@@ -282,7 +283,7 @@ class _GroundOutput(_Reaction):
 
 
 class GroundForceOutput(_GroundOutput):
-    """Total force of a mechanism on the ground, N: of all joints, drivers and forces between bodies (shaking force)."""
+    """Total force of all joints, drivers and forces between bodies on the ground, N (shaking force)."""
 
     unit = "N"
     rate_names = ("force", *RATES)
@@ -295,7 +296,7 @@ class GroundForceOutput(_GroundOutput):
 class GroundTorqueOutput(_GroundOutput):
     """Total torque of a mechanism on the ground about one of its points, N m (shaking moment)."""
 
-    point: Vector = None  # m; the origin unless given
+    point: Vector = None  # m; the origin by default
 
     unit = "N*m"
     rate_names = ("torque", *RATES)
@@ -328,14 +329,14 @@ class _AppliedOutput(AbstractForceOutput):
 
 
 class AppliedForceOutput(_AppliedOutput):
-    """Applied force along its displacement, or with its components, N; it drives a growing displacement if positive."""
+    """Applied force along its displacement, or its components, N; a positive force increases the displacement."""
 
     unit = "N"
     rate_names = ("force", *RATES)
 
 
 class AppliedTorqueOutput(_AppliedOutput):
-    """Applied torque about its angle, or with its components, N m; it drives a growing angle if positive."""
+    """Applied torque along its angle, or its components, N m; a positive torque increases the angle."""
 
     unit = "N*m"
     rate_names = ("torque", *RATES)

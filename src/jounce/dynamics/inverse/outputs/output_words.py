@@ -1,4 +1,4 @@
-"""Remarks on the values of forces: where they change sign, and what they leave out."""
+"""Remarks on forces: instants at which they change sign, and contact forces that they leave out."""
 
 from collections.abc import Sequence
 
@@ -12,7 +12,7 @@ MOST_SHOWN = 4  # instants
 
 
 def lift_off_words(time: np.ndarray, forces: np.ndarray) -> str:
-    """Say before which instants the force of a cam on its follower changes its sign; nothing where it keeps it.
+    """Return a remark on the instants before which the force of a cam changes its sign; empty if it keeps it.
 
     Examples
     --------
@@ -31,14 +31,14 @@ def lift_off_words(time: np.ndarray, forces: np.ndarray) -> str:
 
 
 def following(mechanism: Mechanism, leader: str) -> list[str]:
-    """Return the drivers whose laws are of the coordinate of a driver, by its name, as they have the law of that."""
+    """Return the names of drivers whose laws are functions of the coordinate of a leading driver."""
     led = {name: getattr(driver, "motion", None) for name, driver in mechanism.drivers.items()}
     laws = [(name, law.recipe.value[0][1]) for name, law in led.items() if isinstance(law, FollowingMotion)]
     return [name for name, law in laws if law is led[leader] or repr(law) == repr(led[leader])]
 
 
 def signal_words(names: Sequence[str]) -> str:
-    """Say of drivers that follow another one that it does not bear their load; nothing where there are none.
+    """Return a remark that a driver does not bear the load of the drivers that follow it; empty if there are none.
 
     Examples
     --------
@@ -52,7 +52,7 @@ def signal_words(names: Sequence[str]) -> str:
 
 
 def slack_words(time: np.ndarray, tensions: np.ndarray) -> str:
-    """Say at which instants a rope would have to push, where it is slack; nothing where it pulls.
+    """Return a remark on the instants at which a rope is slack, as it would have to push; empty if it always pulls.
 
     Examples
     --------
@@ -76,18 +76,18 @@ def slack_words(time: np.ndarray, tensions: np.ndarray) -> str:
 
 
 def ratio_words(names: Sequence[str]) -> str:
-    """Say of joints that are given by a ratio alone what their reactions leave out; nothing where there are none."""
+    """Return a remark that joints given by a ratio alone have no tooth forces; empty if there are none."""
     verb = "is" if len(names) == 1 else "are"
     return f"{', '.join(names)} {verb} given by a ratio alone: bearings show no tooth forces" if names else ""
 
 
 def cam_words(names: Sequence[str]) -> str:
-    """Say of cams what the reactions of bearings leave out; nothing where there are none."""
+    """Return a remark that reactions of bearings leave out contact forces of cams; empty if there are none."""
     verb = "is a law" if len(names) == 1 else "are laws"
     return f"{', '.join(names)} {verb} between coordinates: bearings show no contact force" if names else ""
 
 
 def belt_words(names: Sequence[str]) -> str:
-    """Say of belts what the reactions of bearings leave out; nothing where there are none."""
+    """Return a remark that reactions of bearings leave out the initial tension of belts; empty if there are none."""
     words = "bearings show the difference of the pulls of its strands, not the tension with which it is put on"
     return f"{', '.join(names)}: {words}" if names else ""

@@ -1,4 +1,4 @@
-"""Forces in a moving mechanism, with rates to any order: what drivers, joints and applied forces exert."""
+"""Driver forces, joint reactions and applied forces of a moving mechanism, with rates to any order."""
 
 import copy
 import dataclasses
@@ -27,31 +27,30 @@ if TYPE_CHECKING:
 def driver_force(motion: Motion, name: str, *, redundant: RedundantReactions | None = None) -> "xarray.DataArray":
     """Return the force or torque of a driver with its rates: yank, second rate and so on.
 
-    It is conjugate to the motion law: a torque, N m, where the law is an angle, else a force, N, and its product with
-    the rate of the law is the power that the driver puts in. It follows from the transposed factor of the Jacobian,
-    order after order; no difference is taken.
+    The force is conjugate to the motion law: a torque, N m, if the law is an angle, otherwise a force, N. Its product
+    with the rate of the law is the power of the driver. It follows from the transposed factor of the Jacobian, order
+    after order, without finite differences.
 
     Parameters
     ----------
     motion : Motion
-        Of a mechanism with masses or applied forces.
+        Motion of a mechanism with masses or applied forces.
     name : str
         Name of the driver.
     redundant : str or mapping, optional
-        Which forces to give where constraints are redundant, as `Mechanism.redundant_reactions`, which it is unless
-        given.
+        Choice of forces if constraints are redundant; by default `Mechanism.redundant_reactions`.
 
     Returns
     -------
     xarray.DataArray
-        Dimensions time and derivative. Two orders of the motion are used up by accelerations: one solved to order 4
-        has a second rate. (An output, `DriverTorqueOutput`, is not shorter, as the solver goes two orders further.)
-        NaN where redundant drivers leave it open, with the reason as the attribute ``comment``.
+        Dimensions time and derivative. Accelerations use up two orders of the motion: the force of a motion solved to
+        order 4 has two rates. (The output `DriverTorqueOutput` has all, as the solver goes two orders further.) NaN if
+        redundant drivers leave the force undetermined, with the reason as the attribute ``comment``.
 
     Raises
     ------
     MechanismError
-        If no driver has this name, or nothing in the mechanism has a mass.
+        If no driver has this name, or the mechanism has neither masses nor applied forces.
 
     Examples
     --------
@@ -74,7 +73,7 @@ def driver_force(motion: Motion, name: str, *, redundant: RedundantReactions | N
 
 @dataclasses.dataclass(frozen=True)
 class Reaction:
-    """What a joint does to a body, with rates.
+    """Force and torque of a joint on a body, with rates.
 
     Attributes
     ----------
@@ -99,38 +98,38 @@ def joint_reaction(
 ) -> Reaction:
     """Return the force and torque that a joint, or a driver, exerts on one of its bodies, with rates.
 
-    All that it exerts has no resultant. What its bodies lack of that is on the ground: a coordinate of one body and a
-    ratio of angles are measured there, so that a joint that is given by these has reactions on the ground too.
+    The reactions of a joint on all bodies, the ground included, have no resultant. A coordinate of one body and a ratio
+    of angles are measured in the ground frame, so joints of this kind have reactions on the ground, too.
 
     Parameters
     ----------
     motion : Motion
-        Of a mechanism with masses or applied forces.
+        Motion of a mechanism with masses or applied forces.
     name : str
         Name of the joint, of the driver, or of an applied force between bodies.
     body : str, optional
-        On which body; the second one of the joint unless given. ``"ground"`` is one of each.
+        Body on which the joint acts, by default its second body; ``"ground"`` is possible for every joint.
     frame : str, default "global"
-        In whose axes: ``"global"``, ``"body"`` (that on which it acts), or the name of any body. The rates are those of
-        the components in these axes.
+        Axes of the components: ``"global"``, ``"body"`` (the body on which the joint acts), or the name of any body.
+        The rates are those of the components in these axes.
     point : sequence, optional
-        About which point of the body the torque is taken, in its frame, m; that of the joint unless given, or the
-        origin of the body where the joint has none on it.
+        Reference point of the torque in the frame of the body, m; by default the point of the joint, or the origin of
+        a body on which the joint has none.
     redundant : str or mapping, optional
-        Which reactions to give where constraints are redundant, as `Mechanism.redundant_reactions`, which it is unless
-        given: ``"unique"``, ``"least_norm"``, or stiffnesses of joints.
+        Choice of reactions if constraints are redundant: ``"unique"``, ``"least_norm"``, or stiffnesses of joints; by
+        default `Mechanism.redundant_reactions`.
 
     Returns
     -------
     Reaction
-        Force and torque, two orders shorter than the motion. Components that redundant constraints leave open are NaN,
-        with the reason as the attribute ``comment`` (Wojtyra 2005).
+        Force and torque, with two derivatives fewer than the motion. Components that redundant constraints leave
+        undetermined are NaN, with the reason as the attribute ``comment`` (Wojtyra 2005).
 
     Raises
     ------
     MechanismError
-        If no joint, driver or force has this name, the body is not one of its own, there is no such frame, or nothing
-        has a mass.
+        If no joint, driver or force has this name, it does not act on the body, there is no such frame, or the
+        mechanism has neither masses nor applied forces.
 
     Examples
     --------
@@ -158,27 +157,27 @@ def ground_reaction(
 ) -> Reaction:
     """Return the total force and torque of a mechanism on the ground, with rates: shaking force and shaking moment.
 
-    They are those of all joints, drivers and forces between bodies. With weights and loads from outside they are what
-    the momentum of the bodies lacks: its rate is weights and loads less this force.
+    The total is that of all joints, drivers and forces between bodies. By the balance of momentum, the rate of momentum
+    of the bodies equals weights and external loads less this force.
 
     Parameters
     ----------
     motion : Motion
-        Of a mechanism with masses or applied forces.
+        Motion of a mechanism with masses or applied forces.
     point : sequence, optional
-        About which point of the ground the torque is taken, m; the origin unless given.
+        Reference point of the torque on the ground, m; by default the origin.
     redundant : str or mapping, optional
-        As of `joint_reaction`. Where reactions are not unique, their total may be.
+        As for `joint_reaction`. The total may be unique even if single reactions are not.
 
     Returns
     -------
     Reaction
-        Force and torque, two orders shorter than the motion.
+        Force and torque, with two derivatives fewer than the motion.
 
     Raises
     ------
     MechanismError
-        If nothing in the mechanism has a mass and no force is applied.
+        If the mechanism has neither masses nor applied forces.
 
     Examples
     --------
@@ -202,7 +201,7 @@ def ground_reaction(
 
 
 def _with_choice_of_reactions(motion: Motion, redundant: RedundantReactions | None) -> Motion:
-    """Return a motion whose mechanism has another choice of reactions that redundant constraints leave open."""
+    """Return the motion with another choice of redundant reactions."""
     if redundant is None or redundant == motion.mechanism.redundant_reactions:
         return motion
     other = copy.copy(motion)
@@ -217,14 +216,14 @@ def applied_force(motion: Motion, name: str) -> "xarray.DataArray":
     Parameters
     ----------
     motion : Motion
-        Of a mechanism with applied forces.
+        Motion of a mechanism with applied forces.
     name : str
         Name of the force.
 
     Returns
     -------
     xarray.DataArray
-        Dimensions time, derivative and, for a vector, component; two orders shorter than the motion.
+        Dimensions time, derivative and, for a vector, component; with two derivatives fewer than the motion.
 
     Raises
     ------
