@@ -1,4 +1,4 @@
-"""Planar four-bars and slider-cranks recognized: their type by Grashof, and the transmission angle over a range."""
+"""Recognition of planar four-bars and slider-cranks: Grashof type and range of the transmission angle."""
 
 import dataclasses
 import math
@@ -13,7 +13,7 @@ from jounce.mechanism import Mechanism, build
 from jounce.mechanism.mechanism import GROUND
 from jounce.mechanism.system import Group
 
-EQUAL = 1e-9  # of the sum of lengths: a linkage at the bound of two types
+EQUAL = 1e-9  # relative to the sum of lengths: a linkage at the boundary between two types
 
 
 @dataclasses.dataclass(frozen=True)
@@ -23,9 +23,9 @@ class FourBar:
     Attributes
     ----------
     crank, coupler, output, ground : float
-        Distances of its hinges, m.
+        Link lengths, m.
     offset : float
-        Driver's value at which the crank points from its hinge to the other one on the ground, rad.
+        Driver value at which the crank points from its ground hinge to the other ground hinge, rad.
     """
 
     crank: float
@@ -36,7 +36,7 @@ class FourBar:
 
     @property
     def type(self) -> str:
-        """Which links can turn all the way round (Grashof 1883)."""
+        """Grashof type of the linkage (Grashof 1883)."""
         links = {"ground": self.ground, "crank": self.crank, "coupler": self.coupler, "output": self.output}
         ordered = sorted(links.values())
         excess = ordered[0] + ordered[3] - ordered[1] - ordered[2]
@@ -53,7 +53,7 @@ class FourBar:
         }[shortest]
 
     def transmission(self, value: float) -> float:
-        """Return the angle between coupler and output link at a value of the driver, folded to a right one, rad."""
+        """Return the acute angle between coupler and output link at a driver value, rad."""
         a, b, c, d = self.crank, self.coupler, self.output, self.ground
         square = a * a + d * d - 2 * a * d * math.cos(value - self.offset)
         cosine = (b * b + c * c - square) / (2 * b * c)
@@ -62,7 +62,7 @@ class FourBar:
 
     @property
     def turning_values(self) -> tuple[float, ...]:
-        """Values at which the angle, or its distance from a right one, may be extreme, up to whole turns, rad."""
+        """Driver values at which the transmission angle may be extreme, modulo whole turns, rad."""
         a, b, c, d = self.crank, self.coupler, self.output, self.ground
         right = (a * a + d * d - b * b - c * c) / (2 * a * d)  # where the angle is a right one
         square = [math.acos(right), -math.acos(right)] if abs(right) <= 1 else []
@@ -76,11 +76,11 @@ class SliderCrank:
     Attributes
     ----------
     crank, rod : float
-        Distances of hinges, m.
+        Distances between hinges, m.
     eccentricity : float
-        Distance of the slider's hinge's line from the crank's hinge, to the left of the way that the guide points, m.
+        Offset of the slider's hinge line from the crank's hinge, positive to the left of the guide direction, m.
     offset : float
-        Driver's value at which the crank points along the guide, rad.
+        Driver value at which the crank points along the guide, rad.
     """
 
     crank: float
@@ -90,20 +90,20 @@ class SliderCrank:
 
     @property
     def type(self) -> str:
-        """Whether the crank can turn all the way round."""
+        """Type of the linkage: whether the crank can turn all the way round."""
         gap = self.rod - self.crank - abs(self.eccentricity)
         if abs(gap) <= EQUAL * (self.rod + self.crank):
             return "change-point slider-crank: the rod is as long as crank and eccentricity together"
         return "slider-crank" if gap > 0 else "slider-crank whose crank only rocks"
 
     def transmission(self, value: float) -> float:
-        """Return the angle between the rod and the normal of the guide at a value of the driver, rad."""
+        """Return the angle between the rod and the normal of the guide at a driver value, rad."""
         sine = (self.crank * math.sin(value - self.offset) - self.eccentricity) / self.rod
         return math.acos(min(1.0, abs(sine)))
 
     @property
     def turning_values(self) -> tuple[float, ...]:
-        """Values at which the angle may be extreme, up to whole turns, rad."""
+        """Driver values at which the transmission angle may be extreme, modulo whole turns, rad."""
         level = self.eccentricity / self.crank
         flat = [math.asin(level), math.pi - math.asin(level)] if abs(level) <= 1 else []
         return tuple(self.offset + x for x in (math.pi / 2, -math.pi / 2, *flat))
@@ -113,9 +113,9 @@ Linkage = FourBar | SliderCrank
 
 
 def extremes(linkage: Linkage, low: float, high: float) -> tuple[tuple[float, float], tuple[float, float]]:
-    """Return the smallest and the largest transmission angle over a range, each with the driver's value there, rad.
+    """Return the smallest and the largest transmission angle over a range, each with its driver value, rad.
 
-    An infinite range is a whole turn.
+    An infinite range stands for a whole turn.
     """
     whole = not (math.isfinite(low) and math.isfinite(high))
     if whole:
@@ -128,7 +128,7 @@ def extremes(linkage: Linkage, low: float, high: float) -> tuple[tuple[float, fl
 
 
 def recognized(mechanism: Mechanism, driver: str) -> Linkage | None:
-    """Return the four-bar or slider-crank that a mechanism is, driven at a link on the ground by its angle, or None."""
+    """Return the linkage of a mechanism whose driver is the angle of a link on the ground, or None."""
     law = {**mechanism.initial, **mechanism.drivers}.get(driver)
     if mechanism.space != "planar" or not isinstance(law, CoordinateDriver) or law.coordinate != "angle":
         return None
@@ -147,7 +147,7 @@ class _Joint(NamedTuple):
     ----------
     bodies : tuple of str
     points : tuple of array
-        In the frame of each.
+        Position of the joint in the frame of each body.
     guide : array, optional
         Direction on the first body along which the second slides.
     """
@@ -157,16 +157,16 @@ class _Joint(NamedTuple):
     guide: np.ndarray | None = None
 
     def on(self, body: str) -> np.ndarray:
-        """Return where it is in the frame of a body."""
+        """Return the position of the joint in the frame of a body."""
         return self.points[self.bodies.index(body)]
 
 
 _Link = tuple[str, _Joint, _Joint]
-"""A body, the joint by which it is reached, and the next one."""
+"""A body, the joint through which the loop enters it, and the joint through which it leaves."""
 
 
 def _joints(mechanism: Mechanism) -> list[_Joint]:
-    """Return the hinges and guides of a mechanism; a massless rod is a body with two hinges. None fits others."""
+    """Return the hinges and guides, a massless rod as a body with two hinges; empty if there are other joints."""
     names = [GROUND, *mechanism.bodies]
     joints: list[_Joint] = []
     for group in build(mechanism).system.groups:
@@ -194,7 +194,7 @@ def _value(group: Group, name: str, instance: int) -> np.ndarray:
 
 
 def _loop(joints: list[_Joint], crank: str) -> list[_Link] | None:
-    """Return the three links of a loop from the crank on, in order, if only the last joint may be a guide."""
+    """Return the three links of the loop in order from the crank; None unless only the last joint is a guide."""
     first = [joint for joint in joints if set(joint.bodies) == {GROUND, crank}]
     if len(joints) != 4 or len(first) != 1:
         return None
@@ -224,7 +224,7 @@ def _slider_crank(loop: list[_Link]) -> SliderCrank | None:
     if guide.guide is None or guide.bodies[0] != GROUND:
         return None
     if np.max(np.abs(closing.on(slider) - guide.on(slider))) > 0:
-        return None  # a hinge beside the guide's line: its distance depends on how the slider lies
+        return None  # a hinge off the guide line: its distance depends on the orientation of the slider
     arm, length = between.on(crank) - first.on(crank), float(np.linalg.norm(closing.on(rod) - between.on(rod)))
     along = guide.guide / np.linalg.norm(guide.guide)
     normal = np.array([-along[1], along[0]])

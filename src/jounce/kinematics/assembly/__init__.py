@@ -1,1 +1,1 @@
-"""Putting a mechanism together by Gauss-Newton steps, redundant equations, and what can then move."""
+"""Assembly by Gauss-Newton iteration, redundant constraints, and mobility."""

@@ -1,4 +1,4 @@
-"""The first assembly, from the starting guess, and degrees of freedom counted and explained."""
+"""The first assembly from the starting guess, with checks of its gaps and of the degrees of freedom left."""
 
 import dataclasses
 import itertools
@@ -41,45 +41,45 @@ from jounce.mechanism.transmissions.gear_checks import check_gears, check_wheels
 from jounce.trajectory import AbstractMotion
 
 MAX_DATUMS = 100
-TIGHT = 1e-12  # rad or sizes of the mechanism: the tolerance of bodies assembled to rounding
-SETTLED = 1e-12  # rad, by which the angles of drivers may be counted otherwise
+TIGHT = 1e-12  # rad or sizes of the mechanism: the tolerance of an assembly to rounding
+SETTLED = 1e-12  # rad: largest change of the drivers' reference angles after convergence
 
 
 def assemble(model: Model, instant: float, tolerance: float, *, free: bool = False) -> tuple[Model, Coordinates]:
-    """Put the bodies together at one instant, from the starting guess, by damped Gauss-Newton.
+    """Assemble the bodies at one instant from the starting guess by damped Gauss-Newton.
 
     Parameters
     ----------
     model : Model
         The mechanism.
     instant : float
-        s.
+        Time, s.
     tolerance : float
-        Of the last correction, rad or sizes of the mechanism.
+        Largest last correction, rad or sizes of the mechanism.
     free : bool, default False
-        Whether degrees of freedom may be left: then the position is the nearest to the guess that fulfills all joints.
+        Whether degrees of freedom may be left. The result is then the position nearest to the guess.
 
     Returns
     -------
     model : Model
-        With its rows scaled by the size of their derivatives at the assembled position.
+        The model with its rows scaled by the size of their derivatives at the assembled position.
     coordinates : dict of str to array
         The assembled coordinates of all bodies.
 
     Raises
     ------
     AssemblyError
-        If no position near the guess fulfills all joints; the message names those that stay open.
+        If no position near the guess fulfills all joints; the message names the joints that stay open.
     MobilityError
         If joints and drivers leave degrees of freedom, or the position is singular.
     MechanismError
-        If no body carries the centers of gears with teeth, or a frame does not hold the axis of a shaft.
+        If no body carries the centers of toothed gears, or a frame does not hold the axis of a shaft.
     """
     columns = model.system.shape[1]
     if not model.rows and not free:
         noun = "degree of freedom" if columns == 1 else "degrees of freedom"
         raise MobilityError(f"the mechanism has no joints and no drivers: {columns} {noun} are left")
-    if not model.rows:  # bodies that fly freely are together as they are
+    if not model.rows:  # free bodies are assembled as they are
         model, _ = with_reference(model, model.guess, instant, model.prescribed)
         return dataclasses.replace(model, system=resident(model.system)), model.guess
     model, attempt = find_assembly(model, instant, tolerance)
@@ -95,7 +95,7 @@ def assemble(model: Model, instant: float, tolerance: float, *, free: bool = Fal
 
 
 def _exact(model: Model, attempt: AssemblyAttempt, instant: float, tolerance: float) -> AssemblyAttempt:
-    """Return bodies that were assembled loosely, next to a singular position, assembled to rounding."""
+    """Return an attempt near a singular position assembled again to rounding; others unchanged."""
     if tolerance <= TIGHT or not attempt.jacobian.smallest[1].size:
         return attempt
     exact = assemble_from_guess(model, instant, TIGHT, attempt.coordinates)
@@ -103,10 +103,10 @@ def _exact(model: Model, attempt: AssemblyAttempt, instant: float, tolerance: fl
 
 
 def find_assembly(model: Model, instant: float, tolerance: float) -> tuple[Model, AssemblyAttempt]:
-    """Put the bodies together with no part turned over in its joint, if that goes, and count angles from there.
+    """Assemble the bodies, if possible with no part turned over in its joint, and count angles from the result.
 
-    A guess in which directions that joints hold parallel are far from it may lead to a part that lies turned over, or
-    nowhere: then the directions are drawn together first, in some ways until one does not end in a singular position.
+    Directions that joints hold parallel may be far from parallel in the guess. The assembly may then fail, or turn a
+    part over. The directions are then aligned first, in several ways until one assembles in a regular position.
     """
     names = [model.rows[rows] for rows in group_rows(model)]
     check_gears(model.system.groups, names)
@@ -132,10 +132,10 @@ def find_assembly(model: Model, instant: float, tolerance: float) -> tuple[Model
 
 
 def _assemble_near_guess(model: Model, instant: float, tolerance: float) -> tuple[Model, AssemblyAttempt]:
-    """Put the bodies together from the starting guess, and count the angles about axes from the position found.
+    """Assemble the bodies from the starting guess, and count the angles about axes from the position found.
 
-    Where the axes were tilted against each other in the guess, the angles in the position found are others than those
-    counted from the guess, and it takes another turn to get to those that the drivers prescribe.
+    If axes are not aligned in the guess, angles counted from the guess differ from those at the position found, so that
+    it takes another iteration to reach the angles that the drivers prescribe.
     """
     displace, prescribed = Displacements(model, instant), model.prescribed
     residual, attempt, known = displace.closed(model.guess, tolerance)
@@ -147,7 +147,7 @@ def _assemble_near_guess(model: Model, instant: float, tolerance: float) -> tupl
     elif attempt is None:
         attempt = assemble_from_guess(model, instant, tolerance, known=known or displace.at(model.guess))
     if not attempt.closed and any(map(measures_angle, model.system.groups)):
-        # angles counted from a tilted guess may be far off: first the joints alone, with the drivers as they are
+        # angles counted from a tilted guess may be far off: first close the joints, with the drivers as in the guess
         begin = attempt if lag is None else assemble_from_guess(model, instant, tolerance, lag=lag)
         if begin.closed:
             model, _ = with_reference(model, begin.coordinates, instant, prescribed, laws=laws)
@@ -165,7 +165,7 @@ def _assemble_near_guess(model: Model, instant: float, tolerance: float) -> tupl
 
 
 def warn_of_parts_turned_over(model: Model, attempt: AssemblyAttempt) -> None:
-    """Warn of joints whose parts are the other way round than the starting guess or the joint means."""
+    """Warn of joints whose parts are turned over relative to the starting guess or to the definition of the joint."""
     if names := mirrored_discs(model, attempt.coordinates):
         message = (
             f"{', '.join(names)}: the center of the disc is one radius from the line, but on the other side than the "
@@ -188,10 +188,10 @@ def warn_of_parts_turned_over(model: Model, attempt: AssemblyAttempt) -> None:
 def _start_after_turns(
     model: Model, instant: float, tolerance: float, lag: DriverLag | None
 ) -> tuple[Model, Coordinates | None]:
-    """Return the model and the coordinates to start from where laws begin more than half a turn from the guess.
+    """Return model and start coordinates after turning the drivers from the guess to laws more than half a turn away.
 
-    The drivers are turned from the guess to their laws then, and all angles count their turns; None where none is so
-    far away, or the way cannot be gone.
+    All angles count the turns made on the way. The coordinates are None if no law is so far away, or if the motion
+    there cannot be followed.
     """
     if lag is None or not np.pi < lag.angle < np.inf:
         return model, None
@@ -213,7 +213,7 @@ def _start_after_turns(
 
 
 def nearest_to_guess(model: Model, attempt: AssemblyAttempt, instant: float) -> AssemblyAttempt:
-    """Return planar bodies assembled, with every angle shifted by whole turns to be nearest to the guess."""
+    """Return a planar assembly with every angle shifted by whole turns to be nearest to the guess."""
 
     def residual_at(angle: np.ndarray) -> np.ndarray:
         return attempt.scale * Displacements(model, instant).at({**attempt.coordinates, "angle": angle}).residual
@@ -222,9 +222,9 @@ def nearest_to_guess(model: Model, attempt: AssemblyAttempt, instant: float) -> 
 
 
 def check_assembled(model: Model, attempt: AssemblyAttempt, instant: float, *, free: bool = False) -> None:
-    """Raise AssemblyError, with the joints concerned and by how much they stay open, where gaps are not closed.
+    """Raise AssemblyError if gaps are not closed, with the joints concerned and the sizes of their gaps.
 
-    What is missing for every motion to be prescribed is reported too, unless degrees of freedom may be left (`free`).
+    Missing equations are reported too, unless degrees of freedom may be left (`free`).
     """
     gaps = attempt.gaps
     if not (known := np.isfinite(gaps)).all():
@@ -266,9 +266,9 @@ def check_assembled(model: Model, attempt: AssemblyAttempt, instant: float, *, f
 
 
 def _structural_excess(model: Model, attempt: AssemblyAttempt, instant: float) -> int:
-    """Return how many equations are dependent wherever the bodies are, so that they may contradict each other.
+    """Return the number of equations that are dependent at a random position and may contradict each other.
 
-    Bodies that do not reach each other come to rest where equations depend on each other too, but only there.
+    A failed assembly stops where equations are dependent at that position only, which does not count.
     """
     anywhere = 0.1 * np.random.default_rng(1).standard_normal(model.system.shape[1])
     jacobian = Displacements(model, instant)(attempt.coordinates, anywhere).jacobian
@@ -276,15 +276,15 @@ def _structural_excess(model: Model, attempt: AssemblyAttempt, instant: float) -
 
 
 def _widths(model: Model, attempt: AssemblyAttempt, instant: float) -> dict[str, str]:
-    """Return by how much each joint and driver is open, as a length or as an angle, whichever it closes."""
+    """Return the gap of each joint and driver in words, as a length or as an angle."""
     shifts, entries = model.pose_type.shifts, np.abs(attempt.jacobian.blocks)
     by_shift, by_turn = (np.max(part, axis=(1, 2)) for part in (entries[:, :, :shifts], entries[:, :, shifts:]))
-    squares = _squared_lengths(model, instant)  # of two points in one place the slopes are all zero
+    squares = _squared_lengths(model, instant)  # where two points coincide, all slopes of their distance vanish
     lengthy = (by_shift > 1e-9 * by_turn) | np.isin(model.rows, list(squares))
     unit = np.where(lengthy, 1e3 * model.length, np.degrees(1.0))
     open_by = np.abs(attempt.gaps) * unit / np.maximum(np.where(lengthy, by_shift, by_turn), 1e-300)
     for row, name in enumerate(model.rows):
-        if name in squares:  # the residual is the square of a distance less this
+        if name in squares:  # the residual is the squared distance minus this value
             square = max(attempt.gaps[row] / attempt.scale[row] + squares[name], 0.0)
             open_by[row] = 1e3 * abs(np.sqrt(square) - np.sqrt(squares[name]))
     sizes = {name: {"mm": 0.0, "deg": 0.0} for name in model.rows}
@@ -312,7 +312,7 @@ def _squared_lengths(model: Model, instant: float) -> dict[str, float]:
 
 
 def redundancy_of(model: Model, attempt: AssemblyAttempt, instant: float) -> tuple[Model, Redundancy]:
-    """Return a model that was assembled with its rows scaled, and which of them follow from others."""
+    """Return an assembled model with its rows scaled, and its redundancy."""
     system = resident(with_fields(model.system, row_scale=attempt.scale[:, None], rank=None))
     model = with_fields(model, system=system)
     redundant = redundancy(model, attempt.coordinates, attempt.jacobian, Displacements(model, instant))
@@ -322,9 +322,9 @@ def redundancy_of(model: Model, attempt: AssemblyAttempt, instant: float) -> tup
 
 
 def check_mobility(model: Model, redundant: Redundancy, *, free: bool = False) -> None:
-    """Raise MobilityError, with the bodies concerned, where degrees of freedom are left or the position is singular.
+    """Raise MobilityError, with the bodies concerned, if degrees of freedom are left or the position is singular.
 
-    Redundant constraints are no error: here they agree. Degrees of freedom may be left (`free`).
+    Redundant constraints raise no error, since they agree. With `free`, degrees of freedom may be left.
     """
     (rows, columns), rank = redundant.here.shape, redundant.rank
     left_over = columns - rank
@@ -355,14 +355,14 @@ def check_mobility(model: Model, redundant: Redundancy, *, free: bool = False) -
 
 
 def freely_moving(model: Model, directions: Float[np.ndarray, "direction column"]) -> str:
-    """Name the bodies that move along directions of the coordinates, shape (directions, columns)."""
+    """Return the names of the bodies that move along directions of the coordinates, (directions, columns), in words."""
     chosen = moving_bodies(model, directions)
     shown = ", ".join(chosen[:6])
     return shown + (f" and {len(chosen) - 6} more" if len(chosen) > 6 else "")
 
 
 def moving_bodies(model: Model, directions: Float[np.ndarray, "direction column"]) -> list[str]:
-    """Return the bodies that move along directions of the coordinates, the one that moves most first."""
+    """Return the bodies that move along directions of the coordinates, the fastest first."""
     sizes = np.linalg.norm(directions.reshape(len(directions), len(model.bodies), -1), axis=(0, 2))
     own = [k for k, name in enumerate(model.bodies) if not name.endswith(ENDING)]  # carriages move with the bodies
     weights, names = sizes[own], [model.bodies[k] for k in own]

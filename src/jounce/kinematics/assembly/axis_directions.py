@@ -1,7 +1,7 @@
-"""Signs of the axes of joints: parts lie as drawn, or turned over, which fulfills the same equations.
+"""Signs of joint axes: parts assembled as drawn, or turned over.
 
-The rows of a hinge or a guide hold a body in two ways: as drawn, and with its axis the other way round. The second is
-no assembly that a user means, and no motion leads from one to the other.
+A hinge or a guide fulfills its equations in two ways: as drawn, and with its axis reversed. Users never mean the
+second, and no motion leads from one to the other.
 """
 
 import itertools
@@ -28,16 +28,16 @@ from jounce.rigid.pose import Pose
 DRAWN_OPPOSITE = -0.9  # cosine: directions as far apart in the starting guess are meant to point opposite ways
 DRAWN_NEARLY = 0.8  # where all are within this, the guess leaves no doubt, and nothing is gained by another
 
-MIRRORED = 1e-6  # of the radius: a disc as near to where it touches its line from the other side is meant to
+MIRRORED = 1e-6  # of the radius: distance from the position on the other side that counts as being there
 
 AxisSigns = Bool[np.ndarray, " pair"]
-"""Of each pair of directions that joints hold parallel, whether they point the same way."""
+"""For each pair of directions that joints hold parallel, whether they point the same way."""
 
 
 class SameDirection(Module):
-    """Two unit vectors that point the same way, not opposite ways: rows grow without bound as they come to do so.
+    """Constraint that two unit vectors point the same way; its rows grow without bound as they become opposite.
 
-    The rows have the size of the tangent of half the angle between the vectors.
+    The norm of the rows is the tangent of half the angle between the vectors.
     """
 
     vector_i: Float[np.ndarray, "component instance 1"]  # in the frame of body i
@@ -58,20 +58,20 @@ class SameDirection(Module):
 
 
 def axis_signs(system: System, coordinates: Coordinates) -> AxisSigns:
-    """Tell of each pair of directions that joints hold parallel whether they point the same way.
+    """Return, for each pair of directions that joints hold parallel, whether they point the same way.
 
-    Coordinates are those of all bodies, the ground first.
+    `coordinates` are those of all bodies, the ground first.
     """
     return _cosines(system, coordinates) >= 0
 
 
 def signs_of(model: Model, attempt: AssemblyAttempt) -> AxisSigns:
-    """Return the signs where the bodies were assembled."""
+    """Return the axis signs of an assembly."""
     return axis_signs(model.system, attempt.coordinates) if attempt.signs is None else attempt.signs
 
 
 def drawn_axis_signs(model: Model) -> AxisSigns:
-    """Return the signs that the starting guess means: the same way, unless it draws a pair almost opposite."""
+    """Return the axis signs that the starting guess means: equal, unless a pair is drawn almost opposite."""
     return _cosines(model.system, model.guess) > DRAWN_OPPOSITE
 
 
@@ -83,10 +83,10 @@ def pair_names(model: Model) -> list[str]:
 
 
 def axis_signs_to_try(model: Model, attempt: AssemblyAttempt) -> list[AxisSigns]:
-    """Return the signs with which to assemble again, the most likely first; none where the assembly is as drawn.
+    """Return the axis signs for another assembly, the most likely first; none if the assembly is as drawn.
 
-    That is where parts lie turned over, and where they were not assembled at all from a guess in which directions
-    are far from parallel. What the guess draws may not exist: then all pairs are meant to point the same way.
+    Another assembly is needed if parts are turned over, or if the first one failed and directions in its guess are far
+    from parallel. Signs as drawn may be impossible; all pairs pointing the same way come second.
     """
     there = signs_of(model, attempt) if attempt.closed else None
     if there is not None and there.all():
@@ -103,10 +103,10 @@ def axis_signs_to_try(model: Model, attempt: AssemblyAttempt) -> list[AxisSigns]
 
 
 def starts_with_axis_signs(model: Model, signs: AxisSigns, instant: float, tolerance: float) -> Iterator[Coordinates]:
-    """Give coordinates near the starting guess in which the joints hold with these signs, the most likely first.
+    """Yield coordinates near the starting guess that fulfill the joints with given axis signs, the most likely first.
 
-    Drivers hold in the first as well. The attitudes alone come first in a part of them: what is far away else draws
-    parts round.
+    Drivers hold in the first half of them. In each half, one start has the attitudes aligned beforehand, since distant
+    bodies otherwise pull parts around.
     """
     turned = assemble_from_guess(_directed(model, signs, only_directions=True), instant, tolerance)
     for driven in (True, False):
@@ -118,7 +118,7 @@ def starts_with_axis_signs(model: Model, signs: AxisSigns, instant: float, toler
 
 
 def _directed(model: Model, signs: AxisSigns, *, only_directions: bool = False, driven: bool = True) -> Model:
-    """Return the model with rows that hold directions the same way, or the opposite one where the sign is False.
+    """Return the model with added rows that make directions point the same way, or opposite ways for a False sign.
 
     Parameters
     ----------
@@ -127,9 +127,9 @@ def _directed(model: Model, signs: AxisSigns, *, only_directions: bool = False, 
     signs : array of bool, shape (pairs,)
         Whether the directions of each pair point the same way.
     only_directions : bool, default False
-        Whether they are the only rows; then pairs that close a loop are left out.
+        Whether these are the only rows; pairs that close a loop are then left out.
     driven : bool, default True
-        Whether drivers stay.
+        Whether to keep the drivers.
     """
     groups = [] if only_directions else [group for group in model.system.groups if driven or not group.is_driver]
     leads, first = list(range(model.system.body_count + 1)), 0
@@ -149,7 +149,7 @@ def _directed(model: Model, signs: AxisSigns, *, only_directions: bool = False, 
 
 
 def _joins(leads: list[int], body: int, other: int) -> bool:
-    """Tell whether two bodies were not joined yet, and join them; each leads to another of its kind, or to itself."""
+    """Join the sets of two bodies (union-find by `leads`), and return whether they were separate."""
     ends = []
     for start in (body, other):
         end = start
@@ -161,14 +161,14 @@ def _joins(leads: list[int], body: int, other: int) -> bool:
 
 
 def _pairs(system: System) -> Iterator[tuple[Group, tuple[str, str]]]:
-    """Give the groups of joints that hold two directions parallel, with the names of these."""
+    """Yield the groups of joints that hold two directions parallel, with the names of the two fields."""
     for group in system.groups:
         for names in facts_of(type(group.element)).held_parallel:
             yield group, names
 
 
 def _unit(group: Group, name: str) -> Float[np.ndarray, "component instance"]:
-    """Return unit vectors along a direction that an element has, in the axes of its body."""
+    """Return the unit vectors of a direction field of a group, in the axes of its body."""
     vectors = np.asarray(getattr(group.element, name))[..., 0]
     return np.broadcast_to(unit(vectors), (len(vectors), group.instances))
 
@@ -188,7 +188,7 @@ def _cosines(system: System, coordinates: Coordinates) -> Float[np.ndarray, " pa
 def mirrored_discs(model: Model, coordinates: Coordinates) -> list[str]:
     """Return the names of rolling joints whose disc touches its line from the wrong side.
 
-    There a disc that rolls turns the other way than the joint says.
+    Such a disc rolls in the opposite sense to that of the joint.
     """
     names: list[str] = []
     position = np.asarray(coordinates["position"])
@@ -211,7 +211,7 @@ def mirrored_discs(model: Model, coordinates: Coordinates) -> list[str]:
 def _right_of(
     line: Float[np.ndarray, "component instance"], axis: Float[np.ndarray, "component instance"] | None = None
 ) -> Float[np.ndarray, "component instance"]:
-    """Return unit vectors from lines to the right, in space as one sees it who looks against the axis of the disc."""
+    """Return unit vectors to the right of lines, in space as seen against the axis of the disc."""
     if axis is None:
         return np.stack([line[1], -line[0]])
     side = np.cross(line, axis, axis=0)
@@ -221,7 +221,7 @@ def _right_of(
 def in_global_axes(
     vectors: Float[np.ndarray, "component instance"], coordinates: Coordinates, bodies: Int[np.ndarray, " instance"]
 ) -> Float[np.ndarray, "component instance"]:
-    """Return vectors given in the axes of bodies in global ones."""
+    """Return vectors in global axes, given those in the axes of bodies."""
     if "angle" in coordinates:
         angle = np.asarray(coordinates["angle"])[bodies, 0]
         c, s = np.cos(angle), np.sin(angle)

@@ -1,11 +1,11 @@
-"""The constraints of a mechanism at one position as series: how far a motion that begins there can be continued.
+"""The constraints at a position as Taylor series: how far a motion that begins there can be continued.
 
-At a position with dependent constraints a velocity that they allow may still be blocked by the equations of a higher
-order. With coordinates x = K y + z, the velocities K y that the constraints allow free and the rest z solved for, what
-is left is a few equations g(y) = 0 without linear terms (Lyapunov and Schmidt): as many as constraints are dependent.
-Along any series y(t) the coefficients of g follow order after order from those of the residual, with one matrix, as in
-a solve: no derivative of a constraint is written (Mueller 2016, Higher-order analysis of kinematic singularities of
-lower pair linkages and serial manipulators, does it by differentials).
+Where constraints are dependent, equations of higher order may block a velocity that they allow. Let x = K y + z, with K
+y the velocities that the constraints allow and z solved for. What remains is a few equations g(y) = 0 without linear
+terms (Lyapunov-Schmidt reduction), as many as constraints are dependent. Along any series y(t), the coefficients of g
+follow from those of the residual, order after order, with one matrix, as in a solve: no derivative of a constraint is
+written. Mueller (2016, Higher-order analysis of kinematic singularities of lower pair linkages and serial manipulators)
+uses differentials instead.
 """
 
 import dataclasses
@@ -26,31 +26,31 @@ from jounce.mechanism.building.starting_guess import pose_at
 from jounce.mechanism.system import System
 from jounce.rigid.pose import Pose
 
-LANES = 32  # series that are followed side by side
-FULFILLED = 1e-7  # of what the terms of an order are: less is rounding, and what a position is known to
-SINGULAR = 1e-7  # of the largest singular value: what is less is zero at a position known to some 1e-8
+LANES = 32  # series evaluated side by side
+FULFILLED = 1e-7  # relative to the terms of an order: smaller residuals are rounding and error of the position
+SINGULAR = 1e-7  # of the largest singular value: smaller ones count as zero at a position known to about 1e-8
 
 
 @dataclasses.dataclass(frozen=True)
 class ReducedConstraints:
-    """The few equations g(y) = 0 that dependent constraints leave at a position.
+    """The equations g(y) = 0 that dependent constraints leave at a position.
 
     Attributes
     ----------
     model : Model
-        Of the joints alone, with rows of one size.
+        The joints alone, with rows scaled to one size.
     coordinates : dict of str to array
-        Of all bodies there, the ground first.
+        Coordinates of all bodies at the position, the ground first.
     free : array of shape (columns, k)
         Orthonormal velocities that the constraints allow: K.
     dependent : array of shape (rows, s)
-        Orthonormal combinations of rows that vanish there.
+        Orthonormal combinations of rows that vanish at the position.
     inverse : array of shape (columns, rows)
         Pseudo-inverse of the Jacobian.
     held : array of bool, shape (rows,)
-        Rows that must hold; others, such as those of drivers, are not looked at.
+        Rows that must hold; the others, such as those of drivers, are ignored.
     order : int
-        To which series go.
+        Order of the series.
     """
 
     model: Model
@@ -70,7 +70,7 @@ class ReducedConstraints:
         order: int,
         held: Bool[np.ndarray, " row"] | None = None,
     ) -> "ReducedConstraints":
-        """Reduce the constraints at a position, where they have a scaled Jacobian; or only some of its rows."""
+        """Reduce the constraints, or those of the held rows, at a position with a given scaled Jacobian."""
         held = np.ones(len(jacobian), bool) if held is None else held
         left, sizes, right = np.linalg.svd(jacobian[held])
         rank = int(np.sum(sizes > SINGULAR * sizes.max(initial=0.0)))
@@ -82,14 +82,14 @@ class ReducedConstraints:
         return cls(model, coordinates, right[rank:].T, dependent, inverse, held, order)
 
     def along(self, series: Float[np.ndarray, "lane order k"]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return what g is along series of y, without their coefficients of order 0, which are zero.
+        """Return the series of g along series of y; both without their coefficients of order 0, which are zero.
 
         Returns
         -------
         equations : array of shape (lanes, order, s)
-            Coefficients of g, from order 1 on, by rows of one size.
+            Coefficients of g from order 1 on, with scaled rows.
         sizes : array of shape (lanes, order)
-            The largest coefficient of any row that they are left of.
+            Largest coefficient of any row of the residual from which those of g are combined.
         coordinates : array of shape (lanes, order, columns)
             Coefficients of the scaled coordinates.
         """
@@ -100,7 +100,7 @@ class ReducedConstraints:
         return equations, sizes, moved
 
     def gap(self, series: Float[np.ndarray, "lane order k"], order: int) -> tuple[np.ndarray, np.ndarray]:
-        """Return the coefficients of g up to an order, (lanes, order * s), and what of each counts as zero."""
+        """Return the coefficients of g up to an order, (lanes, order * s), and the bound below which each is zero."""
         equations, sizes, _ = self.along(series)
         orders = np.arange(1, order + 1)
         rate = np.max(np.maximum(sizes[:, :order], 1e-300) ** (1.0 / orders), axis=1)
@@ -109,7 +109,7 @@ class ReducedConstraints:
         return flat, np.repeat(allowed, equations.shape[2], axis=1)
 
     def placed(self, coefficients: Float[np.ndarray, "order column"], step: float) -> Float[np.ndarray, " column"]:
-        """Return the scaled increment of the coordinates a step along a series, to first order in turns."""
+        """Return the scaled increment of the coordinates after a step along a series, to first order in rotations."""
         powers = step ** np.arange(1, len(coefficients) + 1)
         return powers @ coefficients
 

@@ -1,4 +1,4 @@
-"""Bodies assembled at one instant, from a starting guess, by damped Gauss-Newton on the host."""
+"""Assembly of the bodies at one instant from a starting guess, by damped Gauss-Newton on the host."""
 
 from functools import cached_property
 from typing import Any, NamedTuple
@@ -21,23 +21,23 @@ from jounce.mechanism.system import System
 from jounce.rigid.pose import Pose
 
 MAX_STEPS = 100
-NEXT_STEP = 1e-3  # of the tolerance: a step that would be this short, as residuals fall, is left out
+NEXT_STEP = 1e-3  # of the tolerance: a step predicted to be shorter, as residuals fall, is skipped
 LONGEST_STEP = 0.5  # rad, or sizes of the mechanism
-REGULAR = 1e-4  # smallest pivot over the largest, from where on a matrix is inverted instead of decomposed
+REGULAR = 1e-4  # ratio of smallest to largest pivot above which a matrix is inverted rather than decomposed
 
 
 class _NewtonState(NamedTuple):
     """State of the Newton-Raphson iteration between two steps, for one instant."""
 
     coordinates: dict[str, Numbers]
-    increment: Float[Numbers, " column"]  # to be made next
+    increment: Float[Numbers, " column"]  # of the next step
     begun: Float[Numbers, " row"]  # residual at the first position
     residual: Float[Numbers, " row"]
     entries: Float[Numbers, " entry"]
     row_scale: Float[Numbers, " row"]
     size: Float[Numbers, ""]  # of the increment
     closed: Bool[Numbers, ""]
-    left: Int[Numbers, ""]  # steps that may follow; below zero none does
+    left: Int[Numbers, ""]  # steps that may follow; none if negative
 
 
 @compiled("pose_type", narrow=True, brief=True)
@@ -52,9 +52,9 @@ def _moved(
 ) -> Any:
     """Return the coordinates after an increment, with residual and entries of the Jacobian.
 
-    With a pattern, by which a square Jacobian is a dense matrix, some steps may follow, as long as those of
-    Newton-Raphson are those of `assemble_from_guess`: short, from regular positions, and with residuals that fall. The
-    residual before them is returned too, and whether they closed it.
+    If the pattern makes a square Jacobian dense, Newton-Raphson steps may follow, as long as they equal those of
+    `assemble_from_guess`: short steps from regular positions with falling residuals. The result then also has the
+    residual before them, and whether they closed all gaps.
     """
     time = Jet([instant[None, None]])
 
@@ -91,22 +91,22 @@ def _moved(
 
 
 class AssemblyAttempt(NamedTuple):
-    """The outcome of an assembly: a position, and the gaps that stay open.
+    """The outcome of an assembly: a position and its gaps.
 
     Attributes
     ----------
     coordinates : dict of str to array
-        Of all bodies, the ground first: assembled, or as near to it as they came.
+        Coordinates of all bodies, the ground first: assembled, or as close as the iteration came.
     scale : array of shape (rows,)
-        By which the rows are multiplied.
+        Factors by which the rows are multiplied.
     gaps : array of shape (rows,)
-        By how much each row is open, rad or sizes of the mechanism.
+        Gap of each row, rad or sizes of the mechanism.
     jacobian : HostJacobian
-        Scaled, there.
+        Scaled Jacobian at the position.
     closed : bool
         Whether all gaps are closed, to the tolerance of the last correction.
     signs : array of bool, shape (pairs,), optional
-        Of each pair of directions that joints hold parallel whether they point the same way, where that is known.
+        For each pair of directions that joints hold parallel, whether they point the same way, if known.
     """
 
     coordinates: Coordinates
@@ -118,9 +118,9 @@ class AssemblyAttempt(NamedTuple):
 
 
 class Displacements:
-    """Displacements of the bodies of a model at an instant, s, in compiled code, called from the host.
+    """Compiled displacements of the bodies of a model at an instant, s, called from the host.
 
-    Called with coordinates and an increment, it returns the displaced position.
+    A call with coordinates and an increment returns the displaced position.
     """
 
     def __init__(self, model: Model, instant: float):
@@ -135,16 +135,16 @@ class Displacements:
     def closed(
         self, start: Coordinates, tolerance: float
     ) -> tuple[Float[np.ndarray, " row"], AssemblyAttempt | None, Displaced | None]:
-        """Return the residual at some coordinates, and the bodies assembled from there if no step needs a check.
+        """Return the residual at given coordinates, and the assembly from there, if it takes full Newton steps only.
 
-        The position with those coordinates comes last, where none of its steps was tried: the one to go on from.
+        The position at the coordinates comes third, if no step was tried from it; the damped iteration starts there.
         """
         there, begun, closed = self._moved(start, self._still, MAX_STEPS if self._dense else 0, tolerance)
         attempt = _attempt(there, tolerance) if closed else None
         return begun, attempt, None if self._dense else there
 
     def at(self, coordinates: Coordinates) -> Displaced:
-        """Return the position with some coordinates."""
+        """Return the position with given coordinates."""
         return self(coordinates, self._still)
 
     def _moved(
@@ -175,22 +175,22 @@ def assemble_from_guess(
     lag: DriverLag | None = None,
     known: Displaced | None = None,
 ) -> AssemblyAttempt:
-    """Assemble the bodies at one instant by damped Gauss-Newton; the outcome may have open gaps.
+    """Assemble the bodies at one instant by damped Gauss-Newton; the result may have open gaps.
 
     Parameters
     ----------
     model : Model
         The mechanism, with at least one row.
     instant : float
-        s.
+        Time, s.
     tolerance : float
-        Of the last correction, rad or sizes of the mechanism.
+        Largest last correction, rad or sizes of the mechanism.
     start : dict of str to array, optional
-        Coordinates to start from instead of the guess.
+        Start coordinates in place of the guess.
     lag : DriverLag, optional
-        What drivers may still lack.
+        Lag that the drivers keep.
     known : Displaced, optional
-        Where to start from, in the place of coordinates, if it is known whole.
+        Start position in place of coordinates, with residual and Jacobian.
     """
     displace = Displacements(model, instant)
 

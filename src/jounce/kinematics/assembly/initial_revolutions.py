@@ -1,9 +1,8 @@
 """Whole turns at the first assembly, from the starting guess and the laws of the drivers.
 
-Where a law starts more than half a turn from where the guess has its body, the drivers are turned from the guess to the
-law step by step, and every body and every angle counts the turns that it makes on the way. Otherwise all angles are
-those nearest to the guess. So the turns depend neither on the path of assembly nor on the instant at which a grid
-starts.
+If a law starts more than half a turn from the guess, the drivers are turned step by step from the guess to the law, and
+all bodies and angles count their turns on the way. Otherwise all angles are those nearest to the guess. The turns thus
+depend neither on the path of assembly nor on the first instant of a grid.
 """
 
 from collections.abc import Callable, Sequence
@@ -20,10 +19,10 @@ from jounce.mechanism import Model
 from jounce.mechanism.transmissions.axis_angles import AttitudeHistory, measures_angle
 
 STEPS_A_TURN = 64
-MOST_TURNS = 4  # followed one by one; beyond, each further turn does what the last one did
+MOST_TURNS = 4  # followed step by step; each further turn repeats the last one
 CORRECTIONS = 8
-MOST_FOLLOWED = 100  # where they do not, as those of drivers that turn unlike each other
-SMALLEST_PERIOD, LARGEST_PERIOD = 1, 60  # whole turns, among which those are sought that leave coupled bodies coupled
+MOST_FOLLOWED = 100  # turns, if the last one cannot be repeated, as with drivers at different rates
+SMALLEST_PERIOD, LARGEST_PERIOD = 1, 60  # whole turns searched for shifts that keep coupled bodies coupled
 
 
 Coordinates = dict[str, np.ndarray]
@@ -31,7 +30,7 @@ Coordinates = dict[str, np.ndarray]
 
 
 class Displaced(NamedTuple):
-    """A position, after a displacement of the bodies."""
+    """A position after a displacement of the bodies."""
 
     coordinates: Coordinates
     residual: Float[np.ndarray, " row"]
@@ -42,16 +41,16 @@ Displace = Callable[[Coordinates, np.ndarray], Displaced]
 
 
 class DriverLag(NamedTuple):
-    """The lag of the drivers at the starting guess: law less guess, by rows of the residual.
+    """The lag of the drivers at the starting guess: law minus guess, by rows of the residual.
 
     Attributes
     ----------
     size : array of shape (rows,)
-        What the law says less what the guess has, with whole turns; zero in the rows of joints.
+        Value of the law minus that of the guess, with whole turns; zero in the rows of joints.
     turning : array of bool, shape (rows,)
-        Whether it is an angle.
+        Whether the row is an angle.
     periodic : array of bool, shape (rows,)
-        Whether the row forgets whole turns.
+        Whether the row is periodic in whole turns.
     """
 
     size: Float[np.ndarray, " row"]
@@ -60,19 +59,19 @@ class DriverLag(NamedTuple):
 
     @property
     def angle(self) -> float:
-        """The largest angle, rad."""
+        """The largest lag of an angle, rad."""
         return float(np.max(np.abs(self.size[self.turning]), initial=0.0))
 
     def open(self, residual: Float[np.ndarray, " row"], part: float) -> Float[np.ndarray, " row"]:
-        """Return the residual of drivers that lack a part of this still."""
+        """Return the residual of drivers that still lag by a part of the total."""
         opened = residual + part * self.size
         return np.where(self.periodic, principal(opened), opened)
 
 
 def driver_lag(model: Model, laws: Sequence[np.ndarray], residual: Float[np.ndarray, " row"]) -> DriverLag | None:
-    """Return the lag of the drivers where the residual is that of the guess; None where a driver has several rows.
+    """Return the lag of the drivers, given the residual at the guess; None if a driver has several rows.
 
-    Laws are the values of those of angles about axes, as `law_values` returns them.
+    `laws` are the values for drivers of angles about axes, as `law_values` returns them.
     """
     rows = [k for k, name in enumerate(model.rows) if name.startswith(("drivers.", "initial."))]
     groups = [group for group in model.system.groups if group.is_driver]
@@ -96,24 +95,24 @@ def driver_lag(model: Model, laws: Sequence[np.ndarray], residual: Float[np.ndar
 def turned_to_laws(
     model: Model, lag: DriverLag, start: Coordinates, displace: Displace
 ) -> tuple[Coordinates, AttitudeHistory | None] | None:
-    """Follow the mechanism from the drivers of the guess to those of the laws, in steps.
+    """Follow the mechanism step by step from the driver values of the guess to those of the laws.
 
     Parameters
     ----------
     model : Model
         The mechanism.
     lag : DriverLag
-        At the guess.
+        Lag at the guess.
     start : dict of str to array
-        Coordinates, assembled with the drivers as in the guess.
+        Coordinates assembled with the driver values of the guess.
     displace : callable
-        Takes coordinates and an increment to coordinates, residual and Jacobian.
+        Maps coordinates and an increment to coordinates, residual and Jacobian.
 
     Returns
     -------
     tuple or None
-        The coordinates there, with the turns of planar bodies, and in space the history of the attitudes, along which
-        angles about axes count their turns; None if the motion ends on the way.
+        The coordinates, with the turns of planar bodies, and in space the history of attitudes from which the turns of
+        angles about axes are counted; None if the motion cannot be followed.
     """
     turns, skipped = lag.angle / WHOLE_TURN, 0
     if turns > MOST_TURNS:
@@ -128,7 +127,7 @@ def turned_to_laws(
                 break
             if turns > MOST_FOLLOWED:
                 return None
-            skipped = 0  # drivers that turn unlike each other: no turn is like the last
+            skipped = 0  # drivers at different rates: no turn repeats the last one
         corrected = _corrected(states[-1], increment, lambda r, p=part: lag.open(r, p), displace)
         if corrected is None:
             return None
@@ -147,7 +146,7 @@ def _corrected(
     opened: Callable[[np.ndarray], np.ndarray],
     displace: Displace,
 ) -> tuple[Coordinates, Float[np.ndarray, " column"]] | None:
-    """Return the coordinates after a step, and the step; None where Newton-Raphson does not converge."""
+    """Return the coordinates after a Newton-Raphson corrected step, and the step; None if it does not converge."""
     whole, trial = increment, displace(coordinates, increment)
     for _ in range(CORRECTIONS):
         step = trial.jacobian.step(opened(trial.residual))
@@ -160,10 +159,10 @@ def _corrected(
 
 
 def _repeated(states: list[Coordinates], turns: int) -> Coordinates | None:
-    """Return the coordinates after further turns, each like the last; None if the last turn did not close."""
+    """Return the coordinates after further turns like the last; None if the last turn did not close."""
     before, after = states[-1 - STEPS_A_TURN], states[-1]
     advance = np.zeros_like(after["position"])
-    if len(states) > 2 * STEPS_A_TURN:  # by as much a turn, as a nut on a screw does, or what counts the turns of a cam
+    if len(states) > 2 * STEPS_A_TURN:  # an advance per turn, as of a nut on a screw or the turn counter of a cam
         advance = before["position"] - states[-1 - 2 * STEPS_A_TURN]["position"]
     for name, value in after.items():
         away = value - before[name]
@@ -182,16 +181,16 @@ def _repeated(states: list[Coordinates], turns: int) -> Coordinates | None:
 def nearest_turns(
     guess: dict[str, Any], coordinates: Coordinates, residual_at: Callable[[np.ndarray], np.ndarray]
 ) -> Coordinates:
-    """Return planar coordinates with every angle shifted by the whole turns that bring it nearest to the guess.
+    """Return planar coordinates with angles shifted by the whole turns that bring them nearest to the guess.
 
-    Drivers, gears and rolling discs count turns: what they couple is shifted together, or not at all.
+    Drivers, gears and rolling discs count turns: bodies that they couple are shifted together or not at all.
 
     Parameters
     ----------
     guess, coordinates : dict of str to array
         Coordinates of all bodies, the ground first.
     residual_at : callable
-        Returns the scaled residual at some angles, shape (rows,).
+        Returns the scaled residual for given angles, shape (rows,).
     """
     away = ((np.asarray(guess["angle"]) - coordinates["angle"]) / WHOLE_TURN)[1:, 0]
     if not np.round(away).any():
@@ -214,7 +213,7 @@ def nearest_turns(
 
 
 def _together(changes: Float[np.ndarray, "body row"], away: Float[np.ndarray, " body"]) -> Float[np.ndarray, " body"]:
-    """Return the whole turns, nearest to given ones, that change no row; changes of one turn are (bodies, rows)."""
+    """Return the whole turns nearest to `away` that change no row; `changes` are those by one turn of each body."""
     if np.max(np.abs(np.round(away) @ changes)) < 1e-6:
         return np.round(away)
     left, sizes, _ = np.linalg.svd(changes)

@@ -1,4 +1,4 @@
-"""Loose bodies: movable ones that one joint or none holds, which suggests a missing joint."""
+"""Loose bodies: movable bodies held by at most one joint, which suggests a missing joint."""
 
 from collections.abc import Sequence
 
@@ -6,12 +6,12 @@ from jounce.mechanism import Model
 from jounce.mechanism.building.builder import named_groups
 from jounce.mechanism.mechanism import GROUND
 
-OF_A_HINGE = {2: 2, 3: 5}  # equations, by the components of positions
+OF_A_HINGE = {2: 2, 3: 5}  # equations of a hinge, by the number of position components
 MOST_NAMED = 3
 
 
 def joints_of(model: Model) -> dict[str, list[str]]:
-    """Return the names of the joints that hold each body, drivers left out."""
+    """Return the names of the joints of each body, without drivers."""
     names = (GROUND, *model.bodies)
     joints: dict[str, list[str]] = {name: [] for name in names}
     for group, members in named_groups(model):
@@ -25,21 +25,21 @@ def joints_of(model: Model) -> dict[str, list[str]]:
 
 
 def missing_joint_words(model: Model, moving: Sequence[str], left: int) -> str:
-    """Say which joint may be missing where bodies have degrees of freedom left; nothing where no body hangs loose.
+    """Return a hint at a missing joint for bodies with degrees of freedom left, or an empty string.
 
     Parameters
     ----------
     model : Model
-        Put together.
+        The assembled model.
     moving : sequence of str
         Names of the bodies that can move.
     left : int
-        Degrees of freedom.
+        Number of degrees of freedom left.
     """
     joints = joints_of(model)
     loose = [body for body in moving if len(joints[body]) <= 1]
     if not loose or (len(loose) == 1 and left == 1 and joints[loose[0]]):
-        return ""  # a crank, which a driver may be missing of
+        return ""  # a crank that lacks a driver, not a joint
     supports = [f"by {joints[body][0]} alone" if joints[body] else "by no joint" for body in loose]
     first, *others = zip(loose, supports, strict=True)
     phrases = [f"{first[0]} is held {first[1]}", *map(" ".join, others[: MOST_NAMED - 1])]

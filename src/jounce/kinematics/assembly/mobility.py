@@ -1,7 +1,7 @@
-"""Mobility at a position: by the count of equations, by their rank, and by finite motions.
+"""Mobility at a position: by count of equations, by their rank, and by finite motions.
 
-A velocity that all joints allow may be no motion: equations of a higher order may block it. The series of the
-constraints tell which velocities continue, and where they branch (`constraint_series`, `tangent_cone`).
+Equations of higher order may block a velocity that all joints allow. The series of the constraints show which
+velocities can be continued, and where they branch (`constraint_series`, `tangent_cone`).
 """
 
 import dataclasses
@@ -27,7 +27,7 @@ from jounce.mechanism.time import first_instant
 Kind = Literal["regular", "rigid", "shaky", "cusp", "singular", "change point"]
 HIGHEST_ORDER = 20
 TOLERANCE = 1e-12
-NEARBY = 0.02  # rad or sizes of the mechanism: how far along a branch its degrees of freedom are counted
+NEARBY = 0.02  # rad or sizes of the mechanism: distance along a branch at which its degrees of freedom are counted
 FARTHER = 0.05
 SAME_BRANCH = 0.3  # rad, between tangent spaces
 RANDOM_CURVES = 4
@@ -41,12 +41,12 @@ class Branch:
     Attributes
     ----------
     freedom : int
-        Its degrees of freedom: those counted at a position a little way along it.
+        Degrees of freedom of the branch, counted at a position a little way along it.
     tangents : dict of str to array of shape (freedom, coordinates)
-        How each body begins to move along it: velocity of its origin, m, and angle, or angular velocity in its own
-        axes, rad, up to a common factor.
+        Initial motion of each body along the branch: velocity of its origin, m, and angle (in space the angular
+        velocity in its own axes), rad, up to a common factor.
     cusp : bool
-        Whether the motion comes to rest here and turns back.
+        Whether the motion comes to rest at the position and turns back.
     """
 
     freedom: int
@@ -65,27 +65,27 @@ class Branch:
 
 @dataclasses.dataclass(frozen=True)
 class Mobility:
-    """How a mechanism can move from a position; drivers are released.
+    """The mobility of a mechanism at a position, with its drivers released.
 
     Attributes
     ----------
     coordinates, equations : int
-        Of the bodies, and of the joints.
+        Number of coordinates of the bodies, and of equations of the joints.
     instantaneous : int
-        Degrees of freedom by the rank of the equations here: velocities that the joints allow.
+        Degrees of freedom by the rank of the equations at the position: velocities that the joints allow.
     finite : int
-        Those of the branch that has most of them.
+        Degrees of freedom of the branch with most of them.
     order : int, optional
-        To which order motions were continued; None where the equations are independent, so that all go on.
+        Order to which motions were continued; None if the equations are independent, so that all velocities continue.
     kind : str
-        ``"regular"``; ``"rigid"``, with no motion at all; ``"shaky"``, with none that goes on; ``"cusp"``,
-        ``"singular"`` or ``"change point"``, where only some velocities go on, by one branch or by several.
+        ``"regular"``; ``"rigid"``, without any velocity; ``"shaky"``, with velocities that all are blocked; ``"cusp"``,
+        ``"singular"`` or ``"change point"``, where only some velocities continue, along one branch or several.
     blocked : int, optional
-        Order at which the last of the other velocities is blocked.
+        Order at which the last of the blocked velocities is blocked.
     branches : tuple of Branch
-        What goes on.
+        Families of motions through the position.
     repetitions : tuple of Repetition
-        Which joints repeat equations of which others.
+        Joints with redundant equations, and the joints whose equations they repeat.
     """
 
     coordinates: int
@@ -100,7 +100,7 @@ class Mobility:
 
     @property
     def count(self) -> int:
-        """Degrees of freedom by the count of Gruebler and Kutzbach: coordinates less equations."""
+        """Degrees of freedom by the Gruebler-Kutzbach count: coordinates minus equations."""
         return self.coordinates - self.equations
 
     def __str__(self) -> str:
@@ -122,7 +122,7 @@ class Mobility:
 
 
 def independent(coordinates: int, equations: int) -> Mobility:
-    """Return the mobility of a mechanism whose equations do not depend on each other at a position."""
+    """Return the mobility of a mechanism whose equations are independent at a position."""
     left = coordinates - equations
     return Mobility(coordinates, equations, left, left, None, "regular" if left else "rigid")
 
@@ -131,16 +131,16 @@ def independent(coordinates: int, equations: int) -> Mobility:
 def mobility(mechanism: Mechanism, time: float | None = None, order: int = 10) -> Mobility:
     """Return the mobility of a mechanism at its assembled position: by count, by rank, and by finite motions.
 
-    Drivers and initial conditions hold it at the position, and are released there.
+    Drivers and initial conditions determine the position, and are then released.
 
     Parameters
     ----------
     mechanism : Mechanism
-        That can be assembled.
+        A mechanism that can be assembled.
     time : float, optional
-        The instant of the drivers, s; that at which the mechanism's own grid begins, or 0, unless given.
+        Instant at which the drivers are evaluated, s; by default the first of the mechanism's own grid, or 0.
     order : int, default 10
-        To which motions are continued where equations depend on each other: 2 to 20.
+        Order from 2 to 20 to which motions are continued where equations are dependent.
 
     Raises
     ------
@@ -151,7 +151,7 @@ def mobility(mechanism: Mechanism, time: float | None = None, order: int = 10) -
 
     Examples
     --------
-    Three hinges in a line allow a velocity and no motion; four-bars go on:
+    Three hinges in a line allow a velocity but no motion; a four-bar moves:
 
     >>> import jounce as jn
     >>> hinge = jn.planar.Revolute
@@ -188,7 +188,7 @@ def mobility(mechanism: Mechanism, time: float | None = None, order: int = 10) -
 
 
 def _released(mechanism: Mechanism, time: float) -> tuple[Model, AssemblyAttempt | None]:
-    """Return the model of the joints alone, if any, where drivers hold it, with rows of one size."""
+    """Return the model of the joints alone, rows scaled, and its assembly, if any, as the drivers hold it."""
     driven = dataclasses.replace(mechanism, drivers={**mechanism.drivers, **mechanism.initial}, initial={}, outputs={})
     model = build(driven)
     coordinates = model.guess
@@ -206,7 +206,7 @@ def _released(mechanism: Mechanism, time: float) -> tuple[Model, AssemblyAttempt
 
 
 def _analyzed(constraints: ReducedConstraints, displace: Displace) -> Mobility:
-    """Return the mobility at a position where equations depend on each other."""
+    """Return the mobility at a position where equations are dependent."""
     columns, rows = constraints.inverse.shape
     left, order = constraints.free.shape[1], constraints.order
     if not left:
@@ -229,7 +229,7 @@ def _analyzed(constraints: ReducedConstraints, displace: Displace) -> Mobility:
 
 
 def _all_go_on(constraints: ReducedConstraints) -> bool:
-    """Tell whether all velocities can be continued, by a sample of random ones."""
+    """Return whether all velocities can be continued, judged by a random sample."""
     count = constraints.free.shape[1]
     some = np.random.default_rng(2).standard_normal((RANDOM_CURVES, count))
     series = np.zeros((RANDOM_CURVES, constraints.order, count))
@@ -239,7 +239,7 @@ def _all_go_on(constraints: ReducedConstraints) -> bool:
 
 
 def _branches(constraints: ReducedConstraints, going: Sequence[LocalCurve], displace: Displace) -> tuple[Branch, ...]:
-    """Return the branches of curves: curves with the same tangent space a little further on are one branch."""
+    """Return the branches to which curves belong: curves with the same tangent space a little farther on are one."""
     members: list[tuple[np.ndarray, list[LocalCurve]]] = []
     for curve in going:
         coefficients = constraints.along(curve.series[None])[2][0]
@@ -264,7 +264,7 @@ def _branches(constraints: ReducedConstraints, going: Sequence[LocalCurve], disp
 
 
 def _moves_by_trial(constraints: ReducedConstraints, displace: Displace) -> bool:
-    """Tell whether bodies displaced along a free velocity can be assembled there."""
+    """Return whether bodies displaced along a free velocity can be assembled near the displaced position."""
     everything = np.ones(len(constraints.dependent), bool)
     random = np.random.default_rng(3).standard_normal((2 * RANDOM_CURVES, constraints.free.shape[1]))
     directions = np.concatenate([np.eye(random.shape[1]), -np.eye(random.shape[1]), random])
@@ -277,7 +277,7 @@ def _moves_by_trial(constraints: ReducedConstraints, displace: Displace) -> bool
 
 
 def _by_body(constraints: ReducedConstraints, vectors: Float[np.ndarray, "vector column"]) -> dict[str, np.ndarray]:
-    """Return scaled velocities by body, in SI units, the largest part of each vector one in scaled ones."""
+    """Return scaled velocities by body, in SI units; the largest scaled component of each vector is one."""
     model = constraints.model
     scale = np.asarray(model.system.column_scale)
     vectors = vectors / np.abs(vectors).max(axis=1, keepdims=True)
@@ -287,7 +287,7 @@ def _by_body(constraints: ReducedConstraints, vectors: Float[np.ndarray, "vector
 
 
 def _turn(vector: Float[np.ndarray, " coordinate"]) -> float:
-    """Return how fast a body turns, with the sign of the largest component."""
+    """Return the rotation rate of a body, with the sign of its largest component."""
     turns = vector[2:] if len(vector) == 3 else vector[3:]
     size = float(np.linalg.norm(turns))
     return 0.0 if size < 1e-9 else size * float(np.sign(turns[np.argmax(np.abs(turns))]))

@@ -1,7 +1,7 @@
-"""Redundant constraints: found by the rank of the Jacobian at several positions, with the joints that repeat others.
+"""Redundant constraints, from the rank of the Jacobian at several positions, and the joints that repeat others.
 
-The rank may be low at one position only, at a dead point or where bodies happen to be aligned. So it is taken at
-nearby general positions that fulfill the joints, with the drivers released.
+At a dead point, or where bodies happen to be aligned, the rank is low at that position only. The rank is therefore
+taken at nearby general positions that fulfill the joints, with the drivers released.
 """
 
 import dataclasses
@@ -18,30 +18,30 @@ from jounce.kinematics.assembly.tangent_cone import curves
 from jounce.linear_algebra.host_jacobian import HostJacobian
 from jounce.mechanism import Model
 
-SWAYS = (0.1, 0.01)  # rad or sizes of the mechanism: how far a position in general is from the one assembled
+SWAYS = (0.1, 0.01)  # rad or sizes of the mechanism: distances of general positions from the assembled one
 POSITIONS = 3
 MOST_STEPS = 50
-OPEN = 1e-7  # part of a row in combinations that vanish: what is less is none
+OPEN = 1e-7  # in vanishing combinations of rows: smaller parts count as zero
 KINDS = {"joints": "joint", "drivers": "driver", "initial": "initial condition"}
-CURVE_ORDER = 4  # to which curves are looked for that lead away from a singular position
-CLOSED = 1e-9  # rad or sizes of the mechanism, by which joints may be open at a position in general
-ROUNDING = 1e-14  # of residuals, whose rows have one size: what is less does not distinguish two positions
+CURVE_ORDER = 4  # of the curves that are sought away from a singular position
+CLOSED = 1e-9  # rad or sizes of the mechanism: largest residual of joints at a general position
+ROUNDING = 1e-14  # of scaled residuals: smaller differences do not distinguish two positions
 STEP = 1e-3  # rad or sizes of the mechanism, over which the change of the Jacobian is measured
 
 
 class Repetition(NamedTuple):
-    """Equations that a joint or driver repeats.
+    """Redundant equations of one joint or driver.
 
     Attributes
     ----------
     kind : str
         ``"joint"`` or ``"driver"``.
     name : str
-        Of it.
+        Name of the joint or driver.
     equations : int
-        How many of its equations follow from those of others.
+        Number of its equations that follow from those of others.
     of : tuple of str
-        Names of these others; none where its own equations repeat each other.
+        Names of the others; empty if its own equations repeat each other.
     """
 
     kind: str
@@ -56,18 +56,18 @@ class Repetition(NamedTuple):
 
 @dataclasses.dataclass(frozen=True)
 class Redundancy:
-    """Which equations of a mechanism follow from others.
+    """The rank of the equations of a mechanism, and the redundant ones among them.
 
     Attributes
     ----------
     rows : tuple of str
-        The joint or driver of each row, as a model has them.
+        Joint or driver of each row, as in a model.
     rank : int
-        Of the Jacobian, in general.
+        Rank of the Jacobian at general positions.
     here : HostJacobian
-        Scaled, at the position assembled.
+        Scaled Jacobian at the assembled position.
     jacobian : HostJacobian
-        Scaled, at a position of that rank.
+        Scaled Jacobian at a position with the general rank.
     """
 
     rows: tuple[str, ...]
@@ -77,22 +77,22 @@ class Redundancy:
 
     @property
     def count(self) -> int:
-        """Number of equations that follow from others, in general."""
+        """Number of equations that follow from others at general positions."""
         return len(self.rows) - self.rank
 
     @property
     def is_singular(self) -> bool:
-        """Whether the position assembled is singular: fewer equations are independent there than in general."""
+        """Whether the assembled position is singular: its rank is below the general rank."""
         return self.here.rank < self.rank
 
     @cached_property
     def repetitions(self) -> tuple[Repetition, ...]:
-        """Which joints and drivers repeat equations of which others."""
+        """Joints and drivers with redundant equations, and the ones they repeat."""
         return repetitions(self.rows, self.jacobian.dependences) if self.count else ()
 
     @property
     def among(self) -> tuple[str, ...]:
-        """Joints and drivers whose equations depend on each other, as `rows` has them."""
+        """Joints and drivers whose equations depend on each other, named as in `rows`."""
         if not self.count:
             return ()
         weights = np.linalg.norm(self.jacobian.dependences, axis=1)
@@ -103,18 +103,18 @@ class Redundancy:
 
 
 def redundancy(model: Model, coordinates: Coordinates, jacobian: HostJacobian, displace: Displace) -> Redundancy:
-    """Return which rows of an assembled mechanism are redundant.
+    """Return the redundancy of the equations of an assembled mechanism.
 
     Parameters
     ----------
     model : Model
         The mechanism.
     coordinates : dict of str to array
-        Of all bodies, where joints and drivers are fulfilled.
+        Assembled coordinates of all bodies.
     jacobian : HostJacobian
-        There, with rows of one size.
+        Jacobian at these coordinates, rows scaled to one size.
     displace : callable
-        Takes coordinates and an increment to coordinates, residual and Jacobian, with rows of that size.
+        Maps coordinates and an increment to coordinates, residual and Jacobian, rows scaled alike.
     """
     here = _next_to_singular(coordinates, jacobian, displace)
     best, rank = jacobian, jacobian.rank
@@ -126,11 +126,11 @@ def redundancy(model: Model, coordinates: Coordinates, jacobian: HostJacobian, d
 
 
 def _next_to_singular(coordinates: Coordinates, jacobian: HostJacobian, displace: Displace) -> HostJacobian:
-    """Return the Jacobian with those singular values zero that are so at a position that rounding does not distinguish.
+    """Return the Jacobian with a tolerance that zeroes singular values that vanish within rounding of the position.
 
-    Along the velocity v of a small singular value s, the residual by the combination u of rows that belongs to it grows
-    as ``s x + c x^2 / 2``, where c is the change of the Jacobian in that direction, seen by u. At ``x = -s / c`` the
-    position is singular, and its residual differs from that of this one by ``s^2 / 2 c``.
+    Along the velocity v of a small singular value s, the residual combined with the left singular vector u grows as ``s
+    x + c x^2 / 2``, where c is the rate of change of the Jacobian along v, projected on u and v. The position at ``x =
+    -s / c`` is singular, and its residual differs from the present one by ``s^2 / 2 c``.
     """
     rows, sizes, columns = jacobian.smallest
     if not sizes.size:
@@ -146,12 +146,12 @@ def _next_to_singular(coordinates: Coordinates, jacobian: HostJacobian, displace
 
 
 def _nearby(model: Model, coordinates: Coordinates, jacobian: HostJacobian, displace: Displace) -> list[HostJacobian]:
-    """Return the Jacobians at general positions near one; random displacements that do not close are left out."""
+    """Return the Jacobians at general positions nearby; random displacements that do not close are skipped."""
     joints = np.array([name.startswith("joints.") for name in model.rows], bool)
     directions = jacobian.take(joints).free_directions
     if not len(directions):
         return []
-    random, jacobians = np.random.default_rng(1), []  # any directions do, the same each time
+    random, jacobians = np.random.default_rng(1), []  # any directions will do, as long as they are reproducible
     for _ in range(POSITIONS):
         sway = random.normal(size=len(directions)) @ directions
         for size in SWAYS:
@@ -165,7 +165,7 @@ def _nearby(model: Model, coordinates: Coordinates, jacobian: HostJacobian, disp
 def _along_curves(
     model: Model, coordinates: Coordinates, jacobian: HostJacobian, joints: Bool[np.ndarray, " row"], displace: Displace
 ) -> list[HostJacobian]:
-    """Return the Jacobians a little way along the curves that lead away from a singular position."""
+    """Return the Jacobians a little way along the curves that leave a singular position."""
     if not joints.any() or jacobian.is_large:
         return []
     constraints = ReducedConstraints.at(model, coordinates, jacobian.dense(), CURVE_ORDER, joints)
@@ -182,18 +182,18 @@ def _along_curves(
 def closed_nearby(
     coordinates: Coordinates, sway: Float[np.ndarray, " column"], joints: Bool[np.ndarray, " row"], displace: Displace
 ) -> HostJacobian | None:
-    """Return the Jacobian at a position near a displaced one that fulfills the joints; None where it is not displaced.
+    """Return the Jacobian at a position near a displaced one that fulfills the joints; None if it falls back.
 
     Parameters
     ----------
     coordinates : dict of str to array
-        Of all bodies at a position.
+        Coordinates of all bodies.
     sway : array of shape (columns,)
-        By how much they are displaced, rad and sizes of the mechanism.
+        Displacement, rad and sizes of the mechanism.
     joints : array of bool, shape (rows,)
         Rows that must hold.
     displace : callable
-        As `redundancy` takes it.
+        As in `redundancy`.
     """
     displaced, total = displace(coordinates, sway), sway
     for _ in range(MOST_STEPS):
@@ -209,14 +209,14 @@ def closed_nearby(
 
 
 def repetitions(rows: tuple[str, ...], combinations: Float[np.ndarray, "row combination"]) -> tuple[Repetition, ...]:
-    """Return which joints and drivers repeat equations of which others.
+    """Return the joints and drivers with redundant equations, and the ones they repeat.
 
     Parameters
     ----------
     rows : tuple of str
-        The joint or driver of each row.
+        Joint or driver of each row.
     combinations : array of shape (rows, combinations)
-        An orthonormal basis of the combinations of rows that vanish.
+        Orthonormal basis of the vanishing combinations of rows.
     """
     names = list(dict.fromkeys(rows))
     parts = {name: combinations[[k for k, row in enumerate(rows) if row == name]] for name in names}
@@ -224,7 +224,7 @@ def repetitions(rows: tuple[str, ...], combinations: Float[np.ndarray, "row comb
     while combinations.shape[1]:
         ranks = {name: _rank(part) for name, part in parts.items()}
         most = max(ranks.values())
-        # of joints that repeat as many, the last one; a driver prescribes a motion only once
+        # among joints that repeat equally many, the last one; a driver comes after all joints
         name = [name for name in names if ranks[name] == most][-1]
         _, _, turned = np.linalg.svd(parts[name])
         its, rest = turned[:most].T, turned[most:].T

@@ -1,9 +1,9 @@
-"""Curves through a position that fulfill the reduced constraints: their tangents, and to which order they go on.
+"""Curves through a position that fulfill the reduced constraints: their tangents, and the order they reach.
 
-A curve is a series y(t) = y_p t^p + y_(p+1) t^(p+1) + ..., its tangent y_p of length one and all later coefficients
-across it, which fixes how it is run through. The equations of order k are met together by coefficients of all orders
-below (Gauss and Newton, from many starts at order two, from the curve found so far beyond): what they leave open at one
-order is decided by later ones. With p = 1 these are smooth motions; at a cusp p is 2, and the motion turns back.
+A curve is a series y(t) = y_p t^p + y_(p+1) t^(p+1) + ... Its tangent y_p has length one, and all later coefficients
+are perpendicular to it, which fixes the parameter. The equations up to order k determine the coefficients together
+(Gauss-Newton: from many starts at order two, then from the curve found so far); later orders decide what they leave
+open. A smooth motion has p = 1; at a cusp p is 2, and the motion turns back.
 """
 
 import dataclasses
@@ -15,13 +15,13 @@ from jaxtyping import Float
 from jounce.kinematics.assembly.constraint_series import FULFILLED, ReducedConstraints
 from jounce.linear_algebra.quadratic_forms import common_zeros, polarized
 
-STARTS = 400  # directions from which tangents are sought
+STARTS = 400  # directions from which tangents are searched
 MOST_CURVES = 16
-SAME = 1e-3  # rad, between two tangents that are one
+SAME = 1e-3  # rad: largest angle between tangents that are the same
 STEPS = 40
 VANISHING = 1e-9  # of the largest coefficient of the forms
 RETRIES = 6
-DIFFERENCE = 1e-4  # of coefficients, by which slopes are found: of polynomials, whose error is its square
+DIFFERENCE = 1e-4  # of coefficients for central differences of polynomials, whose error is its square
 
 Series = Float[np.ndarray, "order k"]
 
@@ -33,11 +33,11 @@ class LocalCurve:
     Attributes
     ----------
     series : array of shape (order, k)
-        Coefficients of y, from order one on; those below `multiplicity` are zero.
+        Coefficients of y from order one on; those below `multiplicity` are zero.
     multiplicity : int
-        Order of the first that is not zero: one of a smooth motion, two at a cusp.
+        Order of the first nonzero coefficient: one for a smooth motion, two at a cusp.
     order : int
-        To which it fulfills the constraints; where that is less than the order looked at, it is blocked at the next.
+        Order to which the curve fulfills the constraints. If lower than the order sought, the next order blocks it.
     """
 
     series: Series
@@ -46,14 +46,14 @@ class LocalCurve:
 
     @property
     def tangent(self) -> Float[np.ndarray, " k"]:
-        """Its direction, of length one."""
+        """Unit tangent of the curve."""
         return self.series[self.multiplicity - 1]
 
 
 def curves(constraints: ReducedConstraints) -> list[LocalCurve]:
-    """Return the curves through a position, one for each tangent that is found: those that go on, and the others.
+    """Return the curves through a position, one for each tangent found, blocked ones included.
 
-    Of a continuum of tangents, as where two degrees of freedom are left, a few are returned.
+    A continuum of tangents, as with two degrees of freedom, is represented by a few.
     """
     tangents = _distinct([*_quadratic_tangents(constraints)])
     branches = []
@@ -75,7 +75,7 @@ def _cusp(constraints: ReducedConstraints, tangent: Float[np.ndarray, " k"]) -> 
 
 
 def _quadratic_tangents(constraints: ReducedConstraints) -> Float[np.ndarray, "tangent k"]:
-    """Return unit vectors u with no coefficient of order two along u t, from many starts; any, where there is none."""
+    """Return unit vectors u for which the second-order terms of g vanish, from many starts; any if g has none."""
     count = constraints.free.shape[1]
     if count == 1:
         return np.ones((1, 1))
@@ -89,7 +89,7 @@ def _quadratic_tangents(constraints: ReducedConstraints) -> Float[np.ndarray, "t
 
 
 def _quadratic_forms(constraints: ReducedConstraints) -> Float[np.ndarray, "s k k"]:
-    """Return the coefficients of order two of g as forms."""
+    """Return the second-order terms of g as quadratic forms."""
 
     def second_order(directions: Float[np.ndarray, "pair k"]) -> Float[np.ndarray, "s pair"]:
         series = np.zeros((len(directions), constraints.order, directions.shape[1]))
@@ -100,7 +100,7 @@ def _quadratic_forms(constraints: ReducedConstraints) -> Float[np.ndarray, "s k 
 
 
 def _distinct(tangents: Sequence[Float[np.ndarray, " k"]]) -> list[Float[np.ndarray, " k"]]:
-    """Return tangents that are different lines; of very many, those that are farthest from each other."""
+    """Return tangents along different lines; if too many, those farthest from each other."""
     if not len(tangents):
         return []
     whole = np.asarray(tangents)
@@ -122,7 +122,7 @@ def _continued(constraints: ReducedConstraints, tangent: Float[np.ndarray, " k"]
     for order in range(2 * multiplicity, constraints.order + 1):
         for attempt in range(RETRIES):
             start = series.copy()
-            if attempt:  # what lower orders left open, elsewhere
+            if attempt:  # another choice of what lower orders leave open
                 later = slice(multiplicity, order - multiplicity)
                 start[later] += 0.5 * random.standard_normal(start[later].shape)
             trial = _fulfilling(constraints, start, multiplicity, order)
@@ -135,8 +135,8 @@ def _continued(constraints: ReducedConstraints, tangent: Float[np.ndarray, " k"]
 
 
 def _fulfilling(constraints: ReducedConstraints, series: Series, multiplicity: int, order: int) -> Series | None:
-    """Return a series near one that meets the equations to an order, by the steps of Gauss and Newton; or None."""
-    known = slice(multiplicity - 1, order - multiplicity)  # coefficients on which they depend
+    """Return a nearby series that fulfills the equations to an order, by Gauss-Newton steps, or None."""
+    known = slice(multiplicity - 1, order - multiplicity)  # the coefficients on which the equations depend
     shape = series[known].shape
 
     def with_values(values: np.ndarray) -> np.ndarray:
@@ -154,7 +154,7 @@ def _fulfilling(constraints: ReducedConstraints, series: Series, multiplicity: i
         ahead, behind = np.split(constraints.gap(with_values(nudged), order)[0], 2)
         weights = 1.0 / allowed[0]
         slope = ((ahead - behind) / (2 * DIFFERENCE)).T * weights[:, None]
-        # the tangent stays of length one, later coefficients across it
+        # the tangent keeps length one, later coefficients stay perpendicular to it
         first, later = values[: shape[1]], values.reshape(shape)[1:]
         fixed = np.zeros((shape[0], values.size))
         fixed[0, : shape[1]] = first

@@ -1,1 +1,1 @@
-"""Following a motion in steps: predictor, corrector, singularity distance, change points."""
+"""Continuation of a motion in time: predictor, corrector, singularity distance, change points."""

@@ -1,8 +1,8 @@
-"""Instants next to a change point, interpolated from the motion on both sides.
+"""Instants near a change point, interpolated from the motion on both sides.
 
-At a change point the Jacobian is singular, and near it derivatives lose digits: a distance in time of d radii of the
-Taylor series away, that of order k is good to about ``eps k! / d^(k + 1)``. The motion itself is smooth there. Its jets
-a little way off on both sides, where they are good, determine it in between: two-point Hermite interpolation.
+At a change point the Jacobian is singular, and derivatives near it lose digits: at a time distance of d radii of the
+Taylor series, a derivative of order k has an error of about ``eps k! / d^(k + 1)``. The motion itself is smooth there.
+Accurate jets a little way off on both sides determine the motion in between by two-point Hermite interpolation.
 """
 
 import math
@@ -18,27 +18,27 @@ from jounce.kinematics.continuation.solver import Solver
 from jounce.kinematics.status import Status
 
 ROUNDING = 1e-16
-LARGEST_NOISE = 1e-3  # of the highest derivative, as a part of what the radius of the series lets it be
+LARGEST_NOISE = 1e-3  # of the highest derivative, relative to the bound from the radius of the series
 LARGEST_WIDTH = 0.5  # radii
-TRUNCATION = 1e-3  # of the highest derivative by interpolation over a width of one radius, as measured
-LARGEST_DISAGREEMENT = 1e-7  # of an interpolated position with a solved one, rad or m
+TRUNCATION = 1e-3  # measured error of the highest derivative, interpolated over a width of one radius
+LARGEST_DISAGREEMENT = 1e-7  # between interpolated and solved positions, rad or m
 
 
 def half_width(point: ChangePoint, order: int) -> float:
-    """Return how far from a change point interpolation is as good as the jets that it starts from, s."""
+    """Return the distance from a change point at which interpolation is as accurate as the jets at its ends, s."""
     balance = (ROUNDING * math.factorial(order) / TRUNCATION) ** (1 / (2 * order + 3))
     return point.radius * min(LARGEST_WIDTH, balance)
 
 
 def spoiled_width(point: ChangePoint, order: int) -> float:
-    """Return within what distance of a change point a derivative of an order is mostly rounding, s."""
+    """Return the distance from a change point within which rounding dominates derivatives of an order, s."""
     return point.radius * (ROUNDING * math.factorial(order) / LARGEST_NOISE) ** (1 / (order + 1))
 
 
 def spoiled(
     points: Iterable[ChangePoint], instants: Float[np.ndarray, " time"], order: int
 ) -> Bool[np.ndarray, " time"]:
-    """Tell at which instants solutions by the factored Jacobian are mostly rounding at an order."""
+    """Return whether rounding dominates, at each instant, derivatives of an order from the factored Jacobian."""
     affected = np.zeros(len(instants), bool)
     for point in points:
         affected |= np.abs(instants - point.instant) < spoiled_width(point, order)
@@ -48,18 +48,18 @@ def spoiled(
 def bridged(
     solver: Solver, path: FollowedPath, point: ChangePoint, instants: Float[np.ndarray, " time"]
 ) -> tuple[dict[str, np.ndarray], tuple[np.ndarray, ...]] | None:
-    """Return the jets of coordinates and outputs next to a change point, time last; None where they cannot be had.
+    """Return the jets of coordinates and outputs near a change point, time last; None if they cannot be determined.
 
     Parameters
     ----------
     solver : Solver
-        What solved the path.
+        Solver that followed the path.
     path : FollowedPath
-        The motion followed, through the change point.
+        The motion followed through the change point.
     point : ChangePoint
-        One of the path.
+        A change point of the path.
     instants : array of shape (time,)
-        Within the half width around it, s.
+        Instants within the half width around the change point, s.
     """
     width = half_width(point, solver.order)
     first, last = path.anchors[0].instant, path.anchors[-1].instant
@@ -78,8 +78,8 @@ def bridged(
 
 
 def _interpolated(before: Anchor, after: Anchor, instants: Float[np.ndarray, " time"]) -> Any:
-    """Return the jets of the state at instants between two anchors, by Hermite interpolation of both their jets."""
-    from scipy.interpolate import BPoly  # here, since importing SciPy takes half a second
+    """Return the jets of the state at instants between two anchors by two-point Hermite interpolation."""
+    from scipy.interpolate import BPoly  # imported late, as importing SciPy takes half a second
 
     duration = after.instant - before.instant
     share = (instants - before.instant) / duration

@@ -1,7 +1,7 @@
-"""Many continuation steps of a motion in one compiled program, anchor to anchor, and the instants of a grid between.
+"""Many continuation steps from anchor to anchor, and the grid instants between, in one compiled program.
 
-The first lane of a batch makes the step; the others solve the next instants of the grid up to its end. Those that do
-not fit into it are solved from the same anchor, in more batches, or from the next one if they are few.
+The first lane of a batch makes the step; the other lanes solve the next grid instants up to its end. Instants that do
+not fit are solved from the same anchor in more batches, or, if they are few, from the next anchor.
 """
 
 from functools import partial
@@ -42,17 +42,17 @@ NOWHERE = ExpansionPoint(*[np.full((), np.nan)] * 4)
 class StepState(NamedTuple):
     """State of a run between two batches."""
 
-    known: SolvedState  # what a prediction needs of the last anchor, in all lanes
-    control: StepControl  # of the step that is tried next
-    away: Float[Numbers, " batch"]  # time from the last anchor that each lane is solved at, s
-    instant: Float[Numbers, " batch"]  # when that is, s
-    planned: Bool[Numbers, ""]  # whether they are decided
-    next_up: Int[Numbers, ""]  # among the instants of the grid
-    arrived: ExpansionPoint  # where the step leads to, as a batch before has found it; NaN where none has
+    known: SolvedState  # data of the last anchor from which all lanes are predicted
+    control: StepControl  # of the step tried next
+    away: Float[Numbers, " batch"]  # time from the last anchor to the instant of each lane, s
+    instant: Float[Numbers, " batch"]  # of each lane, s
+    planned: Bool[Numbers, ""]  # whether step and instants are decided
+    next_up: Int[Numbers, ""]  # index of the next grid instant
+    arrived: ExpansionPoint  # end of the step, if an earlier batch has found it; else NaN
 
 
 class Solved(NamedTuple):
-    """Solved instants: their states, and what came of each; instants last."""
+    """Solved instants: states and outcomes, instants last."""
 
     coordinates: dict[str, Numbers]
     outputs: tuple[Numbers, ...]
@@ -61,7 +61,7 @@ class Solved(NamedTuple):
 
 
 class Records(NamedTuple):
-    """Records of a run: its anchors, one after another, and the instants of the grid, each in its place."""
+    """Records of a run: its anchors in order, and the grid instants, each in its place."""
 
     anchors: Solved
     expansion_point: ExpansionPoint
@@ -71,11 +71,11 @@ class Records(NamedTuple):
 class TakenSteps(NamedTuple):
     """Outcome of a run."""
 
-    run: StepState  # its next instant of the grid is the first that is not among the records
+    run: StepState  # `next_up` is the first grid instant that is not among the records
     records: Records
     last: StepResult  # the last batch
     count: Int[Numbers, ""]  # of batches solved
-    steps: Int[Numbers, ""]  # taken: of anchors
+    steps: Int[Numbers, ""]  # number of anchors reached
 
 
 _batch = jax.jit(advance, static_argnames=("pose_type", "order"))  # traced once
@@ -84,7 +84,7 @@ _batch = jax.jit(advance, static_argnames=("pose_type", "order"))  # traced once
 @compiled(
     *("pose_type", "order", "batches", "native"),
     narrow=True,
-    otherwise={"native": None},  # where there is no code for a run, XLA has none to call
+    otherwise={"native": None},  # without machine code for a run, XLA has none to call
 )
 def take_steps(
     system: System,
@@ -100,26 +100,26 @@ def take_steps(
     batches: int,
     native: str | None = None,
 ) -> TakenSteps:
-    """Go on with a run until it arrives, something is out of the ordinary, or enough batches are solved.
+    """Continue a run until it arrives, needs a decision from outside, or has solved enough batches.
 
     Parameters
     ----------
     system : System
         The mechanism.
     run : StepState
-        Where to go on from.
+        State from which to continue.
     grid : array of shape (time,)
-        The next instants of the grid, s; infinite beyond the last. At least one batch more than can be solved.
+        Next grid instants, s, infinite beyond the last; at least one batch more than can be solved.
     limits, settings, search
         See `StepLimits` and `advance`.
     most : int
-        Batches that it may solve.
+        Largest number of batches to solve.
     pose_type, order
         PlanarPose or SpatialPose; derivatives requested.
     batches : int
-        As many as there is room for.
+        Number of batches for which memory is reserved.
     native : str, optional
-        Name of the machine code that solves a batch, see `advance_instant`; unless it is given, the run does.
+        Name of the machine code that solves a batch, see `advance_instant`; by default, XLA solves it.
     """
 
     def solved(run: StepState) -> Any:
@@ -153,7 +153,7 @@ def take_steps(
         anchors = put(anchors, jax.tree.map(lambda x: x[..., :1], solved_now), state.steps)
         points = put(points, jax.tree.map(lambda x: x[None], arrived), state.steps)
         instants = put(instants, jax.tree.map(lambda x: x[..., 1:], solved_now), state.run.next_up)
-        records = Records(anchors, points, instants)  # what is no anchor, or not within the step, is replaced
+        records = Records(anchors, points, instants)  # later batches overwrite what is no part of a step taken
         return TakenSteps(_typed(run, state.run), records, arrival, state.count + 1, state.steps + jnp.sum(taken))
 
     def put(whole: Any, part: Any, index: Any) -> Any:
@@ -177,7 +177,7 @@ def _solved(arrival: StepResult) -> Solved:
 
 
 def _typed(values: Any, like: Any) -> Any:
-    """Return arrays of the types of others, as a loop wants them."""
+    """Convert arrays to the types of others, as loops require."""
     return jax.tree.map(lambda x, y: jax.lax.convert_element_type(x, np.result_type(y)), values, like)
 
 
@@ -187,7 +187,7 @@ def _planned(run: StepState, grid: Float[Numbers, " time"], limits: StepLimits) 
 
 
 def _aimed(run: StepState, control: StepControl, grid: Float[Numbers, " time"]) -> StepState:
-    """Return the run with a step to try, and in the other lanes the next instants of the grid within it."""
+    """Return the run with a step to try, and the next grid instants within it in the other lanes."""
     instant = jnp.concatenate([control.target[None], jnp.minimum(_next_up(run, grid), control.target)])
     away = instant - control.expansion_point.instant
     return run._replace(control=control, instant=instant, away=away, planned=jnp.ones((), bool))
@@ -200,9 +200,9 @@ def _next_up(run: StepState, grid: Float[Numbers, " time"]) -> Float[Numbers, " 
 def _after(
     run: StepState, arrival: StepResult, known: SolvedState, grid: Float[Numbers, " time"], limits: StepLimits
 ) -> tuple[StepState, ExpansionPoint, Bool[Numbers, ""]]:
-    """Return the state of a run after a batch, where its first lane arrived, and whether that is the next anchor.
+    """Return the state of a run after a batch, the end point of its first lane, and whether that is the next anchor.
 
-    What is `known` belongs to the arrival.
+    `known` is the state of the arrival.
     """
     control, status, lanes = run.control, arrival.status[0], len(run.instant) - 1
     target = control.target
@@ -210,8 +210,8 @@ def _after(
     good = is_accepted(control, status, arrived)
     within = good & (_next_up(run, grid) <= target)
     run = run._replace(next_up=run.next_up + jnp.sum(within))
-    behind = jnp.sum(_next_up(run, grid) <= target)  # a few are solved from the next anchor, which is near them
-    taken = good & (behind <= jnp.where(target < limits.stop, lanes // 2, 0))  # else the same step with those left
+    behind = jnp.sum(_next_up(run, grid) <= target)  # a few are solved from the next anchor, which is near
+    taken = good & (behind <= jnp.where(target < limits.stop, lanes // 2, 0))  # else repeat the step for the others
     known = jax.tree.map(lambda new, old: jnp.where(taken, new[..., :1], old), known, run.known)
     again = jax.tree.map(lambda x: jnp.where(good & ~taken, x, jnp.nan), arrived)
     control = next_control(control, status, arrived, limits, good, taken)

@@ -1,10 +1,10 @@
-"""One compiled function: from solved neighbors to solved instants, with all their derivatives.
+"""One compiled function from solved neighbors to solved instants with all their derivatives.
 
-Each lane of the batch is predicted by the Taylor series of a neighbor, corrected by Newton-Raphson, and
-differentiated order after order with the last factorization of its Jacobian (Sommer 2024, equations 1-8). That it is on
-the branch of its neighbor is not judged by how near the prediction was: the simplified Newton iteration must contract
-(Deuflhard 2011, chapter 5), the determinant of the Jacobian must keep its sign, and where one is searched for, the
-nearest zero of that determinant, real or complex, is estimated: no step may go beyond it.
+Each lane of the batch is predicted by the Taylor series of a neighbor, corrected by Newton-Raphson, and differentiated
+order after order with the last factorization of its Jacobian (Sommer 2024, equations 1-8). The quality of the
+prediction does not decide whether an instant is on the branch of its neighbor. Instead, the simplified Newton iteration
+must contract (Deuflhard 2011, chapter 5), and the determinant of the Jacobian must keep its sign. On request, the
+nearest real or complex zero of the determinant is estimated; no step may go beyond it.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -32,19 +32,19 @@ from jounce.rigid.pose import Pose
 Lanes = Float[Numbers, " batch"]
 Truths = Bool[Numbers, " batch"]
 SolvedState = tuple[Mapping[str, Numbers], tuple[Numbers, ...], Numbers]
-"""What a solved instant hands on: jets of coordinates, by name, and of outputs, and the sign of the determinant."""
+"""State of a solved instant: jets of coordinates by name, jets of outputs, and the sign of the determinant."""
 
-CONVERGED = 1e-9  # a last correction up to this has converged, however small the tolerance
+CONVERGED = 1e-9  # a last correction up to this size has converged, however small the tolerance
 # part of the time in which a Taylor term would move a body by a radian, or by the size of the mechanism
 SAFE_FRACTION = 0.4
-SINGULAR_PIVOT = 1e-12  # part of the largest pivot; corrections stop converging before
-LARGEST_GAP = 1e-9  # of redundant rows that agree, rad or sizes of the mechanism, or so many tolerances:
+SINGULAR_PIVOT = 1e-12  # part of the largest pivot; corrections stop converging earlier
+LARGEST_GAP = 1e-9  # of redundant rows that agree, rad or sizes of the mechanism, or this many tolerances:
 GAP_TOLERANCES = 1e3
-LARGEST_CONTRADICTION = 1e-6  # of derivatives in redundant rows, as a part of what those of the motion could be
+LARGEST_CONTRADICTION = 1e-6  # of derivatives in redundant rows, relative to the possible derivatives of the motion
 
 
 class Settings(NamedTuple):
-    """How exactly instants are solved."""
+    """Accuracy settings of a solve."""
 
     tolerance: Float[Numbers, ""]  # largest correction of an accepted pose, rad or sizes of the mechanism
     refine: Bool[Numbers, ""]  # whether accepted poses are corrected to rounding
@@ -54,36 +54,36 @@ class Settings(NamedTuple):
 class StepResult(NamedTuple):
     """Results of the instants of a batch; every array has the batch last."""
 
-    coordinates: dict[str, Numbers]  # jets of the pose, by name, shape (order + 1, ...)
+    coordinates: dict[str, Numbers]  # jets of the pose by name, shape (order + 1, ...)
     outputs: tuple[Numbers, ...]  # jets of each group of outputs
     status: Int[Numbers, " batch"]  # see Status
     body: Int[Numbers, " batch"]  # index of the moving body that is farthest from its prediction
-    safe_step: Lanes  # s, over which the motion from the first lane can be predicted; 0 unless searched; (1,)
-    radius: Lanes  # s, the same by the first three Taylor terms only, which rounding spoils least; likewise
-    deviation: Lanes  # departure from the prediction, over how far that moves
+    safe_step: Lanes  # time over which the first lane can be predicted, s; 0 unless searched; (1,)
+    radius: Lanes  # the same by the first three Taylor terms, the least affected by rounding, s; likewise
+    deviation: Lanes  # departure from the prediction, relative to the predicted travel
     sign: Lanes  # of the determinant of the Jacobian
-    det_rate: Lanes  # 1/s, how fast it nears (< 0) or leaves a singular position; likewise
+    det_rate: Lanes  # rate of approach (< 0) to, or departure from, a singular position, 1/s; likewise
     pivot_ratio: Lanes  # smallest pivot of the Jacobian over the largest
     admissible: Bool[Numbers, "driver batch"]  # whether each driver has a permitted value
-    finite: Bool[Numbers, "result batch"]  # whether all derivatives requested are, of the pose and of each output
-    gaps: Float[Numbers, "2 contradicting batch"]  # of redundant rows, see `_gaps`; of none where none are
+    finite: Bool[Numbers, "result batch"]  # of requested derivatives of the pose, and of each output
+    gaps: Float[Numbers, "2 contradicting batch"]  # of redundant rows, see `_gaps`; empty without redundancy
 
     def state(self, lanes: slice | np.ndarray) -> SolvedState:
-        """Return what the neighbors of some lanes start from: jets of coordinates and outputs, and the sign."""
+        """Return the state of some lanes, from which neighbors start."""
         return jax.tree.map(lambda x: x[..., lanes], (self.coordinates, self.outputs, self.sign))
 
 
 def predicts_turns(group: Group) -> bool:
-    """Tell whether outputs are angles whose turns follow from a prediction.
+    """Return whether the outputs of a group are angles whose turns follow from a prediction.
 
-    Those about axes have theirs counted along the attitudes of the bodies: they turn by half a turn at once where
-    bodies pass near an attitude that tells no angle, and no series of theirs carries past it.
+    The turns of angles about axes are counted along the attitudes of the bodies instead: near an attitude at which such
+    an angle is undefined it jumps by half a turn, which no series predicts.
     """
     return group.element.turning and not measures_angle(group)
 
 
 def predictor(system: System, pose_type: type[Pose], solved: SolvedState) -> SolvedState:
-    """Return what predictions need of solved instants: jets of the pose and of turning angles, and the sign."""
+    """Return the data of solved instants for predictions: jets of the pose and of turning angles, and the sign."""
     coordinates, outputs, sign = solved
     angles = [output for output, group in zip(outputs, system.outputs, strict=True) if predicts_turns(group)]
     return {name: coordinates[name] for name in pose_type.predictor}, tuple(angles), sign
@@ -92,26 +92,26 @@ def predictor(system: System, pose_type: type[Pose], solved: SolvedState) -> Sol
 def differentiated(system: System, pose: Pose, factor: Factor, time: Float[Jet, "1 batch"]) -> Pose:
     """Return the pose with all derivatives that the time jet has: order after order, one solve each.
 
-    The coefficient of order k of the residual is affine in the unknown (r[k], w'[k-1] / k) with the Jacobian as its
-    slope, so that it is found from the coefficient with the unknown set to zero.
+    Coefficient k of the residual is affine in the unknown (r[k], w'[k-1] / k), with the Jacobian as its slope. The
+    unknown thus follows from the coefficient evaluated with the unknown set to zero.
     """
     for k in range(1, time.order + 1):
         trial = pose.extended(None, None)
         right = -system.residual(trial, time.truncate(k)).dense().coefficients[k]
         pose = pose.extended(*system.coordinates(factor.solve(right), pose.shifts))
-        pose = jax.lax.optimization_barrier(pose)  # or XLA computes it again in everything that uses it
+        pose = jax.lax.optimization_barrier(pose)  # otherwise XLA recomputes it wherever it is used
     return pose
 
 
 def _departures(system: System, pose: Pose, predicted: Any) -> Float[Numbers, "body batch"]:
-    """Return how far each moving body is from its prediction, rad or sizes of the mechanism: (bodies, batch)."""
+    """Return the distance of each moving body from its prediction, rad or sizes of the mechanism, (bodies, batch)."""
     shift, turn = (jnp.max(jnp.abs(part), axis=0) for part in pose.separation(predicted))
     return jnp.maximum(shift / system.column_scale[0], turn)[1:]
 
 
 def _terms(system: System, coordinates: dict[str, Jet], predictor: tuple[str, ...]) -> list[Lanes]:
-    """Return the size of each Taylor coefficient but the first, rad or sizes of the mechanism: order x (batch,)."""
-    # a slide that runs away, as toward a dead point of its axes, is measured by where it is
+    """Return the size of each Taylor coefficient from order 1 on, rad or sizes of the mechanism, order x (batch,)."""
+    # the scale of a slide that runs away, as toward a dead point of its axes, is its own position
     scales = {"position": jnp.maximum(system.column_scale[0], _largest(coordinates["position"].coefficients[0]))}
     sizes = [
         jnp.stack([_largest(c) / scales.get(name, 1.0) for name, c in zip(predictor, level, strict=True)])
@@ -125,9 +125,9 @@ def _largest(coefficient: Float[Numbers, "*rest batch"]) -> Lanes:
 
 
 def safe_step_and_radius(system: System, coordinates: dict[str, Jet], predictor: tuple[str, ...]) -> tuple[Any, Any]:
-    """Return the step at which no Taylor term moves a body far, and where the first three of them do.
+    """Return the step over which no Taylor term moves a body far, and the radius estimated from the first three terms.
 
-    All terms count, since those of the highest orders may vanish together (a body at rest, or at a turning point).
+    The step uses all terms, since the highest may vanish together (for a body at rest or at a turning point).
     """
     terms = _terms(system, coordinates, predictor)
     steps = [jnp.power(jnp.maximum(term, 1e-300), -1.0 / k) for k, term in enumerate(terms, 1)]
@@ -136,7 +136,7 @@ def safe_step_and_radius(system: System, coordinates: dict[str, Jet], predictor:
 
 
 def _outputs(system: System, pose: Pose, angles: Sequence[Numbers], step: Lanes) -> tuple[Numbers, ...]:
-    """Return the jets of the outputs, angles with the turns that the jets of a neighbor give them."""
+    """Return the jets of the outputs, with the turns of angles predicted by the jets of a neighbor."""
     results, known = [], iter(angles)
     for group in system.outputs:
         result = group.evaluate(pose)
@@ -151,7 +151,7 @@ def _outputs(system: System, pose: Pose, angles: Sequence[Numbers], step: Lanes)
 def _finite_results(
     coordinates: Sequence[Numbers], outputs: Sequence[Numbers], finite_order: Int[Numbers, ""]
 ) -> Bool[Numbers, "result batch"]:
-    """Tell where the pose and each output are finite up to the order requested."""
+    """Return whether the pose and each output are finite up to the requested order."""
 
     def finite(jet: Numbers, axes: tuple[int, ...]) -> Any:
         above = (np.arange(len(jet)) > finite_order).reshape(-1, *[1] * (jet.ndim - 1))
@@ -162,21 +162,22 @@ def _finite_results(
 
 
 def _signs(system: System, factor: Factor, before: Callable[[], tuple[Pose, Jet]], sign: Lanes) -> Lanes:
-    """Return the signs of the determinants of the Jacobians, those of neighbors being known, and where those are.
+    """Return the signs of the determinants of the Jacobians, given poses (`before`) and signs of the neighbors.
 
-    With redundant rows there is no determinant: the space of the columns has an orientation as seen from the neighbor.
+    With redundant rows there is no determinant; the orientation of the column space relative to the neighbor replaces
+    it.
     """
     if isinstance(factor, LeastSquaresFactor):
         return factor.orientation(factored(system, *before())) * jnp.where(sign == 0, 1.0, sign)
-    return factor.sign() if system.rank is None else jnp.ones_like(sign)  # a large one has no orientation at hand
+    return factor.sign() if system.rank is None else jnp.ones_like(sign)  # large systems provide no orientation
 
 
 def _gaps(
     system: System, pose: Pose, time: Jet, terms: list[Lanes], tolerance: Real
 ) -> Float[Numbers, "2 contradicting batch"]:
-    """Return how far redundant rows are from agreeing: open, rad or sizes of the mechanism; and over what is allowed.
+    """Return the gaps of redundant rows: their size, rad or sizes of the mechanism, and its ratio to the allowed size.
 
-    In the second, derivatives count as well: those of the rows, over what those of the motion could be.
+    The ratio also counts derivatives of the rows, relative to the possible derivatives of the motion.
     """
     if system.rank is None:
         return np.zeros((2, 0, *terms[0].shape))
@@ -198,7 +199,7 @@ def _status(
     consistent: Truths,
     tolerance: Real,
 ) -> Int[Numbers, " batch"]:
-    """Return the outcome at each instant, the gravest last."""
+    """Return the outcome at each instant; graver outcomes override others."""
     outcomes = (
         (~finite, Status.UNDEFINED),
         (~consistent, Status.INCONSISTENT),
@@ -227,27 +228,27 @@ def advance(
     searched: int = 1,
     with_det_rate: bool = True,
 ) -> StepResult:
-    """Solve a batch of instants, each from a neighbor solved before.
+    """Solve a batch of instants, each from a solved neighbor.
 
     Parameters
     ----------
     system : System
         The mechanism.
     settings : Settings
-        Of all instants.
+        Settings of all instants.
     known : tuple
-        Of the neighbors, as `predictor` gives it, the batch last: jets of the pose and of turning angles, and the sign
-        of the determinant of the Jacobian, 0 where it does not matter.
+        State of the neighbors as returned by `predictor`, batch last: jets of the pose and of turning angles, and the
+        sign of the determinant of the Jacobian, 0 where it does not matter.
     step, instant : array of shape (batch,)
-        Time from the neighbor, and the time arrived at, s.
+        Time step from the neighbor, and the instant itself, s.
     search : bool
-        Whether to find how far the motion from the first lanes can be predicted, and where it is singular next.
+        Whether to find the time over which the first lanes can be predicted, and the nearest singular position.
     pose_type, order
         PlanarPose or SpatialPose; derivatives requested.
     searched : int, default 1
-        How many lanes are searched: one, or all.
+        Number of lanes to search: one, or all.
     with_det_rate : bool, default True
-        Whether the rate of the determinant is looked for here, too; else it is left at zero.
+        Whether to compute the rate of the determinant; otherwise it is zero.
     """
     arrival, factor, pose = solved_batch(system, settings, known, step, instant, pose_type=pose_type, order=order)
     first = arrival.status[:searched]
@@ -274,9 +275,9 @@ def solved_batch(
     pose_type: type[Pose],
     order: int,
 ) -> tuple[StepResult, Factor, Pose]:
-    """Return what `advance` does but for what it searches, with the factored Jacobian and the pose."""
+    """Return the result of `advance` without the searched values, the factored Jacobian, and the pose."""
     (jets, angles, sign), (tolerance, refine, finite_order) = known, settings
-    # what a law makes infinite, such as the third derivative of t**2.5 at t = 0, is of no use to a prediction
+    # infinite derivatives of a law, such as the third one of t**2.5 at t = 0, are useless for predictions
     moving = {name: Jet(tuple(jnp.where(jnp.isfinite(c), c, 0.0))) for name, c in jets.items()}
     predicted = pose_type.predicted_from(moving, step)
     time = Jet.variable(instant[None], order)
@@ -302,7 +303,7 @@ def solved_batch(
     consistent = jnp.all(gaps[1] <= 1.0, axis=0)
     status = _status(correction.last, predictable, pivot_ratio, admitted, defined, consistent, tolerance)
     body, deviation = jnp.argmax(departures, axis=0), departure / jnp.maximum(travel, 1e-300)
-    nothing = jnp.zeros_like(step)  # of what is searched
+    nothing = jnp.zeros_like(step)  # placeholder of the searched values
     arrival = StepResult(
         coordinates, outputs, status, body, nothing, nothing, deviation, signs, nothing, pivot_ratio, admissible,
         finite, gaps,

@@ -1,9 +1,8 @@
 """Newton-Raphson corrections of predicted poses, a batch side by side.
 
-Corrections go on with the Jacobian of the first as long as they shrink fast (simplified Newton iteration): to factor a
-Jacobian costs several times what evaluating the residual and solving for a correction does. The first two corrections,
-with one Jacobian, tell whether one solution only is near (Deuflhard 2011, Newton Methods for Nonlinear Problems,
-chapter 5).
+Corrections reuse the first Jacobian as long as they shrink fast (simplified Newton iteration): a factorization costs
+several times as much as a residual and a solve. The first two corrections with one Jacobian show whether the solution
+nearby is unique (Deuflhard 2011, Newton Methods for Nonlinear Problems, chapter 5).
 """
 
 from functools import partial
@@ -25,8 +24,8 @@ MAX_ITERATIONS = 30
 LARGEST_CONTRACTION = 0.25  # of the first simplified Newton corrections: Deuflhard 2011, section 5.1
 ROUNDING = 4e-15  # rad, or sizes of the mechanism
 NEARLY_ROUNDING = 6e-8  # first correction, after which the next one is rounding
-NEGLIGIBLE = 1e-16  # next correction, as the last ones foretell it
-SLOWEST = 0.03  # of a correction over the one before: three more cost as much as to factor the Jacobian again
+NEGLIGIBLE = 1e-16  # predicted size of the next correction
+SLOWEST = 0.03  # ratio of successive corrections: three more cost as much as a new factorization
 
 Lanes = Float[Numbers, " batch"]
 
@@ -36,10 +35,10 @@ class Correction(NamedTuple):
 
     last: Lanes  # size of the last correction, rad or sizes of the mechanism
     first: Lanes
-    simplified: Lanes  # size of the second, with the Jacobian of the first
+    simplified: Lanes  # size of the second correction with the Jacobian of the first
 
     def contracts(self) -> Bool[Numbers, " batch"]:
-        """Tell whether the simplified Newton iteration contracts, as it must where one solution only is near."""
+        """Return whether the simplified Newton iteration contracts, as it must near a unique solution."""
         return (self.simplified <= LARGEST_CONTRACTION * self.first) | (self.first <= SMALLEST_DEPARTURE)
 
 
@@ -49,35 +48,35 @@ class _Iteration(NamedTuple):
     pose: Any
     factor: Factor
     correction: Correction
-    rate: Lanes  # by which the next correction will be smaller than the last one
-    away: Lanes  # how far the pose is from that of the factored Jacobian, rad or sizes of the mechanism
+    rate: Lanes  # expected ratio of the next correction to the last one
+    away: Lanes  # distance of the pose from that of the factored Jacobian, rad or sizes of the mechanism
     count: Int[Numbers, ""]
 
 
 def newton_raphson(
     system: System, pose: Pose, time: Float[Jet, "1 batch"], tolerance: Float[Numbers, ""], refine: Bool[Numbers, ""]
 ) -> tuple[Pose, Factor, Correction]:
-    """Return the assembled pose, the factored Jacobian there, and how large the corrections were.
+    """Return the assembled pose, its factored Jacobian, and the sizes of the corrections.
 
-    A Jacobian serves several corrections (simplified Newton iteration): it is factored again only where they shrink
-    slowly, and for the last one, unless what was factored still solves the equations there (`refactored`). Only fronts
-    are factored at each correction.
+    A Jacobian serves several corrections (simplified Newton iteration). It is factored again only if they shrink
+    slowly, and for the final pose, unless the old factors still solve the equations there (`refactored`). Fronts,
+    however, are factored at each correction.
 
-    An instant is accepted when its correction is at most the tolerance. With `refine` that correction is still made,
-    and others until the next one would be rounding.
+    An instant is accepted when its correction is at most the tolerance. With `refine`, that correction is still made,
+    and others follow until the next one would be rounding.
     """
 
     def sized(pose: Any, step: Any) -> Any:
         shift, turn = system.coordinates(step, pose.shifts)
         away = jnp.max(jnp.abs(pose.position.coefficients[0]), axis=(0, 1), keepdims=True)
-        shift = shift / jnp.maximum(system.column_scale[0], away)  # what is far away is known no better
+        shift = shift / jnp.maximum(system.column_scale[0], away)  # rounding of a position grows with its distance
         return jnp.maximum(jnp.max(jnp.abs(shift), axis=(0, 1)), jnp.max(jnp.abs(turn), axis=(0, 1)))
 
     def going(state: _Iteration) -> Any:
         size = state.correction.last
         accepted = size <= tolerance
         rounded = (size <= ROUNDING) | (accepted & (size * state.rate <= NEGLIGIBLE))
-        hopeful = jnp.isfinite(size) | (state.count == 0)  # what is not finite never will be
+        hopeful = jnp.isfinite(size) | (state.count == 0)  # iterations do not recover from non-finite values
         return ~jnp.where(refine, rounded, accepted) & hopeful
 
     def unfinished(state: _Iteration) -> Any:
@@ -87,26 +86,26 @@ def newton_raphson(
         pose, before, correction, rate, away, count = state
         residual = system.residual(pose, time).coefficients[0]
         on, slow = going(state), ~(rate <= SLOWEST)
-        anew = (count == 0) | (count > 1) & jnp.any(on & slow)  # the second correction tells whether they contract
-        small = (count == 1) & jnp.all(correction.last <= NEARLY_ROUNDING)  # the Jacobian of here serves at the end
+        anew = (count == 0) | (count > 1) & jnp.any(on & slow)  # the second correction measures the contraction
+        small = (count == 1) & jnp.all(correction.last <= NEARLY_ROUNDING)  # the Jacobian here serves as the final one
         moved = anew | small | ~jnp.any(on)
         if system.fronts is None:
             factor = jax.lax.cond(moved, lambda: refactored(system, pose, time, before, anew), lambda: before)
-        else:  # what goes through a branch is copied, and so many fronts take longer to copy than to factor again
+        else:  # results of a branch are copied, and copying so many fronts takes longer than factoring them
             moved = anew = np.ones((), bool)
             factor = refactored(system, pose, time, before, anew)
         step = factor.solve(-residual, refined=False)
         size = again = sized(pose, step)
-        if system.fronts is not None:  # what the Jacobian of before says of the second correction, for `contracts`
+        if system.fronts is not None:  # the second correction with the first Jacobian, for `contracts`
             second = partial(sized, pose)
             again = jax.lax.cond(count == 1, lambda: second(before.solve(-residual, refined=False)), lambda: size)
         made = refine | ~(size <= tolerance)
         pose = pose.displaced(*system.coordinates(jnp.where(made, step, 0.0), pose.shifts))
-        compared = (count == 1) & (refine | ~(correction.last <= tolerance))  # else the pose was left as it was
+        compared = (count == 1) & (refine | ~(correction.last <= tolerance))  # otherwise the pose has not changed
         first = jnp.where(count == 0, size, correction.first)
         simplified = jnp.where(compared, again, correction.simplified)
         rate = jnp.where(anew, size, size / jnp.maximum(correction.last, 1e-300))
-        counts = made & (on | ~moved)  # what is at rest already is corrected by rounding, which may exceed `ROUNDING`
+        counts = made & (on | ~moved)  # corrections of converged lanes are rounding, which may exceed `ROUNDING`
         away = jnp.where(moved, 0.0, away) + jnp.where(counts, size, 0.0)
         return _Iteration(pose, factor, Correction(size, first, simplified), rate, away, count + 1)
 

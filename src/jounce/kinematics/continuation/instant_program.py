@@ -1,4 +1,4 @@
-"""`advance` for one instant, as a program that solves many: machine code side by side, or XLA in arrays."""
+"""`advance` for one instant, as a program for many: vectors of machine code, or arrays of XLA."""
 
 import math
 from collections.abc import Mapping
@@ -15,14 +15,14 @@ from jounce.mechanism.system import System
 from jounce.rigid.pose import Pose
 
 Values = TypeVar("Values")
-WIDTHS = 128, 512  # instants that XLA solves side by side: as many as the cache holds, within these bounds
+WIDTHS = 128, 512  # least and greatest number of instants that XLA solves side by side, to fit the cache
 CACHED_ENTRIES = 2**16  # of the factors of a round: half a megabyte
 
 
 def round_width(system: System) -> int:
-    """Return how many instants of a long grid XLA solves side by side: a power of two.
+    """Return the number of instants of a long grid that XLA solves side by side, a power of two.
 
-    On a processor so many that the factors of their Jacobians fit into the cache, on a GPU so many that they fill it.
+    On a CPU, the factors of their Jacobians fit into the cache; on a GPU, they fill the device.
     """
     if not on_processor():
         return GPU_WIDTH
@@ -32,7 +32,7 @@ def round_width(system: System) -> int:
 
 
 def _of_many(shared: Any, instants: Any, *, pose_type: type[Pose], order: int) -> StepResult:
-    """Solve many instants as `advance_instant` does one; those of one motion are not searched."""
+    """Solve many instants as `advance_instant` does one; instants of one motion are not searched."""
     (system, settings), (known, step, instant, own, search) = shared, instants
     given = of_design(system, own), settings, known, step, instant
     if own is None:
@@ -42,17 +42,17 @@ def _of_many(shared: Any, instants: Any, *, pose_type: type[Pose], order: int) -
 
 @mapped(by_xla=_of_many)
 def advance_instant(shared: Any, instants: Any, *, pose_type: type[Pose], order: int) -> StepResult:
-    """Solve an instant from a neighbor solved before.
+    """Solve an instant from a solved neighbor.
 
     Parameters
     ----------
     shared : tuple
         System and `Settings`.
     instants : tuple
-        What is known of the neighbor, the time from there, the instant, s, the values of its design, if there are many
-        (see `of_design`), else None, and whether to search, as `advance` has it: each of length one.
+        State of the neighbor, time step from it, the instant, s, the values of its design (see `of_design`) or None,
+        and whether to search, as in `advance`: each of length one.
     pose_type, order
-        As those of `advance`.
+        As in `advance`.
     """
     (system, settings), (known, step, instant, own, search) = shared, instants
     reflected = with_fields(of_design(system, own), reflected=True)
@@ -61,7 +61,7 @@ def advance_instant(shared: Any, instants: Any, *, pose_type: type[Pose], order:
 
 
 def of_design(values: Values, own: Mapping[int, Any] | None) -> Values:
-    """Return the system of a design, or more, whose `own` values have the place of some leaves of another, by index."""
+    """Return a system with leaves replaced by the `own` values of a design, or of several, by leaf index."""
     if not own:
         return values
     leaves, structure = jax.tree.flatten(values)
@@ -69,5 +69,5 @@ def of_design(values: Values, own: Mapping[int, Any] | None) -> Values:
 
 
 def finds_det_rate(system: System) -> bool:
-    """Tell whether the rate of the determinant is found with an instant of one motion; many bodies take vectors."""
+    """Return whether the program of an instant computes the rate of the determinant; large systems do so separately."""
     return system.fronts is None

@@ -1,6 +1,6 @@
-"""The factorization of a mechanism's Jacobian: dense where it is small, front by front where that is less work.
+"""Factorization of the Jacobian of a mechanism: dense if small, multifrontal where that is less work.
 
-With redundant constraints, which agree, it has more rows than columns, and its equations are solved in least squares.
+Redundant constraints that agree give more rows than columns; such systems are solved by least squares.
 """
 
 import jax
@@ -17,7 +17,7 @@ from jounce.mechanism.system import System
 from jounce.rigid.pose import Pose
 
 Factor = DenseFactor | ReflectedFactor | FrontalFactor | LeastSquaresFactor
-STALE = 1e-9  # part by which solutions may be off before they are refined, which squares it
+STALE = 1e-9  # relative error of solutions that one refinement reduces to its square
 
 
 def factored(system: System, pose: Pose, time: Jet) -> Factor:
@@ -31,10 +31,10 @@ def factored(system: System, pose: Pose, time: Jet) -> Factor:
 
 
 def refactored(system: System, pose: Pose, time: Jet, known: Factor, anew: Bool[Numbers, ""]) -> Factor:
-    """Return the factored Jacobian at a pose of order zero, near to which it was factored before.
+    """Return the factored Jacobian at a pose of order zero, given factors at a pose nearby.
 
-    Unless it is to be factored anew, what was factored there is kept, with the matrices of here, where refinement by
-    these brings solutions to rounding.
+    Unless `anew` is set, the given factors are kept with the new matrices, if refinement makes their solutions exact to
+    rounding.
     """
     if not isinstance(known, DenseFactor | ReflectedFactor):
         return factored(system, pose, time)
@@ -44,7 +44,7 @@ def refactored(system: System, pose: Pose, time: Jet, known: Factor, anew: Bool[
 
 
 def blank_factor(system: System, lanes: int) -> Factor:
-    """Return a placeholder for the factors of a batch, to start a loop with."""
+    """Return placeholder factors of a batch, to start a loop."""
     if system.fronts is not None:
         return FrontalFactor.blank(system.fronts, lanes)
     if system.rank is not None:

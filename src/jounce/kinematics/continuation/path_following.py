@@ -1,9 +1,9 @@
-"""Following a motion from anchor to anchor: steps that hide no singular position, each of them checked.
+"""Continuation of a motion from anchor to anchor, in checked steps that pass no singular position unnoticed.
 
-A run makes the steps that are in the ordinary (see `continuation_steps`). Toward a dead point steps become shorter and
-shorter, and the motion ends there; a near miss is followed through its sharp turn. Where the steps shrink while the
-motion itself stays smooth, two branches cross: a change point. It is passed on the series that leads through it, if
-that arrives on the other side to rounding, and is recorded.
+A run makes the ordinary steps (see `continuation_steps`). Toward a dead point steps become ever shorter, and the motion
+ends there; after a near miss it is followed through its sharp turn. If steps shrink while the motion stays smooth, two
+branches cross at a change point. The motion passes it along its series, provided that the series meets the far side to
+rounding, and the change point is recorded.
 """
 
 import bisect
@@ -29,31 +29,31 @@ from jounce.mechanism.transmissions.axis_angles import AttitudeHistory
 OK = int(Status.OK)  # NumPy takes long to compare with a member of an enumeration
 PASSABLE = (OK, Status.UNDEFINED)
 SMALLEST_STEP = 1e-10  # part of the span
-PASSAGE_ORDER = 4  # order of the series that leads through; rounding spoils higher derivatives near a singular position
-PASSAGE_DEVIATION = 1e-8  # part of the way: two branches separated by a gap g deviate from that series by (g / way)^2
-NEARLY_SINGULAR = 1e-6  # part of the span: a motion that ends this close before a singular position ends at it
-LEAST_PASSAGE = 0.2  # part of the way to a change point by which the motion must go on beyond it
-NEARBY = 0.1  # radii: a singular position nearer than this spoils high derivatives where the motion is smooth
+PASSAGE_ORDER = 4  # of the series through a change point; rounding spoils higher derivatives near it
+PASSAGE_DEVIATION = 1e-8  # relative: two branches separated by a gap g deviate from that series by (g / distance)^2
+NEARLY_SINGULAR = 1e-6  # part of the span: a motion that stops this close to a singular position ends at it
+LEAST_PASSAGE = 0.2  # part of the distance to a change point by which the motion must continue beyond it
+NEARBY = 0.1  # radii: closer singular positions spoil high derivatives of a smooth motion
 INSTANT = attrgetter("instant")  # of an anchor
-SAMPLES_A_STEP = 8  # attitudes looked at in a step to count turns: no body turns by half a turn between two of them
+SAMPLES_A_STEP = 8  # attitudes per step for counting turns: no body turns by half a turn between two of them
 
 
 class Anchor(NamedTuple):
-    """A solved instant of a motion that is followed, and how far it may be followed from there.
+    """A solved instant of a followed motion, with the reach of its Taylor series.
 
     Attributes
     ----------
     instant : float
-        s.
+        Time, s.
     states, lane, structure
-        Leaves of the states of several anchors, which of them this one is, and the structure of a state: most motions
-        never ask for one.
+        Leaves of the states of several anchors, the index of this one, and the tree structure of a state; most states
+        are never built.
     safe_step, radius : float
-        How far the Taylor series carries, s: with all its terms, and with the first three where its terms grow to one.
+        Reach of the Taylor series, s: by all its terms, and by the time at which the first three terms grow to one.
     det_rate : float
-        Rate at which the Jacobian nears a singular one (below zero) or leaves it, 1/s.
+        Rate at which the Jacobian approaches a singular one (below zero) or leaves it, 1/s.
     status : Status
-        OK, or UNDEFINED, where an output has no finite value: the motion goes on there.
+        OK, or UNDEFINED if an output has no finite value; the motion continues there.
     """
 
     instant: float
@@ -72,12 +72,12 @@ class Anchor(NamedTuple):
 
     @property
     def state(self) -> SolvedState:
-        """Jets of the coordinates and of the outputs, and the sign of the determinant of the Jacobian."""
+        """Jets of the coordinates and outputs, and the sign of the determinant of the Jacobian."""
         return jax.tree.unflatten(self.structure, self.leaves)
 
     @classmethod
     def of(cls, arrival: StepResult, instant: float) -> "Anchor":
-        """Build the anchor from the first lane of a batch that was searched for singular positions."""
+        """Return the anchor of the first lane of a batch that was searched for singular positions."""
         safe_step, radius, det_rate = (float(x[0]) for x in (arrival.safe_step, arrival.radius, arrival.det_rate))
         status = Status(int(arrival.status[0]))
         leaves, structure = jax.tree.flatten(arrival.state(slice(1)))
@@ -85,7 +85,7 @@ class Anchor(NamedTuple):
 
     @property
     def expansion_point(self) -> tuple[float, float, float, float]:
-        """Instant, safe step, radius and rate of the determinant, as a run takes them."""
+        """Instant, safe step, radius and rate of the determinant."""
         return self.instant, self.safe_step, self.radius, self.det_rate
 
     @property
@@ -96,7 +96,7 @@ class Anchor(NamedTuple):
 
 @dataclasses.dataclass(frozen=True)
 class ChangePoint:
-    """A singular position that a motion passes smoothly: when, s, and the radius of its Taylor series there, s."""
+    """A singular position that a motion passes smoothly: instant, s, and radius of the Taylor series there, s."""
 
     instant: float
     radius: float
@@ -104,10 +104,10 @@ class ChangePoint:
 
 @dataclasses.dataclass
 class FollowedPath:
-    """Anchors in order of time, the change points passed, and where and why following the motion ended, if it did.
+    """Anchors in order of time, the change points passed, and the instant and cause of an early end.
 
-    Of the instants of a grid that the steps may solve, it is stored which they have, and the leaves of their states;
-    and the back ends used.
+    `is_solved` marks the grid instants that the steps have solved, `solved_leaves` has the leaves of their states, and
+    `backends` names the backends used.
     """
 
     anchors: list[Anchor]
@@ -120,11 +120,11 @@ class FollowedPath:
     backends: set[str] = dataclasses.field(default_factory=set)
 
     def add(self, done: TakenSteps, first: int) -> None:
-        """Add the anchors of a run, and the instants of the grid that it solved, which begin with the first."""
+        """Add the anchors of a run, and the grid instants that it solved, starting with index `first`."""
         (anchors, points, grid), steps, count = done.records, int(done.steps), int(done.run.next_up)
         self.backends.add(backend_of(anchors.status))
         leaves, structure = jax.tree.flatten(anchors[:3])
-        states = [np.array(np.asarray(x)[..., :steps]) for x in leaves]  # anchors are kept for long, the records not
+        states = [np.array(np.asarray(x)[..., :steps]) for x in leaves]  # copies, which do not keep the records alive
         values, passed = [np.asarray(x)[:steps].tolist() for x in (*points, anchors.status)], Status.OK
         for lane, (instant, safe_step, radius, det_rate, status) in enumerate(zip(*values, strict=True)):
             outcome = passed if status == OK else Status(status)
@@ -138,18 +138,18 @@ class FollowedPath:
             whole[..., lanes] = part
 
     def anchors_around(self, first: float, last: float) -> list[Anchor]:
-        """Return the anchors between two instants, with one before them and one after, where there are some."""
+        """Return the anchors between two instants, with the one before and the one after, where they exist."""
         begin = bisect.bisect_right(self.anchors, first, key=INSTANT) - 1
         end = bisect.bisect_left(self.anchors, last, key=INSTANT)
         return self.anchors[max(min(begin, len(self.anchors) - 1), 0) : end + 1]
 
     def ended(self, status: Status, instant: float, fault: str) -> "FollowedPath":
-        """End the path, with status, instant and fault."""
+        """End the path with a status, instant and fault."""
         self.status, self.ended_at, self.fault = status, instant, fault
         return self
 
     def singular_positions_outside(self) -> list[ChangePoint]:
-        """Return where the motion would be singular just before its start or after its end, and smooth all the same."""
+        """Return singular positions just before the start or just after the end that the motion would pass smoothly."""
         first = self.anchors[0]
         points = self._just_ahead() if self.status == Status.OK else []
         if _is_left(first):
@@ -157,9 +157,9 @@ class FollowedPath:
         return points
 
     def _just_ahead(self) -> list[ChangePoint]:
-        """Return the singular position that the motion was nearing when it ended.
+        """Return the singular position that the motion was approaching when it ended, as a list of at most one.
 
-        Where it ends next to it, or just beyond, rounding spoils its data there: an anchor farther off is used.
+        Rounding spoils the data of anchors next to it, so an anchor farther off is used.
         """
         end, passed = self.anchors[-1].instant, self.change_points[-1].instant if self.change_points else -np.inf
         since = itertools.takewhile(lambda anchor: anchor.instant > passed, reversed(self.anchors))
@@ -169,7 +169,7 @@ class FollowedPath:
 
 
 def history_of(anchors: Sequence[Anchor]) -> AttitudeHistory | None:
-    """Return the attitudes of all bodies in space along a motion: at its anchors, and by their series between."""
+    """Return the attitudes of spatial bodies along a motion, by the series of its anchors; None in the plane."""
     if "quaternion" not in anchors[0].state[0]:
         return None
     times = np.array([anchor.instant for anchor in anchors])
@@ -180,12 +180,12 @@ def history_of(anchors: Sequence[Anchor]) -> AttitudeHistory | None:
 
 
 def _is_left(point: "Anchor | ExpansionPoint") -> Any:
-    """Tell whether a singular position lies close behind an expansion point."""
+    """Return whether a singular position lies just behind an expansion point."""
     return (point.det_rate > 0) & (point.det_rate * point.radius > 1 / NEARBY)
 
 
 def _is_just_beyond(point: "Anchor | ExpansionPoint", end: float) -> Any:
-    """Tell whether a singular position lies close ahead, and the motion ends next to it or before."""
+    """Return whether a singular position lies just ahead, and the motion ends near or before it."""
     near = (point.det_rate < 0) & (-point.det_rate * point.radius > 1 / NEARBY)
     return near & ((end - point.instant) * -point.det_rate < 1 + LEAST_PASSAGE)
 
@@ -193,11 +193,11 @@ def _is_just_beyond(point: "Anchor | ExpansionPoint", end: float) -> Any:
 def is_spoiled_outside(
     point: ExpansionPoint, begins: Bool[np.ndarray, " lane"], end: float
 ) -> Bool[np.ndarray, " lane"]:
-    """Tell which motions may be singular just before they begin, at an expansion point, or after their end.
+    """Return which motions may be singular just before their start at an expansion point, or just after their end.
 
-    Those that are followed alone tell by `singular_positions_outside`, which this leaves nothing to.
+    This test is conservative: `singular_positions_outside` finds nothing where it is False.
     """
-    with np.errstate(over="ignore", invalid="ignore"):  # of steps that failed
+    with np.errstate(over="ignore", invalid="ignore"):  # of failed steps
         return begins & _is_left(point) | _is_just_beyond(point, end)
 
 
@@ -209,22 +209,22 @@ def follow(
     first_step: float = np.inf,
     grid: Float[np.ndarray, " time"] = NO_GRID,
 ) -> FollowedPath:
-    """Follow the motion from an anchor to another instant, in steps checked one by one.
+    """Follow the motion from an anchor to another instant in checked steps.
 
     Parameters
     ----------
     solver : Solver
-        What solves an instant from another.
+        Solver of the motion.
     start : Anchor or StepState
-        Where to begin: a solved instant, or the run that begins with solving one; no anchor is found if that fails.
+        A solved instant, or a run whose first batch solves the start; the path has no anchors if that fails.
     stop : float
-        Instant to arrive at, s.
+        Final instant, s.
     span : float
-        Duration of the whole motion, by which steps are too small, s.
+        Duration of the whole motion, s, relative to which steps are too small.
     first_step : float, optional
         Longest first step from an anchor, s.
     grid : array of shape (time,), optional
-        Instants to be solved on the way, s, from where it begins.
+        Instants to solve on the way, s, from the start on.
     """
     if isinstance(start, Anchor):
         path, run = FollowedPath([start]), solver.run_from(start.state, start.expansion_point, first_step)
@@ -265,7 +265,7 @@ def follow(
 
 
 def _ended(solver: Solver, path: FollowedPath, done: TakenSteps, span: float) -> FollowedPath:
-    """End a path that cannot be followed any further, at the instant where a law was first refused, if any."""
+    """End a path that cannot be continued, at the instant where a law was first refused, if any."""
     here, refused = path.anchors[-1], float(done.run.control.refused)
     if np.isnan(refused):
         target, arrival = float(done.run.instant[0]), jax.tree.map(np.asarray, done.last)
@@ -274,15 +274,16 @@ def _ended(solver: Solver, path: FollowedPath, done: TakenSteps, span: float) ->
         arrival = solver(solver.needed(here.state), instant - here.instant, instant, search=True)
     status = Status(int(arrival.status[0]))
     if status != Status.INADMISSIBLE and here.reach < NEARLY_SINGULAR * span:
-        status = Status.SINGULAR  # the range of the motion ends at a dead point
+        status = Status.SINGULAR  # the motion ends at a dead point
     return path.ended(status, target, solver.fault(arrival, 0))
 
 
 def _passed(solver: Solver, here: Anchor, stop: float) -> tuple[Anchor, ChangePoint] | None:
-    """Return the anchor beyond a change point just ahead, as far from it as this one is, if there is one to pass.
+    """Return the anchor beyond a change point just ahead, and the change point; None if there is none to pass.
 
-    The far side must lie on the series that leads there, to rounding, and the Jacobian must leave the singular position
-    as fast as it came near: two branches that only come near each other, and a dead point, do neither.
+    The far anchor is as distant from the change point as this one. It must lie on the series to rounding, and the
+    Jacobian must leave the singular position as fast as it approached it. Neither holds at a dead point, or where two
+    branches only come close.
     """
     middle = here.instant + here.reach
     target = min(middle + here.reach, stop)
@@ -297,12 +298,12 @@ def _passed(solver: Solver, here: Anchor, stop: float) -> tuple[Anchor, ChangePo
         return None
     if not (beyond.det_rate > 0 and abs(beyond.reach - (target - middle)) <= 0.5 * (target - middle)):
         return None
-    located = 0.5 * (middle + target - beyond.reach)  # what each side errs by cancels to the second order
+    located = 0.5 * (middle + target - beyond.reach)  # first-order errors of the two sides cancel
     return beyond, ChangePoint(located, min(here.radius, beyond.radius))
 
 
 def within_steps(times: Float[np.ndarray, " anchor"], count: int) -> Float[np.ndarray, " time"]:
-    """Return so many instants from each anchor to the next one, evenly spaced, and the last anchor."""
+    """Return `count` evenly spaced instants from each anchor to the next, and the last anchor."""
     since = np.diff(times)[:, None] * (np.arange(count) / count)
     return np.append((times[:-1, None] + since).ravel(), times[-1])
 
@@ -323,10 +324,10 @@ def blended_attitudes(
     neighbors: tuple[Int[np.ndarray, " time"], Int[np.ndarray, " time"]],
     instants: Float[np.ndarray, " time"],
 ) -> Float[np.ndarray, "component bodies time"]:
-    """Return attitudes, or positions, at instants by the series of the anchors before and after each, by index.
+    """Return attitudes, or positions, at instants, blended from the series of the anchors before and after each.
 
-    A share s of the way from one to the other, their errors are as s^n and (1 - s)^n, and so are the weights of the
-    other one.
+    At a fraction s of the way between the two anchors, their errors grow as s^n and (1 - s)^n; each is weighted by the
+    error of the other.
     """
     before, after = neighbors
     whole = times[after] - times[before]
@@ -342,7 +343,7 @@ def blended_attitudes(
 
 
 def _shortened(jet: Float[np.ndarray, "order *rest"]) -> Float[np.ndarray, "order *rest"]:
-    """Return Taylor coefficients with those above a low order set to zero."""
+    """Return Taylor coefficients with those above `PASSAGE_ORDER` set to zero."""
     low = jet.copy()
     low[PASSAGE_ORDER + 1 :] = 0
     return low

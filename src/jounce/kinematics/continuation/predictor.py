@@ -1,4 +1,4 @@
-"""How far motions and laws may be from their Taylor predictions, and what a law hides between two instants."""
+"""Allowed departures of motions and laws from their Taylor predictions, and features of laws between two instants."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -16,24 +16,24 @@ from jounce.mechanism.system import System
 
 Lanes = Float[Numbers, " batch"]
 
-LARGEST_DEPARTURE = 0.05  # from a prediction, rad or sizes of the mechanism: beyond, a motion law jumps
-SMALLEST_DEPARTURE = 1e-6  # below this no prediction is called wrong
-PROBES = 32  # instants within a step at which laws are looked at,
-FINEST = 1e-9  # unless it is as short as this part of the time
+LARGEST_DEPARTURE = 0.05  # from a prediction, rad or sizes of the mechanism; beyond it, a motion law jumps
+SMALLEST_DEPARTURE = 1e-6  # predictions with smaller departures are always accepted
+PROBES = 32  # instants within a step at which laws are checked,
+FINEST = 1e-9  # unless the step is shorter than this part of the time
 
 
 def near_prediction(departure: Float[Numbers, "*batch"], travel: Float[Numbers, "*batch"]) -> Bool[Numbers, "*batch"]:
-    """Tell whether a departure from a prediction is small enough, for how far the prediction moves."""
+    """Return whether the departure from a prediction is small relative to the predicted travel."""
     return departure <= jnp.minimum(LARGEST_DEPARTURE, jnp.maximum(0.2 * travel, SMALLEST_DEPARTURE))
 
 
 def travel_of(terms: Sequence[Numbers], step: Numbers) -> Any:
-    """Return how far Taylor terms, from the first on, move something over a step at most."""
+    """Return an upper bound of the travel over a step, from the sizes of Taylor terms of order 1 and higher."""
     return total(term * jnp.abs(step) ** k for k, term in enumerate(terms, 1))
 
 
 def laws_predictable(system: System, instant: Lanes, step: Lanes, order: int) -> Bool[Numbers, " batch"]:
-    """Tell whether the laws that may skip whole turns unseen keep to their own Taylor series over the step."""
+    """Return whether laws that may skip whole turns keep to their own Taylor series over the step."""
     start, end = Jet.variable((instant - step)[None], order), Jet([instant[None]])
     result = np.ones(step.shape, bool)
     for before, after in zip(system.laws(start, periodic=True), system.laws(end, periodic=True), strict=True):
@@ -44,10 +44,10 @@ def laws_predictable(system: System, instant: Lanes, step: Lanes, order: int) ->
 
 
 def hidden_by_laws(system: System, status: Numbers, instant: Lanes, step: Lanes, order: int) -> Numbers:
-    """Return the status of instants, BRANCH_JUMP where a law leaves its Taylor series somewhere on the way there.
+    """Return the status of instants: BRANCH_JUMP where a law leaves its Taylor series within the step.
 
-    A motion that begins with a dwell, or as smoothly as ``t**6``, has a series of zeros: where it comes back to where
-    it began, what lies between would be stepped over.
+    The series of a motion that begins with a dwell, or as smoothly as ``t**6``, is zero. If the motion returns to its
+    start within the step, only these probes notice it.
     """
     start, shares = instant - step, (np.arange(PROBES) + 0.5) / PROBES
     near = np.ones(step.shape, bool)
@@ -62,5 +62,5 @@ def hidden_by_laws(system: System, status: Numbers, instant: Lanes, step: Lanes,
         away = jnp.abs(value - Jet(tuple(terms)).evaluate(ahead))
         allowed = jnp.maximum(0.2 * travel_of([jnp.abs(c) for c in terms[1:]], ahead), size)
         near &= jnp.all(away <= allowed, axis=(0, 1))
-    hidden = ~near & (step > FINEST * jnp.abs(instant))  # only rounding separates instants nearer to each other
+    hidden = ~near & (step > FINEST * jnp.abs(instant))  # instants closer than that differ by rounding only
     return jnp.where((status == int(Status.OK)) & hidden, int(Status.BRANCH_JUMP), status)

@@ -1,8 +1,8 @@
-"""How fast a motion nears a singular position: the largest eigenvalue of ``J^-1 J'``.
+"""Rate at which a motion approaches a singular position: the largest eigenvalue of ``J^-1 J'``.
 
-To first order in a step s the determinant is ``det(J) det(1 + s J^-1 J')``: minus the inverse of that eigenvalue is the
-distance in time to its nearest zero, which may be complex. All zeros count, also those that leave the sign of the
-determinant as it is, as two loops do that pass their dead points together.
+To first order in a step s the determinant is ``det(J) det(1 + s J^-1 J')``. Minus the inverse of that eigenvalue is
+thus the time to its nearest zero, which may be complex. All zeros count, including those without a change of sign, as
+when two loops pass their dead points together.
 """
 
 from collections.abc import Callable
@@ -23,8 +23,8 @@ from jounce.mechanism.system import System
 from jounce.rigid.body_arrays import each_jet
 from jounce.rigid.pose import Pose
 
-SQUARINGS = 4  # of the matrix of which the largest eigenvalue is sought
-PROBES = 8  # vectors by which the norm of a power of a large matrix is estimated
+SQUARINGS = 4  # of the matrix whose largest eigenvalue is sought
+PROBES = 8  # random vectors that estimate the norm of a power of a large matrix
 
 
 def det_rate_of(system: System, pose: Pose, factor: Factor, instant: Float[Numbers, " batch"]) -> Float[Numbers, " 1"]:
@@ -35,11 +35,11 @@ def det_rate_of(system: System, pose: Pose, factor: Factor, instant: Float[Numbe
     system : System
         The mechanism.
     pose : Pose
-        With its first derivatives.
+        The pose with its first derivatives.
     factor : Factor
-        Of the Jacobian there.
+        Factors of the Jacobian at the pose.
     instant : array of shape (batch,)
-        When that is, s.
+        Instants of the lanes, s.
     """
     slope = _slope(system, each_jet(lambda jet: jet.map(lambda c: c[..., :1]), pose), instant[:1])
     if isinstance(factor, FrontalFactor):
@@ -55,7 +55,7 @@ def det_rate_of(system: System, pose: Pose, factor: Factor, instant: Float[Numbe
 def det_rate_at(
     system: System, pose_type: type[Pose], coordinates: dict[str, Numbers], instant: Float[Numbers, " batch"]
 ) -> Float[Numbers, " 1"]:
-    """Return what `det_rate_of` does, from the jets of the coordinates alone."""
+    """Return the result of `det_rate_of`, from the jets of the coordinates alone."""
     pose = pose_type.from_coordinates({name: Jet(tuple(x[:2, ..., :1])) for name, x in coordinates.items()})
     return det_rate_of(system, pose, factored(system, pose.truncate(0), Jet([instant[None, :1]])), instant)
 
@@ -63,14 +63,14 @@ def det_rate_at(
 def det_rates_of(
     system: System, pose: Pose, factor: Factor, instant: Float[Numbers, " batch"]
 ) -> Float[Numbers, " batch"]:
-    """Return what `det_rate_of` does, for all lanes."""
+    """Return the result of `det_rate_of` for all lanes."""
     relative = system.pattern.dense(_slope(system, pose, instant)) * system.row_scale[:, :, None]
     relative = jax.vmap(partial(factor.solve, refined=False), in_axes=1, out_axes=1)(relative)
     return jax.vmap(_of_matrix, in_axes=-1, out_axes=-1)(relative)[0]
 
 
 def _slope(system: System, pose: Pose, instant: Float[Numbers, " batch"]) -> Float[Numbers, "entry batch"]:
-    """Return how fast the entries of the Jacobian change."""
+    """Return the time derivatives of the entries of the Jacobian."""
     still, moving = pose.truncate(0), pose.truncate(1)
     rates = each_jet(lambda jet: Jet([jet.dense().coefficients[1]]) if jet.order else None, moving)
 
@@ -81,7 +81,7 @@ def _slope(system: System, pose: Pose, instant: Float[Numbers, " batch"]) -> Flo
 
 
 def _of_matrix(relative: Float[Numbers, "column column"]) -> Float[Numbers, " 1"]:
-    """Return it for a matrix, from a power of it: the root of its norm is never too small, and tends to the size."""
+    """Return the eigenvalue of a dense matrix, from a power: the root of its norm is an upper bound that converges."""
 
     @by_certain_entries()
     def squared(k: Any, carry: Any) -> Any:
@@ -99,12 +99,12 @@ def _of_matrix(relative: Float[Numbers, "column column"]) -> Float[Numbers, " 1"
 def _of_products(
     product: Callable[[Float[Numbers, "column probe"]], Float[Numbers, "column probe"]], columns: int
 ) -> Float[Numbers, " 1"]:
-    """Return it for a matrix that is given by its products.
+    """Return the eigenvalue of a matrix given by its products with vectors.
 
-    The same power is applied to random vectors, whose mean square then is that of its norm (Hutchinson 1990). To come
-    out too small, all of them would have to miss the direction that the power makes longest: with eight, the chance is
-    below 1e-11 that the root of the norm is less than 0.8 of that of this direction, and it is divided by that. Random
-    vectors know nothing of the mechanism, and a sixteenth root forgives much.
+    The same power is applied to random vectors, whose mean square estimates that of its norm (Hutchinson 1990). The
+    estimate is too small only if all vectors miss the direction that the power stretches most. With eight vectors, the
+    root of the norm is below 0.8 of its true value with a probability under 1e-11; the result is divided by 0.8. Random
+    vectors are independent of the mechanism, and the sixteenth root reduces errors.
     """
 
     def multiplied(_: Any, carry: Any) -> Any:
@@ -123,6 +123,6 @@ def _of_products(
 
 
 def _leading(eigenvalue: Real, size: Real, along: Real, bound: Real) -> Any:
-    """Return an eigenvalue where it is real and leads, as near a singular position, else a bound with its sign."""
+    """Return the eigenvalue if it is real and dominant, as near a singular position; else a bound with its sign."""
     leads = (jnp.abs(eigenvalue) > 0.7 * size) & (jnp.abs(eigenvalue) <= bound)
     return jnp.where(leads, eigenvalue, jnp.where(along < 0, -bound, bound))

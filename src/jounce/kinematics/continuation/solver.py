@@ -1,4 +1,4 @@
-"""A mechanism with the settings under which it is solved: it predicts, corrects and differentiates instants."""
+"""The solver of a mechanism: prediction, correction and differentiation of instants under given settings."""
 
 import dataclasses
 import math
@@ -26,30 +26,30 @@ from jounce.kinematics.continuation.step_control import ExpansionPoint, StepLimi
 from jounce.kinematics.status import Status
 from jounce.mechanism import Model
 
-SMALL_BATCH = 16  # lanes of a short grid and of anchors: each width of a batch compiles once
+SMALL_BATCH = 16  # lanes of a short grid and of anchors; each batch width compiles once
 LONGEST_RUN = 32  # batches
-RUN_ENTRIES = 2**20  # numbers that a run stores at most: those of a large mechanism are shorter
-BLOCK_ENTRIES = 2**19  # numbers of the coordinates that a thread solves at once: they fit into the cache
-XLA_BLOCK_ENTRIES = 2**21  # the same by XLA, whose rounds have more instants, and whose calls take longer
+RUN_ENTRIES = 2**20  # largest count of numbers that a run stores; runs of large mechanisms are shorter
+BLOCK_ENTRIES = 2**19  # numbers of the coordinates that a thread solves at once, to fit into the cache
+XLA_BLOCK_ENTRIES = 2**21  # the same for XLA, whose rounds are wider and whose calls take longer
 FEWEST_FROM_ANCHORS = 64  # instants of a long grid that machine code starts from anchors
 MOST_SIDE_BY_SIDE, CALL_ENTRIES = 1024, 2**21  # instants in a call of machine code, and numbers of their coordinates
-# of a Jacobian up to which machine code keeps all in single values; of more it is longer and no faster
+# columns of a Jacobian up to which machine code keeps all numbers in scalars; beyond, such code is longer and no faster
 FEW_COLUMNS = 18
-LARGE = 64  # numbers of an array that stays in memory in machine code
-LARGE_BESIDE_TABLES = 128  # the same in small mechanisms whose laws pass through many samples
+LARGE = 64  # least size of an array that machine code keeps in memory
+LARGE_BESIDE_TABLES = 128  # the same for small mechanisms whose laws interpolate many samples
 NO_GRID = np.empty(0)
 
 
 @dataclasses.dataclass(frozen=True)
 class Solver:
-    """A model with the settings under which it is solved."""
+    """A model with the settings of its solution."""
 
     model: Model
     order: int
     tolerance: float
     refine: bool = True
     finite_order: int = 0  # highest derivative that must be finite
-    own: Mapping[int, Any] | None = None  # of one of many designs, see `of_design`
+    own: Mapping[int, Any] | None = None  # values of one of many designs, see `of_design`
 
     def __call__(
         self,
@@ -59,9 +59,9 @@ class Solver:
         *,
         search: bool = False,
     ) -> StepResult:
-        """Solve instants from what is `needed` of solved ones.
+        """Solve instants from the `needed` data of solved ones.
 
-        Of a few instants, `search` is as `advance` has it.
+        With few instants, `search` has the meaning it has in `advance`.
         """
         lanes = len(instant)
         if lanes <= SMALL_BATCH:
@@ -73,7 +73,7 @@ class Solver:
         return jax.tree.map(lambda x: np.asarray(x)[..., :lanes], arrival)
 
     def still(self, coordinates: Mapping[str, Any], lanes: int | None = None) -> SolvedState:
-        """Return the state of an unsolved instant: its position, with zero derivatives; or that of many alike."""
+        """Return the state of an unsolved position, with zero derivatives; or `lanes` copies of it."""
         levels, system = self.order + 1, self.model.system
         count: int = np.shape(coordinates["position"])[-1] if lanes is None else lanes
         still = {name: np.zeros((levels, *np.shape(x)[:-1], count)) for name, x in coordinates.items()}
@@ -83,7 +83,7 @@ class Solver:
         return still, outputs, np.zeros(count)
 
     def needed(self, known: SolvedState) -> SolvedState:
-        """Return the data of solved instants that predictions need, see `predictor`."""
+        """Return the data of solved instants from which others are predicted, see `predictor`."""
         return predictor(self.model.system, self.model.pose_type, known)
 
     def rounds(
@@ -101,18 +101,18 @@ class Solver:
         Parameters
         ----------
         known : tuple
-            What predictions need of the instants of the sources, see `needed`.
+            Data of the source instants from which others are predicted, see `needed`.
         state : tuple
-            Where jets of coordinates, by name, and of outputs, and the sign of all instants go; None for what is not
+            Arrays for the jets of coordinates by name and of outputs, and for the sign, of all instants; None where not
             needed.
         step, instant : array of shape (time,)
-            Time from the source, and the time arrived at, s.
+            Time step from the source, and the instant itself, s.
         status : array of int, shape (time,)
-            What comes of each.
+            Array for the outcome of each instant.
         sources : array of int, shape (time,)
-            From which of those known each instant is predicted; below zero if from its lane of the round before.
+            Index in `known` of the source of each instant; below zero for its lane in the round before.
         own : dict of int to array
-            The values of the design of each instant, if there are many (see `of_design`), else None.
+            Values of the design of each instant (see `of_design`), or None for one design.
         """
         coordinates, outputs, sign = state
         nothing: dict[str, Any] = dict.fromkeys(StepResult._fields)
@@ -124,7 +124,7 @@ class Solver:
         return self.program.rounds((known, (step, instant, own), np.zeros(1, bool)), results, sources, links)
 
     def take_steps(self, run: StepState, grid: Float[np.ndarray, " time"], stop: float, smallest: float) -> TakenSteps:
-        """Go on with a run and the next instants of a grid, as far as they fit; see `continuation_steps`."""
+        """Continue a run, and solve the next grid instants as far as they fit; see `continuation_steps`."""
         run = run._replace(next_up=np.zeros((), int))
         return self._take_steps(run, grid, self._batches, stop=stop, smallest=smallest)
 
@@ -141,41 +141,41 @@ class Solver:
         return _run_from(known, expansion_point, largest=largest, crawled=crawled)
 
     def beginning(self, coordinates: Mapping[str, Any], instant: float) -> StepState:
-        """Return the run that begins with solving an instant, from a position assembled there."""
+        """Return the run that begins by solving an instant from a position assembled at it."""
         known = self.needed(self.still(coordinates, SMALL_BATCH))
         return _run_from(known, (instant, 0.0, 0.0, 0.0), instant=np.full(SMALL_BATCH, instant))
 
     @property
     def backend(self) -> str:
-        """What solves the instants of a long grid."""
+        """Backend that solves the instants of a long grid."""
         return self.program.backend
 
     @property
     def is_compiled(self) -> bool:
-        """Whether that is there before the first of them, as machine code is."""
+        """Whether machine code, available before the first instant, solves a long grid."""
         return isinstance(self.program, OnLlvm)
 
     @cached_property
     def from_anchors(self) -> int:
-        """How many instants of a grid start from anchors at least, unless the cache holds no block of so many."""
+        """Least number of grid instants that start from anchors, unless the cache holds no such block."""
         return FEWEST_FROM_ANCHORS if self.is_compiled else self.program.width
 
     @cached_property
     def longest_stride(self) -> int:
-        """How far from each other instants that start from anchors are at most, so that the cache holds a block."""
+        """Largest distance of instants that start from anchors, such that the cache holds a block."""
         entries = BLOCK_ENTRIES if self.is_compiled else XLA_BLOCK_ENTRIES
         return 2 ** int(math.log2(max(1, entries // (self._entries * self.program.width))))
 
     @cached_property
     def together(self) -> int:
-        """How many instants are solved in one call at most, where they are not solved in rounds."""
+        """Largest number of instants solved in one call outside of rounds."""
         if not self.is_compiled:
-            return SMALL_BATCH  # by the program of runs, which is there
+            return SMALL_BATCH  # with the program of runs, which exists already
         return max(FEWEST_FROM_ANCHORS, min(MOST_SIDE_BY_SIDE, CALL_ENTRIES // self._entries))
 
     @cached_property
     def program(self) -> OnLlvm | OnXla:
-        """What solves many instants."""
+        """The program that solves many instants."""
         system = self.model.system
         nothing, still = np.zeros(1), self.still(self.model.guess)
         instants = self.needed(still), nothing, nothing, self.own, np.zeros(1, bool)
@@ -188,12 +188,12 @@ class Solver:
 
     @cached_property
     def _batches(self) -> int:
-        """How many batches a run may have; static, so that each mechanism compiles one program."""
+        """Largest number of batches of a run; static, so that each mechanism compiles one program."""
         return min(LONGEST_RUN, max(1, RUN_ENTRIES // (SMALL_BATCH * self._entries)))
 
     @cached_property
     def _entries(self) -> int:
-        """How many numbers the motion of all bodies has at an instant."""
+        """Count of numbers that describe the motion of all bodies at an instant."""
         return (self.order + 1) * sum(x.size for x in self.model.guess.values())
 
     @cached_property
@@ -222,7 +222,7 @@ class Solver:
         return call(self.model.system, run, window, *bounds, **how)
 
     def fault(self, arrival: StepResult, lane: int) -> str:
-        """Return where to look for the fault: a driver without a permitted value, an output, the farthest body."""
+        """Return the origin of a failure: a driver without a permitted value, an output, or the farthest body."""
         refused = np.flatnonzero(~arrival.admissible[:, lane])
         if refused.size:
             return ", ".join(self.model.drivers[k] for k in refused)
@@ -234,7 +234,7 @@ class Solver:
         return f"body {self.model.bodies[int(arrival.body[lane])]}"
 
     def _contradicting(self, gaps: Float[np.ndarray, "2 row"]) -> str:
-        """Name the joints and drivers that contradict each other, and by how much they are open."""
+        """Return the joints and drivers that contradict each other, with the size of their gap, in words."""
         size, over = gaps
         largest = [self.model.rows[k] for k in np.argsort(-over) if over[k] > 0.1 * over.max()]
         names = dict.fromkeys(sorted(largest, key=lambda name: name not in self.model.drivers))  # drivers first
@@ -252,7 +252,7 @@ def _run_from(
     largest: float = np.inf,
     crawled: int = 0,
 ) -> StepState:
-    """Return a run that begins, with the step that is solved first, if given."""
+    """Return a run at its beginning, with its first step, if given."""
     nothing = np.zeros(SMALL_BATCH)
     here = nothing if instant is None else instant
     control = initial_control(ExpansionPoint(*map(np.asarray, expansion_point)), np.asarray(here[0]))

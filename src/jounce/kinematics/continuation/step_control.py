@@ -1,9 +1,9 @@
-"""Step control of the continuation: the length of the next step, and whether the last one is taken.
+"""Step control of the continuation: the length of the next step, and whether the last one is accepted.
 
-Two things limit a step. The Taylor series must carry it: no term moves a body far. And the Jacobian must not come near
-a singular one on the way, where branches meet and a series that looks smooth may lead over to another: `advance` tells
-where its determinant vanishes next, to first order, and a step goes only part of that way. A step that is refused is
-halved until it is not, or is too small to be halved. What is out of the ordinary ends the steps and is decided outside.
+Two limits apply to a step. The Taylor series must carry it: no term may move a body far. And the Jacobian must stay
+away from singular ones, where branches meet and a smooth series may lead onto another branch: `advance` finds, to first
+order, where the determinant vanishes next, and a step covers only part of that distance. A refused step is halved until
+it is accepted or too small. Anything out of the ordinary ends the run and is decided outside.
 """
 
 import enum
@@ -19,23 +19,23 @@ from jounce.execution.mapped import mapped
 from jounce.kinematics.continuation.correct_and_differentiate import SAFE_FRACTION
 from jounce.kinematics.status import Status
 
-LARGEST_DET_RATE = 1.0  # times a step, as seen from its end, at most; as seen from its start, SAFE_FRACTION
-# part of the radius of the series: so near a singular position it shows whether the motion is smooth there
+LARGEST_DET_RATE = 1.0  # times a step, from its end; from its start, SAFE_FRACTION
+# part of the radius of the series: this close to a singular position, it is clear whether the motion is smooth there
 PASSAGE = 3e-3
-CRAWLING = 1e-6  # part of what is left of the motion: length of a step that is too short,
-# and how many of them in a row end the steps: a sharp turn takes a few dozen, a law without bounds more
+CRAWLING = 1e-6  # part of the remaining motion: length of a step that is too short
+# number of such steps in a row that end the run: a sharp turn takes a few dozen, an unbounded law more
 LONGEST_CRAWL = 300
-SLIVER = 0.1  # part of a step: a remainder no longer than this is added to the last step
-GROWTH = 4.0  # factor by which a step may be longer than the last one
+SLIVER = 0.1  # part of a step: a shorter remainder is added to the last step
+GROWTH = 4.0  # largest ratio of a step to the one before
 
 Lanes = Float[Numbers, "*batch"]
 Truths = Bool[Numbers, "*batch"]
 
 
 class StopReason(enum.IntEnum):
-    """Why steps ended."""
+    """Why a run ended."""
 
-    UNFINISHED = 0  # they have not
+    UNFINISHED = 0  # not ended
     ARRIVED = 1
     PASSAGE = 2  # a singular position is just ahead, and may be passed smoothly
     COLLAPSED = 3  # steps have become too small
@@ -43,7 +43,7 @@ class StopReason(enum.IntEnum):
 
 
 class ExpansionPoint(NamedTuple):
-    """Expansion point of a Taylor series: the instant, s, and how far the series carries; see `StepResult`."""
+    """Expansion point of a Taylor series: the instant, s, and the reach of the series; see `StepResult`."""
 
     instant: Lanes
     safe_step: Lanes
@@ -65,20 +65,20 @@ class StepLimits(NamedTuple):
 
 
 class StepControl(NamedTuple):
-    """The next step, and the outcome of those before."""
+    """The next step, and the outcome of earlier ones."""
 
     expansion_point: ExpansionPoint  # of the last anchor
-    step: Lanes  # to be tried next, s; zero to solve the first instant itself
-    target: Lanes  # where it leads to, s
-    may_pass: Truths  # whether a singular position just ahead ends the steps
-    largest: Lanes  # step that the last one allows, s
-    crawled: Int[Numbers, "*batch"]  # steps in sequence that were too short
+    step: Lanes  # length of the next step, s; zero to solve the first instant itself
+    target: Lanes  # end of the next step, s
+    may_pass: Truths  # whether a singular position just ahead ends the run
+    largest: Lanes  # longest step that the last one allows, s
+    crawled: Int[Numbers, "*batch"]  # number of too short steps in a row
     refused: Lanes  # instant at which a law had no permitted value, s; NaN if none
     ending: Int[Numbers, "*batch"]  # see StopReason
 
 
 def initial_control(point: ExpansionPoint, target: Float[np.ndarray, "*batch"]) -> StepControl:
-    """Return the step that solves the first instant itself, s; or, at a known expansion point, none that is planned."""
+    """Return the control that solves the first instant, s, itself; or, at a known expansion point, has no step yet."""
     blank = np.zeros(target.shape)
     none = np.zeros(target.shape, int)
     yes, far, unknown = (np.full(target.shape, value) for value in (True, np.inf, np.nan))
@@ -86,7 +86,7 @@ def initial_control(point: ExpansionPoint, target: Float[np.ndarray, "*batch"]) 
 
 
 def plan_next_step(control: StepControl, limits: StepLimits) -> StepControl:
-    """Plan the next step from an expansion point, or end the steps with a reason."""
+    """Plan the next step from an expansion point, or end the run with a reason."""
     point = control.expansion_point
     left = limits.stop - point.instant
     step = jnp.minimum(jnp.minimum(point.safe_step, SAFE_FRACTION * point.reach), jnp.minimum(control.largest, left))
@@ -108,7 +108,7 @@ def plan_next_step(control: StepControl, limits: StepLimits) -> StepControl:
 
 
 def is_accepted(control: StepControl, status: Int[Numbers, "*batch"], there: ExpansionPoint) -> Truths:
-    """Tell whether a step may be taken, by its status and the expansion point that it led to."""
+    """Return whether a step is accepted, by its status and the expansion point at its end."""
     passable = (status == int(Status.OK)) | (status == int(Status.UNDEFINED))
     return passable & ((control.step == 0) | (control.step * jnp.abs(there.det_rate) <= LARGEST_DET_RATE))
 
@@ -121,9 +121,9 @@ def next_control(
     good: Truths,
     taken: Truths,
 ) -> StepControl:
-    """Return the step after one that was accepted, `good`, and taken, or not.
+    """Return the control after a step that was accepted (`good`) and made the next anchor (`taken`), or not.
 
-    One that was accepted but not taken is made again; see `is_accepted` for what is known of it.
+    An accepted step that was not taken is repeated for more grid instants.
     """
     stuck = ~good & ((control.step < limits.smallest) | (control.target <= control.expansion_point.instant))
     inadmissible = ~good & (status == int(Status.INADMISSIBLE)) & jnp.isnan(control.refused)
@@ -145,14 +145,14 @@ def next_control(
 def next_controls(
     limits: StepLimits, lanes: tuple[StepControl, Int[Numbers, " batch"], ExpansionPoint]
 ) -> tuple[StepControl, Any]:
-    """Return the next step of each of many designs, and whether the last one was taken, all of which is decided by it.
+    """Return the next step of each of many designs, and whether the last one was accepted and thus taken.
 
     Parameters
     ----------
     limits : StepLimits
-        Of all.
+        Limits of all designs.
     lanes : tuple
-        Of each the step that was made, its status, and the expansion point that it led to.
+        For each design, the step made, its status, and the expansion point at its end.
     """
     control, status, there = lanes
     good = is_accepted(control, status, there)

@@ -1,4 +1,4 @@
-"""A motion over more instants than fit into memory: solved chunk by chunk, each chunk a motion."""
+"""The motion over more instants than fit into memory, solved chunk by chunk; each chunk is a `Motion`."""
 
 from collections.abc import Callable, Iterator
 from typing import Any
@@ -18,28 +18,28 @@ from jounce.mechanism.time import Instants, instants_of
 
 
 class ChunkedMotion:
-    """The motion of a mechanism in chunks: iterating solves them one after another, and none stays in memory.
+    """The motion of a mechanism, solved chunk by chunk during iteration; no chunk stays in memory.
 
     Attributes
     ----------
     mechanism : Mechanism
-        What is solved.
+        The mechanism solved.
     time : sequence of float
         All instants, s.
     order : int
         Highest derivative of the outputs.
     status : numpy.ndarray of int8, shape (time,)
-        Outcome at each instant of the chunks so far, see `Status`; OK at those to come.
+        Outcome at each instant, see `Status`; OK at the instants of chunks that are not solved yet.
     faults : dict of int to str
-        For the instants that failed so far, by index, as those of a `Motion`.
+        Faults of the instants that failed so far, by index, as in a `Motion`.
     change_points : numpy.ndarray of shape (points,)
-        When the motion passes a singular position smoothly, s, as those of a `Motion`; known from the start.
+        Instants at which the motion passes a singular position smoothly, s, as in a `Motion`; known from the start.
     passages : tuple of ChangePoint
-        The change points, with how far the motion carries as a Taylor series at each, as those of a `Motion`.
+        The change points, each with the radius of the Taylor series of the motion there, as in a `Motion`.
     backend : str
-        Which arithmetic gives the numbers, as that of a `Motion`.
+        Backend that computes the numbers, as in a `Motion`.
     derived : dict
-        Values computed from the chunks that may be needed again, by name.
+        Values computed from the chunks and kept for reuse, by name.
     """
 
     def __init__(
@@ -66,7 +66,7 @@ class ChunkedMotion:
         return len(self.time)
 
     def __iter__(self) -> Iterator[Motion]:
-        """Solve and yield one chunk after another; the results of an instant are those of `jounce.solve`."""
+        """Solve and yield one chunk after another, with the same results as `jounce.solve`."""
         history, model = history_of(self._path.anchors), self._solver.model
         for first, part in solved_chunks(self._solver, self._path, self.time, self._progress, self._threads):
             failed = np.flatnonzero(part.status != Status.OK)
@@ -79,7 +79,7 @@ class ChunkedMotion:
 
 
 def needs_chunks(mechanism: Mechanism) -> bool:
-    """Tell whether the time grid of a mechanism is longer than one chunk."""
+    """Return whether the time grid of a mechanism is longer than one chunk."""
     if mechanism.time is None:
-        return False  # which a solve complains of
+        return False  # the solve reports the missing grid
     return len(instants_of(mechanism.time, mechanism.parameter_values)) > grid_storage.CHUNK

@@ -1,4 +1,4 @@
-"""Ends of open curves: a motion that comes to one ends there, and is never continued beyond."""
+"""Ends of open curves: a motion stops where a point reaches the end of its curve."""
 
 import dataclasses
 from collections.abc import Iterable, Mapping
@@ -13,28 +13,28 @@ from jounce.mechanism.carriages import joint_of
 from jounce.trajectory.curves import CurveLaw
 
 SLACK = 1e-9  # of the length of a curve: how far rounding may take a point beyond its end
-SAMPLES = 24  # in each step of a motion at which its parameters are looked at
+SAMPLES = 24  # of the curve parameters in each step of a motion
 HALVINGS = 60
 
 
 @dataclasses.dataclass(frozen=True)
 class CurveEnds:
-    """Where a parameter of a curve or a surface ends.
+    """The range of a parameter of a curve or a surface.
 
     Parameters
     ----------
     joint : str
-        Its name.
+        Name of the joint.
     name : str
-        Of the parameter.
+        Name of the parameter.
     body, component : int
-        Which coordinate of which body has the parameter, the ground being body 0.
+        The body and the coordinate that hold the parameter; the ground is body 0.
     unit : float
-        By which that coordinate is the parameter, m.
+        Length that the coordinate advances per unit of the parameter, m.
     low, high : float
-        The least and the greatest value of the parameter.
+        Least and greatest value of the parameter.
     is_only : bool
-        Whether it is the only parameter: that of a curve.
+        Whether the element has no other parameter: a curve, not a surface.
     """
 
     joint: str
@@ -48,16 +48,16 @@ class CurveEnds:
 
     @property
     def slack(self) -> float:
-        """How far rounding may take the parameter beyond an end."""
+        """Excess beyond an end that rounding may cause."""
         return SLACK * (self.high - self.low)
 
     def excess(self, position: Float[np.ndarray, "component body *time"]) -> Float[np.ndarray, "*time"]:
-        """Return how far positions of bodies are beyond an end, below zero where they are between both."""
+        """Return the excess of the parameter beyond its range, negative inside, for positions of all bodies."""
         value = np.asarray(position)[self.component, self.body] / self.unit
         return np.asarray(np.maximum(self.low - value, value - self.high) - self.slack)
 
     def words(self, beyond_high: bool) -> str:
-        """Say which end of which curve it is."""
+        """Return the name of the joint and the end of its curve, for messages."""
         return f"joints.{self.joint} at its end {self.name} = {self.high if beyond_high else self.low:.6g}"
 
 
@@ -79,7 +79,7 @@ def ends_of(model: Model) -> list[CurveEnds]:
 
 
 def beyond_end(curves: Iterable[CurveEnds], coordinates: Mapping[str, Float[np.ndarray, "..."]]) -> str:
-    """Say at which end of which curve bodies are beyond it, in one position; nothing where they are not."""
+    """Return the first curve end exceeded in a configuration, in words, or an empty string."""
     for ends in curves:
         position = np.asarray(coordinates["position"])[..., 0]
         if ends.excess(position) > 0:
@@ -88,9 +88,9 @@ def beyond_end(curves: Iterable[CurveEnds], coordinates: Mapping[str, Float[np.n
 
 
 def cut_at_ends(path: FollowedPath, curves: Iterable[CurveEnds], grid: Float[np.ndarray, " time"]) -> FollowedPath:
-    """Return a path that ends where a point first comes to an end of its curve; the same where none does.
+    """End the path where a point first reaches an end of its curve, and return it.
 
-    The grid has the instants that were solved on the way, s.
+    `grid` has the instants that were solved on the way, s.
     """
     for ends in curves:
         end = _leaves(path, ends)
@@ -107,7 +107,7 @@ def cut_at_ends(path: FollowedPath, curves: Iterable[CurveEnds], grid: Float[np.
 
 
 def _leaves(path: FollowedPath, ends: CurveEnds) -> tuple[float, bool] | None:
-    """Return when the parameter is beyond an end for the first time, s, and whether it is the upper one."""
+    """Return the first instant beyond an end, s, and whether that end is the upper one."""
     times = np.array([anchor.instant for anchor in path.anchors])
     series = [np.asarray(anchor.state[0]["position"])[:, :, ends.body : ends.body + 1] for anchor in path.anchors]
     whole = np.concatenate(series, axis=-1)

@@ -1,10 +1,10 @@
-"""All instants of a time grid, solved from the anchors of a motion that was followed.
+"""The instants of a time grid, solved from the anchors of a followed motion.
 
-A long grid is not solved one instant after another. Instants start from their nearest anchor, or from a neighbor
-solved before, so that most are predicted to rounding, and many are solved side by side (see `grid_blocks`). What fails
-there, and what starts from it, is solved once more, each after what it starts from; so are the few instants of a short
-grid that were not solved on the way. Between two anchors lies no singular position, so that the sign of the determinant
-tells an instant on another branch.
+An instant of a long grid starts from its nearest anchor, or from a neighbor solved before. Most are thus predicted to
+rounding, and many are solved side by side (see `grid_blocks`). An instant that fails there, and all that start from
+it, are solved once more in order of dependence, as are the few instants of a short grid that were not solved on the
+way. No singular position lies between two anchors, so the sign of the determinant reveals an instant on another
+branch.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -30,13 +30,13 @@ Indices = Int[np.ndarray, " lane"]
 
 
 class GridSolver:
-    """The instants of a time grid, or of a chunk of one, solved from the anchors of a path that lasts for a span, s.
+    """Solver of the instants of a time grid, or of a chunk of one, from the anchors of a path over a span, s.
 
     Attributes
     ----------
     status : array of int, shape (time,)
     faults : dict of int to str
-        For instants that failed, the body farthest from its prediction, or the driver without a permitted value.
+        Body farthest from its prediction, or driver without a permitted value, for each instant that failed.
     """
 
     def __init__(self, solver: Solver, path: FollowedPath, time: Float[np.ndarray, " time"], span: float):
@@ -48,7 +48,7 @@ class GridSolver:
         like, solved = self._anchors[0], np.flatnonzero(path.is_solved)
         self.status[solved] = OK
         if len(solved) == len(time) and not path.change_points and self._reached.all():
-            self._leaves = path.solved_leaves  # all are solved, and stay as they are
+            self._leaves = path.solved_leaves  # the path has solved every instant
         else:
             shapes = [(*x.shape[:-1], len(time) + len(self._anchors)) for x in like.leaves]
             self._leaves = arrays_in(lend(bytes_needed(shapes)), shapes, [float] * len(shapes))
@@ -58,7 +58,7 @@ class GridSolver:
 
     @cached_property
     def _instants(self) -> Float[np.ndarray, " time"]:
-        """The instants, and behind them those of the anchors, s."""
+        """Instants of the grid, followed by those of the anchors, s."""
         return np.concatenate([self.time, [anchor.instant for anchor in self._anchors]])
 
     @property
@@ -70,10 +70,10 @@ class GridSolver:
         return solved, tuple([plain_derivatives(x[..., :count]) for x in outputs])
 
     def solve(self, progress: Callable[[int, int], None] | None, threads: int, *, explain: bool) -> None:
-        """Solve the instants; one that its neighbor cannot predict is followed to from an anchor.
+        """Solve the instants; where prediction from a neighbor fails, follow the motion from an anchor.
 
-        They are solved in several threads; what comes of it does not depend on how many. To `explain` is to say at the
-        first instant that was not reached why.
+        The result does not depend on the number of threads. With `explain`, the first instant that was not reached gets
+        the reason.
         """
         count = len(self.time)
         left = self._reached & (self.status != OK)
@@ -97,7 +97,7 @@ class GridSolver:
             progress(count, count)
 
     def _solve_remaining(self, left: Bool[np.ndarray, " time"], threads: int, report: Callable[[int], None]) -> None:
-        """Solve the instants that are left."""
+        """Solve the instants marked as left."""
         count = len(self.time)
         stride = stride_of(self.solver, int(np.count_nonzero(left)), count, len(self._anchors))
         with Threads(threads, compiled=self.solver.is_compiled) as pool:
@@ -116,9 +116,9 @@ class GridSolver:
     def _in_blocks(
         self, left: Bool[np.ndarray, " time"], stride: int, pool: Threads, report: Callable[[int], None]
     ) -> Bool[np.ndarray, " time"]:
-        """Solve instants in rounds; return what is left: those that failed, and what starts from them.
+        """Solve instants in rounds, and return those left: the failures, and the instants that start from them.
 
-        Nothing is known of a failure but that there is one, so that these are solved once more.
+        Blocks report only that an instant failed; solving these once more finds the cause.
         """
         count = int(np.count_nonzero(left))  # a long grid is reached up to some instant, and nothing is solved yet
 
@@ -137,7 +137,7 @@ class GridSolver:
         return failed
 
     def _sources(self, lanes: Indices, stride: int) -> Indices:
-        """Return from where each instant is predicted: its neighbor, where that is known, or its nearest anchor."""
+        """Return the source of each prediction: the neighbor, where it is solved and nearer, or the nearest anchor."""
         neighbor, known = neighbors(lanes, stride)
         known &= self.status[neighbor] == OK
         time = self.time[lanes]
@@ -146,7 +146,7 @@ class GridSolver:
         return np.where(nearer & known, neighbor, nearest)
 
     def _solve_batch(self, batch: tuple[Indices, Indices]) -> StepResult:
-        """Solve a batch of instants from their sources, and store the states of its lanes."""
+        """Solve a batch of instants from their sources, and store their states."""
         lanes, source = batch
         known = jax.tree.map(lambda x: x[..., source], self.solver.needed(self._store))
         arrival = self.solver(known, self.time[lanes] - self._instants[source], self.time[lanes])
@@ -162,7 +162,7 @@ class GridSolver:
                 self._rescue(int(lanes[k]))
 
     def _insert_anchors(self) -> None:
-        """Put the anchors behind the instants, from which others start, and zeros where none is reached."""
+        """Append the anchors behind the instants, and set the states of unreached instants to zero."""
         count, reached = len(self.time), int(np.count_nonzero(self._reached))
         for whole, *parts in zip(self._leaves, *(x.leaves for x in self._anchors), strict=True):
             whole[..., reached:count] = 0
@@ -186,7 +186,7 @@ class GridSolver:
             self._store_lanes(slice(lane, lane + 1), local.anchors[-1].leaves)
 
     def _bridge(self, point: ChangePoint) -> None:
-        """Replace the instants next to a change point, and the one at it, by what the motion on both sides gives."""
+        """Replace the instants at and next to a change point by interpolation of the motion on both sides."""
         near = np.abs(self.time - point.instant) < half_width(point, self.solver.order)
         lanes = np.flatnonzero(near & (self.time < self.path.ended_at))
         if not lanes.size:
@@ -201,27 +201,27 @@ class GridSolver:
         self._store_lanes(lanes, jax.tree.leaves((*state, self._store[2][lanes])))
 
     def _disagreement(self, coordinates: dict[str, np.ndarray], lanes: Indices) -> float:
-        """Return by how much positions are off from those that were solved, rad or m."""
+        """Return the largest difference of coordinates from the positions already solved, rad or m."""
         solved, names = self.status[lanes] == OK, self.solver.model.pose_type.predictor
         away = [np.abs(coordinates[name][0] - self._store[0][name][0][..., lanes])[..., solved] for name in names]
         return max(np.max(x, initial=0.0) for x in away)
 
     def _refuse(self, points: Sequence[ChangePoint]) -> None:
-        """Mark what was solved next to singular positions, and is mostly rounding there."""
+        """Mark instants next to singular positions as SINGULAR, where rounding dominates the results."""
         self.status[spoiled(points, self.time, self.solver.order) & (self.status == OK)] = Status.SINGULAR
 
     def _explain_end(self, lost: int) -> None:
-        """Say at the first instant that was not reached why the motion could not be followed to it."""
+        """Store, at the first instant that was not reached, why the motion could not be followed there."""
         path, instant = self.path, self.time[lost : lost + 1]
         self.status[lost], self.faults[lost] = path.status, path.fault
         last = path.anchors[-1]
         arrival = self.solver(self.solver.needed(last.state), instant - last.instant, instant)
-        if arrival.status[0] == Status.INADMISSIBLE:  # the fault is the law's, not that of the position before
+        if arrival.status[0] == Status.INADMISSIBLE:  # the law is at fault, not the position before
             self.status[lost], self.faults[lost] = Status.INADMISSIBLE, self.solver.fault(arrival, 0)
 
 
 def _levels(left: Bool[np.ndarray, " time"], stride: int) -> Iterator[Indices]:
-    """Yield instants in groups, each after what it starts from: the number of ones in an index says how far down."""
+    """Yield instants in groups, each after those it starts from; the depth is the number of ones in the index."""
     lanes = np.flatnonzero(left)
     depth = np.bitwise_count(lanes & (stride - 1))
     for level in np.unique(depth).tolist() if lanes.size else ():

@@ -1,10 +1,10 @@
-"""Blocks of a long grid, each solved from the anchors of a motion alone: in any order, in any thread.
+"""Blocks of a long grid, which depend on the anchors alone: any order, any thread.
 
-An instant is predicted from the one whose index is its own with the last binary one set to zero, unless it is a
-multiple of a stride, a power of two, and starts from an anchor; or from the anchor, where that is nearer. So the
-instants from a multiple of the stride up to the next one start from nothing beyond it. A block is as many of these as a
-round has instants: a vector of machine code, or what XLA solves side by side. They are solved round after round, in the
-memory of a thread, which stays in the cache; the requested results are copied out of it.
+Multiples of a stride, a power of two, start from anchors. Any other instant is predicted from the instant whose index
+is its own with the last binary one cleared, or from an anchor, if that is nearer. The instants from one multiple of the
+stride to the next thus depend on nothing beyond them. A block has as many such runs as a round has lanes: those of a
+vector of machine code, or of what XLA solves side by side. A thread solves a block round after round in a buffer that
+stays in its cache, and copies the requested results out of it.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -20,20 +20,20 @@ from jounce.kinematics.position_analysis.solve_buffers import SolveBuffer, solve
 from jounce.mechanism.time import nearest_instants
 
 Indices = Int[np.ndarray, " lane"]
-LONG_GRID = 1024  # instants: from here on in blocks
-FEW_BATCHES = 4  # of instants: they all start from anchors
-GROUP = 64  # instants that a lane takes up one after another, once all multiples of so many are solved
+LONG_GRID = 1024  # instants, from which on a grid is solved in blocks
+FEW_BATCHES = 4  # of instants that all start from anchors
+GROUP = 64  # instants that a lane solves one after another, once all multiples of this number are solved
 
 
 class Block(NamedTuple):
-    """Instants of a grid that start from nothing but anchors and one another.
+    """Instants of a grid that start from anchors and from one another only.
 
     Attributes
     ----------
     first, count : int
-        The index of the first one, and how many there are.
+        Index of the first instant, and number of instants.
     stride : int
-        How far apart those are that start from anchors.
+        Distance of the instants that start from anchors.
     """
 
     first: int
@@ -42,21 +42,21 @@ class Block(NamedTuple):
 
     @property
     def indices(self) -> slice:
-        """Where they are in arrays of all instants."""
+        """The slice of the block in arrays of all instants."""
         return slice(self.first, self.first + self.count)
 
 
 def stride_of(solver: Solver, left: int, count: int, anchors: int) -> int:
-    """Return how far apart the instants that start from anchors are, a power of two.
+    """Return the distance between instants that start from anchors, a power of two.
 
     Parameters
     ----------
     solver : Solver
-        What solves them.
+        Solver of the instants.
     left, count : int
-        How many of a grid are to be solved, and how many there are.
+        Number of instants of a grid still to be solved, and their total.
     anchors : int
-        From how many. Where few instants are left, they all start from anchors.
+        Number of anchors. If few instants are left, all of them start from anchors.
     """
     width, stride = solver.from_anchors if count > LONG_GRID else SMALL_BATCH, 1
     if left > FEW_BATCHES * width:
@@ -66,9 +66,9 @@ def stride_of(solver: Solver, left: int, count: int, anchors: int) -> int:
 
 
 def blocks_of(first: int, count: int, stride: int, width: int, *, full: bool = False) -> list[Block]:
-    """Return the blocks of so many instants of a grid from an index on, for rounds of a width.
+    """Return the blocks of `count` instants of a grid from index `first` on, for rounds of a width.
 
-    To have `full` rounds, the last block has a stride of its own, so short that its instants fill them.
+    With `full`, the stride of the last block is shortened until its instants fill the rounds.
     """
     size = stride * width
     blocks = [Block(first + k, min(size, count - k), stride) for k in range(0, count, size)]
@@ -80,7 +80,7 @@ def blocks_of(first: int, count: int, stride: int, width: int, *, full: bool = F
 
 
 def blocks_for(solver: Solver, first: int, count: int, stride: int) -> list[Block]:
-    """Return the blocks of so many instants for what solves them; a round of XLA is too wide to be left half empty."""
+    """Return the blocks of `count` instants for a solver; XLA gets full rounds, as its rounds are wide."""
     return blocks_of(first, count, stride, solver.program.width, full=not solver.is_compiled)
 
 
@@ -88,8 +88,8 @@ def blocks_for(solver: Solver, first: int, count: int, stride: int) -> list[Bloc
 def rounds(count: int, stride: int, width: int) -> Int[np.ndarray, "round lane"]:
     """Return the instants of a block in the order in which they are solved, by their indices in it.
 
-    Multiples of `GROUP` come first, as what the others start from. Where lanes lie beyond the block, the first of their
-    round is solved again.
+    Multiples of `GROUP` come first, as the others start from them. Lanes beyond the block repeat the first lane of
+    their round.
     """
     group = min(GROUP, stride)
     result = [np.empty((0, width), np.int64)]
@@ -104,13 +104,13 @@ def rounds(count: int, stride: int, width: int) -> Int[np.ndarray, "round lane"]
 
 
 def neighbors(lanes: Indices, stride: int) -> tuple[Indices, Bool[np.ndarray, " lane"]]:
-    """Return the neighbor of each of some instants, by index, and whether it is solved before."""
+    """Return the neighbor of each instant, by index, and whether the instant starts from it."""
     return lanes & (lanes - 1), lanes & (stride - 1) > 0
 
 
 @lru_cache(maxsize=16)
 def _neighbors(count: int, stride: int) -> tuple[Indices, Bool[np.ndarray, " lane"]]:
-    """Return the neighbor of each instant of a block, and whether it is solved before."""
+    """Return the neighbor of each instant of a block, and whether the instant starts from it."""
     return neighbors(np.arange(count), stride)
 
 
@@ -122,25 +122,25 @@ def solve_blocks(
     put: Callable[[slice, Any, Int[np.ndarray, " lane"]], None],
     each: Callable[[Callable[[Block], int], Iterable[Block]], Iterator[int]],
 ) -> Iterator[int]:
-    """Solve blocks of a grid, and yield how many instants each of them has.
+    """Solve the blocks of a grid, and yield the number of instants of each.
 
-    Nothing is known of an instant that failed but that it did.
+    For an instant that failed, only the failure is reported.
 
     Parameters
     ----------
     solver : Solver
-        What solved the path.
+        Solver that followed the path.
     path : FollowedPath
-        The motion, followed to all these instants.
+        The motion, followed to all instants of the blocks.
     time : array of shape (time,)
         All instants, s.
     blocks : sequence of Block
-        Those to solve.
+        Blocks to solve.
     put : callable
-        Takes over the instants of a block by where they are among all: their states, as an anchor's, time last, and the
-        outcome of each. It may be called from several threads at once; the arrays are used again after it.
+        Stores a block, given the slice of its instants, their states in the form of an anchor's, time last, and their
+        outcomes. Several threads may call it at once; the arrays are reused after the call.
     each : callable
-        In the manner of `map`; it may call from several threads at once.
+        Works like `map`; it may call from several threads at once.
     """
     size = max(block.count for block in blocks) if blocks else 0
     around = {block: path.anchors_around(time[block.first], time[block.first + block.count - 1]) for block in blocks}

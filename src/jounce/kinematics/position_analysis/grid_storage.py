@@ -1,4 +1,4 @@
-"""Time grids of any length, solved chunk by chunk, so that only the requested results of each stay in memory."""
+"""Time grids of any length, solved chunk by chunk, of which only the requested results stay in memory."""
 
 import itertools
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
@@ -29,7 +29,7 @@ class Solved(NamedTuple):
     Attributes
     ----------
     coordinates : dict of str to array, or callable
-        Jets of the coordinates of all bodies, time last, or what computes them again.
+        Jets of the coordinates of all bodies, time last, or a function that computes them again.
     outputs : tuple of array
         Derivatives of the outputs, time last.
     status : array of int, shape (time,)
@@ -51,12 +51,12 @@ def solve_grid(
     *,
     keep: bool | None,
 ) -> Solved:
-    """Return all instants of a grid, solved from the anchors of a path.
+    """Solve all instants of a grid from the anchors of a path.
 
     Parameters
     ----------
     solver : Solver
-        What solved the path.
+        Solver that followed the path.
     path : FollowedPath
         The motion followed.
     time : array of shape (time,)
@@ -64,10 +64,10 @@ def solve_grid(
     progress : callable, optional
         Called with the number of instants done and their total.
     threads : int
-        That solve batches.
+        Number of threads that solve batches.
     keep : bool, optional
-        Whether the jets of all bodies are kept; where they fit into one chunk, unless given. They are computed again
-        when they are requested.
+        Whether to keep the jets of all bodies; unless given, those of a grid that fits into one chunk. Others are
+        computed again on request.
     """
     keeps_series = len(time) <= CHUNK if keep is None else keep
     status, faults = np.empty(len(time), int), {}
@@ -90,7 +90,7 @@ def solve_grid(
 
 
 def _without_decrease(progress: Callable[[int, int], None]) -> Callable[[int, int], None]:
-    """Return a progress callback that never decreases, although some instants may be solved twice."""
+    """Return a progress callback whose count never decreases, although some instants may be solved twice."""
     furthest = 0
 
     def report(done: int, total: int) -> None:
@@ -109,9 +109,9 @@ def _solved_at_once(
     threads: int,
     results: "tuple[_Store, Int[np.ndarray, ' time']]",
 ) -> frozenset[int]:
-    """Solve all chunks without known singular positions at once, so that no thread waits at the end of one.
+    """Solve all chunks without known singular positions together, so that no thread waits at the end of a chunk.
 
-    Returns the first instants of those in which all are OK; the others are still to be solved, one after another.
+    Return the first instants of the chunks in which all instants are OK; the others remain to be solved.
     """
     (store, status), blocks = results, {}
     if path.is_solved.any():
@@ -140,18 +140,18 @@ def _solved_at_once(
 
 
 class _Store:
-    """Arrays for the states of all instants of a grid of several chunks: of outputs and, if kept, of coordinates."""
+    """Arrays for the states of all instants of a grid: outputs and, if kept, jets of the coordinates."""
 
     def __init__(self, like: SolvedState, count: int, *, keeps_series: bool):
-        state = like[0] if keeps_series else {}, like[1]  # threads that solve instants first touch their memory
+        state = like[0] if keeps_series else {}, like[1]  # left untouched, so that each thread first touches its part
         self.state: Any = jax.tree.map(lambda x: np.empty((*x.shape[:-1], count)), state)
 
     def put(
         self, lanes: slice, coordinates: Mapping[str, Any], outputs: Sequence[Any], *, series: bool = False
     ) -> None:
-        """Take over some instants: jets of the coordinates, and derivatives of the outputs, or their series.
+        """Store instants: jets of the coordinates, and derivatives of the outputs, or their series.
 
-        Series are of any size where an instant failed, which is solved again.
+        The series of a failed instant may overflow; the instant is solved again.
         """
         stored_coordinates, stored_outputs = self.state
         for name, whole in stored_coordinates.items():
@@ -174,7 +174,7 @@ def solved_chunks(
 ) -> Iterator[tuple[int, GridSolver]]:
     """Yield the solved chunks of a grid one after another, with the index of their first instant.
 
-    Those that are solved already are left out, by their first instants.
+    Chunks that are solved already are skipped; `without` has the indices of their first instants.
     """
     for first in range(0, len(time), CHUNK):
         if first in without:

@@ -1,4 +1,4 @@
-"""Motions of mechanisms with idle motions: they are held by the least motion, and no output may depend on them."""
+"""Mechanisms with idle motions: joints hold the idle bodies, and no output may depend on their spin."""
 
 import dataclasses
 import functools
@@ -19,13 +19,13 @@ from jounce.mechanism.time import instants_of
 
 P = ParamSpec("P")
 R = TypeVar("R")
-DEPENDS = 1e-9  # part of an output, or of the size of the mechanism
-ORDER = 4  # of the derivatives by which outputs are compared
-BETWEEN = 0.618  # of the time: an instant at which they are compared, beside the first and the last
+DEPENDS = 1e-9  # relative to an output, or to the size of the mechanism
+ORDER = 4  # of the derivatives compared
+BETWEEN = 0.618  # of the time: the instant of comparison between the first and the last
 
 
 def with_idle_motions_held(mechanism: Mechanism, idle: IdleMotions) -> Mechanism:
-    """Return the mechanism with joints by which its idle motions are the least: no spin about the axes."""
+    """Return the mechanism with joints that suppress its idle motions: no spin about the idle axes."""
     taken = {*mechanism.joints, *mechanism.drivers, *mechanism.initial}
     holds = {}
     for body, (_, axis) in idle.items():
@@ -37,7 +37,7 @@ def with_idle_motions_held(mechanism: Mechanism, idle: IdleMotions) -> Mechanism
 
 
 def idle_words(idle: IdleMotions, *, axes: bool = False) -> str:
-    """Say which bodies may spin, and about which axes, in the frame of the first of each.
+    """Return the bodies that may spin, in words, with their axes in the frame of the first body of each group.
 
     Examples
     --------
@@ -52,7 +52,7 @@ def idle_words(idle: IdleMotions, *, axes: bool = False) -> str:
 
 
 def warn_of_idle(idle: IdleMotions) -> None:
-    """Tell once which idle motions are held."""
+    """Warn once of the idle motions that are held."""
     message = (
         f"nothing keeps these bodies from spinning about an axis of themselves, which moves nothing else: "
         f"{idle_words(idle, axes=True)}; they are held by the least motion, and no output depends on it"
@@ -61,12 +61,12 @@ def warn_of_idle(idle: IdleMotions) -> None:
 
 
 def holding_idle(solver: Callable[[], Callable[..., Any]]) -> Callable[[Callable[P, R]], Callable[P, R]]:
-    """Let a function of a mechanism hold idle motions of it, where these are all the degrees of freedom that are left.
+    """Return a decorator that holds idle motions of a mechanism, if they are all its remaining degrees of freedom.
 
     Parameters
     ----------
     solver : callable
-        Returns what solves a mechanism at instants to an order.
+        Returns the function that solves a mechanism at instants to an order.
     """
 
     def decorate(function: Callable[P, R]) -> Callable[P, R]:
@@ -79,7 +79,7 @@ def holding_idle(solver: Callable[[], Callable[..., Any]]) -> Callable[[Callable
                     raise
                 idle = error.idle
             given: Any = dict(zip(("mechanism", "time"), arguments, strict=False)) | keywords
-            if holds_tracer(given):  # a change of design may end an idle motion, and depend on how far it has gone
+            if holds_tracer(given):  # a change of design may end an idle motion, and depend on its angle
                 message = f"these bodies may spin about themselves: {idle_words(idle)}; hold them by joints"
                 raise UnsupportedError(f"{message} where a motion is differentiated", name="mechanism")
             mechanism = with_idle_motions_held(given["mechanism"], idle)
@@ -89,7 +89,7 @@ def holding_idle(solver: Callable[[], Callable[..., Any]]) -> Callable[[Callable
             rest: Any = {name: value for name, value in keywords.items() if name != "mechanism"}
             solve_held: Any = function
             result: Any = solve_held(mechanism, *arguments[1:], **rest)
-            if isinstance(result, Motion):  # what is requested later must not depend on them either
+            if isinstance(result, Motion):  # outputs requested later must not depend on the idle motions either
                 vars(result).update(mechanism=given["mechanism"], check_idle=check)
             return cast("R", result)
 
@@ -101,16 +101,16 @@ def holding_idle(solver: Callable[[], Callable[..., Any]]) -> Callable[[Callable
 def with_idle_held_in_family(
     mechanism: Mechanism, designs: Sequence[Mechanism], instants: Any, tolerance: float, solve: Callable[..., Any]
 ) -> Mechanism:
-    """Return a mechanism of many designs with its idle motions held, as the first of the designs given has them.
+    """Return a mechanism of many designs with the idle motions held that the first of the given designs has.
 
-    Outputs of the designs given are checked not to depend on them.
+    Raise MechanismError if an output of a given design depends on an idle motion.
     """
     model, first = build(with_output_drivers(designs[0])), float(instants[0])
     (rows, columns), idle = model.system.shape, {}
     try:
         if rows < columns:
             assemble(model, first, tolerance)
-    except JounceError as error:  # another one is raised where the design is solved
+    except JounceError as error:  # other errors are raised when the design is solved
         idle = error.idle if isinstance(error, MobilityError) else {}
     if not idle:
         return mechanism
@@ -129,8 +129,8 @@ def check_independent(
 ) -> None:
     """Raise MechanismError for an output that depends on an idle motion, by name.
 
-    Outputs at some instants, with derivatives, are compared with those of bodies that spin. Those of forces are not:
-    what they are without a spin follows, where nothing drives one, from what holds it exerting nothing.
+    Outputs and their derivatives at some instants are compared with those of spinning bodies. Outputs of forces are
+    skipped: an undriven idle motion takes no force, so the holding joints exert none.
     """
     checked = mechanism.outputs if outputs is None else outputs
     checked = {name: output for name, output in checked.items() if not output.of_forces}

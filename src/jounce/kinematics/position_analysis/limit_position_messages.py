@@ -1,4 +1,4 @@
-"""Messages of a motion in time that runs into a dead point: where its driver turns back, and what lies beyond."""
+"""Messages about a motion that runs into a dead point: where its driver turns back, and where the branch leads."""
 
 import math
 
@@ -14,12 +14,12 @@ from jounce.mechanism import with_output_drivers
 from jounce.mechanism.laws.output_drivers import output_laws
 
 ENDS = (Status.SINGULAR, Status.NOT_CONVERGED, Status.COLLAPSED)
-LENGTH = 40.0  # of the curve, looked at for where the other branch leads
-NEAR = 1e-9  # of the value, by which an instant may be short of a dead point that it is at
+LENGTH = 40.0  # of the curve that is traced for the other branch
+NEAR = 1e-9  # relative to the value: distance of an instant from a dead point that counts as reached
 
 
 def dead_end_words(motion: Motion, index: int) -> str:
-    """Word where the dead point is that ends a motion before an instant, and where the other branch leads; or nothing.
+    """Describe the dead point that ends a motion before an instant, and the other branch; or return an empty string.
 
     The curve of configurations is traced from the last instant that was solved.
     """
@@ -35,7 +35,7 @@ def dead_end_words(motion: Motion, index: int) -> str:
         target = here if name == TIME else law_values(mechanism, here)[name]
         curve = trace(last, before, driver=name, order=0, count=2, length=LENGTH)
     except JounceError:
-        return ""  # the message names what failed already
+        return ""  # the message already names the failure
     end = _end_before(curve, target)
     if end is None:
         return ""
@@ -57,7 +57,7 @@ def dead_end_words(motion: Motion, index: int) -> str:
 
 
 def _end_before(curve: Curve, target: float) -> tuple[float, float | None] | None:
-    """Return the end of the range of a driver that keeps it from a value, and the far end of the branch beyond."""
+    """Return the end of a driver's range that keeps it from a value, and the far end of the branch beyond it."""
     low, high = curve.range
     slack = NEAR * max(abs(low), abs(high), 1e-300)
     upwards = target >= high - slack
@@ -66,7 +66,7 @@ def _end_before(curve: Curve, target: float) -> tuple[float, float | None] | Non
     value = high if upwards else low
     limits = [x.value for x in curve.turning_points]
     if not any(abs(x - value) <= slack for x in limits):
-        return None  # as far as the curve was followed
+        return None  # the curve was traced no further
     beyond = [b for b in curve.branches[1:] if abs((b.high if upwards else b.low) - value) <= slack]
     ends = [b.low if upwards else b.high for b in beyond]
     return value, next((x for x in ends if any(abs(x - y) <= slack for y in limits)), None)

@@ -1,4 +1,4 @@
-"""From a mechanism and a time grid to its motion."""
+"""Position analysis: the motion of a driven mechanism over a time grid."""
 
 import numbers
 from collections.abc import Callable, Mapping
@@ -40,14 +40,14 @@ from jounce.mechanism.outputs.base import lost_orders
 from jounce.mechanism.time import Instants, TimeLike, instants_of
 from jounce.mechanism.transmissions.axis_angles import lost_count
 
-LOWEST_ORDER = 4  # of the jets inside: predictions need some, also where the user wants positions only
+LOWEST_ORDER = 4  # of the internal jets: predictions need derivatives even if the user wants positions only
 HIGHEST_ORDER = 30  # of derivatives of outputs
 HIGHEST_OF_MOTION = HIGHEST_ORDER + 2  # forces are two derivatives shorter than the motion
 LARGEST_TOLERANCE = 1e-2
 
 
 def _differentiated(solve: Callable[..., Motion], given: Mapping[str, Any]) -> Motion:
-    """Solve a mechanism of which JAX traces some values."""
+    """Solve a mechanism with values that JAX traces."""
     mechanism = given["mechanism"]
     check_mechanism(mechanism)
     options = {name: value for name, value in given.items() if name not in ("mechanism", "time", "order", "strict")}
@@ -78,31 +78,31 @@ def solve(
 ) -> Motion:
     """Return the motion of a driven mechanism and its time derivatives up to any order, exact to rounding.
 
-    Positions are found by Newton-Raphson; all derivatives of an instant follow from one factorization of the
-    Jacobian there (Sommer 2024, equations 1-8 and all orders beyond).
+    Positions are found by Newton-Raphson; all derivatives at an instant follow from one factorization of the
+    Jacobian (Sommer 2024, equations 1-8 and all orders beyond).
 
     Parameters
     ----------
     mechanism : Mechanism
-        Drivers and joints must leave no degree of freedom; redundant ones must agree.
+        Joints and drivers must leave no degree of freedom; redundant constraints must agree.
     time : array_like of shape (time,), optional
-        Strictly increasing instants, s; those of the mechanism unless given.
+        Strictly increasing instants, s; those of the mechanism by default.
     order : int, default 4
         Highest derivative of the outputs: 0 position, 3 jerk, 4 jounce, up to 30.
     tolerance : float, default 1e-12
         Largest Newton correction of an accepted position, in rad, or in sizes of the mechanism.
     refine : bool, default True
-        Correct accepted positions once more, to rounding. Otherwise their errors may be as large as the tolerance.
+        Whether to correct accepted positions once more, to rounding. Otherwise their errors may reach the tolerance.
     strict : bool, default True
-        Raise if an instant fails. Otherwise it is NaN and `Motion.status` says why.
+        Whether to raise if an instant fails. Otherwise its results are NaN and `Motion.status` says why.
     progress : callable, optional
         Called with the number of instants done and their total.
     threads : int, optional
-        Number of threads that solve a grid of more than a thousand instants: that of the cores of the process, or the
-        value of the environment variable ``JOUNCE_THREADS``, unless given. Results do not depend on it.
+        Number of threads for grids of more than a thousand instants. The default is the environment variable
+        ``JOUNCE_THREADS`` or the number of cores of the process. Results do not depend on it.
     keep : bool, optional
         Whether to store the motion of all bodies in addition to the outputs, for later requests of points, energies or
-        reactions; unless given, up to 65,536 instants. A motion that is not stored is computed again on request.
+        reactions; by default, for up to 65,536 instants. A motion that is not stored is computed again on request.
 
     Returns
     -------
@@ -118,9 +118,9 @@ def solve(
     MobilityError
         If degrees of freedom are left, or the start is a singular position.
     SolveError
-        If the motion cannot be followed to an instant (with `strict`); it holds the motion up to there.
+        If the motion cannot be followed to an instant (with `strict`); the error holds the motion so far.
     UnsupportedError
-        If JAX traces anything but values of the mechanism; by those, outputs are differentiated.
+        If JAX traces anything but values of the mechanism. Outputs can be differentiated by those values.
 
     Examples
     --------
@@ -139,7 +139,7 @@ def solve(
     outcome = solution.status, solution.faults, path.change_points
     backend = _backend(solver, path, instants)
     _check_count(solver.model, path)
-    history: Any = partial(history_of, path.anchors)  # made when somebody asks for turns
+    history: Any = partial(history_of, path.anchors)  # made when turns are requested
     motion = actuated(Motion(mechanism, solver.model, instants, order, state, *outcome, history, backend))
     check_room(motion)
     if strict:
@@ -161,8 +161,8 @@ def solve_in_chunks(
 ) -> ChunkedMotion:
     """Follow a motion as `jounce.solve` does, and solve its instants chunk by chunk, as the caller iterates.
 
-    Memory contains one chunk at a time, of 65,536 instants, and the anchors of the motion, the number of which grows
-    with how far the mechanism moves, not with the number of instants.
+    Memory holds one chunk of 65,536 instants at a time, and the anchors of the motion, whose number grows with the
+    distance that the mechanism moves, not with the number of instants.
 
     Parameters
     ----------
@@ -177,7 +177,7 @@ def solve_in_chunks(
     Raises
     ------
     MechanismError, AssemblyError, MobilityError, SolveError
-        As `jounce.solve`, for errors that show before the first chunk.
+        As `jounce.solve`, for errors found before the first chunk.
 
     Examples
     --------
@@ -197,7 +197,7 @@ def solve_in_chunks(
 
 
 def checked_settings(mechanism: Mechanism, order: Any, tolerance: float) -> int:
-    """Return the order of derivatives, or raise MechanismError unless mechanism, order and tolerance are valid."""
+    """Return the order as an int, or raise MechanismError if mechanism, order or tolerance is invalid."""
     check_mechanism(mechanism)
     check_holonomic(mechanism, "a motion that is solved")
     order = checked_order(order)
@@ -216,7 +216,7 @@ def checked_settings(mechanism: Mechanism, order: Any, tolerance: float) -> int:
 def _followed(
     mechanism: Mechanism, instants: Instants, order: int, tolerance: float, *, refine: bool
 ) -> tuple[Solver, FollowedPath]:
-    """Return the solver of the instants of a grid, and the motion followed from the first instant to the last."""
+    """Return the solver of a grid, and the motion followed from its first instant to its last."""
     first, last = float(instants[0]), float(instants[-1])
     lost = lost_orders(mechanism.outputs.values())
     of_forces = any(output.of_forces for output in mechanism.outputs.values())
@@ -224,7 +224,7 @@ def _followed(
     guessed = build(chosen(with_output_drivers(mechanism), first))
     expect(len(instants))
     settings = max(order + lost, LOWEST_ORDER), float(tolerance), refine, order
-    if not guessed.system.rank_is_open:  # else its program depends on the assembled bodies
+    if not guessed.system.rank_is_open:  # otherwise the program depends on the assembled bodies
         prepare_later(Solver(guessed, *settings).prepare, "take_steps", guessed.system, settings[0])
     try:
         model, coordinates = assemble(guessed, first, tolerance)
@@ -249,7 +249,7 @@ def _followed(
 
 
 def _check_count(model: Model, path: FollowedPath) -> None:
-    """Raise SolveError where gears in space have lost count of their turns on the way."""
+    """Raise SolveError where spatial gears have lost count of their turns on the way."""
     groups = [group for group in model.system.groups if getattr(group.element, "whole", None) is not None]
     history = history_of(path.anchors) if groups else None
     lost = None if history is None else lost_count(model.system.groups, history)
@@ -263,12 +263,12 @@ def _check_count(model: Model, path: FollowedPath) -> None:
 
 
 def _backend(solver: Solver, path: FollowedPath, instants: Instants) -> str:
-    """Return the back ends that have followed a motion and that solve the instants of a long grid."""
+    """Return the backends that followed a motion and that solve the instants of a long grid."""
     return joined({*path.backends, *([solver.backend] if len(instants) > LONG_GRID else [])})
 
 
 def raise_for_status(motion: Any) -> None:
-    """Raise SolveError, with the first instant that failed and what to do, unless all were solved."""
+    """Raise SolveError, with the first failed instant and a remedy, unless all instants were solved."""
     failed = np.flatnonzero(motion.status)  # OK is zero
     if not failed.size:
         return
@@ -283,7 +283,7 @@ def raise_for_status(motion: Any) -> None:
 
 
 def checked_order(order: Any) -> int:
-    """Return the order of derivatives, or raise MechanismError."""
+    """Return the order of derivatives as an int, or raise MechanismError if it is invalid."""
     whole = isinstance(order, numbers.Integral) and not isinstance(order, bool)
     if not whole or not 0 <= int(order) <= HIGHEST_ORDER:
         message = f"the order of derivatives must be a whole number from 0 to {HIGHEST_ORDER}"
@@ -292,6 +292,6 @@ def checked_order(order: Any) -> int:
 
 
 def _failure(instant: float, status: Status, fault: str) -> str:
-    """Say when and where a motion failed, how, and what to do."""
+    """Return a message with the instant of a failure, its kind, and a remedy."""
     where = f"t = {instant:g} s" + (f", {fault}" if fault else "")
     return f"{where}: {status.name.lower().replace('_', ' ')}: {status.advice}"

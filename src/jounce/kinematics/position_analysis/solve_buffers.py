@@ -1,4 +1,4 @@
-"""Buffers in which a thread solves many instants in rounds: they stay in its cache, and results are copied out."""
+"""Buffers in which a thread solves many instants in rounds; they stay in its cache, and results are copied out."""
 
 import threading
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -19,26 +19,26 @@ Rounds = Int[np.ndarray, "round width"]
 
 
 class SolveBuffer:
-    """The memory of a thread, for some instants after others.
+    """Memory in which one thread solves one set of instants after another.
 
-    Of the instants of one motion all states are kept, as others start from them, and the anchors lie behind them. Of
-    many designs, whose instants start from anchors or from the round before, nothing is kept but outputs.
+    For one motion, the states of all instants are kept, since others start from them, with the anchors behind them. For
+    many designs, whose instants start from anchors or from the round before, only outputs are kept.
 
     Parameters
     ----------
     solver : Solver
-        What solves the instants.
+        Solver of the instants.
     like : tuple
-        The state of an instant.
+        State of an instant, as an example of the form.
     size, anchors : int
-        The most instants and anchors that it is for.
+        Largest number of instants, and of anchors.
 
     Attributes
     ----------
     first_anchor : int
-        Index of the first anchor among what instants may start from.
+        Index of the first anchor among the states from which instants may start.
     state : tuple
-        Jets of coordinates and outputs, and the sign, of all instants; None for what is not kept.
+        Jets of coordinates and outputs, and the sign of the determinant, of all instants; None for parts not kept.
     status : array of int, shape (size,)
     """
 
@@ -62,7 +62,7 @@ class SolveBuffer:
         self.rounds: Rounds = np.zeros((0, self.width), np.int64)
 
     def put_anchors(self, parts: Iterable[Sequence[np.ndarray]]) -> None:
-        """Put anchors to where instants start from: parts of each leaf of their state, anchors last."""
+        """Store the anchors: for each leaf of their state, the parts to concatenate along the last axis."""
         for whole, columns in zip(jax.tree.leaves(self._known), parts, strict=True):
             count = sum(x.shape[-1] for x in columns)
             np.concatenate(columns, axis=-1, out=whole[..., self.first_anchor : self.first_anchor + count])
@@ -74,19 +74,19 @@ class SolveBuffer:
         rounds: Rounds,
         own: Mapping[int, np.ndarray] = MappingProxyType({}),
     ) -> None:
-        """Take up instants, s.
+        """Load instants to be solved.
 
         Parameters
         ----------
         time : array of shape (time,)
-            s.
+            Instants, s.
         sources : tuple of array, shape (time,)
-            What each starts from, an instant, an anchor, or below zero its lane of the round before; and the time from
-            there, s.
+            Source of each instant (an instant, an anchor, or, if negative, its lane of the round before), and the time
+            step from there, s.
         rounds : array of int, shape (rounds, lanes)
-            In which they are solved.
+            Instants of each round.
         own : dict of int to array, optional
-            The values of their designs, designs last; each has as many of the instants.
+            Values of the designs, designs last; each design has the same number of the instants.
         """
         count = len(time)
         self.time[:count], self.rounds = time, rounds
@@ -96,11 +96,11 @@ class SolveBuffer:
             whole[..., :count].reshape(*whole.shape[:-1], designs, -1)[...] = own[k][..., None]
 
     def solve(self) -> None:
-        """Solve the instants that were taken up last."""
+        """Solve the instants loaded last."""
         self._run(self.rounds)
 
     def results(self, count: int) -> tuple[Any, Indices]:
-        """Return the states and the outcome of so many of them."""
+        """Return the states and outcomes of the first `count` instants."""
         return jax.tree.map(lambda x: x[..., :count], self.state), self.status[:count]
 
 
@@ -111,24 +111,24 @@ def solve_in_buffers(
     put: Callable[[Item, Any, Indices], None],
     each: Callable[[Callable[[Item], int], Iterable[Item]], Iterator[int]],
 ) -> Iterator[int]:
-    """Solve items, each in a buffer, and yield how many instants each of them has.
+    """Solve items, each in a buffer, and yield the number of instants of each.
 
     Parameters
     ----------
     new : callable
         Makes a buffer for a thread.
     items : sequence
-        What is solved.
+        Items to solve.
     begin : callable
         Loads an item into a buffer, and returns its number of instants.
     put : callable
-        Takes over the states of the instants of an item, and the outcome of each. It may be called from several threads
-        at once; the arrays are used again after it.
+        Stores the states and outcomes of the instants of an item. Several threads may call it at once; the arrays are
+        reused after the call.
     each : callable
-        In the manner of `map`; it may call from several threads at once.
+        Works like `map`; it may call from several threads at once.
     """
-    idle_buffers: list[SolveBuffer] = []  # those of threads that are between two items
-    lock = threading.Lock()  # many short operations go faster one thread after another than in turns for Python's lock
+    idle_buffers: list[SolveBuffer] = []  # of threads between two items
+    lock = threading.Lock()  # short operations run faster one thread at a time than contending for Python's lock
 
     def solve(item: Item) -> int:
         with lock:

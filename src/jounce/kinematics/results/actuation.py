@@ -1,4 +1,4 @@
-"""Actuation: the motion of the drivers that move outputs along their laws."""
+"""Actuation: the motion of drivers that make outputs follow laws."""
 
 import dataclasses
 
@@ -17,10 +17,10 @@ from jounce.trajectory import HermiteMotion
 
 
 def actuated(motion: Motion) -> Motion:
-    """Return a motion for which outputs were held to their laws as that of the drivers that move them.
+    """Return a motion that was solved with outputs held to their laws as the motion of the drivers that move them.
 
-    The bodies move as they did; drivers have the laws found, so that forces are theirs. Any other motion is returned as
-    it is.
+    The bodies move as before. The drivers have the laws found, so that forces are those of the drivers. Any other
+    motion is returned unchanged.
     """
     mechanism = motion.mechanism
     led = output_laws(mechanism)
@@ -34,23 +34,24 @@ def actuated(motion: Motion) -> Motion:
 
 
 def _law(motion: Motion, name: str) -> HermiteMotion:
-    """Return the law of a driver through all derivatives that there are, those beyond the order of the motion too."""
+    """Return the law of a driver through all its derivatives, including those beyond the order of the motion."""
     derivatives = np.asarray(plain_derivatives(np.asarray(motion.driver_coefficients(name))[:, 0]))
     solved = motion.status == Status.OK
     return HermiteMotion(motion.time[solved], derivatives.T[solved])
 
 
 def _row_scale(mechanism: Mechanism, driven: Model, instant: float) -> Float[np.ndarray, "row 1"]:
-    """Return the scales of the rows of drivers and joints, where the outputs were held first.
+    """Return the row scales of drivers and joints at the first instant, at which the outputs were held.
 
-    Laws do not matter to them, and those found have as many pieces as there were instants: a program for each number.
+    The scales do not depend on the laws. The mechanism without them is used, because laws found by a motion have one
+    piece per instant, and each number of pieces would compile another program.
     """
     displace = Displacements(build(without_output_laws(mechanism)), instant)
     return displace.at(driven.reference).jacobian.row_scale[:, None]
 
 
 def _counted(model: Model, driven: Model, row_scale: Float[np.ndarray, "row 1"]) -> Model:
-    """Return the model of the drivers with all that was found when the outputs were held."""
+    """Return the model of the drivers, with angle counts, forces and rank of the model that held the outputs."""
     groups, held = counted_as_in(model.system.groups, driven), driven.system
     known = {"forces": held.forces, "outputs": held.outputs, "row_scale": row_scale, "rank": held.rank}
     system = with_fields(model.system, groups=groups, **known)

@@ -1,4 +1,4 @@
-"""The result of a solve: outputs and any point of any body, with their derivatives, at every instant."""
+"""The result of a solve: outputs and points of bodies, with their derivatives, at every instant."""
 
 import dataclasses
 import itertools
@@ -52,32 +52,31 @@ class Motion(Tabulated):
     Attributes
     ----------
     mechanism : Mechanism
-        What was solved.
+        The mechanism solved.
     model : Model
         The numeric model, with the drivers of the mechanism.
     solved_model : Model
-        The one that was solved: the same, unless drivers follow from outputs, which are held there in their place.
-    time : numpy.ndarray of shape (time,)
+        The model that was solved: the same, unless drivers follow from outputs; then it holds the outputs instead.
         Instants, s.
     order : int
         Highest derivative of the outputs.
     status : numpy.ndarray of int, shape (time,)
         Outcome at each instant, see `Status`; where it is not 0, all results are NaN.
     faults : dict of int to str
-        For the instants that failed, by index: the body farthest from its prediction, or the driver at fault.
+        Body farthest from its prediction, or driver at fault, for each instant that failed, by index.
     change_points : numpy.ndarray of shape (points,)
-        When the motion passed a singular position smoothly, where assembly branches cross, s: there another motion
-        could have branched off, and forces are not determined: they are NaN there, and so are their rates where
+        Instants at which the motion passed a singular position smoothly, where assembly branches cross, s. Another
+        motion could have branched off there. Forces are not determined there and are NaN, as are their rates where
         rounding decides them.
     passages : tuple of ChangePoint
-        The same, each with the radius of the Taylor series of the motion there.
+        The change points, each with the radius of the Taylor series of the motion there.
     derived : dict
-        Values computed from the motion that may be needed again, by name: the forces, for one.
+        Values computed from the motion and kept for reuse, by name, such as the forces.
     backend : str
-        What computed the numbers: "llvm", machine code, "xla", with the device unless it is the processor, or both.
+        Backend that computed the numbers: "llvm" (machine code), "xla" (with the device, if not the CPU), or both.
 
-    It is assembled from the Taylor coefficients of the coordinates of all bodies, or what computes them, and the
-    derivatives of the outputs, (order + 1, components, instances, time) for each group.
+    A motion is made from the Taylor coefficients of the coordinates of all bodies, or a function that computes them,
+    and the derivatives of the outputs, (order + 1, components, instances, time) for each group.
 
     Examples
     --------
@@ -87,7 +86,7 @@ class Motion(Tabulated):
     """
 
     traced = False  # by JAX
-    check_idle: Callable[[dict[str, AbstractQuantity]], None] | None = None  # raises for what depends on idle motions
+    check_idle: Callable[[dict[str, AbstractQuantity]], None] | None = None  # raises if outputs depend on idle motions
 
     def __init__(
         self,
@@ -110,42 +109,42 @@ class Motion(Tabulated):
         self.model, self.solved_model, self._history = model, model, history
         self._bodies, self._groups = state[0], dict(zip(model.outputs, state[1], strict=True))
         self._known_outputs: dict[str, Any] = {}
-        self._actuated: Mechanism | None = None  # with laws, where those of drivers follow from outputs
+        self._actuated: Mechanism | None = None  # with the laws found, if drivers follow from outputs
 
     @cached_property
     def _coordinates(self) -> dict[str, Any]:
-        """Taylor coefficients of the coordinates of all bodies, computed again where they were not kept."""
+        """Taylor coefficients of the coordinates of all bodies, computed again if they were not kept."""
         return self._bodies() if callable(self._bodies) else self._bodies
 
     @cached_property
     def history(self) -> AttitudeHistory | None:
-        """Attitudes that all bodies in space went through, by which turns are counted; None where none are kept."""
+        """Attitudes of spatial bodies along the motion, from which turns are counted; None where none are kept."""
         return self._history() if callable(self._history) else self._history
 
     @property
     def poses(self) -> tuple[type, dict[str, Any]]:
-        """Type of the poses of all bodies, the ground first, and Taylor coefficients of their coordinates by name."""
+        """Type of the poses, and Taylor coefficients of the coordinates of all bodies by name, the ground first."""
         return self.model.pose_type, self._coordinates
 
     @cached_property
     def forces(self) -> tuple[Group, ...]:
-        """The applied forces, in the groups of the model, with the turns of angles about axes at every instant."""
+        """Applied forces in the groups of the model, with turns of angles about axes at every instant."""
         return self._counting(self.model.system.forces)
 
     @property
     def counted_outputs(self) -> tuple[Group, ...]:
-        """The outputs of poses, in the groups of the model, with the turns of angles about axes at every instant."""
+        """Outputs of poses in the groups of the model, with turns of angles about axes at every instant."""
         return self._counting(self.model.system.outputs)
 
     @property
     def continued_outputs(self) -> tuple[Float[np.ndarray, "component instance time"], ...]:
-        """Values of the outputs of poses that are angles in a range, made continuous, for each group of such."""
+        """Values of wrapped angles among the outputs of poses, made continuous, for each group of them."""
         pairs = zip(self._groups.values(), self.model.system.outputs, strict=True)
         continued: Any = tuple(self._continued(g, c)[0] for c, g in pairs if getattr(g.element, "wraps", ()))
         return continued
 
     def moved_by(self, model: Model, actuated: Mechanism) -> "Motion":
-        """Return the same motion of the same bodies, with a model of the drivers that move them, and their laws."""
+        """Return the same motion with a model of the drivers that move the bodies, and the laws of these drivers."""
         state = self._bodies, tuple(self._groups.values())
         outcome = self.status, self.faults, self.passages, self._history, self.backend
         motion = Motion(self.mechanism, model, self.time, self.order, state, *outcome)
@@ -154,9 +153,9 @@ class Motion(Tabulated):
 
     @property
     def actuated(self) -> Mechanism:
-        """The mechanism with laws of all drivers: those that follow from outputs are the ones found by this motion.
+        """The mechanism with laws of all drivers; for drivers that follow from outputs, those found by this motion.
 
-        They go through the instants of the motion with all derivatives, and say nothing beyond its first and last.
+        These laws interpolate all derivatives at the instants of the motion, and end at its first and last instants.
         """
         return self.mechanism if self._actuated is None else self._actuated
 
@@ -166,7 +165,7 @@ class Motion(Tabulated):
         Parameters
         ----------
         name : str
-            Of the driver.
+            Name of the driver.
 
         Returns
         -------
@@ -176,7 +175,7 @@ class Motion(Tabulated):
         Raises
         ------
         MechanismError
-            If there is no such driver, or its class does not say what its coordinate is.
+            If there is no such driver, or its class does not define its coordinate.
 
         Examples
         --------
@@ -190,7 +189,7 @@ class Motion(Tabulated):
         return self.evaluate((DriverAngleOutput if turning else DriverDisplacementOutput)(name), name)
 
     def driver_law(self, name: str) -> HermiteMotion:
-        """Return the law of a driver: through the instants that were solved, with the derivatives of the motion.
+        """Return the law of a driver through the solved instants, with the derivatives of the motion.
 
         Raises
         ------
@@ -201,7 +200,7 @@ class Motion(Tabulated):
         return HermiteMotion(self.time[solved], values[solved])
 
     def driver_coefficients(self, name: str) -> Float[Numbers, "order 1 time"]:
-        """Return the Taylor coefficients of the coordinate of a driver, as the bodies have it."""
+        """Return the Taylor coefficients of the coordinate of a driver, from the poses of its bodies."""
         bare: Any = dataclasses.replace(self.mechanism.drivers[name], motion=0.0)
         return self._coefficients(output_group(bare, self.mechanism, self.model, f"drivers.{name}"))[:, :, 0]
 
@@ -214,15 +213,15 @@ class Motion(Tabulated):
     def outputs(self) -> Mapping[str, Any]:
         """Outputs by name: arrays of shape (time, order + 1) or (time, order + 1, component), SI.
 
-        The nine components of a rotation matrix stand row by row. An output is computed when it is first requested. Its
+        The nine components of a rotation matrix are in row-major order. An output is computed on first request. Its
         array is read-only, since the motion uses it; `numpy.array` copies it.
         """
-        # not kept, as it refers to the motion: its arrays are to go with the last reference, not with the next search
+        # not cached, as it refers to the motion: the last reference frees the arrays, without garbage collection
         outputs = OnDemand(self.mechanism.outputs, self._outputs_with, self._known_outputs)
-        return dict(outputs) if self.traced else outputs  # what JAX traces is a plain tree
+        return dict(outputs) if self.traced else outputs  # JAX needs a plain tree
 
     def _outputs_with(self, name: str) -> dict[str, Any]:
-        """Return an output, and those that are found with it."""
+        """Return an output, and the others of its group, by name."""
         output = self.mechanism.outputs[name]
         if isinstance(output, AbstractMotionOutput):
             return read_only_arrays({name: self._derivatives(output.coefficients(self))})
@@ -231,7 +230,7 @@ class Motion(Tabulated):
         return read_only_arrays(dict(zip(names, self._each_shown(self._continued(group, values)), strict=True)))
 
     def _each_shown(self, values: Float[Numbers, "order component instance time"]) -> Sequence[Any]:
-        """Return each output of a group as `outputs` has it."""
+        """Return each output of a group in the form of `outputs`."""
         return [self._shown(values[:, :, k]) for k in range(values.shape[2])]
 
     @cached_property
@@ -239,9 +238,7 @@ class Motion(Tabulated):
         """Outputs as an `xarray.Dataset` with dimensions time, derivative and component; units in the attributes.
 
         Euler parameters have the dimension euler_parameter instead of component, Euler angles euler_angle, and rotation
-        matrices row_axis and column_axis.
-
-        The unit of a variable is that of its derivative 0; each derivative adds ``/s``.
+        matrices row_axis and column_axis. The unit of a variable is that of derivative 0; each derivative adds ``/s``.
         """
         import xarray
 
@@ -267,7 +264,7 @@ class Motion(Tabulated):
         Returns
         -------
         xarray.DataArray
-            Dimensions time, derivative, component; m and its derivatives by s.
+            Dimensions time, derivative, component; m and its time derivatives.
         """
         return self.evaluate(PointOutput(body, point), name="position")
 
@@ -278,12 +275,12 @@ class Motion(Tabulated):
     def angular_velocity(self, body: str, frame: str = "global") -> "xarray.DataArray":
         """Return the angular velocity of a body and its derivatives, rad/s, in the frame ``global`` or ``body``.
 
-        The highest derivative of the motion is used up: the result has one order less.
+        The result has one order less than the motion.
         """
         return self.evaluate(AngularVelocityOutput(body, frame), name="angular_velocity")
 
     def evaluate(self, output: AbstractOutput | AbstractMotionOutput, name: str = "output") -> "xarray.DataArray":
-        """Return any output, as an `xarray.DataArray`, without solving again.
+        """Return any output as an `xarray.DataArray`, without solving again.
 
         Raises
         ------
@@ -303,21 +300,21 @@ class Motion(Tabulated):
         return self._labeled(name, values, given)
 
     def series(self, output: AbstractQuantity) -> Float[Numbers, "order component time"]:
-        """Return the Taylor coefficients of any output, (levels, components, time), angles up to whole turns."""
+        """Return the Taylor coefficients of any output, (order + 1, components, time), angles modulo whole turns."""
         if isinstance(output, AbstractMotionOutput):
             return output.coefficients(self)
         posed: Any = output
         return self._coefficients(output_group(posed, self.mechanism, self.model))[:, :, 0]
 
     def _check_order(self, output: AbstractQuantity, name: str) -> None:
-        """Raise MechanismError for an output that takes more derivatives than the motion has."""
+        """Raise MechanismError for an output that needs more derivatives than the motion has."""
         levels = len(self.poses[1]["position"])
         if output.lost_orders >= levels:
             message = f"needs the motion to order {output.lost_orders}, and it was solved to order {levels - 1}"
             raise MechanismError(f"{message}: solve it to a higher order", name=name)
 
     def _check_finite(self, values: Float[np.ndarray, "time derivative *component"], name: str) -> None:
-        """Raise MechanismError for the first instant that was solved and at which an output is not finite."""
+        """Raise MechanismError for the first solved instant at which an output is not finite."""
         finite = np.isfinite(values).all(axis=tuple(range(2, values.ndim)))
         bad = ~finite & (self.status == Status.OK)[:, None]
         if bad.any():
@@ -329,7 +326,7 @@ class Motion(Tabulated):
     def _continued(
         self, group: Group, coefficients: Float[Numbers, "order component instance time"]
     ) -> Float[Numbers, "order component instance time"]:
-        """Return Taylor coefficients of outputs, or derivatives, of which angles have the turns made on the way."""
+        """Return Taylor coefficients or derivatives of outputs, with the turns of angles counted along the motion."""
         element = group.element
         if not (measures_angle(group) or getattr(element, "wraps", ())) or (history := self._attitudes) is None:
             return coefficients
@@ -346,13 +343,13 @@ class Motion(Tabulated):
 
     @property
     def _attitudes(self) -> AttitudeHistory | None:
-        """The attitudes of all bodies along the motion, where they are known."""
+        """Attitudes of all bodies along the motion, where they are known."""
         return self.history
 
     def _coefficients(self, group: Group) -> Float[Numbers, "order component instance time"]:
         """Return the Taylor coefficients of outputs, (order + 1, components, instances, time).
 
-        The program is given the ground, which never moves, and the bodies of the group alone: it serves any others.
+        The compiled program receives only the ground and the bodies of the group, so that it serves any other bodies.
         """
         moving, index = [body for slot in group.bodies for body in slot if body], itertools.count(1)
         indices = tuple(tuple(next(index) if body else 0 for body in slot) for slot in group.bodies)
@@ -368,11 +365,11 @@ class Motion(Tabulated):
     def _derivatives(
         self, coefficients: Float[Numbers, "order component time"]
     ) -> Float[np.ndarray, "time derivative *component"]:
-        """Turn Taylor coefficients into derivatives."""
+        """Return the derivatives that Taylor coefficients stand for, in the shape of an output."""
         return self._shown(plain_derivatives(np.asarray(coefficients[: self.order + 1])))
 
     def _shown(self, values: Float[Numbers, "order component time"]) -> Float[np.ndarray, "time derivative *component"]:
-        """Turn derivatives (order, component, time) into those shown (time, derivative[, component]), NaN if failed."""
+        """Reshape derivatives (order, component, time) to (time, derivative[, component]), NaN at failed instants."""
         values = np.moveaxis(np.asarray(values[: self.order + 1]), -1, 0)
         if (failed := self.status != Status.OK).any():
             values = np.where(failed[:, None, None], np.nan, values)

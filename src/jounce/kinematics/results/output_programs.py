@@ -1,4 +1,4 @@
-"""The programs of outputs that follow from a motion, made while it is solved."""
+"""Programs of outputs that follow from a motion, compiled while the motion is solved."""
 
 import numpy as np
 
@@ -10,14 +10,14 @@ from jounce.mechanism.transmissions.axis_angles import AttitudeHistory
 
 
 def prepare_outputs(mechanism: Mechanism, model: Model, order: int) -> None:
-    """Have the programs made in another thread that outputs of a mechanism need of any motion of a model.
+    """Compile, in another thread, the programs that the outputs of a mechanism need of a motion.
 
     Parameters
     ----------
     mechanism : Mechanism
-        Drivers that follow from its outputs are not known before its motion: there is nothing to be done then.
+        If drivers follow from its outputs, they are unknown before the motion, and nothing is compiled.
     model : Model
-        Of its bodies.
+        Model of its bodies.
     order : int
         Highest Taylor coefficient of the motion.
     """

@@ -1,4 +1,4 @@
-"""Outputs that follow from the poses of bodies at an instant, of many instants at once."""
+"""Outputs of poses, evaluated at many instants at once."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -21,7 +21,7 @@ from jounce.mechanism.transmissions.axis_angles import angles_of, of_one_lane, w
 
 
 def check_output(output: AbstractQuantity, mechanism: Mechanism, name: str = "output") -> None:
-    """Raise MechanismError unless an output names what the mechanism has, and exists in its space."""
+    """Raise MechanismError if an output names missing elements, or does not exist in the space of the mechanism."""
     mechanism.check_fit(output, name)
     output.check(mechanism)
 
@@ -29,9 +29,9 @@ def check_output(output: AbstractQuantity, mechanism: Mechanism, name: str = "ou
 def output_group(
     output: AbstractOutput | AbstractConstraint, mechanism: Mechanism, model: Model | None = None, name: str = "output"
 ) -> Group:
-    """Return an output of poses, or a driver for its coordinate, as a group of one, on the pose of all bodies.
+    """Return an output of poses, or the coordinate of a driver, as a group of one that takes the poses of all bodies.
 
-    With a model, angles about axes are counted as those of the outputs that it was assembled with.
+    With a model, angles about axes are counted as in the outputs of the assembled model.
     """
     index = {body: k for k, body in enumerate((GROUND, *mechanism.bodies))}
     components = POSITION_COMPONENTS[mechanism.space]
@@ -52,7 +52,7 @@ def output_series(
 def series_along(
     groups: tuple[Group, ...], coordinates: dict[str, Any], pose_type: type
 ) -> tuple[Float[Numbers, "_ _ _ batch"], ...]:
-    """Return what `output_series` does for instants whose turns of angles about axes the groups hold."""
+    """Return the result of `output_series` for groups that hold the turns of angles about axes at each instant."""
     lanes = coordinates, angles_of(groups)
     return _of_instant.along(of_one_lane(groups), lanes, pose_type=pose_type)
 

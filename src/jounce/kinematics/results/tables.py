@@ -1,4 +1,4 @@
-"""Results as other libraries take them: a variable for each derivative with its own unit, or a table of pandas."""
+"""Results as xarray data sets with a variable and a unit for each derivative, and as pandas tables."""
 
 from __future__ import annotations
 
@@ -21,30 +21,30 @@ FORMS = ("stacked", "split")
 
 
 class Tabulated(Displayed):
-    """What has a `dataset` with the dimensions time and derivative."""
+    """Base of results with a `dataset` that has the dimensions time and derivative."""
 
     __slots__ = ()
     dataset: Any
 
     def to_dataset(self, derivatives: str = "stacked") -> xarray.Dataset:
-        """Return the results as an `xarray.Dataset` in which the unit of each derivative can be seen.
+        """Return the results as an `xarray.Dataset` that states the unit of each derivative.
 
         Parameters
         ----------
         derivatives : {"stacked", "split"}, default "stacked"
-            Stacked along the dimension ``derivative``, whose coordinate ``derivative_unit`` says by what the unit of a
-            variable is divided there; or split: a variable for each derivative, such as ``psi``, ``psi_d1`` and
-            ``psi_d2``, with its own unit. `pint-xarray` reads those of the latter.
+            "stacked" keeps the dimension ``derivative``, whose coordinate ``derivative_unit`` is the factor by which
+            the unit of a variable is multiplied at each derivative. "split" makes a variable for each derivative, such
+            as ``psi``, ``psi_d1`` and ``psi_d2``, with its own unit, which `pint-xarray` can read.
 
         Returns
         -------
         xarray.Dataset
-            SI; the units are in the attributes ``units``.
+            SI; units in the attributes ``units``.
 
         Raises
         ------
         MechanismError
-            The form is none of these.
+            If `derivatives` is neither.
 
         Examples
         --------
@@ -65,10 +65,10 @@ class Tabulated(Displayed):
         return dataset.assign_coords(derivative_unit=("derivative", units))
 
     def to_dataframe(self) -> pandas.DataFrame:
-        """Return the results as a `pandas.DataFrame`, with names and units in two levels of its columns.
+        """Return the results as a `pandas.DataFrame` whose columns have two levels, name and unit.
 
-        The names are those of the columns of CSV files: ``psi``, ``psi_d1``, ``C_x``, ``C_x_d1``, ... pint-pandas reads
-        the units by ``frame.pint.quantify(level=-1)``.
+        The names are those of the columns of CSV files: ``psi``, ``psi_d1``, ``C_x``, ``C_x_d1``, ... With pint-pandas,
+        ``frame.pint.quantify(level=-1)`` reads the units.
 
         Returns
         -------
@@ -85,7 +85,7 @@ class Tabulated(Displayed):
         import pandas
 
         columns: dict[tuple[str, str], Float[np.ndarray, " time"]] = {}
-        positions: dict[tuple[str, str], tuple[int, ...]] = {}  # so that the derivatives of a component follow it
+        positions: dict[tuple[str, str], tuple[int, ...]] = {}  # sort keys: derivatives follow their component
         variables = list(self.dataset)
         for name, order, part in _by_derivative(self.dataset):
             suffix, unit = f"_d{order}" if order else "", part.attrs["units"]
@@ -101,14 +101,14 @@ class Tabulated(Displayed):
 
 
 def _by_derivative(dataset: xarray.Dataset) -> Iterator[tuple[str, int, xarray.DataArray]]:
-    """Yield name, order and values of each derivative that there is, with its unit."""
+    """Yield name, order and values of each available derivative, with its unit."""
     for name, variable in dataset.data_vars.items():
         if "derivative" not in variable.dims:
             continue
         for order in dataset["derivative"].values.tolist():
             part = variable.sel(derivative=order, drop=True)
             if order and np.isnan(part).all() and not np.isnan(variable.sel(derivative=0)).all():
-                continue  # a quantity that uses up orders has none so high
+                continue  # the quantity uses up orders and has no derivative this high
             unit = derivative_unit(str(variable.attrs.get("units", "1")), order)
             words = f"derivative {order} of {name}" if order else str(name)
             yield str(name), order, part.assign_attrs(units=unit, long_name=words)
