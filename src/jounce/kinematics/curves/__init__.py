@@ -1,1 +1,1 @@
-"""Curves of configurations: the positions of a mechanism with one driver free, through dead and change points."""
+"""Curves of configurations: the positions of a mechanism with one free driver, through dead and change points."""

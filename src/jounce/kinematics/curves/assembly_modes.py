@@ -1,4 +1,4 @@
-"""All assemblies of a mechanism at one instant: from many starts, and along the curves through those found."""
+"""All assemblies of a mechanism at one instant, from many random starts and along the circuits through those found."""
 
 import dataclasses
 from collections.abc import Sequence
@@ -28,11 +28,11 @@ from jounce.mechanism import Mechanism, build, check_mechanism
 from jounce.mechanism.building.preconditions import check_holonomic, concrete
 from jounce.mechanism.carriages import check_without_ends
 
-BATCH = 256  # starts side by side
-OFTEN = 3  # times that each assembly is to be found before it is believed that none is left
-MOST_ROUNDS = 8  # times as many starts as requested, if some were found less often
-CLOSED = 1e-9  # of the residual of a start that led to an assembly
-SAME, SAME_IF_SINGULAR = 1e-6, 1e-3  # rad or sizes of the mechanism
+BATCH = 256  # starts assembled side by side
+OFTEN = 3  # hits of each assembly after which the search counts as complete
+MOST_ROUNDS = 8  # largest multiple of the requested starts, if an assembly was found less often
+CLOSED = 1e-9  # largest residual of an assembly
+SAME, SAME_IF_SINGULAR = 1e-6, 1e-3  # rad or sizes of the mechanism: largest difference of equal assemblies
 NEARLY_SINGULAR = 1e-5  # smallest singular value of the Jacobian
 MOST_SINGULAR = 8
 TOLERANCE = 1e-12
@@ -45,20 +45,20 @@ class Assembly:
     Attributes
     ----------
     number : int
-        From 1, in the order of how far it is from the starting guess.
+        Number from 1, in the order of the distance from the starting guess.
     mechanism : Mechanism
-        With this configuration as its starting guess.
+        The mechanism with this configuration as its starting guess.
     circuit : int or None
-        Which of the circuits it is on, from 1: two assemblies on one circuit can move into each other without being
-        taken apart. None where circuits were not requested.
+        Number of its circuit, from 1: assemblies on one circuit can move into each other without being taken apart.
+        None if circuits were not requested.
     branch : int or None
-        Which of the branches of the circuit, from 1: two on one branch can be driven into each other.
+        Number of its branch of the circuit, from 1: assemblies on one branch can be driven into each other.
     hits : int
-        How many starts led to it; 0 if it was found along a circuit.
+        Number of starts that led to it; 0 if it was found along a circuit.
     distance : float
-        From the starting guess, rad or sizes of the mechanism.
+        Distance from the starting guess, rad or sizes of the mechanism.
     smallest_singular_value : float
-        Of the scaled Jacobian; near zero at a dead point.
+        Smallest singular value of the scaled Jacobian; near zero at a dead point.
     """
 
     number: int
@@ -71,19 +71,19 @@ class Assembly:
 
 
 class Assemblies(Displayed, Sequence[Assembly]):
-    """All assemblies that were found, in the order of how far they are from the starting guess.
+    """All assemblies that were found, in the order of their distance from the starting guess.
 
     Attributes
     ----------
     starts : int
-        How many were made.
+        Number of starts.
     since_last_new : int
-        How many of them came after that which found the last new one: the larger, the less may be missing.
+        Number of starts after the one that found the last new assembly; the larger, the fewer may be missing.
     circuits : tuple of Curve
         One curve of each circuit.
     movable : int
-        How many starts led to configurations in which the mechanism can move although its drivers are held. There is
-        no end of them, so that they are not among the assemblies.
+        Number of starts that led to configurations in which the mechanism can move with its drivers held. Such
+        configurations are infinitely many, so they are not among the assemblies.
     """
 
     def __init__(
@@ -117,12 +117,12 @@ class Assemblies(Displayed, Sequence[Assembly]):
         return self._found[index]
 
     def number(self, number: int) -> Assembly:
-        """Return the assembly of a number, from 1.
+        """Return the assembly with a given number, from 1.
 
         Raises
         ------
         AssemblyError
-            If there is none of this number.
+            If there is no assembly with this number.
         """
         if not isinstance(number, int) or isinstance(number, bool) or not 1 <= number <= len(self):
             message = f"there is no assembly of this number: {len(self)} were found from {self.starts} starts"
@@ -142,30 +142,30 @@ def assemblies(
 ) -> Assemblies:
     """Return all assemblies of a driven mechanism at one instant that many random starts lead to.
 
-    Starts are random poses of all bodies; as many as requested are made, and more, up to eight times as many, while
-    some assembly was found less than three times. The circuits through those found are then traced, which finds what
-    else lies on them.
+    Starts are random poses of all bodies. As many as requested are made, and more, up to eight times as many, while
+    some assembly was found fewer than three times. Tracing the circuits through the assemblies then finds all others on
+    them.
 
     Parameters
     ----------
     mechanism : Mechanism
-        Drivers and joints must leave no degree of freedom.
+        Joints and drivers must leave no degree of freedom.
     time : float, optional
-        Instant, s; the first of the mechanism's own unless given.
+        Instant, s; by default the first of the mechanism's own.
     count : int, default 1024
         Number of starts.
     seed : int, default 0
-        Of the random numbers: the same one gives the same starts.
+        Seed of the random numbers; the same seed gives the same starts.
     circuits : bool, default True
-        Whether to tell the circuit and the branch of each, for which curves are traced; with several drivers only if
-        one is named.
+        Whether to trace the circuits, which determines the circuit and the branch of each assembly; with several
+        drivers only if one is named.
     driver : str, optional
-        Whose value is free on the circuits, where there are several drivers; see `jounce.trace`.
+        Driver whose value is free on the circuits, if there are several; see `jounce.trace`.
 
     Returns
     -------
     Assemblies
-        A sequence, with how many starts were made, and how many since the last new assembly was found.
+        A sequence of assemblies, with the number of starts, and of those since the last new assembly.
 
     Raises
     ------
@@ -174,7 +174,7 @@ def assemblies(
     AssemblyError
         If no start leads to an assembly: a loop cannot close.
     MobilityError
-        If degrees of freedom are left: then there are infinitely many.
+        If degrees of freedom are left, so that assemblies are infinitely many.
 
     Examples
     --------
@@ -206,7 +206,7 @@ class _Configuration:
 
 
 class _Search:
-    """What is known of the assemblies at an instant."""
+    """Search for the assemblies at an instant, with those found so far."""
 
     def __init__(self, mechanism: Mechanism, instant: float):
         self.mechanism, self.instant = dataclasses.replace(mechanism, assembly=None), instant
@@ -228,7 +228,7 @@ class _Search:
             self.add({name: x[..., 0] for name, x in attempt.coordinates.items()}, hits=0)
 
     def from_starts(self, count: int, random: np.random.Generator) -> None:
-        """Look from random starts, until each assembly was found often enough."""
+        """Assemble from random starts until each assembly was found often enough."""
         most = MOST_ROUNDS * count
         while self.starts < count or (self.starts < most and any(x.hits < OFTEN for x in self.configurations)):
             self._round(min(BATCH, most - self.starts), random)
@@ -254,7 +254,7 @@ class _Search:
                 self.since_last_new = 0
 
     def _remove_movable(self) -> bool:
-        """Take singular ones for parts of a curve or a surface once they are many, dead points being few; tell it."""
+        """Drop singular assemblies if too many to be dead points (they form a continuum); return whether any were."""
         singular = [x for x in self.configurations if x.smallest < NEARLY_SINGULAR]
         if len(singular) <= (0 if self.movable else MOST_SINGULAR):
             return False
@@ -263,7 +263,7 @@ class _Search:
         return True
 
     def _random_poses(self, random: np.random.Generator) -> dict[str, np.ndarray]:
-        """Return random poses of all bodies, the ground where it is."""
+        """Return random poses of all bodies; the ground keeps its pose."""
         guess = self.model.guess
         position = np.repeat(np.asarray(guess["position"], float), BATCH, axis=-1)
         position[:, 1:] += self.model.length * random.uniform(-1.0, 1.0, size=position[:, 1:].shape)
@@ -277,7 +277,7 @@ class _Search:
         return {"position": position, "quaternion": quaternion}
 
     def add(self, coordinates: dict[str, np.ndarray], hits: int = 1) -> bool:
-        """Add an assembly, and tell whether it is new; one with a part turned over in its joint is none."""
+        """Add an assembly, and return whether it is new; reject it if a part is turned over in its joint."""
         there = {name: x[..., None] for name, x in coordinates.items()}
         if not np.array_equal(axis_signs(self.system, there), self.axis_signs):
             return False
@@ -293,16 +293,16 @@ class _Search:
         return True
 
     def _polished(self, coordinates: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
-        """Return an assembly to rounding, its planar angles with the whole turns that are nearest to the guess."""
+        """Return an assembly corrected to rounding, with planar angles in the whole turn nearest to the guess."""
         begun = {name: x[..., None] for name, x in coordinates.items()}
         attempt = assemble_from_guess(self.first, self.instant, TOLERANCE, begun)
         if not attempt.closed:
-            return coordinates  # next to a singular position, as good as it gets
+            return coordinates  # near a singular position: no better accuracy is possible
         attempt = nearest_to_guess(self.first, attempt, self.instant) if "angle" in coordinates else attempt
         return {name: x[..., 0] for name, x in attempt.coordinates.items()}
 
     def along_circuits(self, driver: str | None) -> tuple[Curve, ...]:
-        """Trace the circuits of all assemblies, and add what else is on them."""
+        """Trace the circuits of all assemblies, and add the other assemblies on them."""
         circuits: list[Curve] = []
         number = 0
         while number < len(self.configurations):
@@ -311,7 +311,7 @@ class _Search:
                 curves = curve_through(begun, self.instant, driver).connected()
                 circuits.append(curves[0])
                 self.configurations[number].circuit, self.configurations[number].branch = len(circuits), 1
-                before = 0  # branches of the curves through the same change points
+                before = 0  # number of branches on the curves before, through the same change points
                 for curve in curves:
                     self._assign(curve, len(circuits), before)
                     before += len(curve.branches)
@@ -319,7 +319,7 @@ class _Search:
         return tuple(circuits)
 
     def _assign(self, curve: Curve, circuit: int, before: int) -> None:
-        """Tell the circuit and the branch of all assemblies on a curve, whose branches come after so many others."""
+        """Set circuit and branch of all assemblies on a curve; `before` branches of the circuit precede its own."""
         for arc_length in curve.where(curve.first_value):
             coordinates = curve.coordinates_at(arc_length)
             self.add(coordinates, hits=0)
@@ -332,7 +332,7 @@ class _Search:
         return self.configurations[int(np.argmin(away))]
 
     def result(self, circuits: tuple[Curve, ...]) -> Assemblies:
-        """Return the assemblies in the order of how far they are from the starting guess."""
+        """Return the assemblies in the order of their distance from the starting guess."""
         guess = {name: np.asarray(x)[..., 0] for name, x in self.model.guess.items()}
         away = [float(np.linalg.norm(self.tracker.difference(x.coordinates, guess))) for x in self.configurations]
         order = np.argsort(away, kind="stable").tolist()

@@ -1,4 +1,4 @@
-"""From a mechanism to its curve of configurations."""
+"""Tracing the curve of configurations of a mechanism."""
 
 from jounce.base.shapes import Real
 from jounce.errors import MechanismError, whole_number
@@ -9,7 +9,7 @@ from jounce.mechanism import Mechanism, check_mechanism
 from jounce.mechanism.building.preconditions import check_holonomic, concrete
 from jounce.mechanism.carriages import check_without_ends
 
-HIGHEST_ORDER = 8  # of derivatives with respect to arc length: those above are worse than rounding between the points
+HIGHEST_ORDER = 8  # of derivatives with respect to arc length; higher ones lose all digits between the points
 
 
 @concrete
@@ -24,37 +24,38 @@ def trace(
 ) -> Curve:
     """Return the whole curve of configurations of a mechanism, through the dead points of its driver.
 
-    The law of one driver is replaced by an unknown value, and the curve is followed by its arc length: forward, as the
-    value grows at first, until it is closed, or else to both its ends.
+    The law of one driver is replaced by a free value, and the curve is followed by arc length: forward in the direction
+    in which the value grows, until it closes, or else to both its ends.
 
     Parameters
     ----------
     mechanism : Mechanism
-        Driven, or of one degree of freedom; joints may repeat equations of others.
+        Driven, or with one degree of freedom; constraints may be redundant.
     time : float, optional
-        Instant of the start, at which all other drivers are held, s; the first of the mechanism's own unless given.
+        Instant of the start, at which all other drivers are held, s; by default the first of the mechanism's own.
     driver : str, optional
-        Whose value is free, where there are several; ``"time"`` for the instant, while all drivers follow their laws.
+        Driver whose value is free, if there are several; ``"time"`` frees the instant, and all drivers follow their
+        laws.
     order : int, default 2
         Highest derivative of the outputs with respect to arc length, up to 8.
     count : int, default 361
         Number of points, evenly spaced in arc length; limit positions and change points are added to them.
     length : float, default 200
-        Largest arc length, rad or sizes of the mechanism, to either side: not every curve is closed.
+        Largest arc length on either side of the start, rad or sizes of the mechanism; not every curve closes.
 
     Returns
     -------
     Curve
-        With its limit positions, change points, branches, and outputs along it.
+        The curve with its limit positions, change points, branches and outputs.
 
     Raises
     ------
     MechanismError
-        If the mechanism or an option is not valid, or it is not said which of several drivers is free.
+        If the mechanism or an option is not valid, or if none of several drivers is named.
     AssemblyError
         If the bodies cannot be assembled at the start.
     MobilityError
-        If there is more than one degree of freedom with the driver free, or none.
+        If there is not exactly one degree of freedom with the driver free.
     SingularityError
         If the start is a change point.
 

@@ -1,4 +1,4 @@
-"""The assembly that a mechanism asks for, among all that there are."""
+"""The assembly that a mechanism selects among all of its assemblies."""
 
 import dataclasses
 from collections.abc import Mapping
@@ -12,16 +12,16 @@ from jounce.mechanism import Mechanism, build
 from jounce.mechanism.mechanism import NEAREST, SIDES
 from jounce.rigid.planar import PlanarPose
 
-DIFFERENT = 1e-6  # sizes of the mechanism, by which a wish must distinguish assemblies
+DIFFERENT = 1e-6  # sizes of the mechanism: least distance by which a selection must distinguish assemblies
 
 
 def chosen(mechanism: Mechanism, instant: float) -> Mechanism:
-    """Return a mechanism whose starting guess is the assembly that it asks for; itself where it asks for none.
+    """Return a mechanism whose starting guess is the assembly that it selects; unchanged if it selects none.
 
     Raises
     ------
     AssemblyError
-        If there is no assembly of the number, or a wish does not distinguish assemblies.
+        If there is no assembly with the number, or the selection fits several assemblies.
     """
     wish = mechanism.assembly
     if wish is None:
@@ -44,7 +44,7 @@ def _guesses(mechanism: Mechanism, picked: Assembly) -> dict:
 
 
 def _by_wish(candidates: Assemblies, wish: Mapping[str, str]) -> Assembly:
-    """Return the assembly in which each body lies farthest to the side wished for, the first wish first."""
+    """Return the assembly in which each body lies farthest toward its side; the first body has priority."""
     left = list(candidates)
     for body, side in wish.items():
         axis, sign = SIDES[side]
@@ -59,7 +59,7 @@ def _by_wish(candidates: Assemblies, wish: Mapping[str, str]) -> Assembly:
 
 
 def _middle(mechanism: Mechanism, body: str) -> np.ndarray:
-    """Return the middle of the points that joints have on a body, in the global frame, else its origin."""
+    """Return the mean of the joint points on a body in the global frame; its origin if there are none."""
     model = build(mechanism)
     number = 1 + list(mechanism.bodies).index(body)
     points = [

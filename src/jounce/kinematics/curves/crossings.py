@@ -1,8 +1,8 @@
-"""Change points: where branches of a curve of configurations cross, and in which directions they leave.
+"""Change points: positions where branches of a curve of configurations cross, and the directions of the branches.
 
-Along a branch that passes through, the series is smooth, while the bordered Jacobian is singular there. So the crossing
-is located on the series, and its directions follow from the rows at second order: of all directions that the first
-order allows, those that every vanishing combination of rows allows at the second (theory: Lyapunov and Schmidt).
+Along a branch through a change point the series is smooth, while the bordered Jacobian is singular. The crossing is
+therefore located on the series. Its directions follow at second order (Lyapunov-Schmidt reduction): of all directions
+that the first order allows, those for which all vanishing combinations of rows vanish at second order, too.
 """
 
 import dataclasses
@@ -15,20 +15,20 @@ from jounce.kinematics.curves.path_tracker import CurvePoint, PathTracker, all_f
 from jounce.kinematics.status import Status
 from jounce.linear_algebra.quadratic_forms import common_zeros, polarized
 
-PASSAGE_ORDER = 8  # of the series that leads through: rounding spoils higher coefficients near a singular point
-NEAR = 0.02  # of the radius of the series: from so near its terms up to that order are good to rounding
-REAL = 0.02  # a singular point whose imaginary part is more than this part of its distance is not on the curve
+PASSAGE_ORDER = 8  # of the series through a change point: rounding spoils higher coefficients near it
+NEAR = 0.02  # of the radius of the series: this close, its terms up to that order are exact to rounding
+REAL = 0.02  # largest ratio of imaginary part to distance for a singular point on the curve
 NEARLY_SINGULAR = 1e-6  # of the largest singular value
-OPEN = 1e-12  # of the residual at the crossing: branches a gap of g apart leave g^2
+OPEN = 1e-12  # largest residual at a crossing: two branches with a gap g between them leave a residual of g^2
 LARGEST_DEPARTURE = 1e-8
-VANISHING = 1e-7  # of second derivatives
-MAX_CORRECTIONS, LOCATED = 6, 1e-9  # of the way there, to which a crossing is located
+VANISHING = 1e-7  # second derivatives below which a form is zero
+MAX_CORRECTIONS, LOCATED = 6, 1e-9  # to locate a crossing; tolerance relative to its distance
 SAME_DIRECTION = 1e-6
-FIRST_STEPS, LARGEST_BEND = (2e-3, 2e-4, 2e-5), 1e-3  # into a branch
-STARTS, STEPS, LONGEST_STEP = 16, 60, 0.3  # on the sphere, for each direction of the first order
+FIRST_STEPS, LARGEST_BEND = (2e-3, 2e-4, 2e-5), 1e-3  # onto a branch
+STARTS, STEPS, LONGEST_STEP = 16, 60, 0.3  # on the unit sphere, for each direction of the first order
 ROUNDING = 1e-12  # of the largest coefficient of the forms
-MOST_MULTIPLE = 4  # directions in which branches touch; more are a surface
-LEAST_ANGLE = 1e-3  # between branches, by the slopes of the forms: nearer ones count as one
+MOST_MULTIPLE = 4  # directions in which branches touch; more form a surface
+LEAST_ANGLE = 1e-3  # between branches, by the slopes of the forms; closer ones count as one
 
 
 @dataclasses.dataclass(frozen=True)
@@ -37,14 +37,14 @@ class ChangePoint:
 
     Attributes
     ----------
-    point : Place
-        With the series of the branch that is followed.
+    center : CurvePoint
+        The change point, with the series of the branch that is followed.
     tangents : array of shape (branches, unknowns)
-        Directions of all branches, the one followed first, of length one in the coordinates.
+        Directions of all branches, the followed one first, of length one in the coordinates.
     dimension : int
-        How many independent directions the first order allows.
+        Number of independent directions that the first order allows.
     decided : bool
-        Whether the second order distinguishes all branches; where it does not, there may be others, or fewer.
+        Whether the second order distinguishes all branches; if not, there may be more or fewer branches.
     """
 
     center: CurvePoint
@@ -58,26 +58,26 @@ class ChangePoint:
 
     @property
     def arc_length(self) -> float:
-        """Where on the curve."""
+        """Arc length of the change point on the curve."""
         return self.center.arc_length
 
     def reversed(self) -> "ChangePoint":
-        """Return it on the curve gone along the other way."""
+        """Return the change point on the curve with reversed direction."""
         tangents = self.tangents.copy()
         tangents[0] *= -1
         return dataclasses.replace(self, center=self.center.reversed(), tangents=tangents)
 
 
 def crossing(tracker: PathTracker, here: CurvePoint, ahead: complex) -> tuple[ChangePoint, CurvePoint] | None:
-    """Return the change point just ahead and the point beyond it, as far from it as this one, if there is one.
+    """Return the change point just ahead, and the point as far beyond it, or None if there is none.
 
     Parameters
     ----------
     tracker : PathTracker
-    here : Place
-        Before it.
+    here : CurvePoint
+        Point before the change point.
     ahead : complex
-        Arc length to the nearest singular point, to first order.
+        Signed arc length to the nearest singular point, to first order.
     """
     near = NEAR * tracker.radius(here, PASSAGE_ORDER - 2)
     if not (0 < ahead.real < near and abs(ahead.imag) <= REAL * ahead.real):
@@ -102,12 +102,12 @@ def crossing(tracker: PathTracker, here: CurvePoint, ahead: complex) -> tuple[Ch
 
 
 def departed(tracker: PathTracker, change_point: ChangePoint, branch: int) -> CurvePoint:
-    """Return a point on a branch a little way off a change point, from which arc length is counted.
+    """Return a point on a branch a little way off a change point; arc length is counted from there.
 
     Raises
     ------
     SolveError
-        If the branch is not there where its direction says it is.
+        If the curve does not follow the direction of the branch.
     """
     direction = change_point.tangents[branch]
     point = tracker.directed(change_point.center, direction)
@@ -123,7 +123,7 @@ def departed(tracker: PathTracker, change_point: ChangePoint, branch: int) -> Cu
 
 
 def _located(tracker: PathTracker, short: CurvePoint, step: float) -> CurvePoint | None:
-    """Return the point on the series where the bordered Jacobian is singular, if the rows hold there."""
+    """Return the point on the series at which the bordered Jacobian is singular, if its residual vanishes."""
 
     def at(step: float) -> tuple[CurvePoint, float]:
         points = tracker.points(short, np.array([step]), corrected=False)
@@ -148,7 +148,7 @@ def _tangents(
 ) -> tuple[Float[np.ndarray, "branch unknown"], bool]:
     """Return the directions of all branches that the second order allows, and whether it distinguishes them."""
     rows = tracker.left_null_space(point.jacobian, NEARLY_SINGULAR)
-    # how combinations of rows that vanish see directions of the first order
+    # second-order forms of the vanishing combinations of rows, on directions of the first order
     forms = polarized(lambda along: rows.T @ tracker.second_order(point, null @ along.T), null.shape[1])
     size = np.max(np.abs(forms), initial=0.0)
     known = null.T @ own
@@ -156,14 +156,14 @@ def _tangents(
         return own[None], False
     zeros, decided = _common_zeros(forms / size)
     along = [x for x in zeros if abs(x @ known) < (1 - SAME_DIRECTION) * np.linalg.norm(known)]
-    decided &= len(along) < len(zeros)  # the branch that is followed is among them
+    decided &= len(along) < len(zeros)  # the followed branch is among the zeros
     others = [null @ x for x in along]
     scaled = [x / np.linalg.norm(x[: tracker.columns]) for x in others]
     return np.stack([own, *scaled]), decided
 
 
 def _common_zeros(forms: Float[np.ndarray, "form k k"]) -> tuple[list[np.ndarray], bool]:
-    """Return unit vectors, up to their sign, on which all forms vanish, and whether each is one by itself."""
+    """Return unit vectors, up to sign, on which all forms vanish, and whether all of these are isolated."""
     count = forms.shape[1]
     single: list[np.ndarray] = []
     several: list[np.ndarray] = []
@@ -175,5 +175,5 @@ def _common_zeros(forms: Float[np.ndarray, "form k k"]) -> tuple[list[np.ndarray
         if all(abs(x @ other) < 1 - least_angle for other in zeros):
             zeros.append(x)
     if len(several) > MOST_MULTIPLE:
-        return single, False  # a surface of them
+        return single, False  # a surface of zeros
     return [*single, *several], not several

@@ -31,40 +31,40 @@ from jounce.mechanism.transmissions.axis_angles import AttitudeHistory
 if TYPE_CHECKING:
     import xarray
 
-SAMPLES = 8  # in each step at which attitudes are looked at for turns
+SAMPLES = 8  # attitudes per step for counting turns
 AXES = ("point", "arc_length", "driver_value")
-MOST_CURVES = 64  # of a circuit
-FULL_TURN = 1e-6  # rad, by which a gain of the driver may differ from whole turns
+MOST_CURVES = 64  # in a circuit
+FULL_TURN = 1e-6  # rad: tolerance of whole turns gained by the driver
 
 
 class CurveSettings(NamedTuple):
-    """How a curve is followed and shown."""
+    """Extent and resolution of a traced curve."""
 
     order: int = 0  # of derivatives of outputs with respect to arc length
     count: int = 2  # of points of the dataset
-    length: float = 200.0  # arc length up to which a curve that does not close is followed
+    length: float = 200.0  # largest arc length of a curve that does not close
 
 
 class Curve(Displayed):
-    """A curve of configurations of a mechanism with the value of one driver free, by arc length.
+    """A curve of configurations of a mechanism with one free driver, by arc length.
 
-    Arc length counts the shifts of the origins of all bodies, in sizes of the mechanism, and the turns of all bodies,
-    in rad: ``ds^2 = sum_b (|dr_b| / L)^2 + |dphi_b|^2`` with L as `size`.
+    Arc length counts the shifts of the origins of all bodies, in sizes of the mechanism, and the rotations of all
+    bodies, in rad: ``ds^2 = sum_b (|dr_b| / L)^2 + |dphi_b|^2`` with L as `size`.
 
     Attributes
     ----------
     mechanism : Mechanism
-        That was traced.
+        The mechanism traced.
     driver : str or None
-        Whose value is free; ``"time"`` where that is the instant, None where nothing is driven.
+        Driver whose value is free; ``"time"`` if the instant is free, None if nothing is driven.
     unit : str
-        Of that value.
+        Unit of the free value.
     first_value : float
-        Of the driver where the trace began; a curve that was followed from a change point begins elsewhere.
+        Driver value at which the trace began; a curve followed from a change point begins elsewhere.
     closed : bool
-        Whether the curve comes back to where it started.
+        Whether the curve returns to its start.
     ends : tuple of str
-        Why it ends where it does: at its start, and at its stop.
+        Why the curve ends, at its start and at its stop.
     """
 
     def __init__(
@@ -98,7 +98,7 @@ class Curve(Displayed):
         return f"<Curve {title}{shape}, length {self.length:.6g}, {counts}>"
 
     def sampled(self, order: int, count: int) -> "Curve":
-        """Return the curve with outputs to another order at another number of points."""
+        """Return the curve with outputs of another order at another number of points."""
         settings = self._settings._replace(order=order, count=count)
         return Curve(self.mechanism, self._free, self._tracker, self._paths, settings)
 
@@ -114,12 +114,12 @@ class Curve(Displayed):
 
     @property
     def _steps(self) -> list[tuple[CurvePoint, float]]:
-        """The points that were solved, and up to where the series of each is used."""
+        """The solved points, each with the arc length up to which its series is used."""
         return list(zip(self._track, [*(point.arc_length for point in self._track[1:]), self.stop], strict=True))
 
     @cached_property
     def limits(self) -> tuple[LimitPosition, ...]:
-        """Limit positions in the order of arc length, located to rounding; none where nothing is driven."""
+        """Limit positions in the order of arc length, located to rounding; empty if nothing is driven."""
         if self.driver is None:
             return ()
         positions = [x for step in self._steps for x in limits_between(*step, self._tracker.value_scale)]
@@ -127,17 +127,17 @@ class Curve(Displayed):
 
     @property
     def turning_points(self) -> tuple[LimitPosition, ...]:
-        """Those limit positions in which the driver turns back."""
+        """Limit positions at which the driver turns back."""
         return tuple(x for x in self.limits if x.kind != "stationary")
 
     @property
     def change_points(self) -> tuple[ChangePoint, ...]:
-        """Where branches cross, in the order of arc length."""
+        """Change points, where branches cross, in the order of arc length."""
         return tuple(self._crossings)
 
     @property
     def turns(self) -> int:
-        """Whole turns that an angular driver gains in going once around a closed curve, negative backwards."""
+        """Whole turns that an angular driver gains once around a closed curve, negative for backward ones."""
         if not self.closed or self.unit != "rad":
             return 0
         gained = (self.value(self.stop) - self.value(self.start)) / WHOLE_TURN
@@ -145,7 +145,7 @@ class Curve(Displayed):
 
     @cached_property
     def branches(self) -> tuple[CurveBranch, ...]:
-        """Branches of this circuit, the one that holds the start first; one if the driver never turns back."""
+        """Branches of this circuit, the one with the start first; a single one if the driver never turns back."""
         if self.driver is None:
             return ()
         ends = [(x.arc_length, x.value) for x in self.turning_points]
@@ -159,13 +159,13 @@ class Curve(Displayed):
 
     @property
     def range(self) -> tuple[float, float]:
-        """Smallest and largest value of the driver on the branch that holds the start; infinite for whole turns."""
+        """Smallest and largest value of the driver on the branch with the start; infinite for whole turns."""
         if self.driver is None or (self.turns and not self.turning_points):
             return (-np.inf, np.inf)
         return self.branches[0].low, self.branches[0].high
 
     def value(self, arc_length: float) -> float:
-        """Return the value of the driver somewhere on the curve."""
+        """Return the value of the driver at an arc length."""
         around, turned = 0.0, self._around(arc_length)
         if self.closed and self.driver is not None:
             around = (arc_length - turned) / self.length * self._gain
@@ -182,7 +182,7 @@ class Curve(Displayed):
         return arc_length
 
     def _at(self, arc_length: float) -> CurvePoint:
-        """Return the point at an arc length, with the series of the nearest of those that were solved."""
+        """Return the point at an arc length by the series of the nearest solved point."""
         known = [point.arc_length for point in self._track]
         after = bisect.bisect_left(known, arc_length)
         near = min(self._track[max(after - 1, 0) : after + 1], key=lambda p: abs(p.arc_length - arc_length))
@@ -194,7 +194,7 @@ class Curve(Displayed):
         Raises
         ------
         MechanismError
-            If the curve does not go there.
+            If the arc length is outside of the curve.
         """
         slack = 1e-9 * max(1.0, self.length)
         if not self.closed and not self.start - slack <= arc_length <= self.stop + slack:
@@ -203,14 +203,14 @@ class Curve(Displayed):
         return posed(self.mechanism, self.coordinates_at(arc_length))
 
     def where(self, value: float) -> list[float]:
-        """Return the arc lengths at which the driver has a value; of an angle whole turns do not count."""
+        """Return the arc lengths at which the driver has a value; whole turns of an angle do not count."""
         if self.driver is None:
             return []
         period = WHOLE_TURN if self.unit == "rad" else None
         return [s for point, stop in self._steps for s in values_between(point, stop, value, period)]
 
     def branch_at(self, arc_length: float) -> int:
-        """Return on which of the branches an arc length is, from 1."""
+        """Return the number, from 1, of the branch at an arc length."""
         for number, branch in enumerate(self.branches, start=1):
             around = (arc_length, arc_length - self.length) if self.closed else (arc_length,)
             if any(branch.start <= s <= branch.stop for s in around):
@@ -223,12 +223,12 @@ class Curve(Displayed):
         return {name: c[0] for name, c in point.coordinates.items()}
 
     def passes(self, coordinates: dict[str, np.ndarray]) -> bool:
-        """Tell whether the curve goes through a configuration."""
+        """Return whether the curve passes through a configuration."""
         steps = ((point, stop - point.arc_length) for point, stop in self._steps)
         return any(step_to_configuration(self._tracker, *step, coordinates) is not None for step in steps)
 
     def connected(self) -> tuple["Curve", ...]:
-        """Return this curve and those that cross it at change points, and those that cross these: the whole circuit."""
+        """Return the whole circuit: this curve and all curves connected with it by change points."""
         curves: list[Curve] = [self]
         waiting: list[Curve] = [self]
         while waiting and len(curves) < MOST_CURVES:
@@ -247,16 +247,16 @@ class Curve(Displayed):
         Parameters
         ----------
         change_point : int
-            Which of `change_points`.
+            Index in `change_points`.
         branch : int, default 1
-            Which of its `tangents`; that of this curve is 0.
+            Index in its `tangents`; that of this curve is 0.
 
         Raises
         ------
         MechanismError
             If there is no such change point or branch.
         SolveError
-            If the branch does not go on in the direction of its tangent.
+            If the curve does not follow the tangent of the branch.
         """
         point = _one_of(self.change_points, change_point, "change_point", "change points")
         _one_of(point.tangents, branch, "branch", "branches")
@@ -265,18 +265,18 @@ class Curve(Displayed):
         return Curve(self.mechanism, self._free, self._tracker, paths, self._settings)
 
     def directions(self, change_point: int) -> list[dict[str, tuple[np.ndarray, np.ndarray]]]:
-        """Return how all bodies move along each branch through a change point, for a unit of arc length.
+        """Return the motion of all bodies along each branch through a change point, per unit of arc length.
 
         Parameters
         ----------
         change_point : int
-            Which of `change_points`.
+            Index in `change_points`.
 
         Returns
         -------
         list of dict
-            For each of its branches, this curve first, by the name of the body: its shift, (2,) or (3,) in m, and its
-            turn, (1,) or (3,) in rad about the axes of the body. The sign of the others is arbitrary.
+            For each branch, this curve first: shift and rotation of each body by name, (2,) or (3,) in m, and (1,) or
+            (3,) in rad about the axes of the body. The signs of the other branches are arbitrary.
         """
         point = _one_of(self.change_points, change_point, "change_point", "change points")
         directions = [self._tracker.parts(tangent) for tangent in point.tangents]
@@ -285,7 +285,7 @@ class Curve(Displayed):
 
     @cached_property
     def arc_lengths(self) -> Float[np.ndarray, " point"]:
-        """Arc lengths of the points of the dataset, evenly spaced, with the limit positions and change points."""
+        """Arc lengths of the points of the dataset: evenly spaced ones, limit positions and change points."""
         special = [x.arc_length for x in (*self.limits, *self.change_points)]
         even = np.linspace(self.start, self.stop, self._settings.count)
         spacing = self.length / max(1, self._settings.count - 1)
@@ -294,7 +294,7 @@ class Curve(Displayed):
 
     @cached_property
     def _points(self) -> tuple[dict[str, np.ndarray], np.ndarray]:
-        """Taylor coefficients of the coordinates and of the value at the points, the points last."""
+        """Taylor coefficients of the coordinates and of the driver value at the points, points last."""
         points = [self._at(s) for s in self.arc_lengths]
         names = points[0].coordinates
         coordinates = {name: np.stack([p.coordinates[name] for p in points], axis=-1) for name in names}
@@ -302,7 +302,7 @@ class Curve(Displayed):
 
     @cached_property
     def _motion(self) -> Motion:
-        """The curve as a motion whose time is arc length: what evaluates outputs."""
+        """The curve as a motion with arc length in the place of time, which evaluates outputs."""
         posed_outputs = {k: v for k, v in self.mechanism.outputs.items() if not isinstance(v, AbstractMotionOutput)}
         taken = set(posed_outputs) & set(AXES)
         if taken:
@@ -328,12 +328,12 @@ class Curve(Displayed):
 
     @cached_property
     def values(self) -> Float[np.ndarray, "point derivative"]:
-        """Value of the driver and its derivatives with respect to arc length at the points."""
+        """Driver value and its derivatives with respect to arc length at the points."""
         return np.asarray(plain_derivatives(self._points[1][: self._settings.order + 1])).T
 
     @cached_property
     def smallest_singular_values(self) -> Float[np.ndarray, " point"]:
-        """Smallest singular value of the scaled Jacobian with the driver held, at the points: zero at dead points."""
+        """Smallest singular values of the scaled Jacobian with the driver held, at the points; zero at dead points."""
         points = [self._at(s) for s in self.arc_lengths]
         points = [dataclasses.replace(point, rows=points[0].rows) for point in points]
 
@@ -346,14 +346,14 @@ class Curve(Displayed):
 
     @cached_property
     def outputs(self) -> Mapping[str, np.ndarray]:
-        """Outputs by name and their derivatives with respect to arc length: (point, derivative) or with components."""
+        """Outputs by name, with derivatives with respect to arc length: (point, derivative) or with components."""
         return self._motion.outputs
 
     @cached_property
     def dataset(self) -> "xarray.Dataset":
         """Outputs as an `xarray.Dataset` with dimensions point, derivative and component.
 
-        The coordinates of a point are ``arc_length`` and, where something is driven, ``driver_value``; derivatives are
+        The coordinates of a point are ``arc_length`` and, if something is driven, ``driver_value``. Derivatives are
         with respect to arc length. Limit positions and change points are among the points.
         """
         dataset = self._motion.dataset.rename(time="point")
@@ -382,7 +382,7 @@ def curve_through(
 
 
 def _one_of(items: Any, number: Any, name: str, what: str) -> Any:
-    """Return one of some, by a number that there is."""
+    """Return an item by index, or raise MechanismError."""
     if not isinstance(number, int) or isinstance(number, bool) or not 0 <= number < len(items):
         there = f"there are {len(items)}, counted from 0" if len(items) else "there are none"
         raise MechanismError(f"no such one among the {what}: {there}", name=name, value=number)

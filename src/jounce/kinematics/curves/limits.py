@@ -1,4 +1,4 @@
-"""Limit positions, where the value of the driver turns back along a curve, read off its series; branches between."""
+"""Limit positions, where the driver turns back along a curve, from its series; and the branches between them."""
 
 import dataclasses
 from typing import Literal
@@ -10,11 +10,11 @@ from numpy.polynomial.polynomial import polyroots, polyval
 from jounce.kinematics.curves.path_tracker import CurvePoint
 
 Kind = Literal["maximum", "minimum", "stationary"]
-ON_THE_CURVE = 1e-7  # of a step: imaginary part of a root that rounding may have made of a double one
-STANDING = 1e-10  # rate of the value, in its unit
-FLAT = 1e-9  # of the largest term: a slope that vanishes for all that is known
-ROUNDING = float(np.finfo(float).eps)  # of the largest term: smaller ones tell nothing within a step
-VANISHING = 1e-12  # of the largest term: what is left where a root is located, a double one to half the digits
+ON_THE_CURVE = 1e-7  # of a step: largest imaginary part that rounding gives a double root
+STANDING = 1e-10  # rate of the driver value, in its unit, below which it stands still
+FLAT = 1e-9  # of the largest term: slopes below it count as zero
+ROUNDING = float(np.finfo(float).eps)  # of the largest term: smaller coefficients are insignificant within a step
+VANISHING = 1e-12  # of the largest term: largest residual at a root; a double root is exact to half the digits
 
 
 @dataclasses.dataclass(frozen=True)
@@ -24,11 +24,11 @@ class LimitPosition:
     Attributes
     ----------
     arc_length : float
-        Where on the curve, rad or sizes of the mechanism.
+        Position on the curve, rad or sizes of the mechanism.
     value : float
-        Of the driver, rad or m.
+        Value of the driver, rad or m.
     kind : str
-        ``"maximum"`` or ``"minimum"``, where the driver turns back, ``"stationary"`` where it goes on.
+        ``"maximum"`` or ``"minimum"`` if the driver turns back, ``"stationary"`` if it continues.
 
     Examples
     --------
@@ -50,9 +50,9 @@ class CurveBranch:
     Attributes
     ----------
     start, stop : float
-        Arc length; the stop of the last branch of a closed curve may lie a length further on.
+        Arc lengths; the stop of the last branch of a closed curve may exceed its length.
     low, high : float
-        Range of the driver's value on it, rad or m; a branch without limits makes whole turns.
+        Range of the driver's value on the branch, rad or m. A branch without limits makes whole turns.
     """
 
     start: float
@@ -62,13 +62,13 @@ class CurveBranch:
 
 
 def limits_between(point: CurvePoint, stop: float, unit: float) -> list[LimitPosition]:
-    """Return the limit positions from a point, that excluded, to an arc length, that included.
+    """Return the limit positions from a point (excluded) to an arc length (included).
 
-    The unit of the value is what it is worth as an unknown; a driver that stands still all the way has none.
+    `unit` is the scale of the driver value as an unknown. A driver that stands still throughout has no limit positions.
     """
     step = stop - point.arc_length
     orders = np.arange(len(point.value))
-    slopes = (point.value * step**orders * orders)[1:]  # of the value along the part of the step
+    slopes = (point.value * step**orders * orders)[1:]  # of the value with respect to the fraction of the step
     size = np.max(np.abs(slopes), initial=0.0)
     if size <= STANDING * unit * step or abs(slopes[0]) > np.sum(np.abs(slopes[1:])):
         return []
@@ -82,9 +82,9 @@ def limits_between(point: CurvePoint, stop: float, unit: float) -> list[LimitPos
 
 
 def roots(coefficients: Float[np.ndarray, " order"]) -> list[float]:
-    """Return the real roots of a polynomial in [0, 1], each once.
+    """Return the distinct real roots of a polynomial in [0, 1].
 
-    Last coefficients that are rounding would spoil the eigenvalues that the roots are, and make some where none are.
+    Insignificant leading coefficients are dropped, since they spoil the eigenvalues that give the roots.
     """
     size = np.max(np.abs(coefficients))
     significant = np.flatnonzero(np.abs(coefficients) > ROUNDING * size)
@@ -115,7 +115,7 @@ def _kind(slopes: Float[np.ndarray, " order"], part: float, size: float) -> Kind
 
 
 def values_between(point: CurvePoint, stop: float, value: float, period: float | None) -> list[float]:
-    """Return the arc lengths from a point to another at which the driver has a value, or one some periods away."""
+    """Return the arc lengths from a point to another at which the driver has a value, up to whole periods."""
     step = stop - point.arc_length
     terms = point.value * step ** np.arange(len(point.value))
     reach = float(np.sum(np.abs(terms[1:])))

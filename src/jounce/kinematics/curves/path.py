@@ -1,9 +1,9 @@
-"""Walking along a curve of configurations: steps that no other branch hides in, from the start to its end.
+"""Continuation along a curve of configurations, in steps that miss no other branch, from the start to its end.
 
-A step is as long as the series is good to rounding, and at most half as long as the way to the nearest singular point
-of the bordered Jacobian, real or complex. It is accepted where Newton-Raphson finds the curve where the series has it,
-at all of the points looked at in between, with the same sign of the determinant. Turning points of the driver are
-nothing special to it. Where branches cross, the steps shrink; the crossing is then located, recorded and passed.
+A step is as long as the series is exact to rounding, and covers at most half the distance to the nearest real or
+complex singular point of the bordered Jacobian. It is accepted if Newton-Raphson confirms the series at several points
+of the step, with the same sign of the determinant. Turning points of the driver need no special treatment. Where
+branches cross, the steps shrink; the crossing is then located, recorded and passed.
 """
 
 import dataclasses
@@ -18,18 +18,18 @@ from jounce.kinematics.curves.path_tracker import LANES, ORDER, TAIL, CurvePoint
 from jounce.kinematics.curves.series import CurvePoints
 
 LARGEST_DEPARTURE = 1e-8  # of the curve from the series, rad or sizes of the mechanism
-LARGEST_CORRECTION = 1e-10  # the last one, where rounding allows that
-ROUNDINGS = 16  # of a correction, over the smallest singular value: what is left of the last one near a crossing
-LARGEST_RESIDUAL = 1e-9  # of rows that repeat others
+LARGEST_CORRECTION = 1e-10  # last correction, unless rounding makes it larger
+ROUNDINGS = 16  # bound of rounding in a correction near a crossing, in units of rounding by the condition number
+LARGEST_RESIDUAL = 1e-9  # of redundant rows
 SMALLEST_STEP = 1e-9
 NEGLIGIBLE = 1e-9
 SAME_DIRECTION = 1e-6
 MOST_CORRECTIONS = 50
-SHARE_OF_DISTANCE = 0.5  # to a singular point, made in one step
+SHARE_OF_DISTANCE = 0.5  # to a singular point, covered in one step
 
 
 class End(enum.Enum):
-    """Why a curve ends where it does."""
+    """Why a curve ends."""
 
     CLOSED = "closed: it is back where it started"
     LENGTH = "not followed any further: it is as long as was asked for"
@@ -39,7 +39,7 @@ class End(enum.Enum):
 
 @dataclasses.dataclass
 class Path:
-    """Points on a curve in the order of arc length, the change points passed, and how it ends."""
+    """Points of a curve in the order of arc length, the change points passed, and the end."""
 
     points: list[CurvePoint]
     change_points: list[ChangePoint] = dataclasses.field(default_factory=list)
@@ -47,14 +47,14 @@ class Path:
     length: float = 0.0
 
     def reversed(self) -> "Path":
-        """Return the path gone along the other way."""
+        """Return the path in the reversed direction."""
         points = [point.reversed() for point in reversed(self.points)]
         change_points = [point.reversed() for point in reversed(self.change_points)]
         return Path(points, change_points, self.end, self.length)
 
 
 def track_both_directions(tracker: PathTracker, start: CurvePoint, length: float) -> tuple[Path, Path | None]:
-    """Return the path from a point forward, and unless that closes, the one backward."""
+    """Return the path forward from a point, and the one backward unless the first closes."""
     forward = track(tracker, start, length)
     return forward, None if forward.end is End.CLOSED else track(tracker, start.reversed(), length)
 
@@ -86,7 +86,7 @@ def track(tracker: PathTracker, start: CurvePoint, length: float) -> Path:
 
 
 def _next_point(tracker: PathTracker, point: CurvePoint, reach: float) -> CurvePoint | End:
-    """Return the next accepted point, or the reason why there is none."""
+    """Return the next accepted point, or the reason for the end of the curve."""
     step = min(tracker.radius(point) * TAIL ** (1 / ORDER), SHARE_OF_DISTANCE * reach)
     parts = np.arange(1, LANES + 1) / LANES
     end = End.SINGULAR
@@ -108,14 +108,14 @@ def _next_point(tracker: PathTracker, point: CurvePoint, reach: float) -> CurveP
 def _accepted(
     tracker: PathTracker, point: CurvePoint, points: CurvePoints, sign: float, correction: float
 ) -> Bool[np.ndarray, " lane"]:
-    """Tell which points are on the curve that the series describes, and on the same branch of it."""
+    """Return which points are on the curve of the series, and on the same branch."""
     good = all_finite(points) & points.admissible & (points.residual <= LARGEST_RESIDUAL)
     good &= (points.first <= LARGEST_DEPARTURE) & (points.last <= correction)
     return good & (tracker.signs(points, point.rows) == sign)
 
 
 def _closing_step(tracker: PathTracker, point: CurvePoint, start: CurvePoint, length: float) -> float | None:
-    """Return how far from here, within a length, a curve is back at its start, in the same direction."""
+    """Return the step, within a length, at which a curve is back at its start in the same direction, or None."""
     step = step_to_configuration(tracker, point, length, {name: c[0] for name, c in start.coordinates.items()})
     if step is None:
         return None
@@ -128,7 +128,7 @@ def _closing_step(tracker: PathTracker, point: CurvePoint, start: CurvePoint, le
 def step_to_configuration(
     tracker: PathTracker, point: CurvePoint, length: float, target: dict[str, np.ndarray]
 ) -> float | None:
-    """Return the step, within a length, at which a curve passes a configuration; None if it does not."""
+    """Return the step, within a length, at which a curve passes a configuration, or None."""
     if np.max(np.abs(tracker.difference(point.at(0.0), target))) > 1.5 * length + NEGLIGIBLE:
         return None
     step = 0.0

@@ -1,4 +1,4 @@
-"""Numerical continuation along a curve of configurations: its points, with Taylor series in arc length, on the host."""
+"""Numerical continuation of curves of configurations: points with Taylor series in arc length, on the host."""
 
 import dataclasses
 import math
@@ -21,28 +21,28 @@ from jounce.rigid import PlanarPose
 from jounce.rigid.spatial import quaternion_change
 
 ORDER = 20
-LANES = 8  # points solved side by side: a number compiles once
-TAIL = 1e-15  # of the series over a step, rad or sizes of the mechanism: rounding
+LANES = 8  # points solved side by side: each number compiles once
+TAIL = 1e-15  # last term of the series over a step, rad or sizes of the mechanism: rounding
 RANK_TOLERANCE = 1e-8  # of the largest singular value
 BINOMIALS = np.array([[math.comb(n, k) for n in range(ORDER + 1)] for k in range(ORDER + 1)], float)
 
 
 @dataclasses.dataclass(frozen=True)
 class CurvePoint:
-    """A point on a curve, with the series of the curve in arc length from there.
+    """A point on a curve, with the Taylor series of the curve in arc length.
 
     Attributes
     ----------
     arc_length : float
-        From the start of the curve.
+        Arc length from the start of the curve.
     coordinates : dict of str to array, shape (order + 1, ..., bodies)
         Taylor coefficients of the coordinates of all bodies, the ground first.
     value : array of shape (order + 1,)
-        Of the value that is free.
+        Taylor coefficients of the free value.
     jacobian, slope : array of shape (rows, unknowns)
-        Of all constraints, scaled, and its derivative along the curve.
+        Scaled Jacobian of all constraints, and its derivative along the curve.
     rows : array of int
-        Those that are independent here, one less than there are unknowns.
+        Rows that are independent at the point, one fewer than unknowns.
     """
 
     arc_length: float
@@ -53,11 +53,11 @@ class CurvePoint:
     rows: Int[np.ndarray, " independent"]
 
     def at(self, step: float) -> dict[str, np.ndarray]:
-        """Return the coordinates that the series gives a step away."""
+        """Return the coordinates at a step from the point, by its series."""
         return {name: np.asarray(polyval(step, c)) for name, c in self.coordinates.items()}
 
     def recentered(self, step: float, order: int = ORDER) -> "CurvePoint":
-        """Return the point a step on that the series gives, with its terms up to an order."""
+        """Return the point at a step along the series, with terms up to an order."""
         power = np.arange(order + 1)
         away = power[None] - power[:, None]
         shift = BINOMIALS[: order + 1, : order + 1] * step ** np.maximum(away, 0)
@@ -68,7 +68,7 @@ class CurvePoint:
         return self._with_series(shifted, arc_length=self.arc_length + step)
 
     def reversed(self) -> "CurvePoint":
-        """Return the point with its series in the opposite direction."""
+        """Return the point with its series in the reversed direction."""
 
         def alternated(c: np.ndarray) -> np.ndarray:
             return c * ((-1.0) ** np.arange(len(c))).reshape(-1, *[1] * (c.ndim - 1))
@@ -76,7 +76,7 @@ class CurvePoint:
         return self._with_series(alternated, arc_length=-self.arc_length, slope=-self.slope)
 
     def shortened(self, order: int) -> "CurvePoint":
-        """Return the point with the coefficients above an order set to zero: rounding spoils those first."""
+        """Return the point with the coefficients above an order, which rounding spoils first, set to zero."""
 
         def truncated(c: np.ndarray) -> np.ndarray:
             return np.concatenate([c[: order + 1], np.zeros_like(c[order + 1 :])])
@@ -84,19 +84,19 @@ class CurvePoint:
         return self._with_series(truncated)
 
     def _with_series(self, change: Callable[[np.ndarray], np.ndarray], **others: Any) -> "CurvePoint":
-        """Return the point with its series changed, and with other attributes."""
+        """Return the point with its series transformed, and other attributes replaced."""
         coordinates = {name: change(c) for name, c in self.coordinates.items()}
         return dataclasses.replace(self, coordinates=coordinates, value=change(self.value), **others)
 
 
 @dataclasses.dataclass(frozen=True)
 class PathTracker:
-    """A model whose value of time is that of the driver that is free, and what is known of its curves."""
+    """The continuation of a model in which the value of a free driver takes the place of time."""
 
     model: Model
     driven: bool
     value_scale: float = 1.0
-    timed: bool = False  # the value is the instant: the same pose at another one is another point
+    timed: bool = False  # whether the value is the instant: equal poses at different instants are different points
 
     @property
     def columns(self) -> int:
@@ -105,12 +105,12 @@ class PathTracker:
 
     @property
     def unknowns(self) -> int:
-        """Number of coordinates, and the value."""
+        """Number of coordinates plus the free value."""
         return self.columns + self.driven
 
     @property
     def is_planar(self) -> bool:
-        """Whether attitudes are angles."""
+        """Whether the mechanism is planar, with angles as attitudes."""
         return "angle" in self.model.guess
 
     @cached_property
@@ -120,7 +120,7 @@ class PathTracker:
     # points
 
     def point_without_series(self, coordinates: dict[str, Any], value: float) -> CurvePoint:
-        """Return a point without a series, of coordinates of shape (..., bodies, 1)."""
+        """Return a point without a series, from coordinates of shape (..., bodies, 1)."""
         series = {}
         for name, x in coordinates.items():
             series[name] = np.zeros((ORDER + 1, *np.shape(x)[:-1]))
@@ -132,7 +132,7 @@ class PathTracker:
         return self.with_jacobian(CurvePoint(0.0, series, values, nothing, nothing, first))
 
     def with_jacobian(self, point: CurvePoint) -> CurvePoint:
-        """Return a point with the Jacobian of its configuration and rows that are independent."""
+        """Return a point with the Jacobian of its configuration and its independent rows."""
         points = self.points(point, np.zeros(1), np.ones(self.columns), corrected=False)
         jacobian = points.jacobian[..., 0]
         rows = self.independent(jacobian)
@@ -154,26 +154,26 @@ class PathTracker:
         return dataclasses.replace(point, coordinates=series, value=value)
 
     def parts(self, direction: Float[np.ndarray, " unknown"]) -> tuple[np.ndarray, np.ndarray]:
-        """Return shifts, (components, bodies) in m, and turns of all bodies in a direction, the ground first."""
+        """Return shifts, (components, bodies) in m, and rotations of all bodies in a direction, the ground first."""
         system, shifts = self.model.system, self.model.pose_type.shifts
         shift, turn = system.coordinates(direction[: self.columns, None], shifts)
         return np.asarray(shift)[..., 0], np.asarray(turn)[..., 0]
 
     def with_series(self, point: CurvePoint, direction: Float[np.ndarray, " unknown"] | None = None) -> CurvePoint:
-        """Return a point with its series, in a direction; by default that in which the value grows."""
+        """Return a point with its series in a direction, by default that of growing value."""
         rows = point.rows
         jacobian = self.with_jacobian(point).jacobian
         tangent = self.null_space(jacobian[rows], 0.0)[:, -1] if direction is None else direction
         if direction is None and self.driven:
             tangent = tangent if tangent[-1] >= 0 else -tangent
         tangent = tangent[: self.columns]
-        for _ in range(2):  # the second time along the series that the first gave
+        for _ in range(2):  # the second pass uses the series of the first
             points = self.points(point, np.zeros(1), tangent)
             point = self.point_at_lane(points, 0, point.arc_length, rows)
         return point
 
     def scaled_at(self, point: CurvePoint) -> "PathTracker":
-        """Return the tracker with the value counted in a unit that makes its largest derivative one."""
+        """Return the tracker with the value in a unit that makes its largest derivative one."""
         if not self.driven:
             return self
         largest = float(np.max(np.abs(point.jacobian[:, -1]), initial=0.0))
@@ -182,7 +182,7 @@ class PathTracker:
     def point_at_lane(
         self, points: CurvePoints, lane: int, arc_length: float, rows: Int[np.ndarray, " row"]
     ) -> CurvePoint:
-        """Return one lane of several points."""
+        """Return the point in one lane of a batch."""
         coordinates = {name: np.array(c[..., lane]) for name, c in points.coordinates.items()}
         jacobian = np.array(points.jacobian[..., lane])
         if len(jacobian) > len(rows):
@@ -199,7 +199,7 @@ class PathTracker:
         *,
         corrected: bool = True,
     ) -> CurvePoints:
-        """Return points of the curve some steps from one point, or from one point each with the same rows."""
+        """Return points of the curve at steps from one center, or one step each from several with the same rows."""
         several = [centers] if isinstance(centers, CurvePoint) else centers
         rows, count = several[0].rows, len(steps)
 
@@ -216,16 +216,16 @@ class PathTracker:
         others = [np.asarray(x)[..., :count] for x in solved[1:]]
         return CurvePoints(cut, *others)
 
-    # what series tell
+    # evaluations of series
 
     def column(self, positions: Numbers, turns: Numbers) -> np.ndarray:
-        """Return shifts and turns of all bodies, shapes (components, bodies, ...), as scaled columns without ground."""
+        """Return shifts and rotations of bodies, (components, bodies, ...), as scaled columns without the ground."""
         lengths = self._lengths.reshape(-1, *[1] * (np.ndim(positions) - 1))
         parts = np.concatenate([positions / lengths, turns])[:, 1:]
         return np.moveaxis(parts, 1, 0).reshape(self.columns, *parts.shape[2:])
 
     def rates(self, coordinates: dict[str, np.ndarray], value: np.ndarray) -> np.ndarray:
-        """Return the direction of a curve from its series, in all unknowns, shape (unknowns, ...)."""
+        """Return the direction of a curve in all unknowns, (unknowns, ...), from its series."""
         if self.is_planar:
             turns = coordinates["angle"][1][None]
         else:
@@ -234,16 +234,16 @@ class PathTracker:
         return np.concatenate([column, value[1][None] / self.value_scale]) if self.driven else column
 
     def tangent(self, point: CurvePoint) -> Float[np.ndarray, " unknown"]:
-        """Return the direction of the curve at a point, of length one in the coordinates."""
+        """Return the tangent of the curve at a point, of length one in the coordinates."""
         return self.rates(point.coordinates, point.value)
 
     def _curvature(self, point: CurvePoint) -> Float[np.ndarray, " unknown"]:
-        """Return the derivative of the direction of the curve along it."""
+        """Return the derivative of the tangent along the curve."""
         second = {name: np.stack([c[0], 2 * c[2]]) for name, c in point.coordinates.items()}
         return self.rates(second, np.stack([point.value[0], 2 * point.value[2]]))
 
     def difference(self, there: dict[str, np.ndarray], here: dict[str, np.ndarray]) -> Float[np.ndarray, " column"]:
-        """Return shifts and turns from one configuration to another, scaled; whole turns do not count."""
+        """Return scaled shifts and rotations from one configuration to another; whole turns do not count."""
         if self.is_planar:
             turns = principal(there["angle"] - here["angle"])[None]
         else:
@@ -252,7 +252,7 @@ class PathTracker:
         return self.column(there["position"] - here["position"], turns)
 
     def terms(self, point: CurvePoint) -> Float[np.ndarray, " order"]:
-        """Return the size of each coefficient but the first, rad or sizes of the mechanism."""
+        """Return the size of each coefficient from order one on, rad or sizes of the mechanism."""
         scaled = point.coordinates["position"][1:] / self._lengths
         attitude = point.coordinates["angle" if self.is_planar else "quaternion"][1:]
         sizes = [np.abs(x).reshape(len(x), -1).max(axis=1) for x in (scaled, attitude)]
@@ -260,26 +260,26 @@ class PathTracker:
         return np.where(np.isfinite(largest), largest, np.inf)
 
     def radius(self, point: CurvePoint, highest: int = ORDER) -> float:
-        """Return about how far the series converges, by its coefficients from the first to some order; at most one."""
+        """Return an estimate of the radius of convergence, at most one, from coefficients up to an order."""
         terms = np.maximum(self.terms(point)[1:highest], 1.0)
         return float(np.min(terms ** (-1.0 / np.arange(2, highest + 1))))
 
     def bordered(self, jacobian: np.ndarray, rates: np.ndarray, rows: np.ndarray) -> np.ndarray:
-        """Return the independent rows with that of arc length below, (..., unknowns, unknowns); lanes first."""
+        """Return the independent rows and the row of arc length below, (..., unknowns, unknowns); lanes first."""
         border = rates.copy()
         border[..., self.columns :] = 0.0
         return np.concatenate([jacobian[..., rows, :], border[..., None, :]], axis=-2)
 
     def signs(self, points: CurvePoints, rows: np.ndarray) -> Float[np.ndarray, " lane"]:
-        """Return the signs of the determinants of the bordered Jacobians of some points."""
+        """Return the signs of the determinants of the bordered Jacobians of points."""
         rates = np.moveaxis(self.rates(points.coordinates, points.value), -1, 0)
         whole = self.bordered(np.moveaxis(points.jacobian, -1, 0), rates, rows)
         return np.linalg.slogdet(np.where(np.isfinite(whole), whole, 0.0))[0]
 
     def singularity_distance(self, point: CurvePoint) -> complex:
-        """Return the arc length to the nearest point where the bordered Jacobian is singular; it may be complex.
+        """Return the arc length to the nearest point with a singular bordered Jacobian; it may be complex.
 
-        As for motions in time (see `det_rate`): minus the inverse of the eigenvalue of ``B^-1 B'`` of largest size.
+        As for motions in time (see `det_rate`), it is minus the inverse of the largest eigenvalue of ``B^-1 B'``.
         """
         matrix = self.bordered(point.jacobian, self.tangent(point), point.rows)
         slope = self.bordered(point.slope, self._curvature(point), point.rows)
@@ -293,13 +293,13 @@ class PathTracker:
     # rank
 
     def independent(self, jacobian: Float[np.ndarray, "row unknown"]) -> Int[np.ndarray, " independent"] | None:
-        """Return rows that are independent, one less than unknowns; None where there are not so many."""
+        """Return independent rows, one fewer than unknowns, by pivoted QR; None if there are fewer rows."""
         rank = self.unknowns - 1
         if len(jacobian) == rank:
             return np.arange(rank)
         if len(jacobian) < rank:
             return None
-        from scipy.linalg import qr  # here, since importing SciPy takes half a second
+        from scipy.linalg import qr  # imported late, as importing SciPy takes half a second
 
         order = np.asarray(qr(jacobian.T, mode="r", pivoting=True)[-1])
         return np.sort(order[:rank])
@@ -307,14 +307,14 @@ class PathTracker:
     def null_space(
         self, jacobian: Float[np.ndarray, "row unknown"], tolerance: float = RANK_TOLERANCE
     ) -> Float[np.ndarray, "unknown k"]:
-        """Return an orthonormal basis of the directions that no row forbids."""
+        """Return an orthonormal basis of the null space of the rows."""
         _, sizes, right = np.linalg.svd(jacobian)
         return right[_rank(sizes, tolerance) :].T
 
     def left_null_space(
         self, jacobian: Float[np.ndarray, "row unknown"], tolerance: float = RANK_TOLERANCE
     ) -> Float[np.ndarray, "row k"]:
-        """Return an orthonormal basis of the combinations of rows that vanish."""
+        """Return an orthonormal basis of the vanishing combinations of rows."""
         left, sizes, _ = np.linalg.svd(jacobian)
         return left[:, _rank(sizes, tolerance) :]
 
@@ -336,18 +336,18 @@ def _rank(sizes: Float[np.ndarray, " k"], tolerance: float) -> int:
 
 
 def spin(quaternion: np.ndarray, other: np.ndarray) -> np.ndarray:
-    """Return twice the vector part of the product of an attitude's conjugate with other Euler parameters."""
+    """Return twice the vector part of the product of conjugate Euler parameters with other ones."""
     return 2.0 * quaternion_product(conjugate(quaternion), other)[1:]
 
 
 def all_finite(points: CurvePoints) -> Bool[np.ndarray, " lane"]:
-    """Tell which points are finite with the series of the curve."""
+    """Return which points, and the series of the curve there, are finite."""
     parts = (*points.coordinates.values(), points.value)
     return np.all([np.isfinite(x).reshape(-1, x.shape[-1]).all(axis=0) for x in parts], axis=0)
 
 
 def with_angular_velocity(coordinates: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
-    """Return series of coordinates with the body-fixed angular velocity that follows from their Euler parameters."""
+    """Return series of coordinates with the body-fixed angular velocity from their Euler parameters."""
     if "quaternion" not in coordinates:
         return coordinates
     p = coordinates["quaternion"]

@@ -1,8 +1,8 @@
-"""One compiled function: from a point of a curve of configurations to others, each with the series of the curve there.
+"""One compiled function from points of a curve of configurations to others, each with the series of the curve.
 
-The unknowns are the coordinates of all bodies and the value of one driver, that which is free; the curve is described
-by its arc length s. Order after order the coefficient of the residual is affine in the highest unknown, as in time
-(Sommer 2024, equations 1-8), and the arc-length condition ``x'.x' = 1`` is one row more of the same kind.
+The unknowns are the coordinates of all bodies and the free value of one driver; the parameter is the arc length s. As
+in time, each coefficient of the residual is affine in the highest unknown, order after order (Sommer 2024, equations
+1-8). The arc-length condition ``x'.x' = 1`` is one more row of the same kind.
 """
 
 from typing import Any, NamedTuple
@@ -25,8 +25,8 @@ from jounce.rigid.pose import Pose
 from jounce.rigid.spatial import quaternion_change
 
 MAX_CORRECTIONS = 10
-ROUNDING = 4e-15  # a correction this small leaves the Jacobian as good as new
-QUADRATIC = 1e-8  # the correction after one this small is rounding
+ROUNDING = 4e-15  # after such a small correction, the Jacobian needs no update
+QUADRATIC = 1e-8  # after a correction of this size, the next one is rounding
 
 Lanes = Float[Numbers, " lane"]
 
@@ -39,15 +39,15 @@ class CurvePoints(NamedTuple):
     coordinates : dict of str to array, shape (order + 1, ..., bodies, lanes)
         Taylor coefficients in arc length of the coordinates of all bodies, the ground first.
     value : array of shape (order + 1, lanes)
-        Of the value of the driver that is free.
+        Taylor coefficients of the free value of the driver.
     jacobian : array of shape (rows, columns, lanes)
-        Of all constraints, scaled; the last column is that of the value, if a driver is free.
+        Scaled Jacobian of all constraints; the last column is that of the value, if a driver is free.
     slope : array of shape (rows, columns, lanes)
-        Its derivative along the series that led there.
+        Derivative of the Jacobian along the series that led to the point.
     first, last : array of shape (lanes,)
-        Size of the first and the last correction, rad or sizes of the mechanism.
+        Sizes of the first and the last correction, rad or sizes of the mechanism.
     residual : array of shape (lanes,)
-        Largest, of all rows.
+        Largest residual of all rows.
     admissible : array of bool, shape (lanes,)
         Whether all drivers have permitted values.
     """
@@ -63,7 +63,7 @@ class CurvePoints(NamedTuple):
 
 
 class _Curve:
-    """The equations of a curve: those of a system with the value of a driver in the place of time."""
+    """The equations of a curve: those of a system with a driver value in the place of time."""
 
     def __init__(self, system: System, rows: Any, value_scale: Any, driven: bool):
         self.system, self.rows, self.value_scale, self.driven = system, rows, value_scale, driven
@@ -82,7 +82,7 @@ class _Curve:
         return jnp.concatenate([entries, (rate * self.value_scale)[:, None]], axis=1)
 
     def bordered(self, jacobian: Any, tangent: Any) -> Any:
-        """Return the factors of the independent rows and the row of arc length."""
+        """Return the factors of the Jacobian bordered by the row of arc length."""
         border = jnp.zeros((1, *jacobian.shape[1:])).at[0, : self.count].set(tangent)
         return DenseFactor.of(jnp.concatenate([jacobian[self.rows], border]))
 
@@ -106,24 +106,24 @@ def curve_points(
     pose_type: type[Pose],
     driven: bool,
 ) -> CurvePoints:
-    """Return points of a curve, each from the series at a point before it.
+    """Return points of a curve, each from the series at a previous point.
 
     Parameters
     ----------
     system : System
-        The mechanism, with the value of the driver in the place of time.
+        The mechanism, with the driver value in the place of time.
     coordinates, value
-        Series at the points before, shape (order + 1, ..., lanes).
+        Series at the previous points, shape (order + 1, ..., lanes).
     tangent : array of shape (columns, lanes)
-        Directions of the curve there, of the coordinates only, scaled: corrections are made across it.
+        Scaled directions of the curve at the previous points, coordinates only; corrections are perpendicular to them.
     step : array of shape (lanes,)
-        Arc length from there.
+        Arc length from the previous points.
     corrected : bool
-        Whether predictions are corrected; at a change point they must not be.
+        Whether to correct predictions; at a change point they must not be corrected.
     rows : array of int
-        One less than there are unknowns, which are independent here.
+        Independent rows, one fewer than unknowns.
     value_scale : float
-        Unit in which the value counts as an unknown.
+        Scale of the value as an unknown.
     pose_type, driven
         PlanarPose or SpatialPose; whether a driver is free.
     """
@@ -144,7 +144,7 @@ def curve_points(
 
 
 def _corrected(curve: _Curve, pose: Any, value: Any, tangent: Any, corrected: Any) -> Any:
-    """Return pose and value on the curve, in the plane across a tangent through the prediction, and two sizes."""
+    """Return pose and value corrected onto the curve, perpendicular to the tangent, and the sizes of corrections."""
     none = jnp.zeros((1, value.shape[0]))
 
     def unfinished(state: Any) -> Any:
@@ -166,7 +166,7 @@ def _corrected(curve: _Curve, pose: Any, value: Any, tangent: Any, corrected: An
 
 
 def _differentiated(curve: _Curve, pose: Any, value: Any, factor: DenseFactor, order: int) -> Any:
-    """Return the series of the coordinates in arc length, by name, and that of the value."""
+    """Return the series of the coordinates in arc length, by name, and of the value."""
     count, lanes, shifts = curve.count, value.shape[0], pose.shifts
     null = factor.solve(jnp.zeros((curve.rows.shape[0] + 1, lanes)).at[-1].set(1.0))
     null = null / jnp.sqrt(jnp.sum(null[:count] ** 2, axis=0, keepdims=True))
@@ -215,12 +215,12 @@ def _differentiated(curve: _Curve, pose: Any, value: Any, factor: DenseFactor, o
 
 
 def _known_spin(quaternion: Any, turns: Any, k: Any) -> Any:
-    """Return what is known of the coefficient of order k of Euler parameters: all but the newest turn's part."""
+    """Return the coefficient of order k of Euler parameters without the contribution of the newest rotation."""
     return jnp.sum(_convolved(quaternion, turns, k - 1, jax.vmap(quaternion_change)), axis=0) / k
 
 
 def _convolved(left: Any, right: Any, order: Any, product: Any) -> Any:
-    """Return the terms of the coefficient of an order of a product; what is not known yet is zero."""
+    """Return the terms of the Cauchy product at an order; unknown coefficients count as zero."""
     counterparts = order - np.arange(len(right))
     left = left[: len(right)]
     there = (counterparts >= 0).reshape(-1, *[1] * (right.ndim - 1))
@@ -228,7 +228,7 @@ def _convolved(left: Any, right: Any, order: Any, product: Any) -> Any:
 
 
 def _slope(curve: _Curve, pose: Any, value: Any, rates: dict[str, Any], value_rate: Any) -> Any:
-    """Return the derivative of the Jacobian along the series, which is smooth where branches cross too."""
+    """Return the derivative of the Jacobian along the series, which is smooth even where branches cross."""
     now = {name: jet.coefficients[0] for name, jet in pose.coordinates().items()}
 
     def at(step: Any) -> Any:
@@ -250,7 +250,7 @@ def second_order(
 ) -> Float[Numbers, "row lane"]:
     """Return half the second derivatives of the residual along directions of all unknowns, the value last.
 
-    Coordinates have the shape (..., bodies, 1).
+    The coordinates have the shape (..., bodies, 1).
     """
     lanes = directions.shape[1]
     wide = {name: jnp.broadcast_to(x, (*x.shape[:-1], lanes)) for name, x in coordinates.items()}

@@ -1,4 +1,4 @@
-"""Where a curve of configurations starts: a mechanism with the value of one driver free, assembled."""
+"""The start of a curve of configurations: an assembled mechanism with one free driver."""
 
 import dataclasses
 import math
@@ -20,23 +20,23 @@ from jounce.trajectory import ExpressionMotion
 
 TIME = "time"
 TOLERANCE = 1e-12
-VANISHING = 1e-9  # of half the second derivatives along directions of one radian: the rows do not forbid them
+VANISHING = 1e-9  # half the second derivatives along directions of one radian, below which they count as zero
 
 
 @dataclasses.dataclass(frozen=True)
 class Freed:
-    """A mechanism of which the value of one driver is free.
+    """A mechanism with one free driver.
 
     Attributes
     ----------
     mechanism : Mechanism
-        With the value in the place of time, and the other drivers held.
+        The mechanism with the free value in the place of time, the other drivers held.
     driver : str or None
-        Which is free; ``"time"`` where all follow their laws and the instant is free, None where nothing is driven.
+        The free driver; ``"time"`` if the instant is free and all drivers follow their laws, None if nothing is driven.
     value : float
-        Where it starts, in rad or m, or s.
+        Initial value, rad, m or s.
     unit : str
-        Of the value.
+        Unit of the value.
     """
 
     mechanism: Mechanism
@@ -51,16 +51,16 @@ def freed(mechanism: Mechanism, instant: float, driver: str | None) -> Freed:
     Parameters
     ----------
     mechanism : Mechanism
-        Driven, or of one degree of freedom.
+        Driven, or with one degree of freedom.
     instant : float
-        At which the other drivers are held, s.
+        Instant at which the other drivers are held, s.
     driver : str or None
-        Which is free; None for the only one there is. ``"time"`` for the instant itself.
+        The driver to free, or None for the only one; ``"time"`` for the instant.
 
     Raises
     ------
     MechanismError
-        If there are several drivers and none is named, or none has the name.
+        If none of several drivers is named, or the name does not exist.
     """
     kind = "drivers" if mechanism.drivers else "initial"
     elements = getattr(mechanism, kind)
@@ -86,7 +86,7 @@ def _driven(mechanism: Mechanism, drivers: Any) -> Mechanism:
 
 
 def law_values(mechanism: Mechanism, instant: float) -> dict[str, float]:
-    """Return what the laws of all drivers prescribe at an instant, by name."""
+    """Return the values that the laws of all drivers prescribe at an instant, by name."""
     model = build(mechanism)
     groups = [group for group in model.system.groups if group.is_driver]
     values = []
@@ -106,14 +106,14 @@ def _with_law(driver: Any, text: str) -> Any:
 
 
 def start_of_curve(free: Freed) -> tuple[PathTracker, CurvePoint]:
-    """Return what walks along the curve of a mechanism, and where it starts.
+    """Return the path tracker of a mechanism, and the starting point of its curve.
 
     Raises
     ------
     AssemblyError
         If the bodies cannot be assembled.
     MobilityError
-        If there is more than one degree of freedom, or none.
+        If there is not exactly one degree of freedom.
     SingularityError
         If the start is a change point.
     """
@@ -133,7 +133,7 @@ def start_of_curve(free: Freed) -> tuple[PathTracker, CurvePoint]:
 
 
 def _check_freedom(tracker: PathTracker, point: CurvePoint) -> None:
-    """Raise an error unless there is one direction to go in."""
+    """Raise an error unless the curve has exactly one direction at its start."""
     jacobian = point.jacobian
     null = tracker.null_space(jacobian)
     if null.shape[1] == 1:
@@ -143,7 +143,7 @@ def _check_freedom(tracker: PathTracker, point: CurvePoint) -> None:
         raise MobilityError(message if tracker.driven else "nothing can move: the joints leave no degree of freedom")
     missing = jacobian.shape[1] - jacobian.shape[0]
     rows = tracker.left_null_space(jacobian)
-    # the second order leaves all directions of the first
+    # degrees of freedom, if not even the second order blocks a direction
     if missing > 1 or np.max(np.abs(rows.T @ tracker.second_order(point, null)), initial=0.0) < VANISHING:
         count = null.shape[1]
         directions = null[: tracker.columns].T
@@ -159,7 +159,7 @@ def _check_freedom(tracker: PathTracker, point: CurvePoint) -> None:
 
 
 def check_number(name: str, value: Any, least: Any, most: Any) -> None:
-    """Raise MechanismError unless an option is a finite number between bounds."""
+    """Raise MechanismError unless an option is a finite number within bounds."""
     fits = isinstance(value, numbers.Real) and not isinstance(value, bool) and math.isfinite(float(value))
     if not fits or not least <= value <= most:
         bounds = "" if not math.isfinite(most) else f" from {least:g} to {most:g}"
@@ -167,7 +167,7 @@ def check_number(name: str, value: Any, least: Any, most: Any) -> None:
 
 
 def instant_of(mechanism: Mechanism, time: Any) -> float:
-    """Return an instant that was given, or the first of a mechanism's own time, s."""
+    """Return a given instant, or by default the first of a mechanism's own time, s."""
     if time is None:
         return first_instant(mechanism.time, mechanism.parameter_values)
     check_number("time", time, -math.inf, math.inf)
@@ -175,7 +175,7 @@ def instant_of(mechanism: Mechanism, time: Any) -> float:
 
 
 def posed(mechanism: Mechanism, coordinates: dict[str, np.ndarray]) -> Mechanism:
-    """Return a mechanism with other starting guesses of its bodies; coordinates have the ground first."""
+    """Return a mechanism with coordinates, the ground first, as the starting guesses of its bodies."""
     bodies = {}
     for k, (name, body) in enumerate(mechanism.bodies.items(), start=1):
         given: dict[str, Any] = {"position": coordinates["position"][:, k].tolist()}

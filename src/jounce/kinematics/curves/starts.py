@@ -1,4 +1,4 @@
-"""One compiled function: bodies assembled from many starts side by side, at one instant."""
+"""One compiled function: assembly from many starts side by side, at one instant."""
 
 from typing import Any
 
@@ -19,23 +19,23 @@ STEPS = 80
 LONGEST_STEP = 1.0  # rad or sizes of the mechanism
 FIRST_DAMPING, SMALLEST_DAMPING, LARGEST_DAMPING = 1e-1, 1e-13, 1e6
 EASED, STIFFENED = 0.2, 4.0
-CLOSED = 1e-12  # of the residual: nothing is gained by going on
+CLOSED = 1e-12  # residual at which the iteration stops
 
 
 @compiled("pose_type")
 def assemble_side_by_side(
     system: System, coordinates: dict[str, Numbers], instant: Float[Numbers, ""], *, pose_type: type[Pose]
 ) -> tuple[dict[str, Numbers], Float[Numbers, " start"]]:
-    """Return the coordinates to which starts lead, and the largest residual there, by Levenberg and Marquardt.
+    """Return the coordinates that starts converge to, and their largest residuals, by the Levenberg-Marquardt method.
 
     Parameters
     ----------
     system : System
-        With rows of one size.
+        The mechanism, with rows of one size.
     coordinates : dict of str to array
-        Of all bodies, the ground first, the starts last.
+        Coordinates of all bodies, the ground first, starts last.
     instant : float
-        s.
+        Time, s.
     pose_type
         PlanarPose or SpatialPose.
     """
