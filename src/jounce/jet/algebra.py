@@ -41,17 +41,17 @@ class Jet:
     A jet of order K holds ``c[k] = x^(k)(t0) / k!`` for k = 0..K. Each coefficient is an array of the
     quantity's own shape: components first, batch axes last. Operators act on jets, arrays and numbers alike;
     an array or number is a constant in time, and of two jets the shorter one sets the order of the result.
-    A coefficient that is None is zero for certain, and nothing is computed with it.
+    A coefficient of None is known to be zero, and nothing is computed with it.
 
     Parameters
     ----------
     coefficients : iterable of array or None
-        Taylor coefficients ``c[0], ..., c[K]``, all of one shape; the first one is an array.
+        Taylor coefficients ``c[0], ..., c[K]``, all of one shape; the first must be an array.
 
     Raises
     ------
     ValueError
-        If there is no coefficient.
+        If there are no coefficients.
 
     Examples
     --------
@@ -64,14 +64,14 @@ class Jet:
     __slots__ = ("coefficients",)
     __array_ufunc__ = None  # NumPy arrays on the left leave the operator to the jet
 
-    def __init__(self, coefficients: Iterable[Any]):  # each a `Coefficient`; JAX puts other things in their place
+    def __init__(self, coefficients: Iterable[Any]):  # of `Coefficient`, or placeholders of JAX transformations
         self.coefficients = tuple(coefficients)
         if not self.coefficients:
             raise ValueError("a jet needs at least one coefficient, got none")
 
     @classmethod
     def constant(cls, value: ArrayLike, order: int) -> "Jet":
-        """Return the jet of a quantity that does not change in time; a ValueError for what is no real number."""
+        """Return the jet of a constant; raise a ValueError unless it is made of real numbers."""
         return cls((in_full(real_or_traced("value", value, no_numbers)), *[None] * _checked(order)))
 
     @classmethod
@@ -98,7 +98,7 @@ class Jet:
 
     @property
     def order(self) -> int:
-        """Highest derivative that the jet carries."""
+        """Highest order of derivative in the jet."""
         return len(self.coefficients) - 1
 
     @property
@@ -108,16 +108,16 @@ class Jet:
 
     @property
     def dtype(self) -> np.dtype:
-        """Type of the numbers; with the shape, it lets annotations check jets as they check arrays."""
+        """Type of the numbers; together with `shape`, it lets jaxtyping check jets like arrays."""
         return jnp.result_type(self.coefficients[0])
 
     def tree_flatten(self) -> tuple[Any, None]:
-        """Tell JAX that the coefficients are what it transforms."""
+        """Return the coefficients as the leaves for JAX."""
         return self.coefficients, None
 
     @classmethod
     def tree_unflatten(cls, _: None, leaves: Iterable[Any]) -> "Jet":
-        """Build the jet again from its transformed coefficients."""
+        """Return the jet of transformed coefficients."""
         jet = object.__new__(cls)  # transformations pass placeholders that are not arrays
         jet.coefficients = tuple(leaves)
         return jet
@@ -136,7 +136,7 @@ class Jet:
         return Jet(None if c is None else function(c) for c in self.coefficients)
 
     def append(self, coefficient: Coefficient) -> "Jet":
-        """Return the jet of one order more, with the given highest Taylor coefficient."""
+        """Return the jet of the next order, with a given highest Taylor coefficient."""
         return Jet((*self.coefficients, coefficient))
 
     def truncate(self, order: int) -> "Jet":
@@ -144,7 +144,7 @@ class Jet:
         return Jet(self.coefficients[: order + 1])
 
     def differentiate(self) -> "Jet":
-        """Return the jet of the time derivative, one order shorter; a ValueError for order 0."""
+        """Return the jet of the time derivative, one order shorter; raise a ValueError at order 0."""
         if self.order == 0:
             raise ValueError("a jet of order 0 carries no derivative")
         first, *rest = (None if c is None else multiplied(c, k) for k, c in enumerate(self.coefficients) if k)
@@ -188,13 +188,13 @@ class Jet:
         return -self + other
 
     def _combined(self, combine: Product, other: "Quantity") -> "Jet":
-        """Add or subtract; a constant of larger shape than the jet makes the other coefficients follow."""
+        """Return the sum or difference; a constant of larger shape broadcasts the other coefficients."""
         if isinstance(other, Jet):
             return Jet(map(combine, self.coefficients, other.coefficients))._filled()
         return Jet((combine(self.coefficients[0], other), *self.coefficients[1:]))._filled()
 
     def _filled(self) -> "Jet":
-        """Give all coefficients the shape of the first, where a sum of unequal shapes left some as they were."""
+        """Return the jet with all coefficients broadcast to the shape of the first."""
         shape = self.shape
         if all(c is None or jnp.shape(c) == shape for c in self.coefficients):
             return self
@@ -225,10 +225,10 @@ class Jet:
 
 
 Quantity = Jet | Real
-"""A jet, or what does not change in time: an array or a number."""
+"""A jet, or a constant in time: an array or a number."""
 
 JetLike = Quantity | Sequence[Any] | Labeled
-"""A jet, or what becomes one: an array, a number, or a sequence of them."""
+"""A jet, or data that becomes one: an array, a number, or a sequence of them."""
 
 
 def _checked(order: int) -> int:
@@ -291,7 +291,7 @@ def _of_each(function: Callable[[Any], Any], vector: Any) -> Any:
 def concatenate(parts: Sequence[Jet | Numbers]) -> Any:
     """Join vectors, jets or arrays, of shape (components, ...), along the component axis.
 
-    Their other axes are broadcast. Jets are joined coefficient by coefficient; None where it is None in all of them.
+    Their other axes are broadcast. Jets are joined coefficient by coefficient; the result is None where all are.
     """
     jets = [part for part in parts if isinstance(part, Jet)]
     if not jets:
@@ -318,7 +318,7 @@ def _alike(arrays: Sequence[Any]) -> list[Any]:
 
 
 def of_quantities(on_arrays: Callable[[Any], Any]) -> Callable[[Callable[[Jet], Jet]], Callable[[Quantity], Any]]:
-    """Let a function of jets take arrays and numbers too, for which JAX has a function."""
+    """Return a decorator that lets a function of jets take arrays and numbers, too, by a function of JAX."""
 
     def decorate(on_jets: Callable[[Jet], Jet]) -> Callable[[Quantity], Any]:
         return wraps(on_jets)(lambda x: on_jets(x) if isinstance(x, Jet) else on_arrays(x))
@@ -351,7 +351,7 @@ def sqrt(x: Jet) -> Jet:
 def power(x: Quantity, exponent: Quantity) -> Any:
     """Return `x` to the power `exponent`.
 
-    A whole exponent multiplies repeatedly: the recurrence for real exponents divides by the base and fails at zero.
+    A whole exponent uses repeated products, as the recurrence for real exponents divides by the base and fails at zero.
     """
     if isinstance(exponent, Jet):
         return exp(exponent * log(x))
@@ -365,14 +365,14 @@ def power(x: Quantity, exponent: Quantity) -> Any:
 
 
 def real_power(x: Jet, exponent: Real) -> Jet:
-    """Return a power whose exponent is known at run time only.
+    """Return a power with an exponent that is known at run time only.
 
-    The recurrence divides by the base, so a whole exponent up to the order is taken from repeated products instead.
+    The recurrence divides by the base, so repeated products replace it for whole exponents up to the order.
     """
     at_zero = x.coefficients[0] == 0
     c = (jnp.where(at_zero, 1.0, x.coefficients[0]), *x.coefficients[1:])
     whole = [whole_power(x, m).dense() for m in range(x.order + 1)]
-    beyond = exponent > x.order  # at a base of zero, every coefficient vanishes; other exponents have none there
+    beyond = exponent > x.order  # at a base of zero all coefficients vanish; for other real exponents they are NaN
 
     def coefficient(k: int, value: Any) -> Any:
         value = jnp.where(at_zero, jnp.where(beyond | ((exponent > 0) & (k == 0)), 0.0, jnp.nan), value)

@@ -1,7 +1,7 @@
-"""Sums and products of Taylor coefficients; None is a coefficient that is zero for certain.
+"""Sums and products of Taylor coefficients; a coefficient of None is known to be zero.
 
-High orders trace them thousands of times. Every function of `jax.numpy` is a `jax.jit` of its own around an operation
-of `jax.lax`; numbers that need no promotion go to that at once.
+High orders trace these functions thousands of times. Each function of `jax.numpy` is a `jax.jit` around an operation of
+`jax.lax`; numbers that need no promotion use the latter directly.
 """
 
 from collections.abc import Callable, Iterable, Sequence
@@ -16,10 +16,10 @@ import numpy as np
 from jounce.base.shapes import Real
 
 Coefficient = Real | None
-"""A Taylor coefficient, of any shape; None is zero for certain."""
+"""A Taylor coefficient of any shape; None is known to be zero."""
 
 Coefficients = Sequence[Any]
-"""Taylor coefficients, the lowest order first."""
+"""Taylor coefficients, lowest order first."""
 
 Product = Callable[[Any, Any], Any]
 
@@ -28,14 +28,14 @@ _FLOAT = np.dtype(float)
 
 
 def _elementwise(operation: Product, promoting: Product) -> Product:
-    """Let operands of different rank meet at their trailing (batch) axes, said aloud for strict rank promotion.
+    """Return an operation that aligns operands of different rank at their trailing (batch) axes, without promotion.
 
     Parameters
     ----------
     operation : callable
-        Of `jax.lax`, for arrays of doubles and numbers.
+        Operation of `jax.lax`, for double precision.
     promoting : callable
-        The same of `jax.numpy`, for all others.
+        The same operation of `jax.numpy`, for all other types.
     """
 
     def aligned(a: Any, b: Any) -> Any:
@@ -52,7 +52,7 @@ def _elementwise(operation: Product, promoting: Product) -> Product:
 
 
 def _plain(x: Any) -> Any:
-    """Return what `jax.lax` takes without promotion, a double or an array of them; None for anything else."""
+    """Return a double or an array of doubles, for which `jax.lax` needs no promotion; None for other types."""
     kind = type(x)
     if kind is float:
         return x
@@ -60,7 +60,7 @@ def _plain(x: Any) -> Any:
         return float(x)
     if kind is np.ndarray:
         return x if x.dtype == _FLOAT else None
-    known = getattr(x, "aval", None)  # of arrays of JAX and of what it traces
+    known = getattr(x, "aval", None)  # of JAX arrays and tracers
     return x if known is not None and known.dtype == _FLOAT and not known.weak_type else None
 
 
@@ -71,12 +71,12 @@ divided = _elementwise(jax.lax.div, jnp.divide)
 
 
 def negated(a: Any) -> Any:
-    """Return a coefficient with the other sign."""
+    """Return a coefficient with opposite sign."""
     return -a if (x := _plain(a)) is None or type(a) in (int, float) else jax.lax.neg(x)
 
 
-# Products of vectors are those of all components at once, which take few operations to trace, and then one sum. The
-# machine code of an instant has the same instructions as if all were written out.
+# Products of vectors multiply all components at once, which traces few operations, and then sum. The machine code of an
+# instant has the same instructions as with each component written out.
 
 
 def of_components(a: Any, b: Any) -> Any:
@@ -88,7 +88,7 @@ def of_components(a: Any, b: Any) -> Any:
 
 
 def _widened(vector: Any, rank: int) -> Any:
-    """Put axes of length one behind the components of a vector."""
+    """Return a vector with axes of length one inserted behind its components."""
     return vector.reshape(len(vector), *[1] * (rank - vector.ndim), *vector.shape[1:])
 
 
@@ -105,31 +105,31 @@ def cycled(vector: Any) -> Any:
 
 
 def turned_back(vector: Any) -> Any:
-    """Return a plane vector turned by a quarter turn, clockwise: its components y and -x."""
+    """Return a plane vector rotated clockwise by a quarter turn: its components y and -x."""
     return jnp.concatenate([vector[1:], -vector[:1]])
 
 
 def total(terms: Iterable[Any]) -> Any:
-    """Sum without the leading ``0 +`` of the built-in, which would put an operation into every trace."""
+    """Return the sum without the leading ``0 +`` of the built-in, which would trace an operation."""
     return reduce(add, terms)
 
 
 def plus(a: Coefficient, b: Coefficient) -> Any:
-    """Add coefficients; None is zero."""
+    """Return the sum of two coefficients; None is zero."""
     if a is None or b is None:
         return b if a is None else a
     return added(a, b)
 
 
 def minus(a: Coefficient, b: Coefficient) -> Any:
-    """Subtract coefficients; None is zero."""
+    """Return the difference of two coefficients; None is zero."""
     if a is None or b is None:
         return a if b is None else negated(b)
     return subtracted(a, b)
 
 
 def sum_of_products(product: Product, a: Iterable[Any], b: Iterable[Any]) -> Any:
-    """Return the sum of the products of paired coefficients, None where all of them vanish."""
+    """Return the sum of the products of paired coefficients; None if all products vanish."""
     terms = [product(x, y) for x, y in zip(a, b, strict=True) if x is not None and y is not None]
     return reduce(added, terms) if terms else None
 
@@ -188,7 +188,7 @@ def raised(x: Coefficients, exponent: Real) -> list[Any]:
 
 
 def with_rank(a: Real, rank: int) -> Any:
-    """Put axes of length one before those of an array; a number stays a number."""
+    """Return an array with leading axes of length one up to a rank; a number stays a number."""
     missing = rank - jnp.ndim(a)
     return jnp.reshape(a, (1,) * missing + jnp.shape(a)) if missing and jnp.ndim(a) else a
 

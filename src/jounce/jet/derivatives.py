@@ -1,4 +1,4 @@
-"""Plain derivatives from Taylor coefficients and back, of whole arrays, the order first."""
+"""Conversion between plain derivatives and Taylor coefficients of whole arrays, order first."""
 
 import math
 from functools import lru_cache

@@ -1,7 +1,7 @@
 """Elementary functions of jets, each by the recurrence of its differential equation, O(K^2) at order K.
 
-Every function takes a jet, an array or a number; what is not a jet is passed to JAX. Where the textbook
-recurrence loses digits, another form of the same equation is used, with the reason beside it.
+Every function takes a jet, an array or a number; arrays and numbers are passed to JAX. Where the textbook recurrence
+loses digits, an equivalent form is used, with the reason beside it.
 """
 
 import math
@@ -23,7 +23,7 @@ def next_sine_cosine(
     *,
     hyperbolic: bool = False,
 ) -> tuple[Any, Any]:
-    """Return the next coefficients of sine and cosine, from those before and a jet of the angle that reaches them."""
+    """Return the next coefficients of sine and cosine from the previous ones and a jet of the angle of that order."""
     slope = next_of_chain(cosine, angle.coefficients, sine)
     return next_of_chain(sine, angle.coefficients, cosine), slope if slope is None or hyperbolic else negated(slope)
 
@@ -75,13 +75,13 @@ def tan(x: Jet) -> Jet:
 
 @of_quantities(jnp.tanh)
 def tanh(x: Jet) -> Jet:
-    """Return the hyperbolic tangent; its slope is taken as 1 / cosh^2, since 1 - tanh^2 cancels where it saturates."""
+    """Return the hyperbolic tangent, with slope 1 / cosh^2, since 1 - tanh^2 cancels where it saturates."""
     decay = jnp.exp(-2 * jnp.abs(x.coefficients[0]))
     return _riccati(x, jnp.tanh(x.coefficients[0]), 4 * decay / (1 + decay) ** 2, -1)
 
 
 def _hyperbolic(x: Jet) -> tuple[Jet, Jet]:
-    """Return sinh and cosh; far out by the exponential of half the argument, since XLA's own lose digits there."""
+    """Return sinh and cosh; beyond 1 by the exponential of half the argument, as XLA's own functions lose digits."""
     value = x.coefficients[0]
     half = jnp.exp(jnp.maximum(jnp.abs(value), 1.0) / 2)
     large = 0.5 * half * half
@@ -104,7 +104,7 @@ def cosh(x: Jet) -> Jet:
 
 
 def _one_minus_square(x: Quantity) -> Any:
-    """Return 1 - x^2, its value as (1 - x)(1 + x), which keeps the digits of arcsine and arccosine near their ends."""
+    """Return 1 - x^2 as (1 - x)(1 + x), which keeps the digits of arcsine and arccosine near their ends."""
     if not isinstance(x, Jet):
         return (1.0 - x) * (1.0 + x)
     return Jet((_one_minus_square(x.coefficients[0]), *(-(x * x)).coefficients[1:]))
@@ -120,7 +120,7 @@ BY_SLOPE: dict[str, tuple[Callable[[Any], Any], Callable[[Any], Any]]] = {
     "log1p": (jnp.log1p, lambda x: 1.0 / (1.0 + x)),
     "erf": (jax.lax.erf, lambda x: 2.0 / math.sqrt(math.pi) * exp(-(x * x))),
 }
-"""Functions whose slope is an algebraic or elementary function of the argument: both, the slope of jets and arrays."""
+"""Functions with an elementary slope: the function of arrays, and its slope for jets and arrays."""
 
 
 def _from_slope(x: Jet, value: Real, slope: Callable[[Jet], Jet]) -> Jet:
@@ -130,7 +130,7 @@ def _from_slope(x: Jet, value: Real, slope: Callable[[Jet], Jet]) -> Jet:
 
 
 def _by_slope(name: str, meaning: str) -> Callable[[Quantity], Any]:
-    """Return a function of arrays, and of jets by integrating its slope."""
+    """Return a function of arrays that also takes jets, whose slope it integrates."""
     function, slope = BY_SLOPE[name]
 
     def of_jet(x: Jet) -> Jet:
@@ -153,8 +153,8 @@ log1p = _by_slope("log1p", "``log(1 + x)``, exact also where x is tiny")
 def atan2(y: Quantity, x: Quantity) -> Any:
     """Return the angle of the point (x, y), in radians, in (-pi, pi] at order zero.
 
-    The point is turned onto the first axis and scaled to unit distance before the recurrence, so that neither
-    huge nor tiny coordinates overflow in the squares.
+    The point is rotated onto the first axis and scaled to unit distance before the recurrence, so that squares of huge
+    or tiny coordinates neither overflow nor underflow.
     """
     if not isinstance(y, Jet) and not isinstance(x, Jet):
         return jnp.arctan2(y, x)
@@ -174,7 +174,7 @@ def atan2(y: Quantity, x: Quantity) -> Any:
 
 @of_quantities(jnp.expm1)
 def expm1(x: Jet) -> Jet:
-    """Return ``exp(x) - 1``, exact also where x is tiny."""
+    """Return ``exp(x) - 1``, exact for tiny x, too."""
     return _from_slope(x, jnp.expm1(x.coefficients[0]), exp)
 
 
@@ -186,14 +186,14 @@ def cbrt(x: Jet) -> Jet:
 
 @of_quantities(jnp.abs)
 def absolute(x: Jet) -> Jet:
-    """Return the absolute value; at zero its derivatives do not exist, and are taken from the positive side."""
+    """Return the absolute value; its derivatives at zero, which do not exist, are those on the positive side."""
     sign = jnp.where(x.coefficients[0] < 0, -1.0, 1.0)
     return x.map(lambda c: sign * c)
 
 
 @of_quantities(jnp.sign)
 def sign(x: Jet) -> Jet:
-    """Return -1, 0 or 1, the sign of the value; its derivatives are zero, but for its jump."""
+    """Return the sign of the value, -1, 0 or 1; its derivatives are zero, except at its jump."""
     return Jet.constant(jnp.sign(x.coefficients[0]), x.order)
 
 
@@ -204,4 +204,4 @@ FUNCTIONS: dict[str, Callable[..., Any]] = {
         tan, tanh,
     )
 } | {"abs": absolute, "pow": power, "square": lambda x: x * x}  # fmt: skip
-"""By the names that JAX gives its operations."""
+"""Functions by the names of the JAX operations."""

@@ -1,4 +1,4 @@
-"""Which piece of a law that is made of several holds at an instant."""
+"""The piece of a piecewise law that applies at an instant."""
 
 import jax.numpy as jnp
 from jaxtyping import Float, Int
@@ -7,14 +7,14 @@ from jounce.base.shapes import Numbers
 
 
 def last_begun(begins: Float[Numbers, " piece"], instants: Float[Numbers, "*batch"]) -> Int[Numbers, "*batch"]:
-    """Return the last piece that has begun at each instant; the first one before it begins.
+    """Return the last piece that has begun at each instant; the first piece before it begins.
 
-    It is found by halving, in operations for which there is machine code: there is none for `jax.numpy.searchsorted`.
+    The bisection uses operations that machine code supports, unlike `jax.numpy.searchsorted`.
 
     Parameters
     ----------
     begins : array of shape (pieces,)
-        Where pieces begin, not decreasing.
+        Start of each piece, nondecreasing.
     instants : array of shape (...)
 
     Examples

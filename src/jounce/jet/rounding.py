@@ -1,4 +1,4 @@
-"""Where rounding decides a series: near a zero of what it is divided by."""
+"""Coefficients of a series that rounding dominates, near a zero of its divisor."""
 
 import jax.numpy as jnp
 from jaxtyping import Bool, Float
@@ -7,22 +7,22 @@ from jounce.base.shapes import Numbers, Real
 from jounce.jet.algebra import Jet
 from jounce.jet.coefficients import with_rank
 
-ROUNDING = 1e-15  # of a coefficient, relative
-LARGEST_ERROR = 1e-2  # of a coefficient that is returned, in its natural size
-COEFFICIENTS = 4  # coefficients: the same, whatever the order
-SMALLEST = 1e-13  # part of a line that is seen along it, or sine between lines, but for rounding
+ROUNDING = 1e-15  # relative error of a coefficient
+LARGEST_ERROR = 1e-2  # of a returned coefficient, relative to its natural size
+COEFFICIENTS = 4  # used for growth rates, at any order
+SMALLEST = 1e-13  # relative length of a line seen along itself, or sine of the angle of lines, that is rounding
 
 Rates = Float[Numbers, "*batch"]
 
 
 def sizes(jet: Jet, batch: int) -> list[Rates]:
-    """Return the sizes of the first coefficients of a jet that has `batch` trailing axes besides its components."""
+    """Return the norms of the first coefficients of a jet with `batch` trailing axes after its components."""
     whole = jet.dense().coefficients[: COEFFICIENTS + 1]
     return [jnp.sqrt(jnp.sum(c * c, axis=0)) if jnp.ndim(c) > batch else jnp.abs(c) for c in whole]
 
 
 def growth(coefficient_sizes: list[Rates], of: Real) -> Rates:
-    """Return by which factor per unit of time coefficients from the first on grow, beside a size of order zero, 1/s."""
+    """Return the growth rate of coefficients from order 1 on, relative to a size of order zero, 1/s."""
     rates = [jnp.power(size / of, 1.0 / k) for k, size in enumerate(coefficient_sizes, 1)]
     return jnp.max(jnp.stack(rates), axis=0) if rates else jnp.zeros_like(jnp.asarray(of))
 
@@ -30,34 +30,34 @@ def growth(coefficient_sizes: list[Rates], of: Real) -> Rates:
 def nan_where_rounding(
     result: Jet, nearness: Rates, rate: Rates, lost: int = 0, also: Bool[Numbers, "*batch"] | None = None
 ) -> Jet:
-    """Return a series with NaN for those coefficients that are rounding, as what it is divided by nears zero.
+    """Return a series with NaN for coefficients that rounding dominates, as its divisor approaches zero.
 
     Parameters
     ----------
     result : Jet
-        Of shape (components, ...) or (...).
+        Series of shape (components, ...) or (...).
     nearness : array of shape (...)
-        How near the zero is, in time, 1/s: the growth of the divisor. Each coefficient is divided once more by the
+        Nearness in time of the zero, 1/s: the growth rate of the divisor. Each coefficient has one more division by the
         divisor, and rounding errors grow as its powers.
     rate : array of shape (...)
-        The growth of what moves, 1/s: the natural size of the coefficients.
+        Growth rate of the motion, 1/s, which gives the natural size of the coefficients.
     lost : int, default 0
-        Divisions before the first coefficient, but one.
+        Divisions, less one, before the first coefficient.
     also : array of bool, shape (...), optional
-        Where the series is defined at all.
+        Where the series is defined.
     """
     coefficients = []
     for k, c in enumerate(result.dense().coefficients):
         largest = (LARGEST_ERROR / ROUNDING) ** (1.0 / max(k + lost, 1))
-        known = nearness <= largest * rate  # false where a growth is no number
+        known = nearness <= largest * rate  # false for a growth rate of NaN
         coefficients.append(jnp.where(with_rank(known if also is None else known & also, jnp.ndim(c)), c, jnp.nan))
     return Jet(coefficients)
 
 
 def nan_where_rounding_in_plane(angle: Jet, seen: Jet, line: Jet, normal: Jet | None = None) -> Jet:
-    """Return the angle of a line, seen in a plane, NaN where it is seen along itself; vectors (components, ...).
+    """Return the angle of a line projected on a plane, NaN where the line is normal to it; vectors (components, ...).
 
-    A plane that moves has a normal, in the axes of the line, unit length: what is seen moves as either does.
+    A moving plane has a unit normal, in the axes of the line; the projection then moves with both.
     """
     batch = jnp.ndim(angle.coefficients[0])
     flat, whole = sizes(seen, batch), sizes(line, batch)
@@ -68,14 +68,14 @@ def nan_where_rounding_in_plane(angle: Jet, seen: Jet, line: Jet, normal: Jet | 
 
 
 def rates_of(speed: Jet, scale: Rates, batch: int) -> tuple[Rates, Rates]:
-    """Return how near in time a quantity stands still, and the rate of its motion, both 1/s, from its derivative.
+    """Return, from the derivative of a quantity, how near in time it stands still, and its rate of motion, both 1/s.
 
     Parameters
     ----------
     speed : Jet
-        The derivative, of shape (...) or (components, ...) with `batch` axes "...".
+        Derivative of the quantity, of shape (...) or (components, ...), with `batch` axes "...".
     scale : array of shape (...)
-        The size of the quantity itself: an angle has 1 rad.
+        Size of the quantity itself; 1 rad for an angle.
     """
     speed_sizes = sizes(speed, batch)
     own = [size / k for k, size in enumerate(speed_sizes, 1)][:COEFFICIENTS]

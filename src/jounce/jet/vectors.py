@@ -1,4 +1,4 @@
-"""Vector and matrix products of jets; components stand on the leading axes, batches behind them."""
+"""Vector and matrix products of jets; component axes are first, batch axes last."""
 
 from collections.abc import Iterable
 from typing import Any, overload
@@ -39,12 +39,12 @@ def transpose(matrix: Jet) -> Jet: ...
 @overload
 def transpose(matrix: Numbers) -> jax.Array: ...
 def transpose(matrix: Jet | Numbers) -> Jet | jax.Array:
-    """Exchange the rows and columns of a matrix of shape (rows, columns, ...)."""
+    """Return the transpose of a matrix of shape (rows, columns, ...)."""
     if isinstance(matrix, Jet):
         return matrix.map(transpose)
     return jnp.swapaxes(matrix, 0, 1)
 
 
 def stack(parts: Iterable[Quantity]) -> Any:
-    """Stack scalars, or vectors, jets or arrays, along a new leading component axis."""
+    """Stack scalars or vectors, as jets or arrays, along a new leading component axis."""
     return concatenate([part[None] if isinstance(part, Jet) else jnp.asarray(part)[None] for part in parts])

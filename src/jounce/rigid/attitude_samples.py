@@ -13,23 +13,23 @@ from jounce.rigid.orientation import angular_velocity, check_rotation
 from jounce.rigid.rotations import rotation_matrix
 
 HIGHEST_DEGREE = 11
-UNIT = 1e-6  # how far the length of a sampled quaternion may be from one: printed digits, single precision
+UNIT = 1e-6  # largest deviation of the length of a sampled quaternion from one: printed digits, single precision
 
 
 class AttitudeSamples:
     """Attitude of a body interpolated through samples in time.
 
-    A spline runs through the unit quaternions of the samples, their signs chosen so that neighbors are near; at any
-    instant it is scaled to unit length as a jet, so that attitude and angular velocity are exact derivatives of the
-    interpolated motion. How near this comes to the true motion depends on the spacing of the samples: the error of the
-    n-th derivative of the attitude falls as spacing^(degree + 1 - n).
+    A spline interpolates the unit quaternions of the samples, with their signs chosen so that neighbors are close. At
+    any instant it is scaled to unit length as a jet, so that attitude and angular velocity are exact derivatives of the
+    interpolated motion. The deviation from the true motion depends on the spacing of the samples: the error of the n-th
+    derivative of the attitude falls as spacing^(degree + 1 - n).
 
     Parameters
     ----------
     times : array_like of shape (samples,)
         Strictly increasing instants, s.
     quaternions : array_like of shape (samples, 4)
-        Unit quaternions (e0, e1, e2, e3), the scalar first, from the body to the global frame; of either sign.
+        Unit quaternions (e0, e1, e2, e3), scalar first, from the body to the global frame; of either sign.
     degree : int, default 5
         Degree of the spline, from 2 to 11; derivatives of the attitude up to ``degree - 1`` are continuous. At least
         ``degree + 1`` samples are needed.
@@ -38,7 +38,7 @@ class AttitudeSamples:
     ------
     TrajectoryError
         If the samples are too few for the degree, not finite, not increasing in time, of unequal number, not of unit
-        length, or so far apart that the turn between neighbors is half a turn, of unknown sense.
+        length, or so far apart that neighbors differ by half a turn, of unknown sense.
 
     Examples
     --------
@@ -64,7 +64,7 @@ class AttitudeSamples:
             )
             raise TrajectoryError(message, name="quaternions", value=quaternions[first].tolist())
         quaternions = _continuous(times, quaternions / length[:, None])
-        from scipy.interpolate import PPoly, make_interp_spline  # here, since importing SciPy takes half a second
+        from scipy.interpolate import PPoly, make_interp_spline  # imported late, as importing SciPy takes half a second
 
         each = [PPoly.from_spline(make_interp_spline(times, component, k=degree)) for component in quaternions.T]
         inside = np.diff(each[0].x) > 0
@@ -76,7 +76,7 @@ class AttitudeSamples:
 
     @classmethod
     def from_rotation_matrices(cls, times: ArrayLike, matrices: ArrayLike, degree: int = 5) -> "AttitudeSamples":
-        """Build the interpolation from rotation matrices from the body to the global frame, (samples, 3, 3).
+        """Return the interpolation of rotation matrices from the body to the global frame, (samples, 3, 3).
 
         Raises
         ------
@@ -95,7 +95,7 @@ class AttitudeSamples:
     def from_euler_angles(
         cls, times: ArrayLike, angles: ArrayLike, sequence: str, degree: int = 5
     ) -> "AttitudeSamples":
-        """Build the interpolation from Euler angles, (samples, 3) in rad, of one of `SEQUENCES`.
+        """Return the interpolation of Euler angles, (samples, 3) in rad, of one of `SEQUENCES`.
 
         Raises
         ------
@@ -126,7 +126,7 @@ class AttitudeSamples:
         Raises
         ------
         TrajectoryError
-            If an instant is outside the samples, or the order asked is not below the degree.
+            If an instant is outside the samples, or the requested order is not below the degree.
         """
         instants = time.coefficients[0]
         if time.order >= self.degree:
@@ -160,7 +160,7 @@ class AttitudeSamples:
         Raises
         ------
         TrajectoryError
-            If an instant is outside the samples, or the order asked is not below the degree.
+            If an instant is outside the samples, or the requested order is not below the degree.
         """
         quaternion = self.quaternion(time)
         scalar, vector = quaternion[0], quaternion[1:]
@@ -178,7 +178,7 @@ class AttitudeSamples:
         ----------
         time : Jet of shape (...)
             Instants, s, between the first and the last sample: of order 1 for the angular velocity, 2 for the angular
-            acceleration too, and so on, below the degree.
+            acceleration, too, and so on, below the degree.
         frame : {"global", "body"}, default "global"
             Frame of the components.
 
@@ -190,7 +190,7 @@ class AttitudeSamples:
         Raises
         ------
         TrajectoryError
-            If an instant is outside the samples, or the order asked is not below the degree.
+            If an instant is outside the samples, or the requested order is not below the degree.
         """
         return angular_velocity(self.attitude(time), frame)
 
@@ -234,7 +234,7 @@ def _check_times(times: np.ndarray, samples: np.ndarray, name: str, shape: tuple
 def _continuous(
     times: Float[np.ndarray, " sample"], quaternions: Float[np.ndarray, "sample 4"]
 ) -> Float[np.ndarray, "sample 4"]:
-    """Choose the sign of each quaternion so that it is the nearer one to its neighbor: both are the same rotation."""
+    """Return quaternions with the signs that bring neighbors closest; both signs are the same rotation."""
     along = np.sum(quaternions[1:] * quaternions[:-1], axis=1)
     unknown = np.abs(along) < UNIT
     if unknown.any():

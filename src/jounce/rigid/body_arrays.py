@@ -1,4 +1,4 @@
-"""Shapes: bodies selected from arrays whose last two axes are bodies and batch; constants set before batch axes."""
+"""Array shapes: selection of bodies along the axis before the batch, and alignment of constants with batch axes."""
 
 from collections.abc import Callable
 from typing import Any
@@ -15,12 +15,12 @@ from jounce.jet.algebra import JetLike
 
 
 def each_jet(function: Callable[[Jet], Any], tree: Any) -> Any:
-    """Apply a function to the jets of a pose, or of another tree of them."""
+    """Apply a function to the jets of a pose, or of another tree of jets."""
     return jax.tree.map(function, tree, is_leaf=lambda x: isinstance(x, Jet))
 
 
 def take_bodies(jet: Jet, bodies: tuple[int, ...]) -> Jet:
-    """Return the jet of the given bodies, in that order, from one of shape (..., bodies, batch).
+    """Return the jet of given bodies, in that order, from one of shape (..., bodies, batch).
 
     The ground alone is a constant, so that nothing is computed with its derivatives.
     """
@@ -30,7 +30,7 @@ def take_bodies(jet: Jet, bodies: tuple[int, ...]) -> Jet:
 
 
 def _taken(array: Float[Numbers, "*components bodies batch"], bodies: tuple[int, ...]) -> Any:
-    """Select by slices where indices are equal or evenly spaced: XLA merges them into what follows, not a gather."""
+    """Select bodies by slices if indices are equal or evenly spaced, since XLA fuses slices, but not a gather."""
     first, *others = bodies
     stride = others[0] - first if others else 1
     if len(set(bodies)) == 1:
@@ -42,7 +42,7 @@ def _taken(array: Float[Numbers, "*components bodies batch"], bodies: tuple[int,
 
 
 def body_vector(local: JetLike, batch_axes: int) -> Any:
-    """Return a vector given in a body frame with the batch axes of a pose behind its components; a jet as it is."""
+    """Return a body vector with the batch axes of a pose appended to its components; a jet unchanged."""
     if isinstance(local, Jet):
         return local
     local = real_or_traced("vector", local, JounceError)

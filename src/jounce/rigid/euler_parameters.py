@@ -1,4 +1,4 @@
-"""Orientations as files and users write them, turned into Euler parameters."""
+"""Euler parameters from the forms in which files and users write orientations."""
 
 from __future__ import annotations
 
@@ -18,19 +18,19 @@ FORMS: dict[str, tuple[str, ...]] = {
     "euler": ("euler", "angles"),
     "axis": ("axis", "angle"),
 }
-"""The forms of an orientation by the key that tells them, and the keys that each of them has."""
+"""The forms of an orientation by the key that identifies them, with the keys of each form."""
 
 Quaternion = tuple[float, float, float, float]
-"""Euler parameters (e0, e1, e2, e3), the scalar first, of unit length."""
+"""Euler parameters (e0, e1, e2, e3), scalar first, of unit length."""
 
 
 def form_of(keys: Mapping[str, Any]) -> str | None:
-    """Return the form of an orientation by its keys, None where none of them tells it.
+    """Return the form of an orientation by its keys, or None if no key identifies it.
 
     Raises
     ------
     MechanismError
-        A key does not belong to the form, or one is missing; its name is the key.
+        If a key does not belong to the form, or one is missing; the name of the error is the key.
     """
     form = next((form for form in FORMS if form in keys), None)
     valid = FORMS[form] if form else [key for names in FORMS.values() for key in names]
@@ -55,12 +55,12 @@ def euler_parameters(orientation: Any) -> Quaternion:
     Returns
     -------
     tuple of 4 float
-        e0, e1, e2, e3, the scalar first, of unit length.
+        e0, e1, e2, e3, scalar first, of unit length.
 
     Raises
     ------
     MechanismError
-        The form is unknown, or its numbers give no orientation.
+        If the form is unknown, or its numbers do not define an orientation.
 
     Examples
     --------
@@ -79,8 +79,8 @@ def euler_parameters(orientation: Any) -> Quaternion:
 
 
 def _numbers(values: Any, count: int, what: str) -> list[float]:
-    """Return finite numbers, or raise a MechanismError that says what they are."""
-    if what != "the Euler angles":  # these have the order of the turns, whatever their labels are
+    """Return finite numbers, or raise a MechanismError that names them as `what`."""
+    if what != "the Euler angles":  # these follow the order of the rotations, whatever their labels
         values = by_component(None, values, MechanismError)
     try:
         numbers = [float(value) for value in values]
@@ -108,12 +108,12 @@ def from_quaternion(quaternion: Sequence[float]) -> Quaternion:
     Parameters
     ----------
     quaternion : sequence of 4 numbers
-        e0, e1, e2, e3, the scalar first; any length but zero.
+        e0, e1, e2, e3, scalar first, of any nonzero length.
 
     Raises
     ------
     MechanismError
-        All are zero.
+        If all are zero.
 
     Examples
     --------
@@ -121,18 +121,18 @@ def from_quaternion(quaternion: Sequence[float]) -> Quaternion:
     (1.0, 0.0, 0.0, 0.0)
     """
     unit = _unit(quaternion, "the Euler parameters")
-    near = abs(math.hypot(*quaternion) - 1) < 1e-15  # what was written in full is read as it was
+    near = abs(math.hypot(*quaternion) - 1) < 1e-15  # values written in full are kept unchanged
     e0, e1, e2, e3 = map(float, quaternion) if near else unit
     return (e0, e1, e2, e3)
 
 
 def from_axis_angle(axis: Sequence[float], angle: float) -> Quaternion:
-    """Return the Euler parameters of a turn by ``angle`` (rad) about an axis in the global frame.
+    """Return the Euler parameters of a rotation by ``angle`` (rad) about an axis in the global frame.
 
     Raises
     ------
     MechanismError
-        The axis is of zero length.
+        If the axis has zero length.
 
     Examples
     --------
@@ -146,7 +146,7 @@ def from_axis_angle(axis: Sequence[float], angle: float) -> Quaternion:
 
 
 def from_rotation_matrices(matrices: Float[np.ndarray, "*batch 3 3"]) -> Float[np.ndarray, "*batch 4"]:
-    """Return the Euler parameters of rotation matrices (..., 3, 3), as (..., 4); the largest one is positive."""
+    """Return the Euler parameters, (..., 4), of rotation matrices, (..., 3, 3); the largest of each is positive."""
     from scipy.spatial.transform import Rotation
 
     flat = Rotation.from_matrix(matrices.reshape(-1, 3, 3)).as_quat(scalar_first=True)
@@ -154,21 +154,21 @@ def from_rotation_matrices(matrices: Float[np.ndarray, "*batch 3 3"]) -> Float[n
 
 
 def from_euler(sequence: str, angles: Sequence[float]) -> Quaternion:
-    """Return the Euler parameters of three turns about coordinate axes, one after the other.
+    """Return the Euler parameters of three successive rotations about coordinate axes.
 
     Parameters
     ----------
     sequence : str
-        Three letters, neighbors different. Lower case (``zxz``): about the axes of the global frame, which stay
-        (extrinsic). Upper case (``ZXZ``): about the axes of the body, which move (intrinsic). This is the convention of
+        Three letters, neighbors different. Lower case (``zxz``): about the fixed axes of the global frame (extrinsic).
+        Upper case (``ZXZ``): about the moving axes of the body (intrinsic). This is the convention of
         ``scipy.spatial.transform.Rotation.from_euler``.
     angles : sequence of 3 numbers
-        rad, in the order of the letters.
+        Angles, rad, in the order of the letters.
 
     Raises
     ------
     MechanismError
-        The sequence is not one of the 12 of either kind.
+        If the sequence is not one of the 12 of either kind.
 
     Examples
     --------

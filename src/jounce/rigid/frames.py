@@ -1,4 +1,4 @@
-"""Frames that move, as jets: where their origins are, where their axes point, how fast they turn."""
+"""Moving frames as jets: origins, axes and angular velocities."""
 
 import dataclasses
 from typing import Any
@@ -14,7 +14,7 @@ from jounce.rigid.body_arrays import body_vector
 
 
 class AbstractFrame:
-    """A moving frame: an origin and three axes, in the frame of the base; all batch axes trail."""
+    """A moving frame: an origin and three axes, in the frame of the base; batch axes are last."""
 
     position: Jet  # (3, ...), m
     axes: tuple[Jet, ...]  # three of shape (3, ...)
@@ -42,7 +42,7 @@ class AbstractFrame:
 @jax.tree_util.register_dataclass
 @dataclasses.dataclass(frozen=True)
 class Frames(AbstractFrame):
-    """One or many moving frames; all batch axes trail.
+    """One or many moving frames; batch axes are last.
 
     Parameters
     ----------
@@ -51,7 +51,7 @@ class Frames(AbstractFrame):
     axes : tuple of 3 Jet
         Axes in the frame of the base, each of shape (3, ...).
     angular_velocity : Jet
-        In the frame of the base, shape (3, ...), rad/s, one order shorter; None at order zero.
+        Angular velocity in the frame of the base, shape (3, ...), rad/s, one order shorter; None at order zero.
     """
 
     position: Jet

@@ -12,8 +12,8 @@ from jounce.base.shapes import ArrayLike, Numbers, Real, Refused, by_component, 
 from jounce.errors import JounceError, RobotError, check_choice, did_you_mean
 from jounce.rigid.solids import SOLIDS, pseudo_parts, solid_moments
 
-ROUNDING = 1e-5  # of the largest principal moment: what files with six digits may miss a possible tensor by
-MOST_SHOWN = 9  # numbers in a message
+ROUNDING = 1e-5  # of the largest principal moment: error of possible tensors in files with six digits
+MOST_SHOWN = 9  # numbers shown in a message
 ADVICE = "check the units, the signs of the products of inertia and the axes"
 WITHOUT_MASS = "has moments of inertia but no mass"
 NEGATIVE = "has a negative principal moment"
@@ -21,7 +21,7 @@ TRIANGLE = "breaks the triangle inequality: the largest principal moment exceeds
 
 
 class Fault(NamedTuple):
-    """What is wrong with an inertia, in words, and the value that shows it."""
+    """A fault of an inertia: its description, and the value that shows it."""
 
     words: str
     value: Any
@@ -29,26 +29,27 @@ class Fault(NamedTuple):
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Inertia:
-    """How mass is distributed in a rigid body, in the frame of that body.
+    """Mass distribution of a rigid body, in the frame of that body.
 
     Parameters
     ----------
     mass : float
-        kg, greater than zero.
+        Mass, kg, greater than zero.
     center_of_mass : array_like of shape (3,), default zero
-        m, in the frame of the body.
+        Center of mass in the frame of the body, m.
     tensor : array_like of shape (3, 3) or (3,), default zero
         Inertia about the center of mass, in axes parallel to those of the body, kg m^2; three numbers are its
         diagonal. Zero is a point mass.
     strict : bool, default True
-        Refuse what no real body has. Otherwise all is computed with the numbers as they are, and `fault` says what is
-        wrong with them; the mass may then be zero. What is missed by 1e-5 of the largest moment counts as rounding.
+        Whether to refuse values that no real body has. Otherwise everything is computed with the numbers as they are,
+        and `fault` describes what is wrong with them; the mass may then be zero. Deviations up to 1e-5 of the largest
+        moment count as rounding.
 
     Raises
     ------
     RobotError
-        If the mass is negative, a value is not finite, or the tensor is not symmetric; if it is strict, also if the
-        mass is zero or the tensor has a negative principal moment, or one that exceeds the sum of the other two.
+        If the mass is negative, a value is not finite, or the tensor is not symmetric; with `strict`, also if the mass
+        is zero or the tensor has a negative principal moment, or one that exceeds the sum of the other two.
 
     Examples
     --------
@@ -79,7 +80,7 @@ class Inertia:
 
     @property
     def fault(self) -> "Fault | None":
-        """What is wrong with the mass and the tensor, as no real body has them; None where nothing is."""
+        """Fault of mass and tensor by which no real body has them; None if there is none."""
         small, middle, large = (float(x) for x in np.linalg.eigvalsh(self.tensor))
         if not self.mass and self.tensor.any():
             return Fault(WITHOUT_MASS, self.tensor.tolist())
@@ -115,7 +116,7 @@ class Inertia:
         position : array_like of shape (3,)
             Origin of the body's frame in the other frame, m.
         rotation : array_like of shape (3, 3)
-            Takes components in the body's frame to the other frame.
+            Rotation matrix from the body's frame to the other frame.
         """
         position, rotation = np.asarray(position, float), np.asarray(rotation, float)
         tensor = rotation @ self.tensor @ rotation.T
@@ -142,19 +143,19 @@ class Inertia:
             ``"cone"`` (radius, length), ``"ellipsoid"`` (size: three diameters), or thin: ``"rod"`` (length),
             ``"disc"`` (radius).
         mass, density : float
-            kg, or kg/m^3: one of them; thin solids take a mass.
+            Mass, kg, or density, kg/m^3: exactly one of them; thin solids take a mass.
         axis : str, optional
             ``"x"``, ``"y"`` or ``"z"`` of the body, along which a rod (x by default), cylinder, tube, capsule, cone,
             or the normal of a disc (z by default) stands.
         center_of_mass : array_like of shape (3,), default zero
-            In the frame of the body, m.
+            Center of mass in the frame of the body, m.
         **sizes
-            m.
+            Sizes, m.
 
         Raises
         ------
         RobotError
-            If the kind, the axis or a size does not exist or is missing, or a value is not greater than zero.
+            If the kind, the axis or a size does not exist, a size is missing, or a value is not greater than zero.
 
         Examples
         --------
@@ -171,19 +172,19 @@ class Inertia:
 
     @classmethod
     def from_pseudo(cls, pseudo: ArrayLike, strict: bool = True) -> "Inertia":
-        """Return the inertia that a matrix of pseudo-inertia describes: the inverse of `pseudo_inertia`.
+        """Return the inertia with a given pseudo-inertia matrix: the inverse of `pseudo_inertia`.
 
         Parameters
         ----------
         pseudo : array_like of shape (4, 4)
             Second moments about the origin of the frame, kg m^2, first moments, kg m, and mass, kg.
         strict : bool, default True
-            Refuse what no real body has.
+            Whether to refuse values that no real body has.
 
         Raises
         ------
         RobotError
-            If it is not symmetric, the mass is not greater than zero, or no real body has such moments.
+            If the matrix is not symmetric, the mass is not greater than zero, or no real body has such moments.
 
         Examples
         --------
@@ -197,7 +198,7 @@ class Inertia:
             raise RobotError("must be symmetric", name="pseudo", value=pseudo.tolist())
         if pseudo[3, 3] <= 0:
             raise RobotError("must be greater than zero", name="mass", value=float(pseudo[3, 3]))
-        with np.errstate(all="ignore"):  # what overflows is refused below
+        with np.errstate(all="ignore"):  # overflow is refused below
             mass, center, second = pseudo_parts(pseudo)
             moments = np.array(second)
             tensor = np.trace(moments) * np.eye(3) - (moments / 2 + moments.T / 2)
@@ -223,13 +224,13 @@ class Inertia:
 
 
 def _of_point(mass: Any, position: Float[Numbers, " 3"]) -> Float[Numbers, "3 3"]:
-    """Return the inertia tensor of a mass at a place: what Steiner's theorem adds."""
+    """Return the inertia tensor of a point mass, as in the parallel-axis theorem (Steiner)."""
     return mass * (position @ position * np.eye(3) - position[:, None] * position[None])
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class TracedInertia(Inertia):
-    """An inertia with values that JAX traces, for gradients: its shapes are checked, its values cannot be."""
+    """An inertia with values that JAX traces, for gradients; only its shapes are checked."""
 
     mass: Any
 
@@ -244,17 +245,17 @@ class TracedInertia(Inertia):
 
     @property
     def fault(self) -> "Fault | None":
-        """None: what is traced is not looked at."""
+        """None, since traced values cannot be checked."""
         return None
 
 
 def check_solid(kind: str, axis: str, given: dict[str, Any]) -> str:
-    """Return the axis of a solid, its own unless one is given, once kind, axis, sizes and mass or density fit.
+    """Return the axis of a solid, by default its own, after checking kind, axis, sizes and mass or density.
 
     Raises
     ------
     RobotError
-        What does not fit.
+        If an entry does not fit.
     """
     check_choice("solid", kind, SOLIDS, RobotError)
     solid = SOLIDS[kind]
@@ -297,20 +298,19 @@ def finite_numbers(
     error: type[JounceError] = RobotError,
     read: Callable[..., np.ndarray] = real_numbers,
 ) -> np.ndarray:
-    """Return a copy of finite numbers of one of the shapes, of any shape if none is given; it cannot be written to.
+    """Return a read-only copy of finite numbers that has one of the shapes, or any shape if none is given.
 
     Raises
     ------
     RobotError
-        Or the error given, if the value is not made of real numbers, its shape is another one, or a number is not
-        finite.
+        Or `error`, if the value is not made of real numbers, has another shape, or has a number that is not finite.
     """
     array = np.array(read(name, value, error))
     if shapes and array.shape not in shapes:
         expected = " or ".join(map(str, shapes))
         raise error(f"must have the shape {expected}, not {array.shape}", name=name)
     bad = array[~np.isfinite(array)]
-    if bad.size:  # of many numbers the first that is not
+    if bad.size:  # of a large array, the message shows the first bad number
         raise error("must be finite", name=name, value=array.tolist() if array.size <= MOST_SHOWN else bad[0].item())
     return unchanging(array)
 
@@ -318,11 +318,11 @@ def finite_numbers(
 def vector_numbers(
     name: str, value: ArrayLike | Refused, *shapes: tuple[int, ...], error: type[JounceError] = RobotError
 ) -> np.ndarray:
-    """Return the components of a vector or tensor as `finite_numbers` does, by their labels where they have some."""
+    """Return the components of a vector or tensor as `finite_numbers` does, ordered by labels if it has some."""
     return finite_numbers(name, by_component(name, value, error), *shapes, error=error)
 
 
 def unchanging(array: np.ndarray) -> np.ndarray:
-    """Return an array that cannot be written to: what was computed from it would not follow."""
+    """Return an array made read-only, as values computed from it would not follow a change."""
     array.setflags(write=False)
     return array

@@ -23,14 +23,14 @@ from jounce.rigid.rotations import (
 FRAMES = ("global", "body")
 
 SINGULAR = 1e-8
-"""Below this distance from a singular orientation more than half the digits of angles and rates are lost."""
+"""Distance from a singular orientation below which angles and rates lose more than half their digits."""
 
 ORTHONORMAL = 1e-6
-"""Largest entry of ``R^T R - I`` that a rotation matrix may have, to forgive single precision and printed digits."""
+"""Largest entry of ``R^T R - I`` of a rotation matrix, which allows for single precision and printed digits."""
 
 
 def transfer_matrix(sequence: str, angles: JetLike, frame: str = "global") -> Any:
-    """Return the angular transfer matrix, which takes rates of Euler angles to the angular velocity.
+    """Return the angular transfer matrix, which maps rates of Euler angles to the angular velocity.
 
     ``J_psi = [u, R(u; a) v, R(u; a) R(v; b) w]`` for moving axes u, v, w. Negrean 2025, equation 30.
 
@@ -46,7 +46,7 @@ def transfer_matrix(sequence: str, angles: JetLike, frame: str = "global") -> An
     Returns
     -------
     Jet or array of shape (3, 3, ...)
-        Columns in the order of the angles: the axis about which each of them turns.
+        Columns in the order of the angles: the axes of their rotations.
 
     Raises
     ------
@@ -62,8 +62,9 @@ def transfer_matrix(sequence: str, angles: JetLike, frame: str = "global") -> An
     check_choice("frame", frame, FRAMES, JounceError)
     turns, finish = simple_rotations(sequence, angles)
     axes = [Jet.constant(_basis(letter, turns[0]), turns[0].order) for letter in sequence]
-    # seen from the global frame an axis is moved by the turns before it about moving axes, after it about fixed ones;
-    # from the body by the inverse of the others
+    # in the global frame, an axis is rotated by the rotations before it (moving axes) or after it (fixed axes); in the
+    # body
+    # frame, by the inverses of the others
     before = is_moving(sequence) == (frame == "global")
     if frame == "body":
         turns = [transpose(turn) for turn in turns]
@@ -76,7 +77,7 @@ def transfer_matrix(sequence: str, angles: JetLike, frame: str = "global") -> An
 
 
 def angular_velocity_from_angles(sequence: str, angles: JetLike, frame: str = "global") -> Jet:
-    """Return the angular velocity of Euler angles that move, with its derivatives. Negrean 2025, equations 41-42.
+    """Return the angular velocity of moving Euler angles, with its derivatives. Negrean 2025, equations 41-42.
 
     Parameters
     ----------
@@ -109,14 +110,14 @@ def angular_velocity_from_angles(sequence: str, angles: JetLike, frame: str = "g
 
 
 def angular_velocity(attitude: Float[Jet | Numbers, "3 3 *batch"], frame: str = "global") -> Float[Jet, "3 *batch"]:
-    """Return the angular velocity of a rotation matrix that moves, ``[w]x = R' R^T``. Negrean 2025, equation 36.
+    """Return the angular velocity of a moving rotation matrix, ``[w]x = R' R^T``. Negrean 2025, equation 36.
 
     Parameters
     ----------
     attitude : Jet of shape (3, 3, ...)
         Rotation matrix from the body to the global frame, orthonormal at every order; of order 1 or more.
     frame : {"global", "body"}, default "global"
-        Frame of the components; in that of the body, ``[w]x = R^T R'``.
+        Frame of the components; in the body frame, ``[w]x = R^T R'``.
 
     Returns
     -------
@@ -137,7 +138,7 @@ def angular_velocity(attitude: Float[Jet | Numbers, "3 3 *batch"], frame: str = 
     """
     check_choice("frame", frame, FRAMES, JounceError)
     attitude = _moving_jet(attitude, "attitude")
-    # every axis of a triad moves as a' = w x a, and the sum of a x (w x a) over the three of them is 2 w
+    # every axis of a triad moves as a' = w x a, and the sum of a x (w x a) over the triad is 2 w
     triad = transpose(attitude) if frame == "global" else attitude
     half = 0.5 if frame == "global" else -0.5
     rates = triad.differentiate()
@@ -152,8 +153,8 @@ def angle_rates(sequence: str, angles: JetLike, angular_velocity: JetLike, frame
     sequence : str
         One of `SEQUENCES`.
     angles : Jet, array_like of shape (3, ...), or three of either
-        Angles in the order of the letters, rad. Values are enough where the angular velocity is a jet: the angles'
-        derivatives then follow from it, order after order.
+        Angles in the order of the letters, rad. If the angular velocity is a jet, values are sufficient: the
+        derivatives of the angles follow from it, order after order.
     angular_velocity : Jet or array_like of shape (3, ...)
         Angular velocity, rad/s.
     frame : {"global", "body"}, default "global"
@@ -162,15 +163,15 @@ def angle_rates(sequence: str, angles: JetLike, angular_velocity: JetLike, frame
     Returns
     -------
     Jet or array of shape (3, ...)
-        Rates of the angles, rad/s, with their derivatives where the angular velocity has them. Of a batch, the samples
-        at a singular orientation are NaN, and `is_singular_orientation` tells which they are.
+        Rates of the angles, rad/s, with their derivatives if the angular velocity has them. In a batch, samples at a
+        singular orientation are NaN, and `is_singular_orientation` returns which ones they are.
 
     Raises
     ------
     JounceError
         If the sequence or the frame is not known, or there are not three angles.
     SingularityError
-        If a single orientation is singular: two of the three axes are parallel there.
+        If a single orientation is singular: two of the three axes are parallel.
 
     Examples
     --------
@@ -186,7 +187,7 @@ def angle_rates(sequence: str, angles: JetLike, angular_velocity: JetLike, frame
     angles = checked_angles(angles)
     value = angles.coefficients[0] if isinstance(angles, Jet) else jnp.asarray(angles, float)
     regular = _regular(sequence, value, singularity_distance(sequence, value))
-    # one state for all of a batch of the other: batch axes of length one
+    # one state may meet a batch: it gets batch axes of length one
     given = angular_velocity.coefficients[0] if isinstance(angular_velocity, Jet) else angular_velocity
     rank = max(np.ndim(value), np.ndim(given))
     angular_velocity, value = body_vector(angular_velocity, rank - 1), body_vector(value, rank - 1)
@@ -203,7 +204,7 @@ def angle_rates(sequence: str, angles: JetLike, angular_velocity: JetLike, frame
 
 
 def singularity_distance(sequence: str, angles: JetLike) -> Array[Numbers, "*batch"]:
-    """Return how far an orientation is from a singular one: the volume that the three axes of rotation span.
+    """Return the distance of an orientation from a singular one: the volume spanned by the three axes of rotation.
 
     Parameters
     ----------
@@ -215,8 +216,8 @@ def singularity_distance(sequence: str, angles: JetLike) -> Array[Numbers, "*bat
     Returns
     -------
     array of shape (...)
-        Absolute determinant of the transfer matrix: 0 at a singular orientation, 1 at the farthest from it; the cosine
-        of the second angle, or its sine where the first and last letters are the same.
+        Absolute determinant of the transfer matrix, from 0 at a singular orientation to 1: the cosine of the second
+        angle, or its sine if the first and last letters are the same.
 
     Raises
     ------
@@ -236,7 +237,7 @@ def singularity_distance(sequence: str, angles: JetLike) -> Array[Numbers, "*bat
 
 
 def is_singular_orientation(sequence: str, angles: JetLike, tolerance: float = SINGULAR) -> Bool[Numbers, "*batch"]:
-    """Tell where Euler angles are at a singular orientation (gimbal lock).
+    """Return whether Euler angles are at a singular orientation (gimbal lock).
 
     Parameters
     ----------
@@ -267,7 +268,7 @@ def is_singular_orientation(sequence: str, angles: JetLike, tolerance: float = S
 
 
 def euler_angles(sequence: str, attitude: JetLike) -> Any:
-    """Return the Euler angles of a rotation matrix, with their derivatives where it is a jet.
+    """Return the Euler angles of a rotation matrix, with their derivatives if it is a jet.
 
     Parameters
     ----------
@@ -279,16 +280,15 @@ def euler_angles(sequence: str, attitude: JetLike) -> Any:
     Returns
     -------
     Jet or array of shape (3, ...)
-        Angles in the order of the letters, rad: the second one in [0, pi] where the first and last letters are the
-        same and in [-pi/2, pi/2] elsewhere, the others in [-pi, pi]. Of a batch, the samples at a singular
-        orientation are NaN.
+        Angles in the order of the letters, rad: the second one in [0, pi] if the first and last letters are the same,
+        else in [-pi/2, pi/2]; the others in [-pi, pi]. In a batch, samples at a singular orientation are NaN.
 
     Raises
     ------
     JounceError
         If the sequence is not known, or the matrix is not a rotation.
     SingularityError
-        If a single orientation is singular: only the sum or the difference of two angles is determined there.
+        If a single orientation is singular: only the sum or the difference of two angles is determined.
 
     Examples
     --------
@@ -303,7 +303,7 @@ def euler_angles(sequence: str, attitude: JetLike) -> Any:
     letters = sequence.lower() if is_moving(sequence) else sequence[::-1]
     i, j, k = (AXES.index(letter) for letter in letters)
     last = 3 - i - j
-    sign = 1.0 if (j - i) % 3 == 1 else -1.0  # whether i, j and the third axis stand in cyclic order
+    sign = 1.0 if (j - i) % 3 == 1 else -1.0  # whether i, j and the third axis are in cyclic order
     if i == k:
         side = [matrix[j, i], -sign * matrix[last, i]]
         end = [matrix[i, j], sign * matrix[i, last]]
@@ -319,14 +319,14 @@ def euler_angles(sequence: str, attitude: JetLike) -> Any:
 
 
 def check_rotation(matrix: Numbers, name: str = "attitude") -> None:
-    """Raise a JounceError unless matrices of shape (3, 3, ...) are rotations; those that JAX traces are not seen."""
+    """Raise a JounceError unless matrices of shape (3, 3, ...) are rotations; traced values are not checked."""
     if tuple(np.shape(matrix)[:2]) != (3, 3):
         message = "a rotation matrix needs 3 rows and 3 columns on the first axes; batch axes come last"
         raise JounceError(message, name=name, value=f"shape {tuple(np.shape(matrix))}")
     if is_traced(matrix):
         return
     matrices = np.moveaxis(np.asarray(matrix).reshape(3, 3, -1), -1, 0)
-    with np.errstate(invalid="ignore"):  # what is not finite shows in the result
+    with np.errstate(invalid="ignore"):  # non-finite values show in the result
         off = np.abs(np.swapaxes(matrices, 1, 2) @ matrices - np.eye(3)).max(axis=(1, 2))
         bad = ~(off <= ORTHONORMAL) | ~(np.linalg.det(matrices) > 0)
     if bad.any():
@@ -342,7 +342,7 @@ def check_rotation(matrix: Numbers, name: str = "attitude") -> None:
 
 
 def _regular(sequence: str, angles: Numbers | None, distance: Numbers) -> Any:
-    """Return the mask of regular orientations; a single one that is singular raises."""
+    """Return the mask of regular orientations; raise SingularityError for a single singular one."""
     regular = distance > SINGULAR
     if np.ndim(distance) == 0 and not is_traced(regular) and not bool(regular) and not bool(jnp.isnan(distance)):
         where = "a multiple of pi" if sequence[0] == sequence[2] else "pi/2 and a multiple of pi"
@@ -358,7 +358,7 @@ def _regular(sequence: str, angles: Numbers | None, distance: Numbers) -> Any:
 
 
 def _marked(vector: Float[Jet, "3 *batch"], regular: Numbers) -> Float[Jet, "3 *batch"]:
-    """Return a vector with NaN at every order where the orientation is singular."""
+    """Return a vector with NaN at all orders where the orientation is singular."""
     if not is_traced(regular) and bool(jnp.all(regular)):
         return vector
     mask = jnp.reshape(regular, (1,) * (len(vector.shape) - jnp.ndim(regular)) + jnp.shape(regular))
@@ -366,7 +366,7 @@ def _marked(vector: Float[Jet, "3 *batch"], regular: Numbers) -> Float[Jet, "3 *
 
 
 def _solved(matrix: Float[Jet, "3 3 *#batch"], vector: Float[Jet, "3 *#batch"]) -> Float[Jet, "3 *#batch"]:
-    """Return ``matrix^-1 vector`` by Cramer's rule: three columns, whose determinant is the singularity distance."""
+    """Return ``matrix^-1 vector`` by Cramer's rule; the determinant is the singularity distance."""
     a, b, c = transpose(matrix)
     normals = cross(b, c), cross(c, a), cross(a, b)
     volume = dot(a, normals[0])
@@ -374,7 +374,7 @@ def _solved(matrix: Float[Jet, "3 3 *#batch"], vector: Float[Jet, "3 *#batch"]) 
 
 
 def _basis(letter: str, turn: Float[Jet, "3 3 *batch"]) -> Float[Numbers, "3 *batch"]:
-    """Return a coordinate axis with the batch axes of a turn."""
+    """Return a coordinate axis with the batch axes of a rotation."""
     one = jnp.ones_like(turn.coefficients[0][0, 0])
     return jnp.stack([one if u == letter.lower() else 0 * one for u in AXES])
 

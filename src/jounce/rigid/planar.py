@@ -19,7 +19,7 @@ def perpendicular(vector: Jet) -> Jet: ...
 @overload
 def perpendicular(vector: Numbers) -> jax.Array: ...
 def perpendicular(vector: Jet | Numbers | Refused) -> Jet | jax.Array:
-    """Turn a plane vector by +90 degrees: the matrix R of Sommer 2024, equation 9."""
+    """Return a plane vector rotated by +90 degrees: the matrix R of Sommer 2024, equation 9."""
     if isinstance(vector, Jet):
         return vector.map(_turned)
     return _turned(real_or_traced("vector", vector, JounceError))
@@ -32,7 +32,7 @@ def _turned(vector: Numbers) -> jax.Array:
 @jax.tree_util.register_dataclass
 @dataclasses.dataclass(frozen=True)
 class PlanarPose:
-    """Pose of one or many planar bodies as jets; all batch axes trail.
+    """Pose of one or many planar bodies as jets; batch axes are last.
 
     Parameters
     ----------
@@ -41,7 +41,7 @@ class PlanarPose:
     angle : Jet
         Angles from the global to the body x axes, shape (...), rad.
     sine, cosine : Jet
-        Of the angle: the entries of the attitude matrix A, Sommer 2024, equation 9.
+        Sine and cosine of the angle: the entries of the attitude matrix A, Sommer 2024, equation 9.
     """
 
     position: Jet
@@ -49,22 +49,22 @@ class PlanarPose:
     sine: Jet
     cosine: Jet
 
-    shifts, turns = 2, 1  # coordinates of each kind: x, y; angle
+    shifts, turns = 2, 1  # numbers of coordinates: x, y; angle
     predictor = ("position", "angle")  # the jets that a prediction needs
 
     @classmethod
     def from_jets(cls, position: Jet, angle: Jet) -> "PlanarPose":
-        """Build the pose from its coordinates; their jets may be of any order."""
+        """Return the pose of jets of its coordinates, of any order."""
         return cls(position, angle, *sine_cosine(angle))
 
     @classmethod
     def at_unit(cls, position: Numbers, angle: Numbers) -> "PlanarPose":
-        """Build the pose of order zero."""
+        """Return the pose of order zero."""
         return cls.from_jets(Jet([position]), Jet([angle]))
 
     @property
     def order(self) -> int:
-        """Highest time derivative that the pose carries."""
+        """Highest order of time derivative in the pose."""
         return self.position.order
 
     def point(self, local: JetLike) -> Float[Jet, "2 *batch"]:
@@ -82,7 +82,7 @@ class PlanarPose:
         return self.cosine * given - self.sine * perpendicular(given)
 
     def take(self, bodies: tuple[int, ...]) -> "PlanarPose":
-        """Return the poses of the given bodies, by index; body 0 is the ground, which never moves."""
+        """Return the poses of given bodies by index; body 0 is the ground, which never moves."""
         return each_jet(lambda jet: take_bodies(jet, bodies), self)
 
     def displaced(self, shift: Float[Numbers, "2 *batch"], turn: Float[Numbers, "1 *batch"]) -> "PlanarPose":
@@ -95,14 +95,14 @@ class PlanarPose:
     ) -> "PlanarPose":
         """Return the pose one order higher, with new Taylor coefficients r[k], (2, ...), and phi[k], (1, ...).
 
-        What is None is zero.
+        None is zero.
         """
         angle = self.angle.append(None if turn is None else turn[0])
         sine, cosine = next_sine_cosine(self.sine.coefficients, self.cosine.coefficients, angle)
         return PlanarPose(self.position.append(shift), angle, self.sine.append(sine), self.cosine.append(cosine))
 
     def varied(self, shift: Float[Jet, "2 *batch"], turn: Float[Jet, "1 *batch"]) -> "PlanarPose":
-        """Return how the jets change, to first order, as bodies shift, (2, ...) in m, and turn, (1, ...) in rad."""
+        """Return the first-order variation of the pose by shifts, (2, ...) in m, and rotations, (1, ...) in rad."""
         turn = turn[0]
         return PlanarPose(shift, turn, self.cosine * turn, -(self.sine * turn))
 
@@ -112,20 +112,20 @@ class PlanarPose:
 
     @classmethod
     def predicted_from(cls, coordinates: dict[str, Jet], step: Real) -> "PlanarPose":
-        """Return the pose of order zero that the Taylor series of coordinates give a time `step` away, in s."""
+        """Return the pose of order zero that the Taylor series of coordinates give after a time `step`, s."""
         position, angle = (coordinates[name].evaluate(step) for name in cls.predictor)
         return cls.from_jets(Jet([position]), Jet([angle]))
 
     def separation(self, other: "PlanarPose") -> tuple[Float[Numbers, "2 *batch"], Float[Numbers, "1 *batch"]]:
-        """Return the vectors of displacement, (2, ...) in m, and of rotation, (1, ...) in rad, from another pose."""
+        """Return the displacement, (2, ...) in m, and the rotation, (1, ...) in rad, from another pose."""
         turn = self.angle.coefficients[0] - other.angle.coefficients[0]
         return self.position.coefficients[0] - other.position.coefficients[0], turn[None]
 
     def coordinates(self) -> dict[str, Jet]:
-        """Return the jets that describe the motion, by name: what a result stores and `from_coordinates` reads."""
+        """Return the jets that describe the motion by name, which results store and `from_coordinates` reads."""
         return {"position": self.position, "angle": self.angle}
 
     @classmethod
     def from_coordinates(cls, coordinates: dict[str, Jet]) -> "PlanarPose":
-        """Build the pose again from what `coordinates` gave."""
+        """Return the pose of jets from `coordinates`."""
         return cls.from_jets(coordinates["position"], coordinates["angle"])

@@ -1,4 +1,4 @@
-"""The poses of either space, as one type."""
+"""The type of planar and spatial poses."""
 
 from jounce.rigid.planar import PlanarPose
 from jounce.rigid.spatial import SpatialPose

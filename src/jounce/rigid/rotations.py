@@ -1,4 +1,4 @@
-"""Simple rotations and Euler sequences on jets, products of exponentials. Negrean 2025, equations 11-22."""
+"""Simple rotations, rotations about any axis, and Euler sequences on jets. Negrean 2025, equations 11-22."""
 
 from collections.abc import Sequence
 from functools import reduce
@@ -15,13 +15,13 @@ from jounce.jet.algebra import JetLike, total
 AXES = "xyz"
 
 MOVING_SEQUENCES = tuple(u + v + w for u in "XYZ" for v in "XYZ" for w in "XYZ" if v not in (u, w))
-"""The twelve Euler sequences about axes that move with the body."""
+"""The twelve Euler sequences about moving axes."""
 
 FIXED_SEQUENCES = tuple(sequence.lower() for sequence in MOVING_SEQUENCES)
-"""The twelve Euler sequences about axes that stay."""
+"""The twelve Euler sequences about fixed axes."""
 
 SEQUENCES = MOVING_SEQUENCES + FIXED_SEQUENCES
-"""All Euler sequences: upper-case letters for moving axes, lower-case for fixed ones, as SciPy writes them."""
+"""All Euler sequences: upper-case letters for moving axes, lower-case for fixed axes, as in SciPy."""
 
 
 def simple_rotation(axis: str, angle: JetLike) -> Any:
@@ -33,19 +33,19 @@ def simple_rotation(axis: str, angle: JetLike) -> Any:
     Parameters
     ----------
     axis : {"x", "y", "z"}
-        Axis of rotation; capitals mean the same.
+        Axis of rotation, in lower or upper case.
     angle : Jet or array_like of shape (...)
-        Angle, rad, counted by the right-hand rule.
+        Angle, rad, by the right-hand rule.
 
     Returns
     -------
     Jet or array of shape (3, 3, ...)
-        Matrix that takes components in the turned frame to those in the frame before; a jet where the angle is one.
+        Matrix from the rotated frame to the original one; a jet if the angle is one.
 
     Raises
     ------
     JounceError
-        If there is no such axis.
+        If the axis does not exist.
 
     Examples
     --------
@@ -78,19 +78,19 @@ def rotation_about(axis: JetLike, angle: JetLike) -> Any:
     Parameters
     ----------
     axis : Jet or array_like of shape (3,) or (3, ...)
-        Direction of the axis, of any length but zero; it may move.
+        Direction of the axis, of any nonzero length; it may move.
     angle : Jet or array_like of shape (...)
-        Angle, rad, counted by the right-hand rule.
+        Angle, rad, by the right-hand rule.
 
     Returns
     -------
     Jet or array of shape (3, 3, ...)
-        Matrix of the rotation; a jet where the axis or the angle is one.
+        Matrix of the rotation; a jet if the axis or the angle is one.
 
     Raises
     ------
     JounceError
-        If the axis is not three finite numbers, or is of zero length.
+        If the axis does not have three finite components, or has zero length.
 
     Examples
     --------
@@ -120,15 +120,15 @@ def rotation_matrix(sequence: str, angles: JetLike) -> Any:
     Parameters
     ----------
     sequence : str
-        Three letters, neighbors different. Upper case ("ZXZ"): each turn is about an axis that the turns before have
-        moved. Lower case ("zxz"): about axes that stay.
+        Three letters, neighbors different. Upper case ("ZXZ"): each rotation is about an axis moved by the rotations
+        before. Lower case ("zxz"): about fixed axes.
     angles : Jet, array_like of shape (3, ...), or three of either
         Angles in the order of the letters, rad.
 
     Returns
     -------
     Jet or array of shape (3, 3, ...)
-        Matrix that takes body components to global ones; a jet where an angle is one, with all its derivatives.
+        Matrix from body to global components; a jet with all derivatives if an angle is one.
 
     Raises
     ------
@@ -137,7 +137,7 @@ def rotation_matrix(sequence: str, angles: JetLike) -> Any:
 
     See Also
     --------
-    euler_angles : The way back.
+    euler_angles : The inverse function.
 
     Examples
     --------
@@ -151,14 +151,14 @@ def rotation_matrix(sequence: str, angles: JetLike) -> Any:
 
 
 def simple_rotations(sequence: str, angles: JetLike) -> tuple[list[Jet], Any]:
-    """Return the three turns of a sequence as jets, in the order of its letters, and what `uniform` returns."""
+    """Return the three rotations of a sequence as jets, in the order of its letters, and the function of `uniform`."""
     check_sequence(sequence)
     (angles,), finish = uniform(angles=checked_angles(angles))
     return [simple_rotation(axis, angle) for axis, angle in zip(sequence, angles, strict=True)], finish
 
 
 def is_moving(sequence: str) -> bool:
-    """Tell whether a sequence turns about moving axes."""
+    """Return whether a sequence rotates about moving axes."""
     return sequence.isupper()
 
 
@@ -173,7 +173,7 @@ def check_sequence(sequence: str, error: type[JounceError] = JounceError, name: 
 
 
 def stacked_if_jets(name: str, values: JetLike) -> Any:
-    """Return a sequence with jets in it as one jet, others as they are; a JounceError for what is no real number."""
+    """Return a sequence with jets in it as one jet, others unchanged; raise a JounceError unless numbers are real."""
     if isinstance(values, Jet):
         return values
     if isinstance(values, Sequence) and any(isinstance(value, Jet) for value in values):
@@ -196,7 +196,7 @@ def checked_angles(angles: JetLike) -> Any:
 
 
 def checked_direction(axis: JetLike, name: str = "axis") -> Any:
-    """Return the direction of an axis, after a check of its size and, where it is known, of its length."""
+    """Return the direction of an axis after checking its shape, and its length if the values are known."""
     axis = axis if isinstance(axis, Jet) else _real(name, axis)
     shape = axis.shape if isinstance(axis, Jet) else np.shape(axis)
     if shape[:1] != (3,):
@@ -219,10 +219,10 @@ def unit(vector: Jet) -> list[Jet]:
 
 
 def uniform(**arguments: JetLike) -> tuple[list[Jet], Any]:
-    """Return arguments as jets of one order, and the function that turns the result into what the caller expects.
+    """Return arguments as jets of one order, and a function that converts the result for the caller.
 
-    Where no argument is a jet, the result is the array of its values. Batch axes of all arguments must agree, or be
-    missing, and stand last. A JounceError names an argument that is not of real numbers.
+    If no argument is a jet, the result becomes an array of values. Batch axes of all arguments must agree or be
+    missing, and are last. A JounceError names an argument that is not made of real numbers.
     """
     orders = [argument.order for argument in arguments.values() if isinstance(argument, Jet)]
     order = min(orders, default=0)

@@ -20,26 +20,26 @@ KINDS = ("revolute", "prismatic")
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class ScrewAxis:
-    """Screw parameters of a joint: an axis in the frame of the base, while all coordinates are zero.
+    """Screw parameters of a joint: an axis in the frame of the base with all coordinates zero.
 
     Negrean 2025, equations 31-34.
 
     Parameters
     ----------
     axis : array_like of shape (3,)
-        Direction of the axis, of any length but zero.
+        Direction of the axis, of any nonzero length.
     point : array_like of shape (3,), default zero
-        A point of the axis, m.
+        A point on the axis, m.
     kind : {"revolute", "prismatic"}, default "revolute"
         Whether the coordinate is an angle about the axis, rad, or a distance along it, m: the operator Delta of the
         paper, one or zero.
     pitch : float, default 0
-        Advance of a revolute axis along itself, m/rad: a screw in the narrow sense where it is not zero.
+        Advance of a revolute axis along itself, m/rad; nonzero for a screw in the narrow sense.
 
     Raises
     ------
     JounceError
-        If the axis is of zero length, a number is not finite, or the kind is not known.
+        If the axis has zero length, a number is not finite, or the kind is not known.
 
     Examples
     --------
@@ -68,7 +68,7 @@ class ScrewAxis:
             raise JounceError(message, name="pitch", value=self.pitch)
 
     def transform(self, coordinate: JetLike) -> Any:
-        """Return the homogeneous transform of this axis at a coordinate: what `screw_transform` returns."""
+        """Return the homogeneous transform of this axis at a coordinate, as `screw_transform` does."""
         return screw_transform(self.axis, self.point, coordinate, self.kind, self.pitch)
 
 
@@ -84,26 +84,26 @@ def screw_transform(
     Parameters
     ----------
     axis : array_like of shape (3,)
-        Direction of the axis, of any length but zero.
+        Direction of the axis, of any nonzero length.
     point : array_like of shape (3,)
-        A point p0 of the axis, m.
+        A point p0 on the axis, m.
     coordinate : Jet or array_like of shape (...)
         Angle about the axis, rad, or distance along it, m.
     kind : {"revolute", "prismatic"}, default "revolute"
-        What the coordinate is.
+        Kind of the coordinate.
     pitch : float, default 0
         Advance of a revolute axis along itself, m/rad.
 
     Returns
     -------
     Jet or array of shape (4, 4, ...)
-        Transform that takes the places of a body before the motion to those after it; a jet where the coordinate is
-        one, with all its derivatives.
+        Transform from positions of the body before the motion to those after it; a jet with all derivatives if the
+        coordinate is one.
 
     Raises
     ------
     JounceError
-        If the axis is of zero length, a number is not finite, or the kind is not known.
+        If the axis has zero length, a number is not finite, or the kind is not known.
 
     Examples
     --------
@@ -112,7 +112,7 @@ def screw_transform(
     >>> jn.rigid.screw_transform([0, 0, 1], [1, 0, 0], pi)[:3, 3].round().astype(int).tolist()
     [2, 0, 0]
     """
-    ScrewAxis(axis, point, kind, pitch)  # its checks
+    ScrewAxis(axis, point, kind, pitch)  # for its checks
     (turn,), finish = uniform(coordinate=coordinate)
     batch = (1,) * len(turn.shape)
     direction = stack(unit(Jet([jnp.asarray(axis, float)]))).coefficients[0].reshape(3, *batch)
@@ -132,16 +132,16 @@ def product_of_exponentials(screws: Sequence[ScrewAxis], coordinates: JetLike, h
     Parameters
     ----------
     screws : sequence of n ScrewAxis
-        From the base outwards, all in the frame of the base while the coordinates are zero.
+        From the base outward, all in the frame of the base with the coordinates zero.
     coordinates : Jet, array_like of shape (n, ...), or n of either
         Angles, rad, and distances, m.
     home : array_like of shape (4, 4), optional
-        Transform of the last body while the coordinates are zero; left out, it coincides with the base.
+        Transform of the last body with the coordinates zero; the identity by default.
 
     Returns
     -------
     Jet or array of shape (4, 4, ...)
-        Transform from the last body to the base; a jet where the coordinates are one, with all its derivatives.
+        Transform from the last body to the base; a jet with all derivatives if the coordinates are one.
 
     Raises
     ------

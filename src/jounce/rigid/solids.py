@@ -1,6 +1,6 @@
-"""Homogeneous solids: volume, and moments of inertia over the mass, from their sizes.
+"""Homogeneous solids: volume, and moments of inertia per mass, from their sizes.
 
-Plain arithmetic, so that sizes may be numbers or anything else that can be added and multiplied.
+The formulas are plain arithmetic, so that sizes may be numbers or anything else that can be added and multiplied.
 """
 
 import math
@@ -9,17 +9,18 @@ from typing import Any, NamedTuple
 
 
 class HomogeneousSolid(NamedTuple):
-    """A kind of solid: its sizes, its axis by default, and how volume and moments follow.
+    """A kind of solid: its sizes, its default axis, and its volume and moments.
 
     Attributes
     ----------
     sizes : tuple of str
         Names of its sizes, m.
     axis : str
-        ``"x"``, ``"y"`` or ``"z"``; empty where no axis is special.
+        ``"x"``, ``"y"`` or ``"z"``; empty if no axis is special.
     measure : callable
         Maps the sizes to the volume, m^3 (None where a size is taken for zero), and to the moments of inertia over
-        the mass, m^2, about the axis and across it; or about x, y and z.
+        Maps the sizes to the volume, m^3 (None for thin solids), and to the moments of inertia per mass, m^2, about the
+        axis and perpendicular to it; or about x, y and z.
     """
 
     sizes: tuple[str, ...]
@@ -48,8 +49,8 @@ def _cylinder(radius: Any, length: Any) -> tuple[Any, tuple[Any, ...]]:
 
 
 def _capsule(radius: Any, length: Any) -> tuple[Any, tuple[Any, ...]]:
-    """Return that of a cylinder of a length between two half spheres."""
-    balls = radius * (4.0 / 3.0)  # as long as a cylinder of their volume
+    """Return volume and moments of a cylinder of a given length between two half spheres."""
+    balls = radius * (4.0 / 3.0)  # length of a cylinder with the volume of the half spheres
     squared, whole = radius * radius, length + balls
     along = (length * squared / 2.0 + balls * squared * 0.4) / whole
     lever = squared * 0.4 + length * length / 4.0 + length * radius * 0.375
@@ -89,7 +90,7 @@ SOLIDS = {
 
 
 def solid_moments(kind: str, axis: str, sizes: dict[str, Any]) -> tuple[Any, tuple[Any, Any, Any]]:
-    """Return the volume of a solid, None for a thin one, and its moments over the mass about x, y and z.
+    """Return the volume of a solid, None for a thin one, and its moments per mass about x, y and z.
 
     Examples
     --------

@@ -1,7 +1,7 @@
 """Spatial rigid bodies on jets: poses, points, directions, angular velocity. Sommer 2024, equations 59-76.
 
-Attitude moves by the recursion ``A' = A skew(w')`` with the body-fixed angular velocity w', and the unit
-quaternion by ``p' = 1/2 p o (0, w')``; no exponential map is ever differentiated.
+The attitude follows the recursion ``A' = A skew(w')`` with the body-fixed angular velocity w', and the unit quaternion
+``p' = 1/2 p o (0, w')``; no exponential map is ever differentiated.
 """
 
 import dataclasses
@@ -40,7 +40,7 @@ def body_axes(quaternion: Float[Numbers, "4 *batch"] | Refused) -> Triad:
 
 
 def quaternion_spins(quaternion: Float[Numbers, "4 *batch"]) -> Quadruples:
-    """Return the quaternion products of p with i, j and k: how it changes as the body turns about its axes."""
+    """Return the quaternion products of p with i, j and k: its changes by rotation about the body axes."""
     e0, e1, e2, e3 = components(quaternion)
     return (
         jnp.concatenate([-e1, e0, e3, -e2]),
@@ -52,7 +52,7 @@ def quaternion_spins(quaternion: Float[Numbers, "4 *batch"]) -> Quadruples:
 def quaternion_change(
     quaternion: Float[Numbers, "4 *batch"], turn: Float[Numbers, "3 *batch"]
 ) -> Float[Numbers, "4 *batch"]:
-    """Return how Euler parameters change with a turn about the axes of the body, rad, or by rates with its rate."""
+    """Return the change of Euler parameters by a rotation about the body axes, rad; or its rate, given rates."""
     return 0.5 * total(spin * part for spin, part in zip(quaternion_spins(quaternion), components(turn), strict=True))
 
 
@@ -63,7 +63,7 @@ def _normalized(quaternion: Float[Numbers, "4 *batch"]) -> Float[Numbers, "4 *ba
 @jax.tree_util.register_dataclass
 @dataclasses.dataclass(frozen=True)
 class SpatialPose(AbstractFrame):
-    """Pose of one or many spatial bodies as jets; all batch axes trail.
+    """Pose of one or many spatial bodies as jets; batch axes are last.
 
     Parameters
     ----------
@@ -72,12 +72,12 @@ class SpatialPose(AbstractFrame):
     quaternion : Jet
         Unit Euler parameters [e0, e1, e2, e3] from the body to the global frame, shape (4, ...).
     spins : tuple of 3 Jet
-        Quaternion products of them with i, j and k, each of shape (4, ...).
+        Quaternion products of the Euler parameters with i, j and k, each of shape (4, ...).
     axes : tuple of 3 Jet
         Axes of the body in the global frame, the columns of the attitude matrix A, each of shape (3, ...).
     angular_velocity : Jet or None
-        Body-fixed angular velocity w', shape (3, ...), rad/s, one order shorter; None at order zero, and where it is
-        zero for certain.
+        Body-fixed angular velocity w', shape (3, ...), rad/s, one order shorter; None at order zero, and if it is known
+        to be zero.
     """
 
     position: Jet
@@ -86,26 +86,26 @@ class SpatialPose(AbstractFrame):
     axes: tuple[Jet, ...]
     angular_velocity: Jet | None
 
-    shifts, turns = 3, 3  # coordinates of each kind: x, y, z; rotation about the three body axes
+    shifts, turns = 3, 3  # numbers of coordinates: x, y, z; rotations about the three body axes
     predictor = ("position", "quaternion")  # the jets that a prediction needs
 
     @classmethod
     def at(
         cls, position: Float[Numbers, "3 *batch"] | Refused, quaternion: Float[Numbers, "4 *batch"] | Refused
     ) -> "SpatialPose":
-        """Build the pose of order zero; the quaternion is normalized."""
+        """Return the pose of order zero; the quaternion is normalized."""
         origin: Any = real_or_traced("position", position, JounceError)
         return cls.at_unit(origin, _normalized(real_or_traced("quaternion", quaternion, JounceError)))
 
     @classmethod
     def at_unit(cls, position: Float[Numbers, "3 *batch"], quaternion: Float[Numbers, "4 *batch"]) -> "SpatialPose":
-        """Build the pose of order zero from Euler parameters that have unit length already."""
+        """Return the pose of order zero from Euler parameters of unit length."""
         spins, axes = (tuple(Jet([x]) for x in f(quaternion)) for f in (quaternion_spins, body_axes))
         return cls(Jet([position]), Jet([quaternion]), spins, axes, None)
 
     @property
     def order(self) -> int:
-        """Highest time derivative that the pose carries."""
+        """Highest order of time derivative in the pose."""
         return self.position.order
 
     def relative_quaternion(self, quaternion: Jet) -> tuple[Jet, Jet]:
@@ -121,7 +121,7 @@ class SpatialPose(AbstractFrame):
         return self.direction(self.angular_velocity)
 
     def take(self, bodies: tuple[int, ...]) -> "SpatialPose":
-        """Return the poses of the given bodies, by index; body 0 is the ground, which never moves."""
+        """Return the poses of given bodies by index; body 0 is the ground, which never moves."""
         taken = each_jet(lambda jet: take_bodies(jet, bodies), self)
         return taken if any(bodies) else dataclasses.replace(taken, angular_velocity=None)
 
@@ -135,7 +135,7 @@ class SpatialPose(AbstractFrame):
     ) -> "SpatialPose":
         """Return the pose one order higher, with new coefficients r[k] and w'[k-1] / k, both of shape (3, ...).
 
-        What is None is zero.
+        None is zero.
         """
         k = self.order + 1
         velocity = self.angular_velocity
@@ -143,7 +143,7 @@ class SpatialPose(AbstractFrame):
             velocity = velocity.append(None if turn is None else k * turn)
         elif turn is not None:
             velocity = Jet((k * turn,)) if k == 1 else Jet((jnp.zeros_like(turn), *[None] * (k - 2), k * turn))
-        # the term with the newest w' is last: the others are then shared between a trial and the solution
+        # the term with the newest w' is last, so that a trial and the solution share the others
         rates = [None] * k if velocity is None else velocity.coefficients
         w = list(zip(*(components(rate) if rate is not None else [None] * 3 for rate in rates), strict=True))
 
@@ -169,9 +169,9 @@ class SpatialPose(AbstractFrame):
         )
 
     def varied(self, shift: Float[Jet, "3 *batch"], turn: Float[Jet, "3 *batch"]) -> "SpatialPose":
-        """Return how the jets change, to first order, as bodies shift, (3, ...) in m, and turn, (3, ...) in rad.
+        """Return the first-order variation of the pose by shifts, (3, ...) in m, and rotations, (3, ...) in rad.
 
-        The turn is about the body's axes; it need not be small, as the change is linear in it.
+        The rotation is about the body axes; it need not be small, since the variation is linear in it.
         """
         x, y, z = self.axes
         p, q, r = components(turn)
@@ -184,7 +184,7 @@ class SpatialPose(AbstractFrame):
         return SpatialPose(shift, quaternion, tuple(map(Jet, spins)), axes, velocity)
 
     def turning(self, change: "SpatialPose") -> Float[Jet, "3 *batch"]:
-        """Return the turn, (3, ...) in rad about the axes of the body, of a change that `varied` gave."""
+        """Return the rotation, (3, ...) in rad about the body axes, of a variation from `varied`."""
         (x, y, z), (dx, dy, dz) = self.axes, change.axes
         return stack([dot(dy, z), dot(dz, x), dot(dx, y)])
 
@@ -201,22 +201,22 @@ class SpatialPose(AbstractFrame):
 
     @classmethod
     def predicted_from(cls, coordinates: dict[str, Jet], step: Real) -> "SpatialPose":
-        """Return the pose of order zero that the Taylor series of coordinates give a time `step` away, in s."""
+        """Return the pose of order zero that the Taylor series of coordinates give after a time `step`, s."""
         return cls.at(*(coordinates[name].evaluate(step) for name in cls.predictor))
 
     def separation(self, other: "SpatialPose") -> tuple[Float[Numbers, "3 *batch"], Float[Numbers, "3 *batch"]]:
-        """Return the vectors of displacement, (3, ...) in m, and of rotation, (3, ...) in rad, from another pose."""
+        """Return the displacement, (3, ...) in m, and the rotation, (3, ...) in rad, from another pose."""
         turn = other.truncate(0).relative_quaternion(self.quaternion.truncate(0))[1]
         return self.position.coefficients[0] - other.position.coefficients[0], 2 * turn.coefficients[0]
 
     def coordinates(self) -> dict[str, Jet]:
-        """Return the jets that describe the motion, by name: what a result stores and `from_coordinates` reads."""
+        """Return the jets that describe the motion by name, which results store and `from_coordinates` reads."""
         jets = {"position": self.position, "quaternion": self.quaternion}
         return jets if self.angular_velocity is None else {**jets, "angular_velocity": self.angular_velocity}
 
     @classmethod
     def from_coordinates(cls, coordinates: dict[str, Jet]) -> "SpatialPose":
-        """Build the pose again from what `coordinates` gave; the attitude follows by its recursion."""
+        """Return the pose of jets from `coordinates`; the attitude follows by its recursion."""
         pose = cls.at(coordinates["position"].coefficients[0], coordinates["quaternion"].coefficients[0])
         for k in range(1, coordinates["position"].order + 1):
             rate = coordinates["angular_velocity"].coefficients[k - 1] * (1 / k)
@@ -234,12 +234,12 @@ def angular_product_matrices(angular_velocity: Jet) -> Float[jax.Array, "derivat
     Parameters
     ----------
     angular_velocity : Jet of shape (3, ...)
-        In the axes of the body, rad/s.
+        Angular velocity in the body axes, rad/s.
 
     Returns
     -------
     array of shape (order + 2, 3, 3, ...)
-        The matrices P_0 (the identity), P_1 (zero), P_2, ..., P_(order + 1), in the axes of the body, 1/s^k.
+        The matrices P_0 (the identity), P_1 (zero), P_2, ..., P_(order + 1), in the body axes, 1/s^k.
 
     Examples
     --------

@@ -1,1 +1,1 @@
-"""Programs of JAX, read as users write them and run on Taylor series: composition, recursion, what they capture."""
+"""Programs of JAX, traced from users' functions and run on Taylor series: composition, recursion, captured values."""

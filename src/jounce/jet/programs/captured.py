@@ -1,10 +1,10 @@
-"""What code of a user computes: a program of JAX, whose captured numbers are arguments.
+"""Programs of user code: traced by JAX, with the captured numbers as arguments.
 
-A Python function is no key of anything that is kept, as what it computes may change while it stays the same object: a
-gain that it reads from an attribute, a list, a global. Here a function is traced whenever it is used, in milliseconds.
-Two functions are equal where their programs are, operation by operation, whatever numbers they hold: those are handed
-in as arguments, so that a changed gain neither goes unseen nor is compiled anew. Whole numbers, exponents and shapes
-are part of the program, and so are numbers within loops and branches.
+A Python function cannot be a cache key: what it computes may change while the object stays the same, as with a gain
+read from an attribute, a list, or a global. A function is therefore traced, in milliseconds, whenever it is used. Two
+functions are equal if their programs are, operation by operation, whatever numbers they hold. These numbers become
+arguments, so that a changed gain is noticed, but not compiled anew. Integers, exponents and shapes are part of the
+program, as are numbers within loops and branches.
 """
 
 import abc
@@ -26,12 +26,12 @@ from jax.extend.core import ClosedJaxpr, Jaxpr, JaxprEqn, Literal, jaxpr_as_fun
 from jounce.errors import PrecisionWarning, warn_caller
 from jounce.settings import under_own_settings
 
-MOST_TRACED = 1000  # programs at most, of functions read before
+MOST_TRACED = 1000  # programs kept of functions traced before
 _JAX = Path(str(jax.__file__)).parent.as_posix() + "/"
-_CALLER = _JAX + "_src/numpy/ufunc_api.py"  # which compiles functions of users as its own
+_CALLER = _JAX + "_src/numpy/ufunc_api.py"  # compiles users' functions as if they were its own
 _CALLS = ("jit", "pjit")
-_BY_IDENTITY = frozenset("cond scan while".split())  # whose functions JAX traces once for each object
-_OF_ARRAYS = ("_searchsorted_scan_impl",)  # functions of JAX with loops that are no user's
+_BY_IDENTITY = frozenset("cond scan while".split())  # JAX traces their functions once per object
+_OF_ARRAYS = ("_searchsorted_scan_impl",)  # functions of JAX itself that have loops
 
 _anew = jax.make_user_context(None)
 _count = itertools.count()
@@ -41,7 +41,7 @@ _known: dict[Any, "Program"] = {}
 
 @dataclasses.dataclass(frozen=True)
 class OpaqueObject:
-    """An object of which nothing is known but that it is itself."""
+    """An object of which only the identity is known."""
 
     value: Any
 
@@ -54,18 +54,18 @@ class OpaqueObject:
 
 @dataclasses.dataclass(frozen=True)
 class Program:
-    """A program of JAX, equal to another where that does the same operations.
+    """A program of JAX; equal programs perform the same operations.
 
     Parameters
     ----------
     digest : str
-        Of all that it does.
-    nameless : tuple of Same
-        What it holds that has no description, such as calls into Python.
+        Digest of all operations.
+    nameless : tuple of OpaqueObject
+        Objects in the program without a description, such as calls into Python.
     shapes : tuple of tuple of int
-        Of the captured values.
+        Shapes of the captured values.
     closed : ClosedJaxpr
-        The program, of the captured values and the arguments.
+        The program as a function of the captured values and the arguments.
     """
 
     digest: str
@@ -74,23 +74,23 @@ class Program:
     closed: ClosedJaxpr = dataclasses.field(compare=False, repr=False)
 
     def __call__(self, captured: Sequence[Any], *arguments: Any) -> list[Any]:
-        """Return the results for captured values, one after another, and arguments."""
+        """Return the list of results for captured values and arguments."""
         return jaxpr_as_fun(self.closed)(*captured, *arguments)
 
 
 class CapturedFunction(NamedTuple):
-    """A function that was read off.
+    """A traced function: its program and the numbers that it captured.
 
     Attributes
     ----------
     program : Program
-        What it does.
+        Program of the function.
     captured : tuple of array
-        The numbers that it holds.
+        Captured numbers.
     traced : ClosedJaxpr
-        As JAX traced it, the numbers in their places.
+        The program as traced by JAX, with the numbers in place.
     result : pytree
-        Shapes and types of what it returns.
+        Shapes and types of the result.
     """
 
     program: Program
@@ -101,12 +101,12 @@ class CapturedFunction(NamedTuple):
 
 @under_own_settings
 def captured_function(function: Callable[..., Any], *examples: Any) -> CapturedFunction:
-    """Return what a function of arrays computes.
+    """Return the program of a function of arrays as it is now, and the numbers that it captures.
 
     Parameters
     ----------
     function : callable
-        JAX-traceable.
+        JAX-traceable function.
     *examples
         Arguments, or their shapes and types.
 
@@ -120,7 +120,7 @@ def captured_function(function: Callable[..., Any], *examples: Any) -> CapturedF
     >>> first.program == second.program, [float(x) for x in second.captured]
     (True, [5.0, 7.0])
     """
-    closed, result = _traced(function, jax.tree.map(_shaped, examples))  # of no weak types, which are other programs
+    closed, result = _traced(function, jax.tree.map(_shaped, examples))  # weak types would give other programs
     description = _Description()
     captured = tuple(description.of(closed))
     key = description.digest(), tuple(map(OpaqueObject, description.nameless))
@@ -136,31 +136,31 @@ def captured_function(function: Callable[..., Any], *examples: Any) -> CapturedF
             warn_caller(PrecisionWarning(message))
     with _lock:
         _known.pop(key, None)
-        _known[key] = program  # the last one used is last
+        _known[key] = program  # reinserted: the most recently used is last
         while len(_known) > MOST_TRACED:
             del _known[next(iter(_known))]
     return CapturedFunction(program, captured, closed, result)
 
 
 def value_key(closed: ClosedJaxpr) -> tuple[str, tuple[OpaqueObject, ...]]:
-    """Return what identifies a program and the numbers in it."""
+    """Return a key of a program including the numbers in it."""
     description = _Description(values=True)
     description.of(closed)
     return description.digest(), tuple(map(OpaqueObject, description.nameless))
 
 
 def may_hold_stale_functions(closed: ClosedJaxpr) -> bool:
-    """Tell whether a program holds functions of a user that JAX traces once for each object."""
+    """Return whether a program contains users' functions that JAX traces once per object."""
     return _may_hold_stale_functions(closed.jaxpr)
 
 
 def known_as(digest: str) -> AbstractContextManager[None]:
-    """Return within what JAX remembers functions of a user by what they compute, and not by the object."""
+    """Return a context in which JAX caches users' functions by a digest of their program, not by object."""
     return _anew(digest)
 
 
 def parameters_of(equation: JaxprEqn) -> tuple[list[str], list[Any]]:
-    """Return what distinguishes an operation from others of its name, and what of it has no description."""
+    """Return a description of the parameters of an operation, and the objects in them without a description."""
     description = _Description()
     return description.parameters(equation), description.nameless
 
@@ -170,16 +170,16 @@ def _shaped(x: Any) -> jax.ShapeDtypeStruct:
 
 
 def _traced(function: Callable[..., Any], examples: Sequence[Any]) -> tuple[ClosedJaxpr, Any]:
-    """Return the program of a function as it is now: another function each time, of which JAX remembers nothing."""
+    """Return the current program of a function, traced as a new function of which JAX has no cached trace."""
     traced = jax.make_jaxpr(lambda *x: function(*x), return_shape=True)(*examples)
     if not _may_hold_stale_functions(traced[0].jaxpr):
         return traced
-    with _anew(next(_count)):  # nothing traced before is found under it
+    with _anew(next(_count)):  # finds no earlier traces
         return jax.make_jaxpr(lambda *x: function(*x), return_shape=True)(*examples)
 
 
 def _may_hold_stale_functions(jaxpr: Jaxpr, within: str = "") -> bool:
-    """Tell whether a program holds functions of a user that JAX may have traced before."""
+    """Return whether a program contains users' functions that JAX may have traced before."""
     for equation in jaxpr.eqns:
         name = equation.primitive.name
         if name in _BY_IDENTITY and within not in _OF_ARRAYS:
@@ -192,14 +192,14 @@ def _may_hold_stale_functions(jaxpr: Jaxpr, within: str = "") -> bool:
 
 
 def _inner(equation: JaxprEqn) -> Iterator[Jaxpr]:
-    """Yield the programs within an operation."""
+    """Yield the programs nested in an operation."""
     for part in jax.tree.leaves(list(equation.params.values()), is_leaf=lambda x: isinstance(x, Jaxpr | ClosedJaxpr)):
         if isinstance(part, Jaxpr | ClosedJaxpr):
             yield part.jaxpr if isinstance(part, ClosedJaxpr) else part
 
 
 def _narrowed(jaxpr: Jaxpr) -> np.dtype | None:
-    """Return the type of less than double precision to which a program converts numbers; None if it does not."""
+    """Return the type narrower than double precision to which a program converts numbers, or None."""
     for equation in jaxpr.eqns:
         made: Any = equation.params.get("new_dtype")
         taken: list[Any] = [v.aval for v in equation.invars]
@@ -218,28 +218,28 @@ def _is_of_libraries(jaxpr: Jaxpr) -> bool:
 
 
 def _origin(jaxpr: Jaxpr) -> str:
-    """Return the file of the function that a program was traced from; nothing if it is not known."""
+    """Return the file of the function that a program was traced from, or an empty string."""
     return Path(getattr(jaxpr.debug_info, "func_filename", None) or "").as_posix()
 
 
 class Pass(abc.ABC):
-    """Goes through a program, operation by operation, and through those of the functions that it calls."""
+    """A pass over a program and the programs of functions that it calls, operation by operation."""
 
     def of(self, closed: ClosedJaxpr, arguments: Sequence[Any]) -> list[Any]:
-        """Return what stands for the results of a program."""
+        """Return the representations of the results of a program."""
         return self._read(closed.jaxpr, closed.consts, arguments)
 
     @abc.abstractmethod
     def captured(self, value: Any, dtype: np.dtype) -> Any:
-        """Return what stands for a number that the function holds."""
+        """Return the representation of a captured number."""
 
     @abc.abstractmethod
     def fixed(self, value: Any, dtype: np.dtype) -> Any:
-        """Return what stands for a number that is part of the program."""
+        """Return the representation of a number that is part of the program."""
 
     @abc.abstractmethod
     def applied(self, equation: JaxprEqn, operands: list[Any]) -> Sequence[Any]:
-        """Return what stands for the results of an operation."""
+        """Return the representations of the results of an operation."""
 
     def _read(self, jaxpr: Jaxpr, constants: Sequence[Any], arguments: Sequence[Any]) -> list[Any]:
         numbers = {v: self._number(c, v.aval) for v, c in zip(jaxpr.constvars, constants, strict=True)}
@@ -269,7 +269,7 @@ class Pass(abc.ABC):
 
 
 class _Replay(Pass):
-    """Does what the program does, with other captured numbers."""
+    """Replay of a program with other captured numbers."""
 
     def __init__(self, values: Sequence[Any]):
         self._values = iter(values)
@@ -287,7 +287,7 @@ class _Replay(Pass):
 
 
 class _Description(Pass):
-    """Tells all that a program does, and collects the numbers that it holds."""
+    """Description of all operations of a program, with its captured numbers collected."""
 
     def __init__(self, *, values: bool = False, rules: bool = True):
         self.values: list[Any] = []
@@ -297,7 +297,7 @@ class _Description(Pass):
     def of(self, closed: ClosedJaxpr, arguments: Sequence[Any] = ()) -> list[Any]:
         del arguments
         given = [self._argument(k, v.aval) for k, v in enumerate(closed.jaxpr.invars)]
-        self._lines.append(f"of {given}")  # also of arguments that it does not read
+        self._lines.append(f"of {given}")  # including arguments that are not read
         self._lines.append(f"return {super().of(closed, given)}")
         return self.values
 
@@ -325,7 +325,7 @@ class _Description(Pass):
         return names
 
     def parameters(self, equation: JaxprEqn) -> list[str]:
-        """Return what distinguishes an operation from others of its name."""
+        """Return a description of the parameters of an operation."""
         trusted = all(map(_is_of_libraries, _inner(equation))) and equation.primitive.name.startswith("custom_")
         given = sorted((key, value) for key, value in equation.params.items() if key != "name")
         description = [f"{key}={self._parameter(key, value, trusted)}" for key, value in given]
@@ -360,19 +360,19 @@ class _Description(Pass):
         return f"nameless {len(self.nameless)}"
 
     def _within(self, program: Jaxpr | ClosedJaxpr, *, rules: bool = True) -> str:
-        """Return a description of a program within this one, its numbers included."""
+        """Return a digest of a nested program, including its numbers."""
         inner = _Description(values=True, rules=rules and self._rules)
         inner.of(program if isinstance(program, ClosedJaxpr) else ClosedJaxpr(program, ()))
         self.nameless += inner.nameless
         return inner.digest()
 
     def _rule(self, equation: JaxprEqn) -> str:
-        """Return a description of the rule by which a user's function is differentiated."""
+        """Return a description of the differentiation rule of a user's function."""
         count = len(equation.invars) - equation.params.get("num_consts", 0)
         jaxpr, constants, zeros = equation.params["jvp_jaxpr_fun"].call_wrapped(*[False] * count)
         return f"{self._within(ClosedJaxpr(jaxpr, constants), rules=False)} {zeros}"
 
 
 def array_digest(array: np.ndarray) -> str:
-    """Return what distinguishes an array from others: not rounded, and zero from minus zero."""
+    """Return a digest of an array, which is exact and distinguishes zero from minus zero."""
     return f"{array.shape} {array.dtype} {hashlib.sha256(array.tobytes()).hexdigest()}"

@@ -1,9 +1,8 @@
-"""Composition of a jet with any JAX-traceable function: its program is read off once and run on jets.
+"""Composition of a jet with any JAX-traceable function: its program is traced once and run on jets.
 
-Elementary, linear and bilinear operations of the program have exact rules, O(K^2) at order K; branches are all run
-and selected from, short loops of known length are unrolled. A program with any other operation (a loop until a
-condition, a special function) is differentiated by nested forward mode instead: exact as well, but its cost doubles
-with each order.
+Elementary, linear and bilinear operations have exact rules, O(K^2) at order K. All branches are run and selected from;
+short loops of known length are unrolled. A program with any other operation (a loop with a condition, a special
+function) is differentiated by nested forward mode, which is exact, too, but doubles its cost with each order.
 """
 
 from collections.abc import Callable, Sequence
@@ -35,7 +34,7 @@ def compose(function: Callable[[Any], Any], x: Jet) -> Jet:
     Returns
     -------
     Jet
-        Of the order and shape of `x`.
+        Jet of the function, of the order and shape of `x`.
 
     Raises
     ------
@@ -54,15 +53,15 @@ def compose(function: Callable[[Any], Any], x: Jet) -> Jet:
 
 
 class Composed(Module):
-    """A function of one scalar, read off to be run on jets.
+    """A traced function of one scalar that runs on jets.
 
     Parameters
     ----------
     program : Program
-        What it computes.
+        Program of the function.
     captured : tuple of array
-        The numbers that it holds; of several functions of one program, each with two axes more at its end: one for the
-        functions, and one that spreads over the batch.
+        Captured numbers; if several functions share the program, each has two more axes at its end: the functions, and
+        one that broadcasts over the batch.
     """
 
     program: Program = field(static=True)
@@ -70,7 +69,7 @@ class Composed(Module):
 
     @classmethod
     def of(cls, function: Callable[[Any], Any]) -> "Composed":
-        """Return what a function computes now.
+        """Return the current program of a function.
 
         Raises
         ------
@@ -83,11 +82,11 @@ class Composed(Module):
         return cls(program.program, program.captured)
 
     def __call__(self, x: Jet) -> Jet:
-        """Return the jet of the function, of the order of `x`; the batch axes stand last."""
+        """Return the jet of the function, of the order of `x`; batch axes are last."""
         return over_instances(self._at, self.program.shapes, self.captured, x)
 
     def _at(self, captured: Sequence[Any], x: Jet) -> Jet:
-        """Return the jet for a scalar of one instance."""
+        """Return the jet of one instance for a scalar jet."""
         if has_rules(self.program):
             (result,) = on_jets(self.program, captured, [x])
         else:
@@ -98,16 +97,16 @@ class Composed(Module):
 
 
 class SampleFunction(Module):
-    """A function of arrays of one sample, as what it computed when it was read off.
+    """A function of the arrays of one sample, with the program that it had when it was traced.
 
     Parameters
     ----------
     program : Program
-        What it computes.
+        Program of the function.
     captured : tuple of array
-        The numbers that it holds.
+        Captured numbers.
     shape : tuple of int
-        Of its result.
+        Shape of the result.
     """
 
     program: Program = field(static=True)
@@ -116,12 +115,12 @@ class SampleFunction(Module):
 
     @classmethod
     def of(cls, function: Callable[..., Any], *examples: Any) -> "SampleFunction":
-        """Return what a function computes now of arrays with the shapes and types of examples."""
+        """Return the current program of a function, for arrays with the shapes and types of examples."""
         program = captured_function(lambda *x: jnp.asarray(function(*x), float), *examples)
         return cls(program.program, program.captured, program.result.shape)
 
     def __call__(self, *samples: Any) -> Any:
-        """Return the results for samples side by side, which stand along the last axes, there and here."""
+        """Return the results for a batch of samples, along the last axes of arguments and result."""
         return jax.vmap(self.at, in_axes=-1, out_axes=-1)(*samples)
 
     def at(self, *sample: Any) -> Any:
@@ -132,18 +131,18 @@ class SampleFunction(Module):
 def over_instances(
     function: Callable[[Sequence[Any], Any], Any], shapes: Sequence[tuple[int, ...]], captured: Sequence[Any], x: Jet
 ) -> Jet:
-    """Return what a function of captured values and a jet of one scalar returns for jets with batch axes.
+    """Map a function of captured values and one scalar jet over jets with batch axes.
 
     Parameters
     ----------
     function : callable
-        Of values and of a jet without batch axes.
+        Function of the values and of a jet without batch axes.
     shapes : sequence of tuple of int
-        Of the values; those of several instances have an axis for these and one for the batch at their ends.
+        Shapes of the values. Values of several instances have two more axes at their ends: instances and batch.
     captured : sequence of array
-        The values.
+        Captured values.
     x : Jet
-        The argument.
+        Argument with batch axes.
     """
     several = [np.ndim(value) > len(shape) for value, shape in zip(captured, shapes, strict=True)]
     if not any(several):
@@ -165,18 +164,18 @@ def _ends(captured: Sequence[Any], several: Sequence[bool]) -> list[tuple[int, .
 
 
 def on_jets(program: Program, captured: Sequence[Any], arguments: Sequence[Any]) -> list[Any]:
-    """Return the results of a program for jets; what does not depend on them is an array."""
+    """Return the results of a program for jets; results that do not depend on them are arrays."""
     closed = program.closed
     return _OnJets().read(closed.jaxpr, closed.consts, [*captured, *arguments])
 
 
 def has_rules(program: Program) -> bool:
-    """Tell whether each operation of a program has a rule for jets."""
+    """Return whether each operation of a program has a rule for jets."""
     return all(map(_has_rule, _operations(program.closed.jaxpr)))
 
 
 def _nested(function: Callable[[Any], Any], x: Jet) -> Jet:
-    """Differentiate ``function`` along the polynomial of `x`, by forward mode within forward mode."""
+    """Differentiate ``function`` along the polynomial of `x` by nested forward mode."""
 
     def along(step):
         return function(x.evaluate(step))
@@ -193,7 +192,7 @@ def _slope(f: Callable[[Any], Any]) -> Callable[[Any], Any]:
 
 
 class _OnJets(ProgramReader):
-    """Runs programs on jets, and on arrays for what does not depend on time."""
+    """Interpreter of programs on jets, and on arrays where values do not depend on time."""
 
     moving = Jet
 
@@ -272,7 +271,7 @@ def _has_rule(name: str) -> bool:
 
 
 def _operations(jaxpr: Any) -> Any:
-    """Yield the names of all operations, those inside calls, branches and short loops too."""
+    """Yield the names of all operations, including those inside calls, branches and short loops."""
     for equation in jaxpr.eqns:
         name, parameters = equation.primitive.name, equation.params
         if name == "cond":

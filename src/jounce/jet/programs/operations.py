@@ -1,4 +1,4 @@
-"""How the operations of JAX programs act on Taylor series: tables of `composition` and `series`."""
+"""Rules of JAX operations on Taylor coefficients: tables for `composition` and `series`."""
 
 import math
 from collections.abc import Callable
@@ -12,7 +12,7 @@ from jounce.jet.elementary import BY_SLOPE
 
 
 def times(a: Any, b: Any) -> Any:
-    """Multiply coefficients; None is zero."""
+    """Return the product of coefficients; None is zero."""
     return None if a is None or b is None else a * b
 
 
@@ -43,7 +43,7 @@ def _of_argument(slope: Callable[[Any], Any]) -> Callable[[Any, Any], Any]:
     return lambda x, _y: slope(x)
 
 
-# a function and its partial derivatives, which may use its value, the last argument
+# a function and its partial derivatives, which may use its value as the last argument
 SLOPES: dict[str, tuple[Callable[..., Any], tuple[Callable[..., Any], ...]]] = {
     "exp": (jnp.exp, (lambda _x, y: y,)),
     "expm1": (jnp.expm1, (lambda _x, y: y + 1.0,)),

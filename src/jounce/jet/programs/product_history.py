@@ -1,4 +1,4 @@
-"""The factors of all products of series side by side, one row an order, so that one loop sums all products."""
+"""Factors of all products of series side by side, one row per order, so that a single loop sums all products."""
 
 import math
 from collections.abc import Sequence
@@ -10,30 +10,30 @@ import numpy as np
 
 from jounce.jet.coefficients import total
 
-BLOCK = 8  # terms of a sum taken at once; a row that is made for certain zeros has some times as many numbers
-LEAST_ROW = 40  # numbers of such a row: machine code adds those of a shorter one by one
+BLOCK = 8  # terms of a sum per iteration; the length of a row without constant entries is a multiple of it
+LEAST_ROW = 40  # numbers of such a row: machine code adds shorter rows number by number
 
 
 class ProductHistory:
-    """Coefficients known so far of what is multiplied.
+    """History of the coefficients of all factors of products.
 
     Parameters
     ----------
     shapes : sequence of tuple
-        Of the factors.
+        Shapes of the factors.
     pairs : sequence of tuple
-        For each product, the places of its factors, and whether coefficients of the first count by their order.
+        For each product, the indices of its factors, and whether coefficients of the first are weighted by their order.
     order : int
-        Highest that will be requested.
+        Highest order that will be requested.
     still : sequence of array of bool, optional
-        Which entries of the factors do not change in time: there is no sum of their products.
+        Entries of the factors that are constant in time; their products need no sum.
     reversible, unrolled : bool, default False
-        As for `Recursion`.
+        As in `Recursion`.
 
     Attributes
     ----------
     begun
-        The history before the first order, a pytree of arrays.
+        History before the first order, a pytree of arrays.
     """
 
     def __init__(
@@ -61,7 +61,8 @@ class ProductHistory:
     def noted(self, history: Any, k: Any, newest: Sequence[Any]) -> Any:
         """Return the history with the coefficients of order k of all factors.
 
-        They go there in one piece a side, so that what is compiled stays small; a few are put in their places at once.
+        They are written as one piece per side, which keeps the compiled code small; with constant entries, piece by
+        piece.
         """
         if not self._pairs:
             return history
@@ -84,7 +85,7 @@ class ProductHistory:
         return tuple(result)
 
     def sums(self, history: Any, k: Any) -> list[Any]:
-        """Return the sums over the products of coefficients of orders 1 to k - 1, those of order k left out."""
+        """Return, for each product, the sum over the products of coefficients of orders 1 to k - 1."""
         left, right = history
 
         def block(i: Any, products: Any) -> Any:
@@ -93,7 +94,7 @@ class ProductHistory:
             b = jax.lax.dynamic_slice_in_dim(right, k - first + 1, BLOCK)
             return products + total(a[j] * b[BLOCK - 1 - j] for j in range(BLOCK))
 
-        count = -(-self._order // BLOCK) if self._reversible else (k + BLOCK - 2) // BLOCK  # what is beyond is zero
+        count = -(-self._order // BLOCK) if self._reversible else (k + BLOCK - 2) // BLOCK  # terms beyond are zero
         if self._unrolled:
             products = total(left[j - 1] * right[k - j - 1] for j in range(1, k)) if k > 1 else jnp.zeros(self._width)
         else:
@@ -107,20 +108,20 @@ class ProductHistory:
 
 
 class _Runs(NamedTuple):
-    """Parts of a row of numbers: those from one place to another."""
+    """Contiguous parts of a row of numbers."""
 
     size: int
-    ends: tuple[tuple[int, int], ...] | None = None  # of each part; all numbers if None
+    ends: tuple[tuple[int, int], ...] | None = None  # start and stop of each part; None selects all numbers
 
     @classmethod
     def of(cls, mask: np.ndarray) -> "_Runs":
-        """Return those of the numbers of an array for which a mask is true."""
+        """Return the parts of an array in which a mask is true."""
         steps = np.flatnonzero(np.diff(mask.ravel().astype(int), prepend=0, append=0)).tolist()
         return cls(mask.size, tuple(zip(steps[::2], steps[1::2], strict=True)))
 
     @property
     def count(self) -> int:
-        """How many numbers there are."""
+        """Number of numbers in the parts."""
         return self.size if self.ends is None else sum(stop - start for start, stop in self.ends)
 
     def cut(self, row: Any) -> list[Any]:
@@ -128,7 +129,7 @@ class _Runs(NamedTuple):
         return [row] if self.ends is None else [row[start:stop] for start, stop in self.ends]
 
     def spread(self, parts: Any) -> Any:
-        """Return a row with its parts given, one after another, and zero elsewhere."""
+        """Return a row with given numbers in its parts and zeros elsewhere."""
         if self.ends is None:
             return parts
         pieces, before, place = [jnp.zeros(0)], 0, 0

@@ -1,9 +1,9 @@
-"""Methods of users' classes that act on jets: what they compute, read off so that captured numbers are arguments.
+"""Methods of user classes that act on jets, traced so that captured numbers are arguments.
 
-A method that composes operations without looking at single derivatives is known by its program on the values alone,
-which runs on jets as it does on numbers. Whether it is one is checked, not believed: on jets, program and method must
-do the same operations. All other methods are called as they are, and what they compute, their numbers included, is part
-of what is compiled.
+If a method composes operations without looking at single derivatives, its program on the values alone defines it: that
+program runs on jets as on numbers. Whether this holds is checked by comparing the operations of program and method on
+jets. All other methods are called as they are, and what they compute, with all their numbers, becomes part of the
+compiled program.
 """
 
 from collections.abc import Callable, Sequence
@@ -31,21 +31,21 @@ from jounce.jet.programs.same_programs import is_same
 
 
 class ReadMethod(Module):
-    """A method as its program on values, run on jets.
+    """A method in the form of its program on values, which is run on jets.
 
     Parameters
     ----------
     program : Program
-        Of the captured numbers and of the values of the arguments, instances and batch last.
+        Program of the captured numbers and of the values of the arguments, instances and batch last.
     captured : tuple of array
-        The numbers; those of stacked instances have the axes of these and of the batch at their ends.
+        Captured numbers; those of stacked instances have axes for instances and batch at their ends.
     """
 
     program: Program = field(static=True)
     captured: tuple[Any, ...]
 
     def __call__(self, method: Callable[[], Any], inputs: Callable[[], Sequence[Any]]) -> Any:
-        """Return what the method returns for jets and arrays, whose last axes are the instances and the batch."""
+        """Return the result of the method for jets and arrays whose last axes are the instances and the batch."""
         del method
         captured = [
             v if np.ndim(v) > len(shape) else jnp.reshape(jnp.asarray(v), (*shape, 1, 1))
@@ -67,12 +67,12 @@ class ReadMethod(Module):
 
 
 class Verbatim(Module):
-    """A method that is called as it is: what it computes, with all its numbers, is part of the program.
+    """A method that is called as it is; its operations and numbers are part of the compiled program.
 
     Parameters
     ----------
     key : tuple
-        Tells it from others.
+        Key that distinguishes it from other methods.
     old : bool
         Whether JAX may have traced parts of it before.
     """
@@ -81,7 +81,7 @@ class Verbatim(Module):
     old: bool = field(static=True)
 
     def __call__(self, method: Callable[[], Any], inputs: Callable[[], Sequence[Any]]) -> Any:
-        """Return what the method returns."""
+        """Return the result of the method."""
         del inputs
         with known_as(str(self.key[0])) if self.old else nullcontext():
             return method()
@@ -91,18 +91,18 @@ Reading = ReadMethod | Verbatim
 
 
 class ReadObject(Module):
-    """A module that a user may have written, called on jets, as what it computes.
+    """A module, perhaps written by a user, that is called on jets through its traced program.
 
     Parameters
     ----------
     reading : ReadMethod or Verbatim
-        Of its call.
+        The traced call of the module.
     fields : tuple of array
-        The numbers in its fields; those of stacked objects have the axes of these and of the batch at their ends.
+        Numbers in its fields; those of stacked objects have axes for objects and batch at their ends.
     shapes : tuple of tuple of int
-        Of the fields of one object.
+        Shapes of the fields of one object.
     source : Untraced
-        The object.
+        The module itself.
     """
 
     reading: Reading
@@ -112,11 +112,11 @@ class ReadObject(Module):
 
     @classmethod
     def of(cls, source: Any, orders: Sequence[int], shape: tuple[int, ...] = ()) -> "ReadObject":
-        """Return what an object computes now of jets of some orders and of a shape."""
+        """Return the current reading of an object for jets of given orders and shape."""
         leaves, tree = jax.tree.flatten(source)
         held = [np.shape(x) for x in leaves]
         jets = [Jet([jax.ShapeDtypeStruct((*shape, 1, 1), float)] * (order + 1)) for order in orders]
-        jets[-1] = Jet([jax.ShapeDtypeStruct((1, 1), float)] * (orders[-1] + 1))  # the time
+        jets[-1] = Jet([jax.ShapeDtypeStruct((1, 1), float)] * (orders[-1] + 1))  # time
         fields = [jax.ShapeDtypeStruct((*its, 1, 1), float) for its in held]
 
         def on_jets(given: Sequence[Any], _: Any) -> Any:
@@ -131,7 +131,7 @@ class ReadObject(Module):
         return cls(reading, tuple(leaves), tuple(held), Untraced(source))
 
     def __call__(self, *jets: Jet) -> Jet:
-        """Return the jet of the object; instances and batch are the last axes of all jets."""
+        """Return the jet of the object; the last axes of all jets are instances and batch."""
 
         def source() -> Any:
             return jax.tree.unflatten(jax.tree.structure(self.source.value), self.fields)(*jets)
@@ -150,23 +150,23 @@ def read_method(
     rates: Sequence[Any],
     whole: Callable[[], Any] | None = None,
 ) -> Reading:
-    """Return what a method computes now.
+    """Return the current reading of a method.
 
     Parameters
     ----------
     on_values : callable
-        The method of values, arrays in the place of the jets; returns an array.
+        The method on values, arrays in place of the jets; returns an array.
     on_jets : callable
-        The method of jets, and then of the rates, in one list; returns a pytree of arrays.
+        The method on jets and on the rates, given as two lists; returns a pytree of arrays.
     jets : sequence of Jet or array
-        Shapes and types of its arguments.
+        Shapes and types of the arguments.
     rates : sequence of Jet
-        Of what else it may look at, which has no values at order zero.
+        Jets of other inputs, which have no values at order zero.
     whole : callable, optional
-        Calls the method, without arguments, where the former two may not be able to.
+        Calls the method without arguments, for methods that the first two cannot call.
     """
     leaves, tree = jax.tree.flatten(([*jets], [*rates]))
-    reading: Reading = Verbatim((OpaqueObject(object()),), old=False)  # the call raises the error again
+    reading: Reading = Verbatim((OpaqueObject(object()),), old=False)  # the later call raises the error again
     functions = [lambda *x: on_jets(*jax.tree.unflatten(tree, x)), *([] if whole is None else [lambda *_: whole()])]
     for function in functions:
         try:
@@ -181,7 +181,7 @@ def read_method(
 
 
 def _as_program(on_values: Callable[..., Any], traced: ClosedJaxpr, jets: Sequence[Any]) -> ReadMethod | None:
-    """Return a method as a program on values; None where it is none, or holds no numbers."""
+    """Return a method as a program on values; None if it is no such program, or captures no numbers."""
     leaves, tree = jax.tree.flatten([*jets])
     shapes = tuple(x.shape for x in leaves)
     try:
@@ -191,14 +191,14 @@ def _as_program(on_values: Callable[..., Any], traced: ClosedJaxpr, jets: Sequen
             return None
 
         other = _on_series(program.program, tree, shapes)
-    except Exception:  # noqa: BLE001 - it needs more than values
+    except Exception:  # noqa: BLE001 - values alone are not enough for it
         return None
     return reading if is_same(traced, other, program.captured) else None
 
 
 @lru_cache(maxsize=1000)
 def _on_series(program: Program, tree: Any, shapes: tuple[tuple[int, ...], ...]) -> ClosedJaxpr:
-    """Return what JAX traces as a program on values is run on jets of some shapes."""
+    """Return the program that JAX traces when a program on values is run on jets of given shapes."""
     reading, held = ReadMethod(program, ()), [v.aval for v in program.closed.jaxpr.invars[: len(program.shapes)]]
 
     def again(captured: Any, *x: Any) -> Any:
@@ -209,7 +209,7 @@ def _on_series(program: Program, tree: Any, shapes: tuple[tuple[int, ...], ...])
 
 
 def _along(function: Callable[[Any], Any], given: Any) -> Any:
-    """Map a function over the instances and the batch of a pytree of arrays, whose last two axes they are."""
+    """Map a function over instances and batch, the last two axes of all arrays in a pytree."""
     for axis in (-1, -2):
         function = _mapped(function, axis)
     return function(given)

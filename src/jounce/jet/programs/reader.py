@@ -1,4 +1,4 @@
-"""Programs of JAX, run operation after operation on values of another kind, such as jets in place of arrays."""
+"""Interpreter of JAX programs, operation by operation, on values of another kind, such as jets."""
 
 import abc
 from collections.abc import Callable, Sequence
@@ -13,27 +13,27 @@ from jounce.jet.programs.operations import ADDITIVE, REARRANGING
 
 
 class ProgramReader(abc.ABC):
-    """Runs programs on values that change in time and on constants; branches are all run, loops unrolled.
+    """Interpreter of programs on time-varying values and constants; all branches are run, and loops unrolled.
 
-    A subclass says what the values are, and what an operation makes of them.
+    A subclass defines the values and the rule of each operation.
     """
 
-    moving: ClassVar[type]  # of the values that change in time
+    moving: ClassVar[type]  # type of the values that change in time
 
     def constant(self, array: Any) -> Any:
-        """Return what stands for an array that does not change in time."""
+        """Return the representation of a constant array."""
         return array
 
     @abc.abstractmethod
     def value(self, x: Any) -> Any:
-        """Return the array that a value or a constant is now."""
+        """Return the present array of a value or a constant."""
 
     @abc.abstractmethod
     def applied(self, equation: JaxprEqn, operands: list[Any]) -> list[Any]:
-        """Return what an elementary operation makes of values."""
+        """Return the results of an elementary operation."""
 
-    def is_constant(self, equation: JaxprEqn, operands: list[Any]) -> bool:  # noqa: ARG002 - of use to others
-        """Tell whether an operation makes constants, so that it may be applied to arrays."""
+    def is_constant(self, equation: JaxprEqn, operands: list[Any]) -> bool:  # noqa: ARG002 - for subclasses
+        """Return whether the results of an operation are constants, so that it applies to arrays."""
         return not any(isinstance(x, self.moving) for x in operands)
 
     def read(self, jaxpr: Any, constants: Sequence[Any], arguments: Sequence[Any]) -> list[Any]:
@@ -51,12 +51,12 @@ class ProgramReader(abc.ABC):
         return [look(v) for v in jaxpr.outvars]
 
     def composed(self, function: Callable[..., Any], operands: Sequence[Any]) -> Any:
-        """Read a function of the operands in the place of an operation."""
+        """Interpret a function of the operands in place of an operation."""
         program = jax.make_jaxpr(function)(*map(self.value, operands))
         return self.read(program.jaxpr, program.consts, operands)[0]
 
     def results(self, equation: JaxprEqn, operands: list[Any]) -> list[Any]:
-        """Return the results of one operation, which may hold programs of its own."""
+        """Return the results of one operation, which may contain programs."""
         name, parameters = equation.primitive.name, equation.params
         if self.is_constant(equation, operands):
             results = equation.primitive.bind(*map(self.value, operands), **parameters)
@@ -72,7 +72,7 @@ class ProgramReader(abc.ABC):
         return self.read(inner.jaxpr if closed else inner, inner.consts if closed else (), operands)
 
     def _branches(self, which: Any, operands: list[Any], branches: Sequence[Any]) -> list[Any]:
-        """Run every branch of a condition and select from the results."""
+        """Run every branch of a conditional and select from the results."""
         outcomes = zip(*(self.read(branch.jaxpr, branch.consts, operands) for branch in branches), strict=True)
         index = jnp.clip(self.value(which), 0, len(branches) - 1)
 
@@ -103,9 +103,9 @@ def _is_floating(variable: Any) -> bool:
 
 
 def only_adds(jaxpr: Any) -> bool:
-    """Tell whether a program does nothing to numbers but add and move them, so that it acts on each coefficient alike.
+    """Return whether a program only adds and moves numbers, so that it acts on each coefficient alike.
 
-    What it multiplies, or adds of its own, would make it another function of the coefficients than of the values.
+    Multiplications and added constants would act on coefficients differently than on values.
     """
     if jaxpr.constvars:
         return False

@@ -1,4 +1,4 @@
-"""Whether two programs of JAX do the same operations on the same numbers, in whatever order they stand."""
+"""Equality of JAX programs: the same operations on the same numbers, in any order."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -9,13 +9,13 @@ from jax.extend.core import ClosedJaxpr, JaxprEqn
 
 from jounce.jet.programs.captured import Pass, array_digest, parameters_of
 
-_SPREADING = frozenset("add add_any sub mul div max min pow atan2 select_n".split())  # which take single numbers too
+_SPREADING = frozenset("add add_any sub mul div max min pow atan2 select_n".split())  # broadcast scalars
 
 
 def is_same(first: ClosedJaxpr, second: ClosedJaxpr, captured: Sequence[Any]) -> bool:
-    """Tell whether a program is the same as another one that gets captured values as its first arguments.
+    """Return whether a program equals another one that takes the captured values as its first arguments.
 
-    The first may have more arguments at its end; where it looks at them, the two are not the same.
+    The first may have more arguments at its end, but must not use them.
     """
     nodes: dict[Any, Any] = {}
     one, two = _Nodes(nodes), _Nodes(nodes)
@@ -26,7 +26,7 @@ def is_same(first: ClosedJaxpr, second: ClosedJaxpr, captured: Sequence[Any]) ->
 
 
 class _Nodes(Pass):
-    """Numbers what a program computes; what is computed in the same way has the same number."""
+    """Value numbering of programs: equal computations get equal numbers."""
 
     def __init__(self, nodes: dict[Any, Any]):
         self._nodes = nodes

@@ -1,13 +1,13 @@
-"""A program run on Taylor series one order at a time, for equations whose next coefficients are unknown until solved.
+"""Programs run on Taylor series one order at a time, for equations whose next coefficients are unknown until solved.
 
-Jets evaluate an expression at all orders at once, from inputs that are known. The solution of a differential equation
-is not: its coefficient k follows from the equation at order k, so that the equation is needed order after order, each
-once. `Recursion` reads the program of a JAX-traceable function, keeps the coefficients of what is multiplied, and gives
-the next coefficients of the outputs from the next ones of the inputs, in a loop over the orders.
+Jets evaluate an expression at all orders at once, from known inputs. For a differential equation, coefficient k of the
+solution follows from the equation at order k, so the equation is evaluated order after order, each order once.
+`Recursion` traces a JAX-traceable function, stores the coefficients of the factors of products, and computes the next
+coefficients of the outputs from those of the inputs, in a loop over the orders.
 
-In ``y = f(x)`` the newest coefficient of x enters the newest of y as in ``f'(x_0) x_k`` only. A solver may so advance
-with zero for the unknown, solve its linear equations, and add what the unknown changes with `Recursion.corrected`. All
-other products are of coefficients known before: one sum over the orders for all of them side by side.
+In ``y = f(x)``, the newest coefficient of x enters that of y only as ``f'(x_0) x_k``. A solver may thus advance with
+zero for the unknown, solve its linear equations, and add the effect of the unknown with `Recursion.corrected`. All
+other products are of known coefficients: one sum over the orders for all of them side by side.
 """
 
 from collections.abc import Callable, Sequence
@@ -39,7 +39,7 @@ from jounce.jet.programs.reader import ProgramReader, only_adds
 
 
 class _Pair(NamedTuple):
-    """Two variables whose coefficients are multiplied: ``sum_j left[j] right[k-j]``, or with the weight j."""
+    """Two variables with a Cauchy product: ``sum_j left[j] right[k-j]``, or with the weight j."""
 
     left: int
     right: int
@@ -47,43 +47,43 @@ class _Pair(NamedTuple):
 
 
 class _Node(NamedTuple):
-    """One operation on series: the rule for its next coefficient, what it reads and what it makes."""
+    """One operation on series: the rule for its next coefficient, its operands and its result."""
 
-    rule: Callable[..., Any]  # of the coefficients of the operands, and of the sum over its pairs
-    operands: tuple[Any, ...]  # numbers of variables, or arrays that do not change in time
+    rule: Callable[..., Any]  # function of the coefficients of the operands, and of the sum over the pairs
+    operands: tuple[Any, ...]  # numbers of variables, or constant arrays
     pairs: list[_Pair]
     result: int
-    sparse: bool  # whether it is by certain entries
+    sparse: bool  # whether it runs under `by_certain_entries`
 
 
 class Recursion(ProgramReader):
-    """A function on series, ready to be run order after order.
+    """A function on series that runs order after order.
 
     Parameters
     ----------
     function : callable
-        Maps arrays to a pytree of arrays by operations that have derivatives of every order: arithmetic, elementary
-        functions, selections. Branches are all run; loops must be short and of known length.
+        Maps arrays to a pytree of arrays by operations with derivatives of every order: arithmetic, elementary
+        functions, selections. All branches are run; loops must be short and of known length.
     values : sequence of array
-        Coefficients of order zero of its arguments.
+        Coefficients of order zero of the arguments.
     order : int
         Highest coefficient that will be requested.
     reversible : bool, default False
-        Whether loops are of known length, as JAX wants them for derivatives in reverse mode; they take longer then.
+        Whether loops have a known length, as reverse-mode differentiation in JAX requires; they are slower then.
     unrolled : bool, default False
-        Whether orders are whole numbers of Python, each with code of its own, which is faster where it is not too much.
-    still : Still, optional
-        Entries of the arguments, and of what is multiplied, that do not change in time.
+        Whether orders are Python integers, each with its own code, which is faster if there is not too much of it.
+    still : ConstantEntries, optional
+        Entries of the arguments, and of the factors, that do not change in time.
 
     Attributes
     ----------
     form : tuple
-        What identifies the program: the operations that were read, the shapes of what is multiplied, and for
-        each product the places of its two factors among those.
+        Key of the program: the operations, the shapes of the factors of products, and for each product the indices of
+        its two factors.
     outputs
         Coefficients of order zero of the results, in the pytree that the function returns.
     history
-        Coefficients known so far of what is multiplied: what `advanced` takes and `noted` returns, a pytree of arrays.
+        Known coefficients of the factors, a pytree of arrays: the input of `advanced`, and the output of `noted`.
 
     Raises
     ------
@@ -104,11 +104,11 @@ class Recursion(ProgramReader):
         still: Any = None,
     ):
         self._nodes: list[_Node] = []
-        self._values: dict[int, Any] = {}  # of order zero, by number of the variable
-        self._known: dict[Any, Any] = {}  # results of operations already read, which programs often repeat
-        self._names: list[str] = []  # of operations that were read
-        self._sparse = False  # whether what is read now is by certain entries
-        self._pairs: dict[Any, Any] = {}  # sine and cosine, or their hyperbolic likes, of the same angle
+        self._values: dict[int, Any] = {}  # coefficients of order zero, by number of the variable
+        self._known: dict[Any, Any] = {}  # results of operations already interpreted, as programs often repeat them
+        self._names: list[str] = []  # names of the operations
+        self._sparse = False  # whether the present operation runs under `by_certain_entries`
+        self._pairs: dict[Any, Any] = {}  # sine and cosine, or their hyperbolic counterparts, by argument
         self._inputs = [self._variable(value) for value in values]
         program, shape = jax.make_jaxpr(function, return_shape=True)(*values)
         self._structure = jax.tree.structure(shape)
@@ -128,20 +128,20 @@ class Recursion(ProgramReader):
 
     @property
     def uses_still(self) -> bool:
-        """Whether entries that do not change in time are left out: those given were found for this program."""
+        """Whether constant entries are skipped, which requires that they were found for this program."""
         return self._still is not None
 
     def advanced(self, history: Any, k: Any, coefficients: Sequence[Any]) -> tuple[Any, tuple[Any, ...]]:
-        """Return the coefficients of order k of the outputs, and those of what is multiplied, for `noted`.
+        """Return the coefficients of order k of the outputs, and those of the factors, for `noted`.
 
         Parameters
         ----------
         history
-            To order k - 1.
+            History to order k - 1.
         k : int
-            At least 1.
+            Order, at least 1.
         coefficients : sequence of array or None
-            Of order k, of the arguments; None is zero.
+            Coefficients of order k of the arguments; None is zero.
         """
         if self._still is not None:
             known = zip(self._still.given, coefficients, strict=True)
@@ -149,14 +149,14 @@ class Recursion(ProgramReader):
         return self.swept(coefficients, self._rows.sums(history, k))
 
     def swept(self, coefficients: Sequence[Any], sums: Sequence[Any]) -> tuple[Any, tuple[Any, ...]]:
-        """Return the next coefficients of the outputs and of what is multiplied.
+        """Return the next coefficients of the outputs and of the factors.
 
         Parameters
         ----------
         coefficients : sequence of array or None
-            Next ones of the arguments; None is zero.
+            Next coefficients of the arguments; None is zero.
         sums : sequence of array
-            Of the products of coefficients known before, in the order of `form`.
+            Sums of the products of known coefficients, in the order of `form`.
         """
         now = self._swept(coefficients, dict(zip(self._products, sums, strict=True)))
 
@@ -167,16 +167,16 @@ class Recursion(ProgramReader):
         return self._collected([value_of(x) for x in self._outputs]), tuple(map(value_of, self._stored))
 
     def corrected(self, newest: Sequence[Any], changes: Sequence[Any]) -> tuple[Any, ...]:
-        """Return the `newest` coefficients of what is multiplied after changes, or None, of those of the arguments."""
+        """Return the `newest` coefficients of the factors after changes (None is zero) of those of the arguments."""
         change = self._swept(changes, None)
         return tuple(plus(c, change.get(x)) for x, c in zip(self._stored, newest, strict=True))
 
     def noted(self, history: Any, k: Any, newest: Sequence[Any]) -> Any:
-        """Return the history with the newest coefficients, of order k, of what is multiplied."""
+        """Return the history with the `newest` coefficients, of order k, of the factors."""
         return self._rows.noted(history, k, newest)
 
     def _swept(self, coefficients: Sequence[Any], sums: dict[_Pair, Any] | None) -> dict[int, Any]:
-        """Return coefficients of order k of all variables, from those of the arguments; None is zero."""
+        """Return the coefficients of order k of all variables, from those of the arguments; None is zero."""
         now: dict[int, Any] = dict(zip(self._inputs, coefficients, strict=True))
         for node in self._nodes:
             parts = [now[x] if isinstance(x, int) else None for x in node.operands]
@@ -185,7 +185,7 @@ class Recursion(ProgramReader):
                 now[node.result] = node.rule(parts, swept)
         return now
 
-    # what is known of variables
+    # variables
 
     def _variable(self, value: Any) -> int:
         number = len(self._values)
@@ -209,24 +209,24 @@ class Recursion(ProgramReader):
                 waiting += [x for pair in node.pairs for x in pair[:2]]
         return [node for node in self._nodes if node.result in needed]
 
-    # reading the program
+    # interpretation of the program
 
     def results(self, equation: JaxprEqn, operands: list[Any]) -> list[Any]:
-        """Return the results of one operation; what repeats is read once."""
+        """Return the results of one operation; repeated operations are interpreted once."""
         around, self._sparse = self._sparse, self._sparse or is_by_certain_entries(equation)
         try:
             with by_certain_entries() if self._sparse else nullcontext():
                 key = self._key(equation, operands)
                 if key is None:
                     return self._read(equation, operands)
-                if key not in self._known:  # the operands stay alive with it: no other takes their place in memory
+                if key not in self._known:  # keeps the operands alive, since keys contain their ids
                     self._known[key] = self._read(equation, operands), operands
                 return self._known[key][0]
         finally:
             self._sparse = around
 
     def _read(self, equation: JaxprEqn, operands: list[Any]) -> list[Any]:
-        """Return the results of one operation; a loop that only adds is run as it is, at every order."""
+        """Return the results of one operation; a loop that only adds is run unchanged at every order."""
         self._names.append(equation.primitive.name)
         scanned = equation.primitive.name == "scan" and not self.is_constant(equation, operands)
         if not scanned or not only_adds(equation.params["jaxpr"].jaxpr):
@@ -243,7 +243,7 @@ class Recursion(ProgramReader):
         return [self._node(of(i), value, operands) for i, value in enumerate(bind(*map(self.value, operands)))]
 
     def _passed(self, bind: Callable[..., Any], operands: list[Any], parts: list[Any], *, additive: bool) -> Any:
-        """Return what a linear operation makes of next coefficients; constants that are not added say how."""
+        """Return a linear operation on next coefficients; constants are zero if they are added, else unchanged."""
         if all(part is None for part in parts):
             return None
         whole = []
@@ -254,7 +254,7 @@ class Recursion(ProgramReader):
         return bind(*whole)
 
     def _key(self, equation: JaxprEqn, operands: list[Any]) -> Any:
-        """Return what distinguishes an operation from others; None where that is not known."""
+        """Return a key of an operation, or None if its parameters cannot be hashed."""
         names = [x if isinstance(x, int) else x.key() for x in operands]
         if equation.primitive.name in ("mul", "add", "add_any"):
             names.sort(key=str)
@@ -266,25 +266,25 @@ class Recursion(ProgramReader):
         return key
 
     def constant(self, array: Any) -> "_Constant":
-        """Return what stands for an array that does not change in time."""
+        """Return the representation of a constant array."""
         return _Constant(array)
 
     def value(self, x: Any) -> Any:
-        """Return the coefficient of order zero of a variable, or a constant."""
+        """Return the coefficient of order zero of a variable, or the array of a constant."""
         return self._values[x] if isinstance(x, int) else x.array
 
     def is_constant(self, equation: JaxprEqn, operands: list[Any]) -> bool:
-        """Tell whether nothing changes in time; decisions keep for a step."""
+        """Return whether the results are constant; selections are constant within a step."""
         made: Any = [variable.aval for variable in equation.outvars]
         floating = any(jnp.issubdtype(aval.dtype, jnp.floating) for aval in made)
         return not floating or super().is_constant(equation, operands)
 
     def applied(self, equation: JaxprEqn, operands: list[Any]) -> list[Any]:
-        """Return the variables that an operation makes."""
+        """Return the variables that are the results of an operation."""
         primitive, parameters, name = equation.primitive, equation.params, equation.primitive.name
         if name == "optimization_barrier":
             return operands
-        if name in BROADCASTING:  # numbers and axes of length one, which JAX lets through
+        if name in BROADCASTING:  # JAX broadcasts scalars and axes of length one
             made: Any = equation.outvars[0].aval
             operands = [self._widened(x, made.shape) for x in operands]
         if name in STEPWISE:
@@ -346,7 +346,7 @@ class Recursion(ProgramReader):
 
     def _quotient(self, a: Any, b: int) -> int:
         below, value = self.value(b), self.value(a) / self.value(b)
-        result = len(self._values)  # the node made next
+        result = len(self._values)  # number of the node made below
 
         def rule(parts: list[Any], sums: Any) -> Any:
             above = minus(minus(parts[0], sums), times(value, parts[1]))
@@ -355,7 +355,7 @@ class Recursion(ProgramReader):
         return self._node(rule, value, [a, b], [_Pair(result, b, False)])
 
     def _by_slope(self, name: str, operands: list[Any]) -> int:
-        """Make the nodes of a function known by its derivatives: ``y' = sum g_i(x, y) x_i'``."""
+        """Make the nodes of a function from its partial derivatives: ``y' = sum g_i(x, y) x_i'``."""
         function, slopes = SLOPES[name]
         values: list[Any] = [None] * len(operands)
 
@@ -364,7 +364,7 @@ class Recursion(ProgramReader):
 
         result = self._node(rule, function(*map(self.value, operands)), operands)
         node = self._nodes[-1]
-        for i, x in enumerate(operands):  # read at each order after the function itself, and used at the next
+        for i, x in enumerate(operands):  # nodes after that of the function, whose values serve at the next order
             if isinstance(x, int):
                 slope = self.composed(slopes[i], [*operands, result])
                 values[i] = self.value(slope)
@@ -373,7 +373,7 @@ class Recursion(ProgramReader):
         return result
 
     def _pair(self, name: str, x: int) -> int:
-        """Make the nodes of two functions that are each other's derivative, up to a sign."""
+        """Make the nodes of two functions, each the derivative of the other up to a sign."""
         first, second, sign = PAIRS[name]
         if (x, first) not in self._pairs:
             a, b = len(self._values), len(self._values) + 1
@@ -389,12 +389,12 @@ class Recursion(ProgramReader):
 
 
 class _Constant(NamedTuple):
-    """What does not change in time, or is kept for a step: the choice of a branch."""
+    """An array that is constant in time, or within a step, such as the choice of a branch."""
 
     array: Any
 
     def key(self) -> Any:
-        """Return what distinguishes it from others: small numbers of a program by value, results by identity."""
+        """Return a key: small numbers by value, results by identity."""
         if isinstance(self.array, bool | int | float | np.generic):
             return str(jnp.result_type(self.array)), np.asarray(self.array).tobytes()
         return "array", id(self.array)

@@ -1,7 +1,7 @@
-"""Which entries of the arrays of a differential equation do not change in time, whatever its unknown numbers are.
+"""Entries of the arrays of a differential equation that are constant in time, whatever its unknown numbers.
 
-Where all joints of a robot are parallel, say, their axes keep their direction, and spins have one component. Products
-of what does not change have no sum over the orders, and no series needs them.
+If all joints of a robot are parallel, for example, their axes keep their directions, and angular velocities have one
+component. Products of constants need no sum over the orders, and constants need no series.
 """
 
 from collections.abc import Callable, Sequence
@@ -14,16 +14,16 @@ from jounce.jet.programs.series import Recursion
 
 
 class ConstantEntries(NamedTuple):
-    """What does not change in time.
+    """Constant entries of a differential equation.
 
     Attributes
     ----------
     given : tuple of array of bool
-        Entries of the arguments of a function.
+        Constant entries of the arguments of the function.
     factors : tuple of array of bool
-        Entries of what it multiplies.
+        Constant entries of the factors of its products.
     form : tuple
-        Of the `Recursion` for which they are.
+        `form` of the `Recursion` for which they were found.
     """
 
     given: tuple[np.ndarray, ...]
@@ -34,20 +34,20 @@ class ConstantEntries(NamedTuple):
 def still_entries(
     function: Callable[..., Any], parameters: Any, values: Sequence[np.ndarray], rates: Sequence[int]
 ) -> ConstantEntries:
-    """Return what does not change in a differential equation.
+    """Return the constant entries of a differential equation.
 
-    It stays so by induction over the orders: what has no coefficients up to one order has none of the next.
+    By induction over the orders: entries without coefficients up to one order have none at the next.
 
     Parameters
     ----------
     function : callable
-        Of a pytree of numbers that do not change in time, and of arrays, as for `Recursion`.
+        Function of a pytree of numbers that are constant in time, and of arrays, as for `Recursion`.
     parameters : pytree of array
-        NaN where a number is not known beforehand.
+        Constants; NaN for unknown numbers.
     values : sequence of array
-        Coefficients of order zero of the other arguments, NaN where they are not known.
+        Coefficients of order zero of the other arguments; NaN for unknown numbers.
     rates : sequence of int
-        Which of the results is the rate of an argument; -1 where that is not known.
+        For each argument, the index of the result that is its rate; -1 if unknown.
     """
     from jounce.execution.llvm.certain_numbers import certain_numbers
 

@@ -1,4 +1,4 @@
-"""Plate cams: from the law of a follower to the profile, and what is to be known of it."""
+"""Plate cams: the profile from the law of a follower, pressure angle, curvature and undercut."""
 
 from jounce.kinematics.cams.followers import (
     OscillatingFollower as OscillatingFollower,

@@ -1,7 +1,8 @@
-"""Followers of plate cams: where they are, written on jets, and at what lift they touch a point.
+"""Followers of plate cams: their positions, written on jets, and the lift at which they touch a point.
 
-The cam turns about the origin. A translating follower moves along y, beside the origin by its offset; an oscillating
-one turns about a pivot on the x axis, and its arm lies above that axis. A larger lift takes either away from the cam.
+The cam turns about the origin. A translating follower moves along y, at an offset from the origin. An oscillating
+follower turns about a pivot on the x axis, with its arm above that axis. Increasing lift moves either away from the
+cam.
 """
 
 import abc
@@ -19,7 +20,7 @@ Plane = Float[np.ndarray, "2 points"]
 
 
 class AbstractFollower(abc.ABC):
-    """What touches a cam: a knife edge, a roller, or a flat face."""
+    """A follower of a cam with a knife edge, a roller, or a flat face."""
 
     shape: str
     radius: float
@@ -39,17 +40,17 @@ class AbstractFollower(abc.ABC):
 
     @property
     def is_flat(self) -> bool:
-        """Whether it has a face in the place of a point or a roller."""
+        """Whether the follower has a flat face."""
         return self.shape == "flat_face"
 
     @abc.abstractmethod
     def start(self, base_radius: float) -> float:
-        """Return the coordinate of the follower when it is on the base circle: what its lift is counted from, m or rad.
+        """Return the coordinate of the follower on the base circle, from which its lift is counted, m or rad.
 
         Raises
         ------
         MechanismError
-            If it does not reach that circle.
+            If the follower does not reach the base circle.
         """
 
     @abc.abstractmethod
@@ -62,36 +63,37 @@ class AbstractFollower(abc.ABC):
 
     @abc.abstractmethod
     def travel(self, coordinate: Jet, point: Jet) -> Jet:
-        """Return a vector along which a point of the follower moves as its lift grows, (2, ...)."""
+        """Return a vector along which a point of the follower moves with growing lift, (2, ...)."""
 
     @abc.abstractmethod
     def along_face(self, coordinate: Jet, point: Jet) -> Jet:
-        """Return where a point of the face is along it, m: from the middle if it translates, else from the pivot."""
+        """Return the coordinate of a point along the face, m, from its middle (translating) or from the pivot."""
 
     @abc.abstractmethod
     def touching(self, points: Plane) -> Float[np.ndarray, " points"]:
-        """Return the coordinate at which the follower touches points, coming from far away; -inf where it cannot."""
+        """Return the coordinate at which the follower, coming from outside, touches points; -inf where it misses."""
 
 
 @dataclasses.dataclass(frozen=True)
 class TranslatingFollower(AbstractFollower):
-    """A follower that moves along a line.
+    """A follower that translates along a line.
 
     Parameters
     ----------
     shape : str
         ``"knife_edge"``, ``"roller"`` or ``"flat_face"``, at right angles to its travel.
     radius : float, default 0
-        Of the roller, m.
+        Radius of the roller, m.
     offset : float, default 0
-        Of the line of travel, along y, from the axis of the cam toward x, m. Of a flat face, that of its middle.
+        Offset of the line of travel, along y, from the axis of the cam toward x, m; for a flat face, that of its
+        middle.
 
     Raises
     ------
     MechanismError
-        If the shape does not exist, or a radius does not go with it.
+        If the shape does not exist, or does not go with a radius.
     TrajectoryError
-        If a value is no finite number, or a radius is not above zero.
+        If a value is not a finite number, or a radius is not positive.
 
     Examples
     --------
@@ -146,27 +148,27 @@ class TranslatingFollower(AbstractFollower):
 
 @dataclasses.dataclass(frozen=True)
 class OscillatingFollower(AbstractFollower):
-    """A follower that turns about a pivot.
+    """A follower that oscillates about a pivot.
 
     Parameters
     ----------
     shape : str
         ``"knife_edge"``, ``"roller"`` or ``"flat_face"``.
     center_distance : float
-        Of the pivot from the axis of the cam, toward x, m.
+        Distance of the pivot from the axis of the cam, along x, m.
     arm : float, default 0
-        From the pivot to the edge or to the center of the roller, m; a flat face has none.
+        Length from the pivot to the edge or to the center of the roller, m; none for a flat face.
     radius : float, default 0
-        Of the roller, m.
+        Radius of the roller, m.
     face_offset : float, default 0
-        Of a flat face from the pivot, toward the cam, m.
+        Distance of a flat face from the pivot, toward the cam, m.
 
     Raises
     ------
     MechanismError
-        If the shape does not exist, or a radius does not go with it.
+        If the shape does not exist, or does not go with a radius.
     TrajectoryError
-        If a value is no finite number, or a length is not above zero.
+        If a value is not a finite number, or a length is not positive.
 
     Examples
     --------

@@ -1,8 +1,8 @@
-"""The profile of a plate cam: the envelope of its follower, which goes round it by its law.
+"""The profile of a plate cam, as the envelope of its follower.
 
-Everything is written on jets by the cam angle, in the frame of the cam: the center of a roller is a curve, of which the
-profile is the parallel one; a flat face is a line, of which it is the envelope. Tangents, normals, pressure angles and
-curvatures are read off derivatives of these jets; no formula for one is written.
+Everything is written on jets by the cam angle, in the frame of the cam. The center of a roller traces the pitch curve,
+to which the profile is the parallel curve; the profile of a flat face is the envelope of its lines. Tangents, normals,
+pressure angles and curvatures follow from derivatives of these jets; no formula for one is written.
 """
 
 import dataclasses
@@ -39,18 +39,18 @@ if TYPE_CHECKING:
     import xarray
 
 SIGNS = {"counterclockwise": 1.0, "clockwise": -1.0}
-CLOSED = 1e-9  # of the rise: so near to where it began a law ends
-CURVED = 2  # the derivative of a law on which radii of curvature depend
+CLOSED = 1e-9  # of the rise: largest difference between start and end of a closed law
+CURVED = 2  # highest derivative of a law that affects radii of curvature
 ORDER = 3  # of the jets: positions, tangents, and how they turn
-BENT = 1e-9  # of how far a normal turns: less is straight
-NOTICED = 1e-6  # of the size of the cam: less is lost to the spacing of the points where it is undercut elsewhere
-ROUNDS, POINTS = 9, 9  # looks at an extreme, each nearer than the one before
+BENT = 1e-9  # of the largest turning rate of the normal: smaller ones count as straight
+NOTICED = 1e-6  # of the size of the cam: smaller losses of lift come from the spacing of points near an undercut
+ROUNDS, POINTS = 9, 9  # refinements of an extreme, and points of each
 MOST = 100_000  # points of a profile
 
 
 @dataclasses.dataclass(frozen=True)
 class PlateCam(Displayed):
-    """A plate cam, with its follower and its law.
+    """A plate cam with its follower and law.
 
     Parameters
     ----------
@@ -58,14 +58,14 @@ class PlateCam(Displayed):
         Lift of the follower by the cam angle, m or rad by rad.
     follower : TranslatingFollower or OscillatingFollower
     base_radius : float
-        m.
+        Base radius, m.
     sense : str
-        In which the cam turns, ``"counterclockwise"`` or ``"clockwise"``.
+        Sense of rotation of the cam, ``"counterclockwise"`` or ``"clockwise"``.
     angle : numpy.ndarray of shape (angle,)
-        Cam angles of the table, rad, in the sense in which it turns.
+        Cam angles of the table, rad, in the sense of rotation.
     title : str
     units : dict of str to str
-        In which it is shown and written, as those of a `Mechanism`; inside, all is in SI.
+        Units for display and files, as those of a `Mechanism`; all attributes are in SI.
     """
 
     law: AbstractMotion
@@ -83,12 +83,12 @@ class PlateCam(Displayed):
 
     @property
     def shown_units(self) -> ShownUnits:
-        """The units in which the cam is shown and written."""
+        """The units for display and files."""
         known = {str(name): x.attrs["units"] for name, x in self.dataset.variables.items()}
         return ShownUnits(self.units, known)
 
     def at(self, angle: ArrayLike) -> Geometry:
-        """Return the cam at any cam angles, rad: exact but for rounding."""
+        """Return the cam at any cam angles, rad, exact to rounding."""
         return _geometry(self, np.atleast_1d(real_numbers("angle", angle, MechanismError)))
 
     @cached_property
@@ -98,38 +98,38 @@ class PlateCam(Displayed):
 
     @cached_property
     def continuity(self) -> Continuity:
-        """To which derivative the law is continuous, over a turn of the cam and where the next one begins."""
+        """The order to which the law is continuous over a turn of the cam and across its end."""
         return continuity(self.law, 0.0, WHOLE_TURN, periodic=True)
 
     @cached_property
     def largest_pressure_angle(self) -> Extreme:
-        """The pressure angle that is farthest from zero, with its sign, rad."""
+        """The pressure angle farthest from zero, with its sign, rad."""
         return self._extreme(attrgetter("pressure_angle"), np.abs)
 
     @cached_property
     def least_radius(self) -> Extreme | None:
         """The smallest radius of curvature where the profile is convex, m; negative where it is undercut.
 
-        None for a profile that is nowhere convex.
+        None if the profile is nowhere convex.
         """
         return self._least_radius(1.0)
 
     @cached_property
     def least_concave_radius(self) -> Extreme | None:
-        """The smallest radius of curvature where the profile is concave, m; None where it is nowhere."""
+        """The smallest radius of curvature where the profile is concave, m; None if it is nowhere concave."""
         return self._least_radius(-1.0)
 
     @property
     def is_undercut(self) -> bool:
-        """Whether the follower cannot have its law, somewhere on the cam."""
+        """Whether the follower cannot follow its law somewhere on the cam."""
         return bool(self.undercuts) or (self.least_radius is not None and self.least_radius.value < 0)
 
     @cached_property
     def face(self) -> tuple[Extreme, Extreme] | None:
-        """Where the cam touches a flat face, at the least and the most along it, m; None for other followers.
+        """The lowest and the highest contact along a flat face, m; None for other followers.
 
-        Along a translating face from its middle, along an oscillating one from the foot of the pivot. The face must
-        reach from one to the other.
+        The face must reach from one to the other. Contacts are measured from the middle of a translating face, and from
+        the foot of the pivot along an oscillating one.
         """
         if not self.follower.is_flat:
             return None
@@ -138,16 +138,16 @@ class PlateCam(Displayed):
 
     @cached_property
     def undercuts(self) -> tuple[Undercut, ...]:
-        """The parts of the law that the cam cannot give, with the cam angles where and the lift that is lost."""
+        """The parts of the law that the cam cannot give, with cam angles and lost lift."""
         lost = self.table.lift - self.followed_lift
         size = 1.0 if self.follower.turning else self.base_radius
         return tuple(runs(self.angle, lost, lost > NOTICED * size))
 
     @cached_property
     def followed_lift(self) -> Numbers1:
-        """The lift that the follower has on what is left of the profile, at the angles of the table, m or rad.
+        """The lift of the follower on the remaining profile, at the angles of the table, m or rad.
 
-        The profile is taken as it is cut, by points; where it is not undercut, the lift is that of the law.
+        The profile is cut point by point; without undercut, the lift is that of the law.
         """
         return followed_lift(self.follower, self.base_radius, SIGNS[self.sense], self.angle, self.table, self.at)
 
@@ -174,7 +174,7 @@ class PlateCam(Displayed):
         return dataset.assign_attrs(title=self.title or "plate cam", source="jounce")
 
     def _least_radius(self, sign: float) -> Extreme | None:
-        """Return the smallest radius of curvature where the profile is convex, or concave."""
+        """Return the smallest radius of curvature where the profile is convex (`sign` 1) or concave (-1)."""
 
         def radius(geometry: Geometry) -> Numbers1:
             bent = sign * geometry.turned > BENT * np.abs(geometry.turned).max(initial=0.0)
@@ -185,7 +185,7 @@ class PlateCam(Displayed):
         return self._extreme(radius, np.negative)
 
     def _extreme(self, value: Callable[[Geometry], Numbers1], size: Callable[[Numbers1], Numbers1]) -> Extreme:
-        """Return the value of the largest size, looked for nearer and nearer around the largest of the table."""
+        """Return the value of largest `size`, refined around the largest of the table."""
         step = WHOLE_TURN / max(len(self.angle) - 1, 1)
         best = float(self.angle[int(np.nanargmax(size(value(self.table))))])
         for _ in range(ROUNDS):
@@ -209,28 +209,28 @@ def plate_cam(
     Parameters
     ----------
     law : AbstractMotion, Expression or str
-        Lift of the follower from the base circle by the cam angle, which takes the place of the time: m for a
-        translating one, rad for an oscillating one, by rad. Over a turn it must end where it begins.
+        Lift of the follower from the base circle by the cam angle, which takes the place of time: m by rad for a
+        translating follower, rad by rad for an oscillating one. After a turn it must return to its start.
     follower : TranslatingFollower or OscillatingFollower
     base_radius : float
         The smallest radius of the profile where the lift is zero, m.
     sense : str, default "counterclockwise"
-        In which the cam turns, or ``"clockwise"``.
+        Sense of rotation of the cam, or ``"clockwise"``.
     count : int, default 721
-        Points of the table over a turn, both ends counted.
+        Number of points of the table over a turn, including both ends.
     title : str, optional
 
     Returns
     -------
     PlateCam
-        Its frame is that of the ground where the cam angle is zero.
+        The cam; its frame coincides with that of the ground at cam angle zero.
 
     Raises
     ------
     MechanismError
         If the follower does not reach the base circle, or the law takes it through the axis of the cam or out of reach.
     TrajectoryError
-        If the law does not close over a turn, says nothing of some angles, or a value is not valid.
+        If the law does not close over a turn, is undefined at some angles, or a value is not valid.
 
     Examples
     --------
@@ -261,7 +261,7 @@ def plate_cam(
 
 
 def _check(cam: PlateCam) -> None:
-    """Raise for a law that does not close, or that takes the follower where it cannot be."""
+    """Raise an error if the law does not close, or takes the follower where it cannot be."""
     if isinstance(cam.law, SplineMotion) and cam.law.beyond == "repeat":
         period = float(cam.law.stop) - float(np.asarray(cam.law.breakpoints)[0])
         if abs(WHOLE_TURN / period - round(WHOLE_TURN / period)) > CLOSED * WHOLE_TURN / period:
@@ -288,12 +288,12 @@ def _check(cam: PlateCam) -> None:
 
 
 def _geometry(cam: PlateCam, angles: Numbers1) -> Geometry:
-    """Return a cam at cam angles, from jets by the cam angle in the frame of the cam."""
+    """Return the geometry of a cam at cam angles, from jets by the cam angle in the frame of the cam."""
     follower, sense = cam.follower, SIGNS[cam.sense]
     theta = Jet.variable(angles, ORDER)
     lift = cam.law(theta)
     coordinate = lift + follower.start(cam.base_radius)
-    back = theta * -sense  # the follower goes round the cam the other way
+    back = theta * -sense  # in the frame of the cam, the follower rotates the other way
     if follower.is_flat:
         direction, distance = follower.face(coordinate)
         normal = unit(direction + back)

@@ -1,4 +1,4 @@
-"""Results of a cam: its shape, extremes with the cam angles where they are, and undercut."""
+"""Results of a cam: geometry, extremes and undercut."""
 
 import dataclasses
 from typing import NamedTuple
@@ -11,24 +11,24 @@ Plane = Float[np.ndarray, "2 angle"]
 
 
 class Geometry(NamedTuple):
-    """A cam at some cam angles, in its own frame; lengths in m, angles in rad.
+    """A cam at given cam angles, in its own frame; lengths in m, angles in rad.
 
     Attributes
     ----------
     lift : array of shape (angle,)
-        m or rad.
+        Lift, m or rad.
     pitch, profile : array of shape (2, angle)
-        The center of the roller or the edge, and where it touches; of a flat face both are the same.
+        Position of the roller center or the edge, and of the contact; the same for a flat face.
     pressure_angle : array of shape (angle,)
-        From the travel of the follower to the normal of the profile, in the sense in which the cam turns: positive
-        where the cam lifts the follower.
+        Angle from the travel of the follower to the normal of the profile, in the sense of rotation of the cam:
+        positive where the cam lifts the follower.
     forward, around : array of shape (angle,)
-        How far the contact, and the center of the roller, go round the cam per rad; where the contact goes back, the
+        Speed of the contact, and of the roller center, around the cam per rad; where the contact moves backward, the
         profile is undercut.
     turned : array of shape (angle,)
-        How far the normal turns round the cam per rad, negative where the profile is concave.
+        Rotation of the normal around the cam per rad; negative where the profile is concave.
     contact : array of shape (angle,)
-        Where a flat face is touched, along it.
+        Position of the contact along a flat face.
     """
 
     lift: Numbers1
@@ -42,26 +42,26 @@ class Geometry(NamedTuple):
 
     @property
     def curvature(self) -> Numbers1:
-        """Curvature of the profile, positive where it is convex, 1/m; infinite where it is pointed."""
+        """Curvature of the profile, positive where it is convex, 1/m; infinite at a cusp."""
         with np.errstate(divide="ignore"):
             return self.turned / self.forward
 
     @property
     def pitch_curvature(self) -> Numbers1:
-        """Curvature of the curve of the center of the roller, 1/m."""
+        """Curvature of the pitch curve, 1/m."""
         return self.turned / self.around
 
 
 @dataclasses.dataclass(frozen=True)
 class Extreme:
-    """A largest or a smallest value of a cam.
+    """A largest or smallest value of a cam.
 
     Attributes
     ----------
     value : float
-        m, or rad.
+        Value, m or rad.
     angle : float
-        Of the cam, rad.
+        Cam angle, rad.
     """
 
     value: float
@@ -70,16 +70,16 @@ class Extreme:
 
 @dataclasses.dataclass(frozen=True)
 class Undercut:
-    """A part of a law that a cam cannot give the follower, since the cutter takes away what it should touch.
+    """A part of a law that a cam cannot give the follower, since the cutter removes the profile it would touch.
 
     Attributes
     ----------
     start, stop : float
-        Cam angles between which lift is lost, rad; of a part through zero, the start is greater than the stop.
+        Cam angles between which lift is lost, rad; the start exceeds the stop if the part includes zero.
     angle : float
-        Where most is lost, rad.
+        Cam angle of the largest loss, rad.
     lost : float
-        How much there, m or rad.
+        Largest loss of lift, m or rad.
     """
 
     start: float

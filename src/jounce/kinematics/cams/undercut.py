@@ -1,4 +1,4 @@
-"""Undercut: what a follower would pass through is cut away, and it comes down on what is left."""
+"""Undercut: the follower, as the cutter, removes parts of the profile, and touches the rest."""
 
 from collections.abc import Callable
 
@@ -9,9 +9,9 @@ from jounce.jet.turns import WHOLE_TURN
 from jounce.kinematics.cams.followers import AbstractFollower
 from jounce.kinematics.cams.results import Geometry, Numbers1, Undercut
 
-LOST = 1e-9  # of the size of the cam: less lift is lost to rounding only
-FINEST = 3601  # points of an undercut profile, at least
-CHUNK = 200  # positions of the follower that are compared with all points at a time
+LOST = 1e-9  # of the size of the cam: smaller losses of lift are rounding
+FINEST = 3601  # least number of points of an undercut profile
+CHUNK = 200  # positions of the follower that are compared with all points at once
 
 
 def followed_lift(
@@ -22,37 +22,37 @@ def followed_lift(
     table: Geometry,
     at: Callable[[Numbers1], Geometry],
 ) -> Numbers1:
-    """Return the lift at which a follower comes down on what it has left of a profile as its cutter, m or rad.
+    """Return the lift at which a follower touches the rest of a profile that it has cut, m or rad.
 
-    A point of the profile that the follower would pass through at any cam angle is cut away.
+    Points of the profile inside the follower at any cam angle are cut away.
 
     Parameters
     ----------
     follower : AbstractFollower
     base_radius : float
-        m.
+        Base radius, m.
     sense : float
-        1.0 or -1.0, of the cam's turning.
+        Sense of rotation of the cam, 1.0 or -1.0.
     angle : array of shape (angle,)
-        Of the cam, rad.
+        Cam angles, rad.
     table : Geometry
         The cam at these angles.
     at : callable
-        Gives it at others.
+        Returns the cam at other angles.
     """
     start, size = follower.start(base_radius), 1.0 if follower.turning else base_radius
 
     def touching(
         points: Float[np.ndarray, "2 point"], turns: Float[np.ndarray, " turn"]
     ) -> Float[np.ndarray, "turn point"]:
-        """Return the coordinate at which the follower touches each point of the cam, turned by each angle."""
+        """Return the coordinate at which the follower touches each point of the cam, for each rotation of the cam."""
         c, s = np.cos(turns)[:, None], np.sin(turns)[:, None]
         x, y = points
         placed = np.stack([c * x - s * y, s * x + c * y]).reshape(2, -1)
         return follower.touching(placed).reshape(len(turns), -1)
 
     def left(angle: Numbers1, geometry: Geometry) -> Float[np.ndarray, "2 left"]:
-        """Return the points of a profile through which the follower passes at no cam angle."""
+        """Return the points of a profile that are outside of the follower at all cam angles."""
         cut = np.zeros(len(angle), bool)
         for rows in _chunks(len(angle)):
             touched = touching(geometry.profile, sense * angle[rows])
@@ -60,9 +60,9 @@ def followed_lift(
         return geometry.profile[:, ~cut]
 
     if not (follower.is_flat or follower.radius):
-        return table.lift  # an edge is as sharp as what it cuts
+        return table.lift  # a knife edge follows any profile that it has cut
     points = left(angle, table)
-    if points.shape[1] < len(angle) < FINEST:  # where branches cross is found to the spacing of the points
+    if points.shape[1] < len(angle) < FINEST:  # the spacing of points limits the accuracy of crossing branches
         finer = np.linspace(0.0, WHOLE_TURN, FINEST)
         points = left(finer, at(finer))
     lift = np.full(len(angle), -np.inf)
@@ -77,12 +77,12 @@ def _chunks(count: int) -> list[slice]:
 
 
 def runs(angle: Numbers1, lost: Numbers1, where: Bool[np.ndarray, " angle"]) -> list[Undercut]:
-    """Return the parts of a turn in which lift is lost, one through zero as a whole."""
-    intervals, marks = [], where[:-1]  # the last angle is the first one
+    """Return the parts of a turn in which lift is lost; a part through zero is one."""
+    intervals, marks = [], where[:-1]  # the last angle equals the first
     if marks.all():
         worst = int(np.argmax(lost))
         return [Undercut(0.0, WHOLE_TURN, float(angle[worst]), float(lost[worst]))]
-    first = int(np.argmin(marks))  # begin where nothing is lost
+    first = int(np.argmin(marks))  # start where nothing is lost
     order = np.roll(np.arange(len(marks)), -first)
     edges = np.flatnonzero(np.diff(np.concatenate([[0], marks[order].astype(int), [0]])))
     for low, high in zip(edges[::2], edges[1::2], strict=True):

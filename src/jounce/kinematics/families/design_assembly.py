@@ -1,4 +1,4 @@
-"""Designs assembled side by side, with the steps of each: damped Gauss-Newton from its starting guess."""
+"""Designs assembled side by side by damped Gauss-Newton, each with steps of its own."""
 
 from typing import Any, NamedTuple
 
@@ -19,7 +19,7 @@ from jounce.mechanism.system import System
 from jounce.rigid.pose import Pose
 
 HALVINGS = 12
-CLEARLY_REGULAR = 1e-6  # smallest pivot over the largest of a Jacobian that needs no closer check
+CLEARLY_REGULAR = 1e-6  # ratio of smallest to largest pivot above which a Jacobian needs no closer check
 
 Coordinates = dict[str, Float[Numbers, "_ ... _"]]
 
@@ -33,7 +33,7 @@ class AssemblyAttempts(NamedTuple):
         Coordinates of all bodies, (..., bodies, designs).
     plain : array of bool, shape (designs,)
         Whether Gauss-Newton is sufficient: all gaps are closed, no body turned by more than half a turn, and the
-        Jacobian is regular by far. Other designs are assembled individually.
+        Jacobian is far from singular. Other designs are assembled individually.
     """
 
     coordinates: Coordinates
@@ -48,7 +48,7 @@ def _assembled(
     driven: Bool[Numbers, "row 1"],
     pose_type: type[Pose],
 ) -> AssemblyAttempts:
-    """Put designs together side by side, a lane for each; see `assemble_from_guess`."""
+    """Assemble designs side by side, a lane for each; see `assemble_from_guess`."""
     time = Jet([instant[None]])
     unscaled = with_fields(system, row_scale=np.ones(system.row_scale.shape))
 
@@ -111,10 +111,10 @@ def assemble_from_guess(shared: Any, designs: Any, *, pose_type: type[Pose]) -> 
     Parameters
     ----------
     shared : tuple
-        System; the tolerance of the last correction, rad or sizes of the mechanism; and which rows are those of
-        drivers, shape (rows, 1).
+        System; largest last correction, rad or sizes of the mechanism; and whether each row is that of a driver, shape
+        (rows, 1).
     designs : tuple
-        Coordinates of all bodies to start from, the instant, s, and the values of the design, see `of_design`.
+        Start coordinates of all bodies, the instant, s, and the values of the design, see `of_design`.
     pose_type : type
         PlanarPose or SpatialPose.
     """

@@ -1,8 +1,8 @@
-"""Many designs followed side by side, each in steps of its own, and all instants of a grid solved from their anchors.
+"""Continuation of many designs side by side, and solution of all grid instants from their anchors.
 
-A lane is a design. The programs that solve an instant and decide about a step are those of a single motion; see
-`instant_program` and `step_control`. A design that is out of the ordinary, as it comes to a singular position, is left
-to be solved individually.
+Each lane is a design with its own steps. The programs that solve an instant and decide about a step are those of a
+single motion; see `instant_program` and `step_control`. A design that comes to a singular position, or is otherwise out
+of the ordinary, is left to be solved individually.
 """
 
 from collections.abc import Iterator, Sequence
@@ -39,30 +39,30 @@ from jounce.kinematics.status import Status
 from jounce.mechanism.transmissions.axis_angles import measures_angle, raw_angles
 from jounce.mechanism.transmissions.turn_counting import counted_along
 
-MOST_STEPS = 10_000  # of a design; one that needs more is left to be solved individually
-FEWEST_TOGETHER, MOST_TOGETHER = 512, 1024  # designs that are followed together, unless there are fewer
-MOST_BLOCKS = 16  # of a family: more of them, each with fewer designs, take longer, and fewer leave threads idle
-LARGEST_BLOCK = 4  # times as many instants as a span of a long grid has: each is read by the next one only
+MOST_STEPS = 10_000  # of a design; one that needs more is solved individually
+FEWEST_TOGETHER, MOST_TOGETHER = 512, 1024  # designs followed together, unless there are fewer
+MOST_BLOCKS = 16  # of a family: more and smaller blocks take longer, fewer leave threads idle
+LARGEST_BLOCK = 4  # multiple of the size of a block of a long grid: each instant is read by the next one only
 
 Lanes = Float[np.ndarray, " design"]
 Indices = Int[np.ndarray, " lane"]
 
 
 class Anchors(NamedTuple):
-    """The anchors of designs that were followed together, by design and instant.
+    """Anchors of designs that were followed together, sorted by design and instant.
 
     Attributes
     ----------
     designs : array of int
-        Rising.
+        Designs, ascending.
     begins : array of int
-        Index of the first anchor of each design, and behind them how many anchors there are.
+        Index of the first anchor of each design, and last the number of anchors.
     instant : array of shape (anchors,)
-        s.
+        Time, s.
     order : array of shape (anchors,)
-        Where each is in what is known.
+        Index of each anchor in `known`.
     known : tuple
-        What predictions need of all anchors of the group, in the order of its steps, anchors last.
+        Data from which predictions start, of all anchors of the group, in the order of its steps, anchors last.
     """
 
     designs: Indices
@@ -73,11 +73,11 @@ class Anchors(NamedTuple):
 
     @property
     def owner(self) -> Int[np.ndarray, " anchor"]:
-        """The design of each, among these."""
+        """Index of the design of each anchor, within `designs`."""
         return np.repeat(np.arange(len(self.designs)), np.diff(self.begins))
 
     def parts(self, size: int) -> Iterator["Anchors"]:
-        """Yield the anchors of so many of the designs after others."""
+        """Yield the anchors in parts of `size` designs."""
         for k in range(0, len(self.designs), size):
             begins = self.begins[k : k + size + 1]
             some = slice(begins[0], begins[-1])
@@ -86,23 +86,23 @@ class Anchors(NamedTuple):
 
 
 class DesignPaths:
-    """The motions of many designs, followed from where each is assembled to the last instant.
+    """The motions of many designs, followed from their assemblies to the last instant.
 
     Parameters
     ----------
     solver : Solver
         The solver of the designs.
     systems : VariedTree
-        Those of the designs to be solved, a lane for each.
+        Systems of the designs to be solved, a lane for each.
     instants : array of shape (designs, time)
-        Instants of each design, s; the motions start at the first one.
+        Instants of each design, s. The motions start at the first one.
     last : float
-        The instant to which they are followed, s.
+        Last instant of the motions, s.
 
     Attributes
     ----------
     individual : array of bool, shape (designs,)
-        The designs that are left to be solved individually.
+        Whether each design is left to be solved individually.
     """
 
     def __init__(self, solver: Solver, systems: VariedTree, instants: Float[np.ndarray, "design time"], last: float):
@@ -114,10 +114,10 @@ class DesignPaths:
             order = np.argsort(instants, axis=1, kind="stable")
             self._instants, self._rank = np.take_along_axis(instants, order, axis=1), np.argsort(order, axis=1)
         self._groups: list[Anchors] = []
-        self._arrival: Any = None  # any one, whose arrays have the shapes of all
+        self._arrival: Any = None  # any arrival, for the shapes of its arrays
 
     def follow(self, coordinates: Coordinates, plain: Bool[np.ndarray, " design"], threads: int) -> None:
-        """Follow the designs from where they are assembled, those that are plain."""
+        """Follow the plain designs from their assembled coordinates."""
         self.individual |= ~plain
         lanes = np.flatnonzero(plain)
         size = min(max(FEWEST_TOGETHER, -(-len(lanes) // threads)), MOST_TOGETHER)
@@ -126,9 +126,9 @@ class DesignPaths:
             self._groups = list(pool.map(lambda group: self._followed(coordinates, group), groups))
 
     def _followed(self, coordinates: Coordinates, lanes: Indices) -> Anchors:
-        """Follow some designs, and return the anchors of those that are not left to be solved individually."""
+        """Follow designs, and return the anchors of those that are not left to be solved individually."""
         solver, (first, last) = self.solver, self._ends
-        steps: list[tuple[Indices, Lanes, SolvedState]] = []  # designs and instants of the anchors, and what is known
+        steps: list[tuple[Indices, Lanes, SolvedState]] = []  # designs, instants and states of the anchors
         limits = StepLimits(np.asarray(last), np.asarray(SMALLEST_STEP * (last - first)))
         known = solver.needed(solver.still({name: x[..., lanes] for name, x in coordinates.items()}))
         own = self.systems.own(lanes)
@@ -162,10 +162,10 @@ class DesignPaths:
         return self._sorted(steps)
 
     def _sorted(self, steps: Sequence[tuple[Indices, Lanes, SolvedState]]) -> Anchors:
-        """Return the anchors of steps, without those of designs that are left to be solved individually."""
+        """Return the anchors of steps, without those of designs left to be solved individually."""
         owners, instants, known = zip(*steps, strict=True)
         owner = np.concatenate(owners)
-        order = np.argsort(owner, kind="stable")  # of each design, the instants rise from step to step
+        order = np.argsort(owner, kind="stable")  # the instants of a design ascend from step to step
         order = order[~self.individual[owner[order]]]
         designs, begins = np.unique(owner[order], return_index=True)
         known = jax.tree.map(lambda *parts: np.concatenate(parts, axis=-1), *known)
@@ -175,7 +175,7 @@ class DesignPaths:
         """Return the outputs of all designs, and their status.
 
         Outputs are arrays of shape (designs, time, order + 1, components), for each instance of each group. A design
-        with an instant that is not solved at once is left to be solved individually, too.
+        with a failed instant is left to be solved individually, too.
         """
         count, times = self._instants.shape
         status = np.full((count, times), int(Status.NOT_REACHED))
@@ -197,7 +197,7 @@ class DesignPaths:
             lanes = _slice_of(block.designs)
             status[lanes] = self._as_given(outcome.reshape(-1, times), block.designs)
             for whole, part in zip(wholes, state[1], strict=True):
-                with np.errstate(over="ignore"):  # of what failed
+                with np.errstate(over="ignore"):  # of failed instants
                     derivatives = plain_derivatives(part[:levels], out=part[:levels])
                 values = derivatives.reshape(*derivatives.shape[:-1], -1, times)
                 whole[..., lanes, :] = self._as_given(values, block.designs)
@@ -213,17 +213,17 @@ class DesignPaths:
         return outputs, status
 
     def _as_given(self, values: Any, block: Indices) -> np.ndarray:
-        """Return values of some designs at their instants, (..., designs, time), in the order of the given instants."""
+        """Return values of designs at their instants, (..., designs, time), in the order of the given instants."""
         if self._rank is None:
             return values
         rank = self._rank[block]
         return np.take_along_axis(values, rank.reshape(*[1] * (values.ndim - 2), *rank.shape), axis=-1)
 
     def _begin(self, buffer: SolveBuffer, block: Anchors) -> int:
-        """Load all instants of some designs; each starts from the one before, or from the nearest anchor."""
+        """Load all instants of designs; each starts from the instant before, or from the nearest anchor."""
         instants = self._instants[block.designs]
         count, times = instants.shape
-        length = -(-times // max(1, buffer.width // count))  # of a piece of a motion, so that lanes are in use
+        length = -(-times // max(1, buffer.width // count))  # of a piece of a motion, such that all lanes are used
         buffer.put_anchors([[np.take(leaf, block.order, axis=-1)] for leaf in jax.tree.leaves(block.known)])
         nearest = _nearest(block.owner, block.instant, instants, self._ends)
         to_anchor = instants - block.instant[nearest]
@@ -237,7 +237,7 @@ class DesignPaths:
         return count * times
 
     def _count_turns(self, outputs: list[list[np.ndarray]], anchors: Anchors) -> None:
-        """Give angles about axes the turns that they make along the anchors of their designs."""
+        """Add to angles about axes the turns made along the anchors of their designs."""
         if not any(map(measures_angle, self.solver.model.system.outputs)):
             return
         designs, owner, at = anchors.designs, anchors.owner, anchors.instant
@@ -245,7 +245,7 @@ class DesignPaths:
         measuring = [(g, output) for g, output in zip(system.outputs, outputs, strict=True) if measures_angle(g)]
         series = np.nan_to_num(anchors.known[0]["quaternion"][..., anchors.order], nan=0.0, posinf=0.0, neginf=0.0)
         here = np.arange(len(owner))
-        following = np.where(np.append(owner[1:] != owner[:-1], True), here, here + 1)  # or itself, the last one
+        following = np.where(np.append(owner[1:] != owner[:-1], True), here, here + 1)  # the last anchor: itself
 
         def instants(anchor: Indices, share: Lanes) -> Lanes:
             return at[anchor] + share * (at[following[anchor]] - at[anchor])
@@ -271,8 +271,7 @@ class DesignPaths:
 def _rounds(count: int, times: int, length: int, width: int) -> Int[np.ndarray, "round lane"]:
     """Return the indices of the instants of designs in the order of solution.
 
-    A lane takes up a piece of a motion of this length, one instant after another. Where lanes are left over, the last
-    piece is solved again.
+    Each lane solves a piece of a motion with `length` instants, one after another. Spare lanes repeat the last piece.
     """
     first = (np.arange(count)[:, None] * times + _begins(times, length)).ravel()
     first = first[np.minimum(np.arange(-(-len(first) // width) * width), len(first) - 1)]
@@ -281,7 +280,7 @@ def _rounds(count: int, times: int, length: int, width: int) -> Int[np.ndarray, 
 
 
 def _begins(times: int, length: int) -> Indices:
-    """Return where pieces of a motion begin; the last ones overlap, unless so many instants are whole pieces."""
+    """Return the first instants of the pieces of a motion; the last pieces overlap unless `length` divides `times`."""
     return np.minimum(np.arange(0, times, length), times - length)
 
 
@@ -291,9 +290,9 @@ def _nearest(
     instants: Float[np.ndarray, "design time"],
     ends: tuple[float, float],
 ) -> Int[np.ndarray, "design time"]:
-    """Return the anchor of its design that is nearest to each instant, by index; anchors are in order.
+    """Return the index of the nearest anchor of the same design for each instant; anchors are sorted.
 
-    One number encodes design and instant, so that one search finds where all anchors give way to the next ones.
+    One number encodes design and instant, so that a single search finds the changes of the nearest anchor.
     """
     (first, last), times = ends, instants.shape[1]
     scale = 0.5 / max(last - first, 1e-300)
@@ -305,13 +304,13 @@ def _nearest(
 
 
 def _slice_of(designs: Indices) -> slice | Indices:
-    """Return some designs as a slice, which takes less time, where they follow one another."""
+    """Return consecutive designs as a slice, which indexes faster; others unchanged."""
     first, last = int(designs[0]), int(designs[-1])
     return slice(first, last + 1) if last - first + 1 == len(designs) else designs
 
 
 def _replaced(state: Any, lanes: Any, new: Any) -> Any:
-    """Return a state with that of some lanes in its place."""
+    """Return a state with some lanes replaced."""
 
     def replaced(whole: np.ndarray, part: np.ndarray) -> np.ndarray:
         whole = whole.copy()

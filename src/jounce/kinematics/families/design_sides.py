@@ -1,4 +1,4 @@
-"""Outputs of designs on both sides of where their laws jump or bend: a largest value may be a one-sided limit there."""
+"""Outputs of designs on both sides of breaks of their laws, where an extreme value may be a one-sided limit."""
 
 import dataclasses
 from collections.abc import Mapping
@@ -15,12 +15,12 @@ from jounce.trajectory.law_checks.breaks import both_sides
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Sides:
-    """Outputs of designs on both sides of where their laws jump or bend; NaN where a design has fewer of them.
+    """Outputs of designs on both sides of breaks of their laws; NaN where a design has fewer breaks.
 
     Attributes
     ----------
     instants : array of shape (designs, sides)
-        Of the breaks, s.
+        Instants of the breaks, s.
     values : dict of str to array of shape (designs, sides, order + 1, ...)
     """
 
@@ -28,7 +28,7 @@ class Sides:
     values: dict[str, np.ndarray]
 
     def like(self, values: Mapping[str, np.ndarray]) -> "Sides":
-        """Return them with the axes of other values of the same outputs."""
+        """Return the sides with the component axes of other values of the same outputs."""
         named = {name: array.reshape(*array.shape[:3], *values[name].shape[3:]) for name, array in self.values.items()}
         return dataclasses.replace(self, values=named)
 
@@ -43,10 +43,10 @@ def sides_of_designs(
     *,
     forces: bool | None = None,
 ) -> tuple[Float[np.ndarray, "design side"], Float[np.ndarray, "design side"]]:
-    """Return where the laws of each design jump or bend, and the instants on both sides of it.
+    """Return the breaks of the laws of each design, and the instants on both sides of them.
 
-    A design with fewer of them than others has the first instant in their place. Laws of forces count as
-    `breaks_of_laws` takes them.
+    For a design with fewer breaks than others, the first instant fills the rest. `forces` selects laws of forces as in
+    `breaks_of_laws`.
     """
     count = len(next(iter(parameters.values())))
     different = 0
@@ -57,7 +57,7 @@ def sides_of_designs(
         try:
             design = mechanism.with_parameters(**{name: float(values[k]) for name, values in parameters.items()})
             breaks = breaks_of_laws(design, first, last, order, forces=forces)
-        except JounceError:  # solving the design raises it
+        except JounceError:  # raised again when the design is solved
             breaks = np.zeros(0)
         instants, which = both_sides(breaks, first, last)
         sides.append((breaks[which], instants))

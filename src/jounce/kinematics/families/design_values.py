@@ -1,4 +1,4 @@
-"""Many designs of one mechanism as one system whose values have a lane for each, and where each is assembled."""
+"""Many designs of one mechanism as one system whose values have a lane for each design, and their assemblies."""
 
 import dataclasses
 from collections.abc import Sequence
@@ -27,22 +27,22 @@ def assembled_designs(
     instant: float,
     tolerance: float,
 ) -> tuple[VariedTree, AssemblyAttempts]:
-    """Assemble designs that differ in parameters at an instant, side by side; return their systems, a lane for each.
+    """Assemble designs with different parameters side by side at an instant; return their systems, and the attempts.
 
     Parameters
     ----------
     mechanism : Mechanism
-        Any of them.
+        Any of the designs.
     model : Model
-        Of one that was assembled: sizes are measured by it.
+        Model of an assembled design, whose size is the unit of length.
     names : tuple of str
-        Parameters in which they differ.
+        Names of the parameters that vary.
     rows : array of shape (designs, parameters)
-        Their values.
+        Values of the parameters.
     instant : float
-        s.
+        Time, s.
     tolerance : float
-        Of the last correction, rad or sizes of the mechanism.
+        Largest last correction, rad or sizes of the mechanism.
     """
 
     def design(row: Any) -> Mechanism:
@@ -66,12 +66,12 @@ def assembled_designs(
 
 
 def joined_designs(common: Model, models: Sequence[Model]) -> VariedTree:
-    """Return the systems of designs that were assembled one by one, with the angles about axes that each counts."""
+    """Return the systems of designs that were assembled one by one, with their counts of angles about axes."""
     return VariedTree.joined([_with_values_of(model, common) for model in models])
 
 
 def without_forces(model: Model) -> Model:
-    """Return a model without its forces, on which a driven motion does not depend."""
+    """Return a model without its forces, which do not affect a driven motion."""
     return dataclasses.replace(model, system=with_fields(model.system, forces=()))
 
 
@@ -81,7 +81,7 @@ def _with_values_of(model: Model, common: Model) -> System:
 
 
 def _unfit(systems: VariedTree, count: int) -> Bool[np.ndarray, " design"]:
-    """Tell which designs have a value that no mechanism may have: they are refused in words when solved alone."""
+    """Return which designs have an invalid value; solved individually, they raise an error in words."""
     bad, system = np.zeros(count, bool), systems.at(slice(None))
     for group in (*system.groups, *system.outputs):
         signs = facts_of(type(group.element)).signs

@@ -1,4 +1,4 @@
-"""Outputs of a motion at the instants at which all of them exist."""
+"""Outputs of a motion at the instants at which they all exist."""
 
 from typing import Any
 
@@ -8,7 +8,7 @@ from jounce.kinematics.status import Status
 
 
 def with_outputs(motion: Motion) -> tuple[Motion, dict[str, Any]]:
-    """Return all outputs of a motion, and it with the status of instants at which forces do not exist."""
+    """Return a motion with the status of instants at which forces do not exist, and all its outputs."""
     try:
         return motion, dict(motion.outputs.items())
     except SolveError as error:

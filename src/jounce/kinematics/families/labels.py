@@ -1,4 +1,4 @@
-"""Results of designs, or of runs of a simulation, as labeled arrays."""
+"""Results of designs, or of simulation runs, as labeled arrays."""
 
 from __future__ import annotations
 
@@ -28,23 +28,23 @@ def labeled_family(
     Parameters
     ----------
     lane : str
-        Name of their dimension: design or run.
+        Name of the first dimension: design or run.
     title : str
-        Of the dataset; if empty, ``designs`` or ``runs`` is its title.
+        Title of the dataset; by default, it names the designs or runs.
     described : mapping of str to AbstractOutput or JointCoordinate
-        The unit, the labels and the axes of each output.
+        Outputs or joint coordinates, for units, labels and axes.
     instants : numpy.ndarray of shape (time,)
-        s.
+        Time, s.
     order : int
-        Highest derivative.
+        Highest derivative of the outputs.
     values : mapping of str to numpy.ndarray of shape (lane,)
-        Parameters in which they differ.
+        Values of the parameters that vary.
     outputs : mapping of str to numpy.ndarray of shape (lane, time, order + 1) or (lane, time, order + 1, component)
-        Those that were computed.
+        Outputs that were computed.
     status : numpy.ndarray of shape (lane, time)
-        See `Status`.
+        Outcomes, see `Status`.
     backend : str
-        Which arithmetic gave the numbers.
+        Backend that computed the numbers.
     """
     import xarray
 

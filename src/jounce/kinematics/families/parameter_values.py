@@ -1,4 +1,4 @@
-"""Values of parameters in which designs, or runs of a simulation, differ."""
+"""Values of parameters that vary among designs, or among simulation runs."""
 
 from collections.abc import Callable, Mapping
 from typing import Any
@@ -18,18 +18,18 @@ def checked_values(
     check: Callable[[str], None],
     error: type[JounceError] = MechanismError,
 ) -> dict[str, Any]:
-    """Return values of parameters that many designs, or runs, have, one for each: arrays of JAX where it traces them.
+    """Return the values of parameters of many designs or runs, one for each; arrays of JAX if it traces them.
 
     Parameters
     ----------
     parameters : mapping or table of pandas
-        By name.
+        Values by parameter name.
     each : str
-        What they differ in: designs or runs.
+        Name of the varied item: design or run.
     check : callable
-        Raises for a name that is none of a parameter.
+        Raises if a name is not that of a parameter.
     error : type
-        To raise if values are not finite or of unequal number, or have labels in another order.
+        Error to raise if values are not finite, differ in number, or have labels in different orders.
     """
     parameters = by_parameter(parameters, each, error)
     if not parameters:
@@ -53,12 +53,12 @@ def checked_values(
 
 
 def by_parameter(parameters: Any, each: str, error: type[JounceError]) -> dict[Any, Any]:
-    """Return values of parameters by name: of a mapping, or of the columns of a table of pandas.
+    """Return values by parameter name, from a mapping or from the columns of a pandas table.
 
     Raises
     ------
     JounceError
-        That given, if they are neither, or a column is there twice.
+        Of the given type, if they are neither, or a column occurs twice.
     """
     if isinstance(parameters, Mapping):
         return dict(parameters)

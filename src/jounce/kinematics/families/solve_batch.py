@@ -1,4 +1,4 @@
-"""Families: many designs of one mechanism solved in one program, each with an outcome of its own at every instant."""
+"""Families: many designs of one mechanism solved side by side, each with its own outcome at every instant."""
 
 import itertools
 from collections.abc import Callable, Mapping
@@ -50,7 +50,7 @@ from jounce.trajectory.motion import SplineMotion
 if TYPE_CHECKING:
     import xarray
 
-SPOILED = (AssemblyError, MobilityError, SolveError)  # a design, not the family
+SPOILED = (AssemblyError, MobilityError, SolveError)  # errors that concern one design, not the family
 
 
 @concrete
@@ -67,42 +67,42 @@ def solve_batch(
 ) -> "xarray.Dataset":
     """Return the motions of many designs of a mechanism that differ in its parameters, solved side by side.
 
-    Each design is followed in steps of its own, the same as those of `jounce.solve`. One that locks, or that comes to a
-    singular position, is solved individually; so are all of them where outputs are forces, energies or Euler angles,
-    where constraints are redundant, where laws of pieces depend on the parameters that vary, and where the mechanism
-    selects one of its assemblies.
+    Each design takes its own steps, the same as those of `jounce.solve`. A design that locks, or comes to a singular
+    position, is solved individually. All designs are solved individually if outputs are forces, energies or Euler
+    angles, if constraints are redundant, if piecewise laws depend on the varied parameters, or if the mechanism selects
+    one of its assemblies.
 
     Parameters
     ----------
     mechanism : Mechanism
-        As for `jounce.solve`.
+        As in `jounce.solve`.
     parameters : dict of str to array_like of shape (designs,), or pandas.DataFrame
-        Values of some parameters in each design, SI; of a table, by the names of its columns.
+        Values of parameters in each design, SI; for a table, by column names.
     time : array_like of shape (time,), optional
-        Strictly increasing instants, s, the same for all; those of the mechanism unless given.
+        Strictly increasing instants, s, the same for all designs; those of the mechanism by default.
     order, tolerance
-        As for `jounce.solve`.
+        As in `jounce.solve`.
     progress : callable, optional
         Called with the number of designs done and their total.
     threads : int, optional
-        As for `jounce.solve`; results do not depend on it.
+        As in `jounce.solve`; results do not depend on it.
     alone : bool, default True
-        Whether to solve designs that lock, or are out of the ordinary otherwise, individually, which takes long for
-        many of them. Otherwise their status is that they are not reached.
+        Whether to solve individually the designs that lock or are otherwise out of the ordinary, which takes long for
+        many of them. Otherwise their status is NOT_REACHED.
 
     Returns
     -------
     xarray.Dataset
-        Outputs with the dimensions design, time, derivative, and component where there are some, SI; the values of the
-        parameters are coordinates of the designs, ``parameter_NAME`` where something else has the NAME. ``status``
-        (design, time) is the outcome, see `Status`: where it is not 0, outputs are NaN. An output that no design has is
-        left out. The attribute ``backend`` says which arithmetic gave the numbers, as that of `Motion`.
+        Outputs with the dimensions design, time, derivative and, for vectors, component, SI. The values of the
+        parameters are coordinates of the designs, called ``parameter_NAME`` if NAME is taken. ``status`` (design, time)
+        is the outcome, see `Status`; where it is not 0, outputs are NaN. An output that no design has is left out. The
+        attribute ``backend`` names the backend, as in `Motion`.
 
     Raises
     ------
     MechanismError
-        If a parameter does not exist, values are not finite or of unequal number, or no mechanism may have them; and as
-        `jounce.solve`.
+        If a parameter does not exist, or values are not finite, differ in number, or are invalid for a mechanism; and
+        as in `jounce.solve`.
 
     Examples
     --------
@@ -129,14 +129,14 @@ def solve_with_sides(
     tolerance: float = 1e-12,
     threads: int | None = None,
 ) -> tuple["xarray.Dataset", Sides]:
-    """Return the dataset of `solve_batch`, and outputs on both sides of each jump or bend of the laws of each design.
+    """Return the dataset of `solve_batch`, and the outputs on both sides of each break of the laws of each design.
 
     Parameters
     ----------
     mechanism, parameters, order, tolerance, threads
-        As for `solve_batch`.
+        As in `solve_batch`.
     instants : array of shape (time,)
-        Strictly increasing, s.
+        Strictly increasing instants, s.
     """
     family = _Family(mechanism, parameters, instants, order, tolerance)
     family.add_sides_of_breaks()
@@ -145,7 +145,7 @@ def solve_with_sides(
 
 
 class _Family:
-    """Designs that are being solved, and their results so far."""
+    """The designs of a family, and their results so far."""
 
     def __init__(
         self,
@@ -167,7 +167,7 @@ class _Family:
         self.instants = time_grid(mechanism.time if time is None else time, mechanism.parameter_values)
         some = [self._design(k, mechanism) for k in (0, len(self.rows) // 2, -1)]
         self.mechanism = with_idle_held_in_family(mechanism, some, self.instants, tolerance, solve)
-        self.held = with_output_drivers(self.mechanism)  # solved side by side
+        self.held = with_output_drivers(self.mechanism)  # the mechanism solved side by side
         self.progress = progress
         self.outputs: dict[str, np.ndarray] = {}
         self.backends: set[str] = set()
@@ -176,13 +176,13 @@ class _Family:
     def _set_instants(
         self, side_instants: Float[np.ndarray, "design side"], breaks: Float[np.ndarray, "design side"]
     ) -> None:
-        """Set the instants: those common to all designs first, then further ones of each design."""
+        """Set the instants: the common ones first, then the additional ones of each design."""
         self.breaks, common = breaks, np.broadcast_to(self.instants, (len(self.rows), len(self.instants)))
         self.all_instants = np.concatenate([common, side_instants], axis=1)
         self.status: Int[np.ndarray, "design time"] = np.full(self.all_instants.shape, int(Status.NOT_REACHED))
 
     def add_sides_of_breaks(self) -> None:
-        """Add the instants on both sides of each jump or bend of the laws of each design."""
+        """Add the instants on both sides of each break of the laws of each design."""
         first, last = float(self.instants[0]), float(self.instants[-1])
         level = self.order + lost_orders(self.mechanism.outputs.values())
         breaks, side_instants = sides_of_designs(self.mechanism, self.parameters, first, last, level)
@@ -190,12 +190,12 @@ class _Family:
 
     @property
     def sides(self) -> Sides:
-        """The outputs on both sides of the breaks."""
+        """Outputs on both sides of the breaks."""
         count = len(self.instants)
         return Sides(self.breaks, {name: values[:, count:] for name, values in self.outputs.items()})
 
     def _design(self, k: int, mechanism: Mechanism) -> Mechanism:
-        """Return a mechanism with the values of one of the designs."""
+        """Return a mechanism with the values of one design."""
         return mechanism.with_parameters(**dict(zip(self.names, self.rows[k].tolist(), strict=True)))
 
     def solve(self, threads: int, *, individually: bool = True) -> None:
@@ -213,19 +213,19 @@ class _Family:
 
     @property
     def dataset(self) -> Any:
-        """The results, labeled."""
+        """The results as labeled arrays."""
         count = len(self.instants)
         outputs = {name: series[:, :count] for name, series in self.outputs.items()}
         described = self.mechanism.title, self.mechanism.outputs, self.instants, self.order, self.parameters
         return labeled_family("design", *described, outputs, self.status[:, :count], joined(self.backends))
 
     def _of_whole_motions(self) -> bool:
-        """Return whether an output follows from the whole motion, not from one instant."""
+        """Return whether an output depends on the whole motion, not on one instant."""
         outputs = self.mechanism.outputs.values()
         return any(isinstance(output, AbstractMotionOutput) or getattr(output, "wraps", ()) for output in outputs)
 
     def _pieces_vary(self) -> bool:
-        """Return whether laws of pieces depend on the parameters that vary: their tables have no lane for a design."""
+        """Return whether piecewise laws depend on varied parameters; their tables have no lane per design."""
         tables: list[Any] = []
 
         def pieces(values: Any) -> Any:
@@ -240,7 +240,7 @@ class _Family:
         return any(isinstance(leaf, Tracer) for table in tables for leaf in jax.tree.leaves(table))
 
     def _side_by_side(self, threads: int) -> Int[np.ndarray, " design"]:
-        """Solve designs side by side and store their results; return those that are left to be solved individually."""
+        """Solve designs side by side and store their results; return those left to be solved individually."""
         count = len(self.rows)
         first, last = float(self.instants[0]), float(self.instants[-1])
         attempts = ((k, assembled) for k in range(count) if (assembled := self._assembled(k)) is not None)
@@ -270,9 +270,9 @@ class _Family:
     def _assembled_designs(
         self, model: Model
     ) -> tuple[VariedTree, dict[str, Any], Bool[np.ndarray, " lane"], Int[np.ndarray, " lane"]]:
-        """Return the systems of designs, where each starts, whether it may be followed, and which of all it is.
+        """Return the systems of designs, their start coordinates, whether each may be followed, and its index.
 
-        They are assembled one by one where angles about axes require that, and where equations are too many or too few.
+        They are assembled one by one if angles about axes require it, or if equations are too many or too few.
         """
         system = model.system
         if not any(map(measures_angle, (*system.groups, *system.outputs))) and system.shape[0] == system.shape[1]:
@@ -286,7 +286,7 @@ class _Family:
         return systems, coordinates, np.ones(len(chosen), bool), chosen
 
     def _assembled(self, k: int) -> tuple[Model, dict[str, Any]] | None:
-        """Return the model of a design, its outputs held to their laws, and its start; None if it has no assembly."""
+        """Return the model and start of a design whose outputs follow laws; None if it cannot be assembled."""
         try:
             return assemble(build(self._design(k, self.held)), float(self.instants[0]), self.tolerance)
         except SPOILED:
@@ -314,7 +314,7 @@ class _Family:
             self._put(name, np.array([k]), values[None] if values.ndim == 3 else values[None, ..., None])
 
     def _put(self, name: str, designs: np.ndarray, values: np.ndarray) -> None:
-        """Store the values of an output, (designs, time, derivative, component), of some designs in their order."""
+        """Store the values of an output, (designs, time, derivative, component), for some designs."""
         values = values[..., 0] if values.shape[-1] == 1 else values
         if name not in self.outputs:
             if len(designs) == len(self.rows):

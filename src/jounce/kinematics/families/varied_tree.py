@@ -1,4 +1,4 @@
-"""A tree of arrays, made from rows of parameters: what follows from them has one entry for each row, last."""
+"""A tree of arrays made from rows of parameters: leaves that depend on them have one entry per row, last."""
 
 import dataclasses
 from collections.abc import Callable, Sequence
@@ -14,16 +14,16 @@ Lanes = slice | Int[np.ndarray, " lane"]
 
 @dataclasses.dataclass(frozen=True)
 class VariedTree:
-    """A tree of which some leaves differ from lane to lane.
+    """A tree with leaves that differ from lane to lane.
 
     Attributes
     ----------
     structure : PyTreeDef
-        Of the tree.
+        Structure of the tree.
     fixed : sequence
-        Leaves that are the same in all lanes; None in the place of the others.
+        Leaves that are the same in all lanes; None in the places of the others.
     varied : dict of int to array of shape (..., lanes)
-        The others, by the index of the leaf.
+        Leaves that differ, by index.
     """
 
     structure: Any
@@ -34,16 +34,16 @@ class VariedTree:
     def traced(
         cls, make: Callable[[Any], Any], rows: Float[np.ndarray, "lane parameter"], like: Any = None
     ) -> "VariedTree":
-        """Return the trees that a function makes of rows, all in one pass; leaves have a last axis of length one.
+        """Return the trees that a function makes of rows, all in one pass; leaves lose their last axis of length one.
 
         Parameters
         ----------
         make : callable
-            Makes a tree of one row, which JAX traces.
+            Makes a tree of one row, traced by JAX.
         rows : array of shape (lanes, parameters)
-            Values.
+            Rows of parameter values.
         like : pytree, optional
-            A tree of the same structure, from which leaves are taken that do not depend on the row.
+            Tree of the same structure that provides the leaves that do not depend on the row.
         """
         flattened: list[Any] = []
 
@@ -60,7 +60,7 @@ class VariedTree:
 
     @classmethod
     def joined(cls, trees: Sequence[Any], like: Any = None) -> "VariedTree":
-        """Return trees that were made one by one; `like` as `traced` has it, the first of them unless given."""
+        """Return trees that were made one by one; `like` as in `traced`, by default the first of them."""
         columns = [[np.asarray(leaf, float) for leaf in c] for c in zip(*map(jax.tree.leaves, trees), strict=True)]
         differs = [not all(np.array_equal(leaf, column[0]) for leaf in column) for column in columns]
         varied = {k: np.concatenate(columns[k], axis=-1) for k, differ in enumerate(differs) if differ}
@@ -72,10 +72,10 @@ class VariedTree:
         return cls(structure, [None if k in varied else leaf for k, leaf in enumerate(leaves)], varied)
 
     def own(self, lanes: Lanes) -> dict[int, np.ndarray]:
-        """Return the leaves in which lanes differ, by index, as `of_design` takes them."""
+        """Return the leaves that differ between lanes, by index, in the form of `of_design`."""
         return {k: value[..., lanes] for k, value in self.varied.items()}
 
     def at(self, lanes: Lanes) -> Any:
-        """Return the tree of some lanes."""
+        """Return the tree with the leaves of some lanes."""
         own = self.own(lanes)
         return jax.tree.unflatten(self.structure, [own.get(k, leaf) for k, leaf in enumerate(self.fixed)])

@@ -1,6 +1,6 @@
-"""The Jacobian along a motion as a Taylor series, and linear equations with it: solved with one factorization.
+"""The Jacobian along a motion as a Taylor series, and linear equations with it, solved with one factorization.
 
-How the residuals change with virtual displacements of the bodies is a jet, as everything is: none is written anywhere.
+The derivatives of residuals with respect to virtual displacements of the bodies are jets, too: none is written by hand.
 """
 
 from collections.abc import Callable, Sequence
@@ -23,30 +23,30 @@ from jounce.mechanism.system import Group, System, movable, with_rows
 from jounce.rigid.pose import Pose
 
 Slope = Float[Numbers, "order coordinate row instance batch"]
-"""Taylor coefficients of how the residuals of a group change with the coordinates of the bodies in a slot."""
+"""Taylor coefficients of the derivatives of residuals with respect to the coordinates of the bodies in a slot."""
 
 Series = Float[Numbers, "order column batch"]
-"""Taylor coefficients of what has one entry for each row, or each column, of the Jacobian."""
+"""Taylor coefficients of a quantity with one entry per row, or per column, of the Jacobian."""
 
 
 def slopes(element: AbstractConstraint, poses: Sequence[Pose], time: Jet, slot: int) -> Slope:
-    """Return how the residual of a joint or driver changes as the body in a slot is displaced: Jacobian, as jets.
+    """Return the Jacobian block of a joint or driver for the body in a slot, as jets.
 
     Parameters
     ----------
     element : AbstractConstraint
-        Its values have shape (..., instances, 1).
+        Joint or driver whose values have the shape (..., instances, 1).
     poses : sequence of SpatialPose or PlanarPose
-        Of the bodies in each slot, shape (..., instances, batch), of the order of the time.
+        Poses of the bodies in each slot, shape (..., instances, batch), of the order of the time.
     time : Jet
-        Of shape (1, batch).
+        Time, shape (1, batch).
     slot : int
-        Which of the bodies is displaced; it may be the ground.
+        Slot of the displaced body, which may be the ground.
 
     Returns
     -------
     array of shape (order + 1, coordinates, rows, instances, batch)
-        Taylor coefficients of the derivatives by a shift in global axes, m, and by a turn in axes of the body, rad.
+        Taylor coefficients of the derivatives by a shift in global axes, m, and by a rotation in body axes, rad.
     """
     body = movable(poses[slot].truncate(time.order))
     bodies = (*poses[:slot], body, *poses[slot + 1 :])
@@ -59,23 +59,23 @@ def slopes(element: AbstractConstraint, poses: Sequence[Pose], time: Jet, slot: 
 
 
 def slopes_of_groups(groups: Sequence[Group], pose: Pose, time: Jet) -> list[list[Slope]]:
-    """Return, for each group of joints and drivers, the `slopes` of each moving slot, along a motion of all bodies.
+    """Return the `slopes` of each moving slot for each group of joints and drivers, along a motion of all bodies.
 
-    The pose, (..., bodies, batch), with the ground first, has the order of the time.
+    `pose`, (..., bodies, batch), with the ground first, has the order of the time.
     """
     at = [(group, [pose.take(indices) for indices in group.bodies]) for group in groups]
     return [[slopes(group.element, poses, time, slot) for slot in group.moving_slots] for group, poses in at]
 
 
 def along_displacements(body: Any, changed: Callable[[Any], Any]) -> Slope:
-    """Return how jets change, shape (order + 1, rows, instances, batch), with each displacement of a body in turn.
+    """Return the derivatives of jets, (order + 1, rows, instances, batch), for each displacement of a body.
 
     Parameters
     ----------
     body : SpatialPose or PlanarPose
-        That is displaced, as `movable` gives it, shape (..., instances, batch).
+        Displaced body, as returned by `movable`, shape (..., instances, batch).
     changed : callable
-        Maps a change of the pose to that of the jets.
+        Maps a variation of the pose to the variation of the jets.
     """
     shape, size, order = body.position.shape[1:], body.shifts + body.turns, body.order
 
@@ -89,16 +89,16 @@ def along_displacements(body: Any, changed: Callable[[Any], Any]) -> Slope:
 
 
 def jacobian_series(system: System, pose: Pose, time: Jet) -> Float[Numbers, "order entry batch"]:
-    """Return the entries of the Jacobian along a motion, as Taylor coefficients, in rows that are not scaled.
+    """Return the Taylor coefficients of the entries of the Jacobian along a motion, rows unscaled.
 
     Parameters
     ----------
     system : System
         The mechanism.
     pose : SpatialPose or PlanarPose
-        Of all bodies, the ground first, of the order of the time.
+        Poses of all bodies, the ground first, of the order of the time.
     time : Jet
-        Of shape (1, batch).
+        Time, shape (1, batch).
     """
     scale = jnp.asarray(system.column_scale)[None, :, None, None, None]
     blocks = chain.from_iterable(slopes_of_groups(system.groups, pose, time))
@@ -106,18 +106,18 @@ def jacobian_series(system: System, pose: Pose, time: Jet) -> Float[Numbers, "or
 
 
 def solved_series(system: System, entries: Float[Numbers, "order entry batch"], right: Series) -> Series:
-    """Return the series x with ``J x = right``: order after order, with the factors of the first coefficient of J.
+    """Return the series x with ``J x = right``, order after order, with the factors of the first coefficient of J.
 
-    It is differentiated and transposed as the linear equations that it solves: the factors are not.
+    Derivatives and transposes are those of the linear equations; the factorization itself is not differentiated.
 
     Parameters
     ----------
     system : System
         The mechanism, with as many rows as columns.
     entries : array of shape (order + 1, entries, batch)
-        As `jacobian_series` gives them.
+        Series of the entries, as returned by `jacobian_series`.
     right : array of shape (order + 1, rows, batch)
-        In rows that are not scaled.
+        Right-hand side, rows unscaled.
 
     Returns
     -------
@@ -147,31 +147,31 @@ def solved_series(system: System, entries: Float[Numbers, "order entry batch"], 
 def solver(
     product: Callable[[Any], Any], solve: Callable[[Any], Any], solve_transposed: Callable[[Any], Any]
 ) -> Callable[[Any], Any]:
-    """Return a solver of linear equations with a matrix given by its product, with implicit derivatives."""
+    """Return a solver of linear equations whose matrix is given by its products, with implicit derivatives."""
     return lambda right: jax.lax.custom_linear_solve(
         product, right, lambda _, b: solve(b), lambda _, b: solve_transposed(b)
     )
 
 
 def _row_scale(system: System, entries: Float[Numbers, "order entry batch"]) -> Float[Numbers, "row 1"]:
-    """Return factors by which the largest entry of each row, somewhere along the motion, becomes one."""
+    """Return factors that scale the largest entry of each row along the motion to one."""
     return system.pattern.row_scale(jnp.max(jnp.abs(jax.lax.stop_gradient(entries[0])), axis=-1, keepdims=True))
 
 
 class _Product(NamedTuple):
-    """How matrices multiply columns: these are spread along the entries, multiplied with them, and added up."""
+    """Product of matrices with columns: spread the columns along the entries, multiply, and sum."""
 
     spread: Callable[[Any], Any]
     added: Callable[[Any], Any]
     collected: Callable[[Any], Any] = lambda sums: sums
 
     def sum(self, matrices: Any, spread: Any) -> Any:
-        """Return the sum of the products of matrices with columns that are spread."""
+        """Return the sum of the products of matrices with spread columns."""
         return self.collected(jnp.sum(self.added(matrices * spread), axis=0))
 
 
 def _products(system: System, entries: Any, scale: Any) -> tuple[Any, _Product, _Product]:
-    """Return the matrices of a series of them, and how they, or transposed ones, multiply columns, (columns, batch)."""
+    """Return the matrices of a series, and the products of these, and of their transposes, with columns."""
     pattern = system.pattern
     if system.fronts is None:
         matrices = jax.vmap(pattern.dense)(entries) * scale[None, :, :, None]
@@ -183,7 +183,7 @@ def _products(system: System, entries: Any, scale: Any) -> tuple[Any, _Product, 
 
 
 def _in_order(product: _Product, matrices: Any, solve: Callable[[Any], Any], right: Series) -> Series:
-    """Return the series whose product with one of matrices is known, coefficient after coefficient, in one loop."""
+    """Return the series x of a product of series, given the other factor and the product, in one loop over orders."""
 
     def step(spread: Any, k: Any) -> tuple[Any, Any]:
         def added(j: Any, sums: Any) -> Any:

@@ -1,12 +1,12 @@
-"""The motion of a mechanism of which JAX traces some values, as a function of them: derivatives of any order by design.
+"""Motions of mechanisms with values traced by JAX, as functions of these values: design derivatives of any order.
 
-Along a motion the residuals vanish with all their time derivatives. So a change of a value of the design moves the
-bodies by a series d with ``J d = -r``, where J is the series of the Jacobian and r that of how the residuals change
-while the bodies stay: linear equations, triangular in the orders, with the one matrix on their diagonal that gives the
-time derivatives too. Their transpose gives gradients: a single solution, however many values there are.
+Along a motion the residuals vanish with all their time derivatives. A change of a design value thus moves the bodies by
+a series d with ``J d = -r``: J is the series of the Jacobian, and r the change of the residuals with the bodies held.
+These linear equations are triangular in the orders, and have on their diagonal the same matrix that gives the time
+derivatives. Their transpose gives gradients with a single solution for any number of values.
 
-What is not a function of the design is decided outside of what is traced, by the solver as it always is: the path from
-the starting guess, steps, branches, whole turns.
+The path from the starting guess, steps, branches and whole turns are not functions of the design. The solver decides
+them outside of the traced code, as for plain numbers.
 """
 
 import dataclasses
@@ -46,26 +46,27 @@ from jounce.trajectory import Expression
 
 Solve = Callable[[Mechanism, bool], Motion]
 Values = tuple[Any, ...]
-"""What JAX traces in a mechanism, in the order of `template`."""
+"""Values that JAX traces in a mechanism, in the order of `template`."""
 
 
 class Solved(NamedTuple):
-    """A motion, as its solver gives it.
+    """The arrays of a motion from its solver.
 
     Attributes
     ----------
     coordinates : dict of str to array
         Taylor coefficients of the coordinates of all bodies, the ground first, time last.
     status : array of shape (time,)
-        As numbers that may be traced.
+        Outcomes as floating-point numbers, which may be traced.
     length : array of shape ()
         Size of the mechanism, m.
     angles : Angles
-        About axes, of the model that was solved.
+        Angles about axes of the model that was solved.
     driven : tuple of array of shape (instances, 1)
-        Angles about axes of joints and drivers of the model of the drivers: others where outputs are held to laws.
+        Angles about axes of the joints and drivers in the model of the drivers; they differ if outputs are held to
+        laws.
     continued : tuple of array of shape (components, instances, time)
-        Values of the outputs that are angles in a range, made continuous, for each group of such.
+        Values of wrapped angles among the outputs, made continuous, for each group of them.
     """
 
     coordinates: dict[str, Any]
@@ -81,20 +82,20 @@ def differentiable_motion(
 ) -> tuple[Solved, tuple[Model, Model]]:
     """Return the motion of a mechanism, and its models, as functions of the values that JAX traces in it.
 
-    The first model is the one that is solved, in which outputs are held to laws where drivers follow from them; the
-    second has the drivers, for their forces. They are one where no driver does.
+    The first model is the one that is solved; it holds outputs to their laws if drivers follow from them. The second
+    has the drivers, for their forces. Both are the same if no driver follows from an output.
 
     Parameters
     ----------
     mechanism : Mechanism
-        Some of its values are traced.
+        A mechanism with traced values.
     instants : array of shape (time,)
-        s.
+        Time, s.
     levels : int
-        How many Taylor coefficients a solution has.
+        Number of Taylor coefficients of a solution.
     solve : callable
-        Solves a mechanism of plain numbers at the instants, strictly or not. What it raises where JAX knows the numbers
-        is raised; elsewhere a motion that cannot be begun is NaN.
+        Solves a mechanism of plain numbers at the instants, strictly or not. Its errors are raised if JAX knows the
+        numbers; otherwise a motion without a start is NaN.
     """
     (given, made), driven = template(mechanism), _builder(mechanism, with_output_drivers)
     shown = _builder(mechanism, without_output_laws) if output_laws(mechanism) else driven
@@ -103,7 +104,7 @@ def differentiable_motion(
 
     def on_the_host(strict: bool, values: Values) -> Solved:
         motion = solve(made(values), strict)
-        if np.any(motion.status == Status.OK):  # else nothing is known of drivers that follow from outputs
+        if np.any(motion.status == Status.OK):  # otherwise drivers that follow from outputs are unknown
             return _solved(motion)
         return _failed(shapes, motion.status)
 
@@ -131,7 +132,7 @@ def differentiable_motion(
 
 
 def solved_shapes(mechanism: Mechanism, count: int, levels: int) -> Solved:
-    """Return the shapes of a solution."""
+    """Return the shapes of the arrays of a solution."""
 
     def of(*shape: int) -> jax.ShapeDtypeStruct:
         return jax.ShapeDtypeStruct(shape, np.float64)
@@ -156,13 +157,13 @@ def solved_shapes(mechanism: Mechanism, count: int, levels: int) -> Solved:
 
 
 def _failed(shapes: Solved, status: Any) -> Solved:
-    """Return a solution of which only the status is known."""
+    """Return a solution with all values NaN except for the status."""
     unknown = jax.tree.map(lambda x: np.full(x.shape, np.nan), shapes)
     return unknown._replace(status=np.broadcast_to(np.asarray(status, float), shapes.status.shape))
 
 
 def solved_or_failed(solve: Callable[[Values], Solved], shapes: Solved, values: Values) -> Solved:
-    """Return the solution of a design; of one whose motion cannot be begun, only the status is known."""
+    """Return the solution of a design; only its status if the motion has no start."""
     try:
         return solve(values)
     except (AssemblyError, MobilityError, SolveError) as error:
@@ -170,7 +171,7 @@ def solved_or_failed(solve: Callable[[Values], Solved], shapes: Solved, values: 
 
 
 def given_instants(mechanism: Mechanism, time: Any, read: Callable[..., np.ndarray]) -> Float[np.ndarray, " time"]:
-    """Return the instants that are given, or the mechanism's own, which must not follow from values that JAX traces."""
+    """Return the given instants, or the mechanism's own, which must not depend on values that JAX traces."""
     try:
         return read(mechanism.time if time is None else time, mechanism.parameter_values)
     except ConcretizationTypeError:
@@ -179,7 +180,7 @@ def given_instants(mechanism: Mechanism, time: Any, read: Callable[..., np.ndarr
 
 
 def _solved(motion: Motion) -> Solved:
-    """Return the arrays of a motion that derivatives need, as those of NumPy."""
+    """Return the arrays of a motion that derivatives need, as NumPy arrays."""
     coordinates = jax.tree.map(np.asarray, dict(motion.poses[1]))
     counted = motion.forces, motion.counted_outputs
     angles, driven = angles_of(motion.solved_model, counted), angles_of(motion.model, counted).angle[0]
@@ -189,9 +190,9 @@ def _solved(motion: Motion) -> Solved:
 
 
 def _one_by_one(solve: Callable[[Values], Solved], shapes: Solved, sizes: Sequence[int], values: Values) -> Solved:
-    """Solve one design, or many, with the designs on the first axes; called from within what JAX runs.
+    """Solve one design, or many with the designs on the first axes; JAX calls this function back.
 
-    `sizes` are the numbers of axes that the values of one design have.
+    `sizes` are the numbers of axes of the values of one design.
     """
     batch = np.shape(values[0])[: np.ndim(values[0]) - sizes[0]]
     if not batch:
@@ -206,7 +207,7 @@ def first_of(coordinates: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def check_not_redundant(model: Model) -> None:
-    """Raise MechanismError if constraints are redundant: known by the rank, or more equations than unknowns."""
+    """Raise MechanismError if constraints are redundant, by the rank or by more equations than unknowns."""
     rows, columns = model.system.shape
     if rows > columns or model.system.rank is not None:
         raise MechanismError(
@@ -217,21 +218,21 @@ def check_not_redundant(model: Model) -> None:
 
 
 class _Builder:
-    """Makes the model of a mechanism from what JAX traces in it: operation by operation, or compiled once.
+    """Builder of the model of a mechanism from its traced values: operation by operation, or compiled once.
 
     Parameters
     ----------
     mechanism : Mechanism
-        Some of its values are traced.
+        A mechanism with traced values.
     made_of : callable
-        What the model is made of, for the mechanism.
+        Transforms the mechanism before the model is built.
     again : bool
-        Whether it is used again, so that compiling is worth while.
+        Whether the builder is used again, so that compilation pays.
 
     Attributes
     ----------
     change : callable
-        Returns how the coordinates of a motion change as values of the design do.
+        Returns the change of the coordinates of a motion with the values of the design.
     """
 
     def __init__(self, mechanism: Mechanism, made_of: Callable[[Mechanism], Mechanism], *, again: bool):
@@ -247,16 +248,16 @@ class _Builder:
         return self.model(numbers, which, angles is not None)
 
     def numbers(self, values: Values, length: Any, angles: Angles | None, coordinates: Any) -> tuple[list[Any], Any]:
-        """Return those numbers of a system that depend on what is traced, and which of its leaves they are.
+        """Return the numbers of a system that depend on traced values, and the indices of these leaves.
 
-        The coordinates are Taylor coefficients of a motion; its first position is used. JAX takes longer for a part of
-        an array than for a program that is given the whole.
+        `coordinates` are the Taylor coefficients of a motion, whose first position is used. They are passed whole,
+        since JAX takes longer to slice an array than to call a program with it.
         """
         numbers = self._make(values, length, angles, coordinates, counted=angles is not None)
         return numbers, self._models[angles is not None][2]
 
     def model(self, numbers: Sequence[Any], which: tuple[int, ...], counted: bool) -> Model:
-        """Return the model that has these numbers."""
+        """Return the model with given numbers."""
         model, leaves, _, structure = self._models[counted]
         known = dict(zip(which, numbers, strict=True))
         whole = [known.get(k, leaf) for k, leaf in enumerate(leaves)]
@@ -274,13 +275,13 @@ class _Builder:
         return [leaves[k] for k in which]
 
     def _change(self, values: Values, changes: Values, solved: Solved, instants: Any) -> dict[str, Any]:
-        """Return how the coordinates of a motion change, as Taylor coefficients, as values of the design do."""
+        """Return the Taylor coefficients of the change of the coordinates of a motion with the values of the design."""
         regular = solved.status == int(Status.OK)
         coordinates = {name: _where(regular, c, c[..., :1]) for name, c in solved.coordinates.items()}
         instants = jnp.where(regular, instants, instants[0])
         first = {name: x[:1, ..., :1] for name, x in coordinates.items() if name != "angular_velocity"}
         moved = jax.tree.map(jnp.zeros_like, first)
-        if any(solved.angles.angle):  # they are counted from the first position, which moves too
+        if any(solved.angles.angle):  # the angles are counted from the first position, which moves too
             system, slope, which = _linear(self, (solved.length, None), values, changes, first, moved)
             changed = _moved(system, slope, which, first, instants[:1])
             moved = {name: changed[name] for name in first}
@@ -294,9 +295,9 @@ _builders: dict[Any, _Builder] = {}
 
 
 def _builder(mechanism: Mechanism, made_of: Callable[[Mechanism], Mechanism]) -> _Builder:
-    """Return the builder of the model of a mechanism, which is shared by mechanisms that differ in parameters only.
+    """Return the builder for a mechanism, shared by mechanisms that differ in parameters only.
 
-    One whose joints are made anew each time is not compiled: that would be done each time.
+    If joints are new objects in each call, the builder is not compiled, as this would happen every time.
     """
     numbers = {name: value for name, value in mechanism.parameters.items() if not isinstance(value, Tracer)}
     plain = tuple((n, x if isinstance(x, str | Expression) else float(x)) for n, x in numbers.items())
@@ -308,12 +309,12 @@ def _builder(mechanism: Mechanism, made_of: Callable[[Mechanism], Mechanism]) ->
     if key not in _builders:
         while len(_builders) >= MOST_BUILDERS:
             _builders.pop(next(iter(_builders)))
-        _builders[key] = _Builder(mechanism, made_of, again=True)  # which holds what the key is made of
+        _builders[key] = _Builder(mechanism, made_of, again=True)  # holds the objects whose ids are in the key
     return _builders[key]
 
 
 def _users_code(mechanism: Mechanism) -> tuple[Any, ...] | None:
-    """Return what distinguishes code of users in a mechanism from others; None where it holds what JAX traces."""
+    """Return a key of the users' code in a mechanism; None if it holds values that JAX traces."""
     if not holds_users_code(element for part in mechanism.elements.values() for element in part.values()):
         return ()
     return users_code([group for groups, _ in grouped_elements(mechanism, initial=True) for group in groups])
@@ -326,7 +327,7 @@ def _where(regular: Any, values: Any, others: Any) -> Any:
 def _linear(
     built: _Builder, known: tuple[Any, Angles | None], values: Values, changes: Values, first: Any, moved: Any
 ) -> tuple[System, list[Any], tuple[int, ...]]:
-    """Return the system of a model, how its numbers change, and which of them do."""
+    """Return the system of a model, the changes of its numbers, and the indices of those that change."""
     indices: list[tuple[int, ...]] = []
 
     def numbers(values: Values, first: Any) -> list[Any]:
@@ -361,10 +362,10 @@ def _change_along(
     pose_type: type[Pose],
     which: tuple[int, ...],
 ) -> dict[str, Any]:
-    """Return how the coordinates of a motion change as the numbers of a system do; `which` of its leaves."""
+    """Return the change of the coordinates of a motion with the numbers of a system; `which` are its leaves."""
     order = len(coordinates["position"]) - 1
     pose = pose_type.from_coordinates({name: Jet(tuple(c)) for name, c in coordinates.items()})
-    pose = movable(jax.lax.optimization_barrier(pose))  # or XLA computes it again in everything that uses it
+    pose = movable(jax.lax.optimization_barrier(pose))  # otherwise XLA recomputes it wherever it is used
     time = Jet.variable(instants[None], order)
     leaves = jax.tree.leaves(system)
 

@@ -1,4 +1,4 @@
-"""The motion of a mechanism that JAX differentiates, maps or compiles: the same questions, answered as its arrays."""
+"""A motion that JAX differentiates, maps or compiles, with the interface of `Motion` and arrays of JAX."""
 
 from collections.abc import Sequence
 from functools import cached_property
@@ -26,15 +26,15 @@ if TYPE_CHECKING:
 
 
 class TracedMotion(Motion):
-    """A motion of which JAX traces the values.
+    """A motion with values that JAX traces.
 
-    Outputs are arrays of JAX; labeled arrays hold such, and give them as ``.data``. `status` is an array too: within
-    `jax.jit` and `jax.vmap` nothing can be raised for it, and an instant that failed is NaN and adds nothing to
-    derivatives. It has no dataset, and neither faults nor change points.
+    Outputs are arrays of JAX; labeled arrays hold them as ``.data``. `status` is an array of JAX, too: within `jax.jit`
+    and `jax.vmap` no error can be raised for it, and a failed instant is NaN and adds nothing to derivatives. There is
+    no dataset, and there are neither faults nor change points.
     """
 
     traced = True
-    may_be_traced = ("mechanism",)  # looked through for values that JAX traces
+    may_be_traced = ("mechanism",)  # attributes that are searched for traced values
 
     def __init__(self, mechanism: Mechanism, models: tuple[Model, Model], time: np.ndarray, order: int, solved: Solved):
         driven, model = models
@@ -54,23 +54,23 @@ class TracedMotion(Motion):
 
     @cached_property
     def dataset(self) -> NoReturn:
-        """There is none.
+        """Not available.
 
         Raises
         ------
         UnsupportedError
-            Always: a dataset holds numbers.
+            Always, since a dataset holds numbers.
         """
         raise UnsupportedError("a dataset holds numbers, and JAX traces this motion; take motion.outputs[name]")
 
     @property
     def actuated(self) -> Mechanism:
-        """The mechanism, unless laws of drivers follow from outputs.
+        """The mechanism, unless drivers follow from outputs.
 
         Raises
         ------
         UnsupportedError
-            If they do: the laws found go through numbers.
+            If they do, since the laws found interpolate numbers.
         """
         if output_laws(self.mechanism):
             message = "the laws found go through numbers, and JAX traces this motion; solve it with numbers for them"
@@ -85,7 +85,7 @@ class TracedMotion(Motion):
         MechanismError
             If the output names a body, joint, driver or force that does not exist, or does not fit the mechanism.
         UnsupportedError
-            If it is an angle that is counted over turns, and no output of the mechanism.
+            If it is an angle counted over turns that is not an output of the mechanism.
         """
         if getattr(output, "turning", False) or getattr(output, "wraps", ()):
             message = "an angle that is counted over turns must be an output of a mechanism that JAX traces"
@@ -93,17 +93,17 @@ class TracedMotion(Motion):
         return super().evaluate(output, name)
 
     def _counting(self, groups: tuple[Group, ...]) -> tuple[Group, ...]:
-        return groups  # those of the model have the turns of all instants
+        return groups  # the groups of the model have the turns at all instants
 
     def _continued(
         self,
-        group: Group,  # noqa: ARG002 - as a motion of numbers has it
+        group: Group,  # noqa: ARG002 - as in Motion
         coefficients: Float[Numbers, "order component instance time"],
     ) -> Float[Numbers, "order component instance time"]:
         return coefficients
 
     def _check_finite(self, values: Any, name: str) -> None:
-        """Nothing can be said of values that are traced."""
+        """Do nothing: traced values cannot be checked."""
 
     def _coefficients(self, group: Group) -> Float[Numbers, "order component instance time"]:
         return output_series((group,), self.poses[1], self.model.pose_type)[0]
@@ -125,6 +125,6 @@ class TracedMotion(Motion):
 def _each_shown(
     values: Float[Numbers, "derivative component instance time"], solved: Bool[Numbers, " time"]
 ) -> list[Float[Numbers, "time derivative *component"]]:
-    """Return each output of a group; JAX takes longer for an operation that it differentiates than for a program."""
+    """Return each output of a group; compiled, as JAX takes longer to differentiate single operations."""
     values = jnp.where(solved[:, None, None], jnp.transpose(values, (2, 3, 0, 1)), jnp.nan)
     return list(values[..., 0] if values.shape[-1] == 1 else values)
