@@ -1,4 +1,4 @@
-"""Files of mechanisms, robots, trajectories and results; libraries are imported when a file is read, not before."""
+"""Files of mechanisms, robots, trajectories and results; libraries are imported when a file is read."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def __getattr__(name: str) -> Any:
 
 
 def _of_mechanisms(name: str) -> ModuleType | None:
-    """Return the file that a name of mechanisms is from."""
+    """Return the module that defines a name for mechanisms; None for other names."""
     match name:
         case "load":
             from jounce.io.mechanisms import loader as home
@@ -48,7 +48,7 @@ def _of_mechanisms(name: str) -> ModuleType | None:
 
 
 def _of_robots(name: str) -> ModuleType | None:
-    """Return the file that a name of robots is from."""
+    """Return the module that defines a name for robots; None for other names."""
     match name:
         case "load_robot":
             from jounce.io.robots import loader as home
@@ -62,7 +62,7 @@ def _of_robots(name: str) -> ModuleType | None:
 
 
 def _of_trajectories(name: str) -> ModuleType | None:
-    """Return the file that a name of trajectories is from."""
+    """Return the module that defines a name for trajectories; None for other names."""
     match name:
         case "load_trajectory":
             from jounce.io.trajectories import loader as home
@@ -76,7 +76,7 @@ def _of_trajectories(name: str) -> ModuleType | None:
 
 
 def _of_results(name: str) -> ModuleType | None:
-    """Return the file that a name of results is from."""
+    """Return the module that defines a name for results; None for other names."""
     match name:
         case "read":
             from jounce.io import result_reading as home

@@ -1,4 +1,4 @@
-"""NetCDF files read first by a process of their own: HDF5 may wait for ever in a damaged file, or end its process."""
+"""NetCDF files checked by a process of their own: in a damaged file, HDF5 may hang or crash."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from pathlib import Path
 from jounce.errors import OutputError
 
 SECONDS, BYTES_A_SECOND = 20.0, 10e6
-MEMORY = 2**30  # bytes beside a few times the file
+MEMORY = 2**30  # bytes, in addition to a few times the size of the file
 LONGEST = 300  # characters of a message of the library
 _PROGRAM = """
 import io, sys
@@ -43,19 +43,19 @@ except Exception as error:
 
 
 def check_readable(content: bytes, path: str) -> None:
-    """Raise OutputError unless a process of its own reads the content of a NetCDF file in reasonable time.
+    """Raise OutputError unless a separate process reads the content of a NetCDF file in reasonable time.
 
     Parameters
     ----------
     content : bytes
-        Of the file.
+        Content of the file.
     path : str
-        The file, for messages.
+        Path of the file, for messages.
 
     Raises
     ------
     OutputError
-        The content is damaged, or not one of NetCDF, or names other files.
+        If the content is damaged, is not NetCDF, or refers to other files.
     """
     seconds = SECONDS + len(content) / BYTES_A_SECOND
     try:
@@ -72,8 +72,8 @@ def check_readable(content: bytes, path: str) -> None:
 
 
 def _read_by_another(content: bytes, seconds: float) -> tuple[int, bytes]:
-    """Return the status of a process that reads a file, and what it says."""
-    if not Path(sys.executable or "").name.startswith("python"):  # it may be an application that has Python within
+    """Return the exit status and the standard output of a process that reads a file."""
+    if not Path(sys.executable or "").name.startswith("python"):  # it may be an application with embedded Python
         raise OSError("this program is no interpreter of Python")
     command = [sys.executable, "-P", "-c", _PROGRAM, str(MEMORY), str(LONGEST)]
     done = subprocess.run(command, input=content, capture_output=True, timeout=seconds, check=False)

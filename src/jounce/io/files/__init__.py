@@ -1,6 +1,6 @@
-"""Files of any kind: read safely, parsed with the lines of their entries, written whole."""
+"""Common functions for files of any kind: safe reading, parsing with the line of every entry, atomic writing."""
 
 DATA_FILES = (".yaml", ".yml", ".toml", ".json")
-"""Endings of files of mechanisms, laws and limits: of data that are read and written alike."""
+"""Endings of data files: mechanisms, laws and limits."""
 ROBOT_FILES = (".urdf", ".xml", ".sdf")
-"""Endings of files of robots."""
+"""Endings of robot files."""

@@ -1,4 +1,4 @@
-"""Values given from outside a file, as ``NAME=VALUE``."""
+"""Values given outside a file, as ``NAME=VALUE``."""
 
 from __future__ import annotations
 
@@ -15,18 +15,18 @@ def assignments(
     Parameters
     ----------
     texts : iterable of str
-        ``NAME=VALUE``.
+        Texts of the form ``NAME=VALUE``.
     option : str
-        What they are given by, for messages.
+        Option by which they are given, for messages.
     form : str
-        How they are given, for messages.
+        Description of the form, for messages.
     error_type : type
-        Of the exceptions.
+        Type of the exceptions.
 
     Raises
     ------
     JounceError
-        Of the type given: a name or a value is missing, or a name is given twice: which is meant, nobody can know.
+        Of the given type, if a name or a value is missing, or a name is given twice.
 
     Examples
     --------

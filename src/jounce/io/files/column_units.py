@@ -1,4 +1,4 @@
-"""Units of columns: datasets say them in attributes, and CSV files may say them in their heading."""
+"""Units of columns, which datasets state in attributes and CSV files in their heading."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _LAST_WORD = re.compile(
     r"|(?P<whole>dps|rpm|s|sec|ms|us|ns))",
     re.IGNORECASE,
 )
-_SAID = {  # what measures something else than SI, where a name says it
+_SAID = {  # patterns of names that state a unit other than SI
     "angle": re.compile(r"(?:(?<![a-z])deg(?:s|rees?)?|(?-i:(?<=[a-z0-9])Deg(?:s|rees?)?))(?![a-z])", re.IGNORECASE),
     "length": re.compile(r"(?<![a-z])mm$", re.IGNORECASE),
     "time": re.compile(r"(?<![a-z])[mun]s$", re.IGNORECASE),
@@ -31,22 +31,22 @@ _SAID = {  # what measures something else than SI, where a name says it
 
 @under_own_settings
 def in_units(dataset: xarray.Dataset, units: Mapping[str, str] | ShownUnits) -> xarray.Dataset:
-    """Return a dataset of SI values in other units, which its attributes name.
+    """Return a dataset of SI values in other units, and state these units in its attributes.
 
-    Derivatives are by s, whatever the unit of the quantity itself.
+    Time derivatives are per second, whatever the unit of the quantity.
 
     Parameters
     ----------
     dataset : xarray.Dataset
-        In SI, as ``Motion.dataset``: variables have the attribute ``units``, that of their derivative 0.
+        Values in SI, as ``Motion.dataset``: variables have an attribute ``units``, the unit of their derivative 0.
     units : dict of str to str
-        By ``angle``, ``length``, ``force``, ``torque``, ``energy``, ``power``, or the name of a variable; what none is
-        chosen for stays in SI.
+        Units by ``angle``, ``length``, ``force``, ``torque``, ``energy``, ``power``, or the name of a variable; other
+        quantities stay in SI.
 
     Raises
     ------
     UnitError
-        If a name is neither, or a unit does not measure what it is chosen for.
+        If a name is neither, or a unit does not suit the quantity.
 
     Examples
     --------
@@ -70,7 +70,7 @@ def in_units(dataset: xarray.Dataset, units: Mapping[str, str] | ShownUnits) -> 
 
 
 def is_si(unit: str | None) -> bool:
-    """Return whether a unit is one of SI; what says none is taken to be, and what is no unit of mechanics is none.
+    """Return whether a unit is an SI unit; no unit counts as SI, and a unit outside mechanics does not.
 
     Examples
     --------
@@ -95,7 +95,7 @@ def heading(name: str, unit: str) -> str:
 
 
 def name_and_unit(text: str) -> tuple[str, str | None]:
-    """Return the name in the heading of a column, and the unit that it says, if it says one.
+    """Return the name in the heading of a column, and its unit in brackets; None if there is none.
 
     Examples
     --------
@@ -107,7 +107,7 @@ def name_and_unit(text: str) -> tuple[str, str | None]:
 
 
 def name_and_last_word(text: str) -> tuple[str, str | None]:
-    """Return the name in the heading of a column that says its unit without brackets, and the unit, if it says one.
+    """Return the name in the heading of a column, and its unit without brackets; None if there is none.
 
     Examples
     --------
@@ -127,7 +127,7 @@ def name_and_last_word(text: str) -> tuple[str, str | None]:
 
 
 def _moves(text: str) -> bool:
-    """Return whether a text is a unit of angles, lengths, times or their rates."""
+    """Return whether a text is a unit of angle, length, time or their rates."""
     try:
         return {base for base, _ in unit_size(text)[1]} <= {"angle", "length", "time"}
     except UnitError:
@@ -135,7 +135,7 @@ def _moves(text: str) -> bool:
 
 
 def unit_unread(name: str, dimensions: Iterable[Dimension]) -> str | None:
-    """Return the unit other than those of SI that a name seems to say of what has one of some dimensions.
+    """Return the unit other than SI that a name seems to state for one of some dimensions; None if there is none.
 
     Examples
     --------
@@ -157,7 +157,7 @@ def unit_unread(name: str, dimensions: Iterable[Dimension]) -> str | None:
 
 
 def names_a_unit(name: str) -> bool:
-    """Return whether a name, as the heading of a column, says a unit; a unit in brackets after it counts instead.
+    """Return whether a name, as the heading of a column, states a unit, in brackets or not.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Plain data as the text of a YAML, TOML or JSON file that a person can read, checked by reading it back."""
+"""Plain data as the readable text of a YAML, TOML or JSON file, checked by reading it back."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import Any
 from jounce.errors import OutputError
 
 BLOCKS = ("parameters", "bodies", "joints", "drivers", "forces", "initial", "outputs")  # one line for each entry
-WIDTH = 110  # of an entry in one line
+WIDTH = 110  # longest entry on one line
 
 
 def dumped(data: Mapping[str, Any], suffix: str, path: str = "") -> str:
@@ -19,16 +19,16 @@ def dumped(data: Mapping[str, Any], suffix: str, path: str = "") -> str:
     Parameters
     ----------
     data : mapping
-        By the keys of the schema: mappings, lists, text and numbers.
+        Data by the keys of the schema: mappings, lists, text and numbers.
     suffix : str
-        .yaml, .yml, .toml or .json.
+        Ending of the file: .yaml, .yml, .toml or .json.
     path : str
-        Of the file, for messages.
+        Name of the file, for messages.
 
     Raises
     ------
     OutputError
-        The format cannot hold the data.
+        If the format cannot hold the data.
 
     Examples
     --------
@@ -50,7 +50,7 @@ def dumped(data: Mapping[str, Any], suffix: str, path: str = "") -> str:
 
 
 def _same(first: Any, second: Any) -> bool:
-    """Return whether data are the same; 1 and 1.0 are, 1 and true are not."""
+    """Return whether data are equal; 1 equals 1.0, but not true."""
     if isinstance(first, Mapping) and isinstance(second, Mapping):
         return list(first) == list(second) and all(_same(first[key], second[key]) for key in first)
     if isinstance(first, (list, tuple)) and isinstance(second, (list, tuple)):
@@ -122,7 +122,7 @@ def _toml(data: Mapping[str, Any]) -> str:
     for key, value in data.items():
         if key not in BLOCKS or not isinstance(value, Mapping):
             whole.append(key, styled(value))
-    for key, value in data.items():  # TOML wants its tables last
+    for key, value in data.items():  # TOML requires its tables last
         if key in BLOCKS and isinstance(value, Mapping):
             table = tomlkit.table()
             for name, entry in value.items():

@@ -1,4 +1,4 @@
-"""The example files of the package: in its folder where it was installed, in that of the checkout otherwise."""
+"""The example files of the package, in its installed folder or in that of the checkout."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def examples_folder() -> Path:
     Raises
     ------
     JounceError
-        There is none: the package was copied without it.
+        If there is no such folder, since the package was copied without it.
     """
     installed = Path(str(importlib.resources.files("jounce") / "examples"))
     checkout = Path(__file__).parents[4] / "examples"
@@ -32,7 +32,7 @@ def examples_folder() -> Path:
 
 
 def example_names() -> dict[str, str]:
-    """Return what the examples are about, by name: mechanisms and scripts, then robots, trajectories and the like.
+    """Return the titles of the examples by name: mechanisms and scripts, then robots, trajectories and others.
 
     Examples
     --------
@@ -46,24 +46,24 @@ def example_names() -> dict[str, str]:
 
 
 def copy_example(name: str, path: str | PathLike[str] | None = None, *, overwrite: bool = False) -> list[Path]:
-    """Copy an example, and the files beside it that it names, and return what was written, the example first.
+    """Copy an example and the files that it mentions, and return the written paths, the example first.
 
     Parameters
     ----------
     name : str
         One of `example_names`, such as ``four_bar`` or ``robots/panda.urdf``.
     path
-        The file to write; its own name in the working folder unless given. Files that the example names keep their
-        places relative to it.
+        The file to write; by default the name of the example in the working folder. Mentioned files keep their places
+        relative to it.
     overwrite : bool, default False
-        Whether files that are there may be replaced.
+        Whether existing files may be replaced.
 
     Raises
     ------
     JounceError
-        There is no such example.
+        If there is no such example.
     OutputError
-        A file is there already, or cannot be written; then nothing is.
+        If a file exists already, or cannot be written; then none is written.
 
     Examples
     --------
@@ -99,13 +99,13 @@ def copy_example(name: str, path: str | PathLike[str] | None = None, *, overwrit
 
 
 def _name(path: Path, folder: Path) -> str:
-    """Return the name of an example: without its ending where there is one file of that name alone."""
+    """Return the name of an example, without its ending if no other file has the same stem."""
     relative = path.relative_to(folder).as_posix()
     return relative.rpartition(".")[0] if path.suffix == ".yaml" or "/" not in relative else relative
 
 
 def _example_title(path: Path) -> str:
-    """Return the title of a file, or what its first comment says."""
+    """Return the title of a file, or the text of its first comment."""
     if path.suffix not in (".yaml", ".py"):
         return {".csv": "trajectory", ".ipynb": "notebook"}.get(path.suffix, "robot")
     text = path.read_text(encoding="utf-8")

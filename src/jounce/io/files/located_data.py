@@ -1,4 +1,4 @@
-"""Plain data from a text file, with the line of every entry remembered for the error messages."""
+"""Plain data from a text file, with the line of every entry for error messages."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ TOO_WIDE = "more than {} names in one mapping"
 TOO_MANY = "more than {} entries; long tables of samples belong in a CSV file"
 
 Location = tuple[str | int, ...]
-"""Where an entry is: keys and indices from the top, such as ``("joints", "BC", "points", 1)``."""
+"""Location of an entry: keys and indices from the top, such as ``("joints", "BC", "points", 1)``."""
 
 
 def dotted(location: Location) -> str:
-    """Word a location for a reader.
+    """Return a location as text for a reader.
 
     Examples
     --------
@@ -37,17 +37,17 @@ def dotted(location: Location) -> str:
 
 @dataclass
 class Source:
-    """Plain data from a file, and the line of every entry; errors about them name the file, the line and the entry."""
+    """Plain data from a file, with the line of every entry; errors name the file, the line and the entry."""
 
     path: str
     data: Any
     lines: dict[Location, int] = field(default_factory=dict)
     allow: tuple[str, ...] = ()
     error_type: type[JounceError] = MechanismFileError
-    several: bool = False  # whether the data are the list of several documents
+    several: bool = False  # whether the data are a list of several documents
 
     def line(self, location: Location) -> int | None:
-        """Return the line of an entry, or of the nearest entry around it whose line is known."""
+        """Return the line of an entry, or of the innermost enclosing entry with a known line."""
         for length in range(len(location), -1, -1):
             if location[:length] in self.lines:
                 return self.lines[location[:length]]
@@ -58,11 +58,11 @@ class Source:
         return self.error_type(message, **self.error_fields(location), **value)
 
     def error_fields(self, location: Location = ()) -> dict[str, Any]:
-        """Return the place of an entry, as errors take it: file, line and dotted name."""
+        """Return the location of an entry as fields of an error: file, line and dotted name."""
         return {"path": self.path, "line": self.line(location), "name": dotted(location) or None}
 
     def at(self, location: Location) -> Any:
-        """Return the value at a location, None where there is none."""
+        """Return the value at a location; None if there is none."""
         entry = self.data
         for step in location:
             entry = entry.get(step) if isinstance(entry, dict) else None
@@ -71,9 +71,9 @@ class Source:
     def mapping(
         self, location: Location = (), keys: Iterable[str] | None = None, *, others: Mapping[str, str] | None = None
     ) -> dict[str, Any]:
-        """Return the mapping at a location, which is not empty and has, where they are given, known keys only.
+        """Return the mapping at a location; raise an error if it is empty, or has keys other than `keys`.
 
-        Other words for keys, which people may write instead, are refused with the key that is meant.
+        `others` maps words that users may write instead of a key to that key, for the message.
         """
         entry = self.at(location)
         if not isinstance(entry, dict) or not entry:
@@ -93,8 +93,8 @@ class Source:
         names: Iterable[str] = (),
         dimensions: Mapping[str, Any] | None = None,
     ) -> Any:
-        """Return a value in SI units with its dimension, as `parse_value` reads it."""
-        from jounce.units.values import parse_value  # here, as it brings JAX, which a misspelled key need not wait for
+        """Return a value in SI units with its dimension, as parsed by `parse_value`."""
+        from jounce.units.values import parse_value  # local, so that a wrong key need not wait for JAX
 
         try:
             return parse_value(raw, kind, names, dimensions)
@@ -102,20 +102,20 @@ class Source:
             raise self.error(error.message, location, value=UNSET if shows_value(error) else raw) from None
 
     def number(self, location: Location, raw: Any, kind: str = "any") -> float:
-        """Return a number in SI units; expressions without names are worked out."""
+        """Return a number in SI units; expressions without names are evaluated."""
         value = self.value(location, raw, kind).value
         assert isinstance(value, float)
         return value
 
     def named_file(self, name: str, location: Location) -> str:
-        """Return the path of a file that an entry names, below the folder of this one or one that is allowed."""
+        """Return the path of a file that an entry names, below the folder of this file or an allowed one."""
         try:
             return named_file(name, self.path, self.allow)
         except MechanismFileError as error:
             raise self.error(error.message, location, value=name) from None
 
     def read_named(self, name: str, location: Location, read: Callable[[str], Any]) -> Any:
-        """Return what is read from a file that an entry names; errors tell its path as the entry has it."""
+        """Return the result of reading a file that an entry names; errors show its path as the entry gives it."""
         path = self.named_file(name, location)
         try:
             return read(path)
@@ -126,14 +126,14 @@ class Source:
 
 
 def shows_value(error: JounceError) -> bool:
-    """Return whether the message of an error holds the value itself: that of an expression with the place within it."""
+    """Return whether the message of an error shows the value itself, as for an expression with a column."""
     return isinstance(error, ExpressionError) and error.column is not None
 
 
 class Builder:
-    """Builds nested data from a stream of small steps, without recursion, within the limits.
+    """Builds nested data from a stream of events, without recursion, within limits.
 
-    ``open`` a mapping or a list, ``key`` inside a mapping, ``value`` for a leaf, ``close``.
+    The events are ``open`` for a mapping or a list, ``key`` in a mapping, ``value`` for a leaf, and ``close``.
     """
 
     def __init__(self, path: str) -> None:
@@ -144,7 +144,7 @@ class Builder:
 
     @property
     def expects_key(self) -> bool:
-        """Whether the next step must be a key of a mapping, or its close."""
+        """Whether the next event must be a key of a mapping, or its end."""
         return bool(self._stack) and isinstance(self._stack[-1][0], dict) and self._key is None
 
     def fail(self, message: str, line: int) -> MechanismFileError:
@@ -160,7 +160,7 @@ class Builder:
         return location if self._key is None else (*location, self._key)
 
     def key(self, name: Any, line: int) -> None:
-        """Start an entry of the mapping that is open."""
+        """Start an entry of the open mapping."""
         self._check_text(name, line)
         container, location = self._stack[-1]
         if not isinstance(name, str):
@@ -183,7 +183,7 @@ class Builder:
         self._stack.append((container, location))
 
     def close(self) -> None:
-        """End the mapping or list opened last."""
+        """End the mapping or the list that was opened last."""
         self._stack.pop()
 
     def value(self, value: Any, line: int) -> None:
@@ -192,7 +192,7 @@ class Builder:
         self._put(value, line)
 
     def _check_text(self, value: Any, line: int) -> None:
-        """Refuse halves of surrogate pairs, which escapes can write but no output can show."""
+        """Raise an error for unpaired surrogates, which escapes can write but no output can show."""
         if isinstance(value, str) and not value.isascii():
             try:
                 value.encode()

@@ -1,4 +1,4 @@
-"""Long CSV files of numbers alone, such as an hour of a log at 1 kHz: read without a text for each entry."""
+"""Long CSV files of numbers only, such as an hour of a log at 1 kHz, read without a text for each entry."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from jounce.errors import JounceError
 from jounce.io.files.reading import LARGEST_NUMBER, MAX_SAMPLES, read_file
 
 LONG = 5_000_000
-"""Bytes; a shorter file is read entry by entry, so that each may be text."""
+"""Size in bytes up to which a file is read entry by entry, so that entries may be text."""
 LARGE = 1e8
 LONGEST = 2_000_000_000
 _ROW = re.compile(r"at row (\d+)")
@@ -32,13 +32,13 @@ class Numbers:
     Parameters
     ----------
     header_line : int
-        Line of the names of the columns; a row follows in each line below it.
+        Line of the names of the columns; each line below it is a row.
     names : sequence of str
-        Of the columns, with their units.
+        Names of the columns, with their units.
     values : array of shape (row, column)
-        As they are written, but for the offsets.
+        Numbers as written, minus the offsets.
     offsets : dict of int to Decimal
-        What was subtracted from large numbers of a column, such as stamps, before they were rounded.
+        Offsets subtracted from large numbers of a column, such as stamps, before rounding.
     """
 
     header_line: int
@@ -48,15 +48,15 @@ class Numbers:
 
 
 def numbers_of(path: str, error_type: type[JounceError]) -> Numbers | None:
-    """Return the numbers of a long file below a row of names; None where it is short, or not of that kind.
+    """Return the numbers of a long file with a row of names; None if the file is short or of another kind.
 
     Raises
     ------
     JounceError
-        Of the type given: the file cannot be read, is not text in UTF-8, or has more than 2 GB.
+        Of the given type, if the file cannot be read, is not text in UTF-8, or is larger than 2 GB.
     """
     try:
-        if os.stat(path).st_size <= LONG:  # noqa: PTH116 - the reader reports whatever is wrong with the name
+        if os.stat(path).st_size <= LONG:  # noqa: PTH116 - the reader reports errors of the name
             return None
     except (OSError, ValueError):
         return None
@@ -87,7 +87,7 @@ def numbers_of(path: str, error_type: type[JounceError]) -> Numbers | None:
 
 
 def _offsets(row: bytes) -> dict[int, Decimal]:
-    """Return the large numbers of a row by their columns."""
+    """Return the large numbers of a row, by column."""
     offsets = {}
     for k, entry in enumerate(row.decode("utf-8", "replace").split(",")):
         if _is_number(entry) and LARGE <= abs(float(entry)) <= LARGEST_NUMBER:

@@ -1,8 +1,8 @@
-"""A NetCDF file written part by part along time: with the memory of a part, whatever their number.
+"""A NetCDF file written part by part along time, with the memory of a single part.
 
-HDF5 never touches the disk: it never closes a file on a full one, says so on standard error, and may take the process
-with it. It lays the file out in memory, with everything but the values along time, whose places are left empty. The
-file has its full length from the start, so that a disk which is too small is found at once, and plain writing puts the
+HDF5 never writes to the disk, because on a full disk it does not close its file, prints to standard error, and may end
+the process. HDF5 lays out the file in memory, with everything but the values along time, whose places stay empty. The
+file on the disk has its full length from the start, so that a lack of space is found at once, and plain writes put the
 values into their places.
 """
 
@@ -20,20 +20,20 @@ if TYPE_CHECKING:
     import xarray
 
 BLOCK = 2**14  # bytes
-NO_SUCH_CALL = (errno.EOPNOTSUPP, errno.EINVAL, errno.ENOSYS)  # of file systems that reserve no space
+NO_SUCH_CALL = (errno.EOPNOTSUPP, errno.EINVAL, errno.ENOSYS)  # errors of file systems that cannot reserve space
 
 
 class NetcdfParts:
-    """A NetCDF file of known length, into which parts along time are put.
+    """A NetCDF file of known length, into which parts along time are written.
 
     Parameters
     ----------
     stream : io.FileIO
-        A new file, not buffered.
+        New file, unbuffered.
     example : bytes
-        Content of a NetCDF file that is as the whole one but for its instants.
+        Content of a NetCDF file that equals the whole one except for its instants.
     count : int
-        Number of instants of the whole.
+        Number of instants of the whole file.
     """
 
     def __init__(self, stream: io.FileIO, example: Any, count: int):
@@ -44,7 +44,7 @@ class NetcdfParts:
             _write_at(stream, number * BLOCK, memoryview(block)[: layout.size - number * BLOCK])
 
     def put(self, part: xarray.Dataset, first: int) -> None:
-        """Write the values of a part, of which the first instant has an index in the whole."""
+        """Write the values of a part; `first` is the index of its first instant in the whole file."""
         for name, (offset, dims, dtype) in self._offsets.items():
             values = np.ascontiguousarray(part[name].transpose(*dims).values, dtype)
             _write_at(self._stream, offset + first * values[0].nbytes, values.reshape(-1).view(np.uint8))
@@ -56,11 +56,11 @@ class _Layout(NamedTuple):
     Attributes
     ----------
     size : int
-        Bytes of the whole file.
+        Size of the whole file, bytes.
     blocks : dict of int to bytearray
-        What it holds besides these values, block by block; a block that is not there is left to them.
+        Content except these values, by block number; a missing block holds only such values.
     offsets : dict of str to tuple
-        Where the values of a variable begin, its dimensions and its type.
+        Offset of the values, dimensions and type of each variable along time.
     """
 
     size: int
@@ -69,7 +69,7 @@ class _Layout(NamedTuple):
 
 
 def _layout(example: Any, count: int) -> _Layout:
-    """Return the layout of a file as the example is, but with another number of instants."""
+    """Return the layout of a file like the example, with another number of instants."""
     import h5netcdf
 
     file, offsets = _SparseFile(), {}
@@ -93,7 +93,7 @@ def _layout(example: Any, count: int) -> _Layout:
 
 
 def _preallocated_properties() -> Any:
-    """Return the properties of a variable that has its place in a file from the start, and nothing written there."""
+    """Return the properties of a variable whose space is allocated from the start, and not filled."""
     import h5py
 
     properties = h5py.h5p.create(h5py.h5p.DATASET_CREATE)
@@ -104,7 +104,7 @@ def _preallocated_properties() -> Any:
 
 
 def _reserve(stream: io.FileIO, size: int) -> None:
-    """Give a file its length, and the space for it where the system can tell that there is enough."""
+    """Set the length of a file, and reserve the space for it if the system can."""
     stream.truncate(size)
     if hasattr(os, "posix_fallocate"):
         try:
@@ -122,7 +122,7 @@ def _write_at(stream: io.FileIO, offset: int, values: Any) -> None:
 
 
 class _SparseFile(io.RawIOBase):
-    """A file in memory that holds the blocks which were written to; all else is zero."""
+    """A file in memory that stores only written blocks; the rest is zero."""
 
     def __init__(self) -> None:
         self.blocks: dict[int, bytearray] = {}
@@ -167,7 +167,7 @@ class _SparseFile(io.RawIOBase):
         return len(view)
 
     def _parts(self, length: int) -> Iterator[tuple[int, int, range]]:
-        """Yield where in a span of bytes from here each block begins, the block, and the bytes of it."""
+        """Yield the blocks of a span of bytes from the position: start in the span, number, bytes of the block."""
         start = 0
         while start < length:
             number, within = divmod(self._position + start, BLOCK)

@@ -1,7 +1,6 @@
-"""YAML, JSON and TOML text into plain data with the line of every entry.
+"""Parsers of YAML, JSON and TOML text into plain data with the line of every entry.
 
-None of the three recurses over the data: an input nested without end is refused at the limit, not at the bottom of
-the stack.
+None of them recurses over the data: too deeply nested input is refused at a limit, before the stack overflows.
 """
 
 from __future__ import annotations
@@ -34,7 +33,7 @@ _SPECIAL = re.compile(r"[-+]?\.(inf|Inf|INF)|\.(nan|NaN|NAN)")
 
 
 def plain_scalar(text: str) -> Any:
-    """Resolve a plain scalar by the core schema of YAML 1.2: 1e-3 is a number, yes is text."""
+    """Return the value of a plain scalar by the core schema of YAML 1.2: 1e-3 is a number, yes is text."""
     if text in _NULL:
         return None
     if text in _BOOLEANS:
@@ -51,10 +50,10 @@ def plain_scalar(text: str) -> Any:
 
 
 def read_yaml(path: str, text: str, *, many: bool = False) -> Source:
-    """Read YAML 1.2 through the events of ruamel.yaml.
+    """Return the data of YAML 1.2 text, from the events of ruamel.yaml.
 
-    Aliases, tags and more than one document are refused: a mechanism file does not need them, and they are the usual
-    way to make a small file unfold without end. With `many`, the data are the list of the documents.
+    Aliases, tags and more than one document are refused: no mechanism file needs them, and aliases can expand a small
+    file without bound. With `many`, the data are the list of the documents.
     """
     from ruamel.yaml import YAML, events as kinds
     from ruamel.yaml.error import YAMLError
@@ -107,7 +106,7 @@ def _refuse_tag(builder: Builder, event: Any, line: int) -> None:
 
 
 def _yaml_error(path: str, error: Exception, lines: list[str]) -> MechanismFileError:
-    """Word an error of the YAML scanner in one line."""
+    """Return an error of the YAML scanner as an error of one line."""
     start = getattr(error, "context_mark", None)
     mark = getattr(error, "problem_mark", None) or start
     problem = getattr(error, "problem", None) or str(error).split("\n")[0]
@@ -143,7 +142,7 @@ _TOKEN = re.compile(r'"(?:[^"\\]|\\.)*"|[{}\[\]:,]|[^\s{}\[\]:,"]+')
 
 
 def read_json(path: str, text: str) -> Source:
-    """Read JSON; its syntax is checked by the standard library, lines and duplicates by a walk over its tokens."""
+    """Return the data of JSON text; the standard library checks the syntax, a pass over the tokens finds the lines."""
     _check_depth(path, text)
     try:
         json.loads(text)
@@ -175,7 +174,7 @@ def read_json(path: str, text: str) -> Source:
 
 
 def _check_depth(path: str, text: str) -> None:
-    """Bound the nesting of brackets outside strings, before a recursive parser sees them."""
+    """Raise an error for brackets nested too deeply, before a recursive parser reads them."""
     depth = 0
     for bracket in re.finditer(r'[\[\]{}]|"(?:\\.|[^"\\\n])*+"?', text):
         if bracket.group() in "[{":
@@ -187,7 +186,7 @@ def _check_depth(path: str, text: str) -> None:
             depth -= 1
 
 
-# Strings that do not end are tokens, too, so that no place of the text is looked at twice.
+# Unterminated strings are tokens too, so that no character is scanned twice.
 _TOML_TOKEN = re.compile(
     r"""
     "{3}(?:[^"\\]|\\.|"(?!""))*+(?:"{3,5})?   # strings of several lines
@@ -203,7 +202,7 @@ _TOML_TOKEN = re.compile(
 
 
 def read_toml(path: str, text: str) -> Source:
-    """Read TOML through the standard library; lines come from one pass over the tokens of the text."""
+    """Return the data of TOML text, read by the standard library; a pass over the tokens finds the lines."""
     import tomllib
 
     _check_nesting(path, text)
@@ -222,7 +221,7 @@ def read_toml(path: str, text: str) -> Source:
 
 
 def _toml_tokens(text: str) -> Iterator[tuple[str, int]]:
-    """Give the tokens of a text but for comments, each with its line."""
+    """Yield the tokens of a text except comments, each with its line."""
     line = position = 0
     for token in _TOML_TOKEN.finditer(text):
         line += text.count("\n", position, token.start())
@@ -232,7 +231,7 @@ def _toml_tokens(text: str) -> Iterator[tuple[str, int]]:
 
 
 def _check_nesting(path: str, text: str) -> None:
-    """Bound brackets within brackets, and the parts of dotted keys."""
+    """Raise an error for brackets nested too deeply, or dotted keys with too many parts."""
     depth = dots = 0
     for token, line in _toml_tokens(text):
         if token in ("[", "{"):
@@ -245,7 +244,7 @@ def _check_nesting(path: str, text: str) -> None:
 
 
 def _check_size(path: str, data: Any) -> None:
-    """Bound the number of entries, and the nesting that tables within tables make."""
+    """Raise an error for too many entries, or tables nested too deeply."""
     pending, count = [(data, 0)], 0
     while pending:
         value, depth = pending.pop()
@@ -261,18 +260,18 @@ def _check_size(path: str, data: Any) -> None:
 
 
 class _TomlLines:
-    """Finds the line of every table, key and entry of an array of a text that is TOML."""
+    """Finds the line of every table, key and array entry of valid TOML text."""
 
     def __init__(self) -> None:
         self.lines: dict[Location, int] = {(): 1}
-        self.counts: dict[Location, int] = {}  # of tables in an array
-        self.table: Location = ()  # whose keys come
-        self.open: list[Location] = []  # arrays and inline tables around the place, where they are
-        self.parts: list[str] | None = []  # of the key that is read; None within a value
-        self.location: Location = ()  # of the value that is read
+        self.counts: dict[Location, int] = {}  # numbers of tables in arrays of tables
+        self.table: Location = ()  # current table
+        self.open: list[Location] = []  # locations of the enclosing arrays and inline tables
+        self.parts: list[str] | None = []  # parts of the current key; None within a value
+        self.location: Location = ()  # location of the current value
 
     def lines_of(self, text: str) -> dict[Location, int]:
-        """Return the lines."""
+        """Return the line of every location of a text."""
         header = 0  # brackets of the header of a table
         for token, line in _toml_tokens(text):
             if token == "\n":
@@ -299,7 +298,7 @@ class _TomlLines:
             return 2
         if token == "]" and self.parts:
             location: Location = ()
-            for part in self.parts:  # a table within the last one of an array
+            for part in self.parts:  # a table within the last table of an array
                 location = (*location, part)
                 if location in self.counts and (brackets == 1 or location != tuple(self.parts)):
                     location = (*location, self.counts[location] - 1)

@@ -1,6 +1,6 @@
-"""The one way in which files are read: regular ones, within a size, and below the folder of the file that names them.
+"""Safe reading of files: regular files of bounded size, below the folder of the file that names them.
 
-What was read as an input is remembered, so that no result replaces it unasked (`jounce.io.files.writing`).
+Input files are recorded, so that no result replaces them unasked (`jounce.io.files.writing`).
 """
 
 from __future__ import annotations
@@ -21,18 +21,18 @@ from jounce.errors import JounceError, MechanismFileError, did_you_mean
 
 MAX_BYTES = 10_000_000
 MAX_SAMPLES = 100_000_000
-"""Bytes of a table of samples."""
+"""Largest size of a table of samples, bytes."""
 MAX_ROWS, MAX_ENTRIES = 2_000_000, 8_000_000
-"""Of a table of samples: in memory, as text, they take less than 1 GB."""
-LARGEST_NUMBER = 1e75  # in SI units; beyond, products of a few quantities are no numbers
+"""Limits of a table of samples, which as text take less than 1 GB of memory."""
+LARGEST_NUMBER = 1e75  # in SI units; products of a few larger quantities overflow
 FORMULA = ("=", "+", "-", "@", "\t", "\r", "'")
-"""What spreadsheets take for the beginning of a formula, and the apostrophe that makes it text."""
+"""Characters with which spreadsheets begin a formula, and the apostrophe that makes it text."""
 
 _inputs: dict[str, tuple[int, int]] = {}
-"""Device and number of the files read by this process, by their real paths."""
+"""Device and inode of the files read by this process, by their real paths."""
 _recorded: ContextVar[dict[str, str] | None] = ContextVar("_recorded", default=None)
 _results: dict[str, tuple[int, ...]] = {}
-"""Device, number, size and time of the files that this process wrote, by their real paths."""
+"""Device, inode, size and time of the files written by this process, by their real paths."""
 
 
 def read_file(
@@ -43,33 +43,33 @@ def read_file(
     error: type[JounceError] = MechanismFileError,
     is_input: bool = True,
 ) -> bytes:
-    """Read a regular file of bounded size, or say why it cannot be.
+    """Return the content of a regular file of bounded size.
 
     Parameters
     ----------
     path
         The file; symbolic links are followed.
     limit : int or None
-        The most bytes that are read; None for what the user has asked for and this package wrote.
+        Largest size, bytes; None for files without a limit, which this package wrote.
     what : str
-        What the file is, for messages.
+        Kind of the content, for messages.
     error : type
-        Of the exceptions.
+        Type of the exceptions.
     is_input : bool, default True
         Whether results must not replace the file unasked.
 
     Raises
     ------
     JounceError
-        Of the type `error`: the file does not exist, is a directory, a device or a pipe, is too large, or may not be
-        read. Nothing is opened that could wait for ever or have effects of its own.
+        Of the type `error`, if the file does not exist, is a directory, a device or a pipe, is too large, or may not be
+        read. No file is opened that could block or have side effects.
     """
     name = os.fsdecode(path)
     try:
         _check_regular(name, Path(name).stat(), limit, what, error)
-        # whatever has taken the place of the file since: no pipe is waited for, no terminal taken over
+        # the file may have been replaced since: neither block on a pipe nor acquire a terminal
         flags = os.O_RDONLY | sum(getattr(os, key, 0) for key in ("O_NONBLOCK", "O_NOCTTY", "O_CLOEXEC", "O_BINARY"))
-        with open(os.open(name, flags), "rb") as stream:  # noqa: PTH123 - of a descriptor
+        with open(os.open(name, flags), "rb") as stream:  # noqa: PTH123 - a descriptor
             status = os.fstat(stream.fileno())
             _check_regular(name, status, limit, what, error)
             content = stream.read(-1 if limit is None else limit + 1) or b""
@@ -91,7 +91,7 @@ def read_file(
 
 @contextmanager
 def recording() -> Iterator[dict[str, str]]:
-    """Give a dictionary that gets the digest of every input that is read meanwhile, by its real path."""
+    """Yield a dictionary that records the digest of every input read within the context, by its real path."""
     texts: dict[str, str] = {}
     before = _recorded.set(texts)
     try:
@@ -115,12 +115,12 @@ def _too_large(name: str, size: int, limit: int, what: str, error: type[JounceEr
 
 
 def reason_of(error: Exception) -> str:
-    """Word the reason of a failure by the operating system."""
+    """Return the reason of a failure in the words of the operating system."""
     return getattr(error, "strerror", None) or str(error)
 
 
 def _similar_file(path: str) -> str:
-    """Suggest a file of nearly the same name in the same folder."""
+    """Return a suggestion of a file with a similar name in the same folder; an empty text if there is none."""
     requested = Path(path)
     try:
         names = [entry.name for entry in requested.parent.iterdir() if entry.suffix == requested.suffix][:1000]
@@ -131,7 +131,7 @@ def _similar_file(path: str) -> str:
 
 
 def fault_of_number(number: float) -> str:
-    """Word what keeps a number from being computed with; empty where nothing does."""
+    """Return why a number cannot be used in computations; an empty text if it can."""
     if not math.isfinite(number):
         return "must be a finite number"
     return "" if abs(number) <= LARGEST_NUMBER else f"must be at most {LARGEST_NUMBER:g}"
@@ -145,30 +145,30 @@ def named_file(
     folder: str | PathLike[str] | None = None,
     error: type[JounceError] = MechanismFileError,
 ) -> str:
-    """Return the path of a file that another file names, which must lie below the folder of that one.
+    """Return the path of a file that another file names, which must lie below the folder of the latter.
 
     Parameters
     ----------
     name : str
-        As the file has it: from the folder of the holder, or absolute.
+        Name as the file gives it: relative to the folder of the holder, or absolute.
     holder
-        The file that names it.
+        File that contains the name.
     allow : iterable of path
-        Folders besides that of the holder that the file may be below.
+        Folders besides that of the holder below which the file may lie.
     folder
-        Where a relative name begins; the folder of the holder unless given.
+        Base of a relative name; the folder of the holder by default.
     error : type
-        Of the exceptions.
+        Type of the exceptions.
 
     Returns
     -------
     str
-        Without symbolic links; `read_file` reads it.
+        Path without symbolic links, for `read_file`.
 
     Raises
     ------
     JounceError
-        Of the type `error`: the file lies elsewhere, where its symbolic links are followed.
+        Of the type `error`, if the file, after its symbolic links are resolved, lies elsewhere.
     """
     folder_of_holder = Path(os.fsdecode(holder)).parent
     try:
@@ -184,12 +184,12 @@ def named_file(
 
 
 def check_allowed(folders: Iterable[str | PathLike[str]]) -> tuple[str, ...]:
-    """Return folders that files may be named in, each of which must exist.
+    """Return the folders below which named files may lie, each of which must exist.
 
     Raises
     ------
     MechanismFileError
-        One is no folder.
+        If a folder does not exist.
     """
     allowed = (folders,) if isinstance(folders, str | PathLike) else tuple(folders)
     for folder in allowed:
@@ -199,19 +199,19 @@ def check_allowed(folders: Iterable[str | PathLike[str]]) -> tuple[str, ...]:
 
 
 def read_rows(path: str | PathLike[str], error: type[JounceError]) -> Iterator[tuple[int, list[str]]]:
-    """Read a table of samples from a CSV file of at most 100 MB, 2 million rows and 8 million entries.
+    """Yield the rows of a CSV file of at most 100 MB, 2 million rows and 8 million entries.
 
     Yields
     ------
     line : int
-        Counted from 1.
+        Line number, from 1.
     row : list of str
-        The entries, without blanks around them.
+        Entries without surrounding blanks.
 
     Raises
     ------
     JounceError
-        Of the type `error`: the file cannot be read, is not text in UTF-8, breaks the syntax, or is too large.
+        Of the type `error`, if the file cannot be read, is not text in UTF-8, violates the syntax, or is too large.
     """
     name = os.fsdecode(path)
     content = read_file(name, MAX_SAMPLES, what="the samples", error=error)
@@ -231,7 +231,7 @@ def read_rows(path: str | PathLike[str], error: type[JounceError]) -> Iterator[t
 
 
 def bad_line(content: bytes) -> int | None:
-    """Return the line that is not text in UTF-8."""
+    """Return the first line that is not text in UTF-8; None if there is none."""
     try:
         content.decode()
     except UnicodeDecodeError as error:
@@ -240,7 +240,7 @@ def bad_line(content: bytes) -> int | None:
 
 
 def written_name(name: str) -> str:
-    """Return the name of a column as a CSV file holds it: no spreadsheet takes it for a formula.
+    """Return the name of a column for a CSV file, escaped so that spreadsheets do not read it as a formula.
 
     Examples
     --------
@@ -251,7 +251,7 @@ def written_name(name: str) -> str:
 
 
 def known_name(entry: str) -> str:
-    """Return the name of a column that `written_name` gave a form."""
+    """Return the name of a column that `written_name` may have escaped."""
     return entry[1:] if entry.startswith("'") and entry[1:].startswith(FORMULA) else entry
 
 
@@ -262,14 +262,14 @@ def _note_input(name: str, status: os.stat_result) -> None:
 
 
 def note_result(path: str | PathLike[str]) -> None:
-    """Remember that this process wrote a file, which may then be replaced, read again or not."""
+    """Record that this process wrote a file, which it may then replace."""
     real = os.path.realpath(path)
     _inputs.pop(real, None)
     _results[real] = _identity(Path(real).stat())
 
 
 def is_result(path: str | PathLike[str]) -> bool:
-    """Return whether this process wrote a file that nobody has changed since."""
+    """Return whether this process wrote a file that has not changed since."""
     real = os.path.realpath(path)
     try:
         return _results.get(real) == _identity(Path(real).stat())
@@ -282,7 +282,7 @@ def _identity(status: os.stat_result) -> tuple[int, ...]:
 
 
 def is_input(path: str | PathLike[str]) -> bool:
-    """Return whether a file was read as an input by this process, under this name or any other."""
+    """Return whether this process read a file as an input, under any name."""
     real = os.path.realpath(path)
     try:
         status = Path(real).stat()

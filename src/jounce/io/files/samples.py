@@ -18,13 +18,13 @@ from jounce.units.dimensions import NUMBER, TIME, Dimension, describe_dimension,
 from jounce.units.shown_units import unit_size
 
 SEPARATORS = {";": "semicolons", "\t": "tabs", " ": "spaces"}
-"""What other programs put between entries, and its name."""
+"""Separators of entries that other programs use, and their names."""
 
 COMMENT = "# "
-"""What comments before the rows begin with, and the names of the columns where NumPy writes them."""
+"""Beginning of comments before the rows, one of which names the columns in a file of NumPy."""
 
 ROW_NUMBER = "(row)"
-"""Name of a first column without one that counts the rows, as pandas writes it; nothing is read of it."""
+"""Name for an unnamed first column of row numbers, as pandas writes it; it is not read."""
 
 _RATE = re.compile(r"_d([0-9]{1,2})$")
 
@@ -41,27 +41,27 @@ def read_samples(
     Parameters
     ----------
     path
-        The file: numbers below a row with the names of the columns, in SI units unless the name says another, as
-        ``psi [deg]``. Without that row the file has two columns, time and value.
+        File with a row of column names and rows of numbers, in SI units unless a name states another unit, as in
+        ``psi [deg]``. A file without names has two columns, time and value.
     time : str, optional
-        Name of the column of time, s; when not given, ``time``, or else the first column.
+        Name of the column of time, s; by default ``time``, or else the first column.
     value : str, optional
-        Name of the column of the driven quantity, m or rad; the only other column when not given.
+        Name of the column of values, m or rad; by default the only other column.
     error_type : type
-        Of the exceptions.
+        Type of the exceptions.
     allowed : tuple of sequence of Dimension, optional
-        What the units that the columns of time and value say may measure; anything where none is given.
+        Dimensions that the units of the columns of time and value may have; any dimension if empty.
 
     Returns
     -------
     times, values : list of float
-        One for each row, s, and m or rad.
+        One number for each row, s, and m or rad.
 
     Raises
     ------
     JounceError
-        Of the type given: the file cannot be read, a column does not exist, an entry is not a finite number, or a unit
-        is none, or measures something else.
+        Of the given type, if the file cannot be read, a column does not exist, an entry is not a finite number, or a
+        unit is unknown or has another dimension.
     """
     table, first, second = _sampled(path, time, value, error_type)
     return table.column(first, allowed[0]), table.column(second, allowed[1])
@@ -73,7 +73,7 @@ def sampled_dimension(
     value: str | None = None,
     error_type: type[JounceError] = MechanismFileError,
 ) -> Dimension:
-    """Return what the unit measures that the column of values says, which `read_samples` reads; a number without one.
+    """Return the dimension of the unit of the value column that `read_samples` reads; that of a number without a unit.
 
     Raises
     ------
@@ -87,7 +87,7 @@ def sampled_dimension(
 def _sampled(
     path: str | Path, time: str | None, value: str | None, error_type: type[JounceError]
 ) -> tuple[Table, int, int]:
-    """Return a table of samples, and the numbers of the columns of time and value."""
+    """Return a table of samples, and the indices of the columns of time and value."""
     table = Table(str(path), error_type)
     if len(table.header) < 2:
         raise table.error("samples need a column of times and one of values", line=1)
@@ -102,17 +102,17 @@ def _sampled(
 def read_columns(
     path: str | Path, error_type: type[JounceError] = MechanismFileError, derivative: int = 0
 ) -> tuple[Float[np.ndarray, " time"], dict[str, Float[np.ndarray, " time"]], dict[str, Dimension]]:
-    """Read the column ``time``, which increases, and all others from a CSV file, whose first row names them.
+    """Read the column ``time``, which increases, and all other columns from a CSV file with a row of names.
 
-    Values are in SI units unless the name of a column says another: ``elbow [deg]``, ``elbow_d1 [deg/s]``. They are of
-    angles and lengths, or of a derivative of such, and of one more for each that the name of a column tells. Last, what
-    the units of the columns measure that say one.
+    Values are in SI units unless the name of a column states another unit: ``elbow [deg]``, ``elbow_d1 [deg/s]``. They
+    are angles and lengths, or their time derivatives of order `derivative`, or of a higher order by the ending of a
+    name. The last result holds the dimensions of the columns whose names state units.
 
     Raises
     ------
     JounceError
-        Of the type given: the file cannot be read, names are missing or repeat, there is no ``time`` or it does not
-        increase, or an entry is not a finite number.
+        Of the given type, if the file cannot be read, names are missing or repeated, there is no ``time`` or it does
+        not increase, or an entry is not a finite number.
     """
     table = Table(str(path), error_type)
     line = check_named(table)
@@ -138,12 +138,12 @@ def read_columns(
 
 
 def read_table(path: str | Path) -> dict[str, Float[np.ndarray, " row"]]:
-    """Read the named columns of a CSV file that knows of no time: angles and lengths, in SI units or the one named.
+    """Read the named columns of a CSV file without time: angles and lengths, in SI units or the stated ones.
 
     Raises
     ------
     TrajectoryError
-        The file cannot be read, names are missing or repeat, or an entry is not a finite number.
+        If the file cannot be read, names are missing or repeated, or an entry is not a finite number.
     """
     table = Table(str(path), TrajectoryError)
     check_named(table)
@@ -155,13 +155,13 @@ def read_table(path: str | Path) -> dict[str, Float[np.ndarray, " row"]]:
 
 
 def has_column(path: str | Path, names: Iterable[str]) -> bool:
-    """Return whether a CSV file has a column of one of some names, or does not name its columns at all."""
+    """Return whether a CSV file has a column with one of some names, or does not name its columns."""
     table = Table(str(path), TrajectoryError)
     return table.header_line is None or any(name in table.header for name in names)
 
 
 def check_named(table: Table) -> int:
-    """Check that columns have names and rows an entry for each; return the line of the names."""
+    """Return the line of the column names; raise an error if names are missing or repeated, or a row is incomplete."""
     header, line = table.header, table.header_line
     if line is None:
         message = "the first row holds the names of the columns: time, then the joints"
@@ -178,23 +178,23 @@ def check_named(table: Table) -> int:
 
 
 def rates(bases: Iterable[str], order: int) -> tuple[Dimension, ...]:
-    """Return the dimensions of time derivatives of angles, lengths or others."""
+    """Return the dimensions of time derivatives of angles, lengths or other quantities."""
     return tuple(dimension_of(**{base: 1, "time": -order}) for base in bases)
 
 
 def read_points(
     path: str | Path,
 ) -> tuple[Float[np.ndarray, " point"] | None, Float[np.ndarray, "point component"]]:
-    """Read points from a CSV file, and their times where it has a column ``time``.
+    """Read points from a CSV file, and their times if it has a column ``time``.
 
-    The first row names the columns ``x``, ``y`` and, in space, ``z``, or ``NAME_x`` ..., as results have them; others
-    are not read. Without that row the file has the columns of coordinates only. Lengths are in m and times in s unless
-    the name of a column says another unit: ``x [mm]``.
+    The first row names the columns ``x``, ``y`` and, in space, ``z``, or ``NAME_x`` and so on, as in results; other
+    columns are ignored. A file without names has columns of coordinates only. Lengths are in m and times in s unless
+    the name of a column states another unit: ``x [mm]``.
 
     Raises
     ------
     MechanismFileError
-        The file cannot be read, columns are missing, or an entry is not a finite number.
+        If the file cannot be read, columns are missing, or an entry is not a finite number.
     """
     table = Table(str(path), MechanismFileError)
     if table.header_line is None:
@@ -220,9 +220,9 @@ def read_points(
 
 
 class Table:
-    """Rows of a CSV file with their lines, and the names of its columns, made up where it has none.
+    """Rows of a CSV file with their lines, and the names of its columns, which are invented if it has none.
 
-    Long files of numbers alone have no rows of text, but `numbers`.
+    Long files of numbers only have an array `numbers` instead of rows of text.
     """
 
     def __init__(self, path: str, error_type: type[JounceError]):
@@ -252,7 +252,7 @@ class Table:
         self.header, self.units = [name for name, _ in pairs], [unit for _, unit in pairs]
 
     def _name_index(self) -> None:
-        """Name a first column without a name, the index that pandas writes: numbers of rows, or the times."""
+        """Name an unnamed first column, the index that pandas writes: row numbers, or the times."""
         if len(self.header) < 2 or self.header[0] or not all(self.header[1:]) or not len(self):
             return
         first = [row[0] for _, row in self.rows] if self.numbers is None else self.numbers.values[:, 0].tolist()
@@ -275,7 +275,7 @@ class Table:
         return self.error_type(message, path=self.path, **location)  # type: ignore[arg-type]
 
     def _check_commas(self) -> None:
-        """Refuse a file in which other marks are between the entries, as of spreadsheets, or of robot controllers."""
+        """Raise an error if other marks than commas separate entries, as from spreadsheets or robot controllers."""
         line, row = self.rows[0]
         counts = [len(other[0].split()) if len(other) == 1 else 0 for _, other in self.rows[:2]]
         for mark, name in SEPARATORS.items():
@@ -287,7 +287,7 @@ class Table:
                 raise self.error(message, line=line)
 
     def check_lengths(self) -> None:
-        """Check that each row has an entry for each column."""
+        """Raise an error unless each row has an entry for each column."""
         for row_line, row in self.rows:
             if len(row) != len(self.header):
                 message = (
@@ -296,14 +296,14 @@ class Table:
                 raise self.error(message, line=row_line, value=len(row))
 
     def find(self, column: str) -> int:
-        """Return the number of a column by its name, with its unit or without."""
+        """Return the index of a column by its name, with its unit or without."""
         column = column if column in self.header else name_and_unit(column)[0]
         if column not in self.header:
             raise self.error(no_such("column", column, self.header), line=self.header_line or 1, value=column)
         return self.header.index(column)
 
     def unit(self, number: int, allowed: Sequence[Dimension] = ()) -> tuple[float, Dimension]:
-        """Return the size of the unit that a column says, in SI units, and what it measures; one where it says none."""
+        """Return the size, in SI units, and the dimension of the unit of a column; 1 and a number if there is none."""
         unit = self.units[number]
         name = self.header[number]
         if unit is None:
@@ -345,7 +345,7 @@ class Table:
 
 
 def _without_comments(rows: list[tuple[int, list[str]]]) -> list[tuple[int, list[str]]]:
-    """Return rows without the comments before them, the last of which names the columns if numbers follow."""
+    """Return rows without the leading comments; the last comment is kept if it names the columns."""
     first = next((k for k, (_, row) in enumerate(rows) if not row[0].startswith(COMMENT[0])), len(rows))
     numbers = rows[first][1] if first < len(rows) else []
     named = first > 0 and len(rows[first - 1][1]) == len(numbers) and all(_number(x) is not None for x in numbers)
@@ -353,7 +353,7 @@ def _without_comments(rows: list[tuple[int, list[str]]]) -> list[tuple[int, list
 
 
 def _number(text: str) -> float | None:
-    """Return the number that a text is, None also for 1_5, which only Python takes for 15."""
+    """Return the number that a text denotes; None if none, also for 1_5, which only Python reads as 15."""
     try:
         return None if "_" in text else float(text)
     except ValueError:

@@ -1,4 +1,4 @@
-"""YAML, TOML and JSON files read into plain data, chosen by their ending."""
+"""YAML, TOML and JSON files as plain data, read by the parser of their ending."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ MAX_LINE_LENGTH = 100_000
 
 
 def _decode(path: str, content: bytes) -> str:
-    """Decode UTF-8 text within the limits on lines; refuse anything that is not text."""
+    """Return UTF-8 text within the limits on lines; raise an error for anything that is not text."""
     try:
         text = content.decode("utf-8-sig")
     except UnicodeDecodeError as error:
@@ -53,13 +53,13 @@ def read_source(
     path
         A file ending in .yaml, .yml, .toml or .json.
     allow
-        Folders besides its own that files named in it may be below.
+        Folders besides its own below which files named in it may lie.
     kind : str
-        What the file holds, for messages.
+        Kind of content, for messages.
     error_type : type
-        Of the exceptions, also of those that the source makes.
+        Type of the exceptions, also of those that the source makes.
     many : bool, default False
-        Whether a YAML file may have more than one document: its data are then the list of those that are not empty.
+        Whether a YAML file may have several documents: its data are then the list of those that are not empty.
 
     Returns
     -------
@@ -69,8 +69,8 @@ def read_source(
     Raises
     ------
     JounceError
-        Of the type given: the file cannot be read, breaks the syntax, has a duplicate name, or exceeds a limit on size
-        or nesting.
+        Of the given type, if the file cannot be read, violates the syntax, has a duplicate name, or exceeds a limit on
+        size or nesting.
     """
     name = str(fspath(path))
     if not name:
@@ -88,13 +88,13 @@ def read_source(
         source.allow, source.error_type = check_allowed(allow), error_type
     except MechanismFileError as error:
         raise error_type(error.message, path=error.path, line=error.line, name=error.name, value=error.value) from None
-    if source.data is None and not source.lines:  # only comments
+    if source.data is None and not source.lines:  # comments only
         raise error_type("the file is empty", path=name)
     return source
 
 
 def _without_empty(source: Source) -> Source:
-    """Return the source of several documents without empty ones; that of the only one if there is but one."""
+    """Return the source of several documents without empty ones; a single document becomes the data itself."""
     full = [k for k, document in enumerate(source.data) if document is not None]
     if len(full) == 1:
         lines = {location[1:]: line for location, line in source.lines.items() if location[:1] == (full[0],)}

@@ -1,4 +1,4 @@
-"""Files written whole or not at all, asked about before a long computation, and never onto what was read."""
+"""Atomic writing of files: checked before a long computation, and never onto an input."""
 
 from __future__ import annotations
 
@@ -20,29 +20,29 @@ from jounce.errors import OutputError
 from jounce.io.files.reading import is_input, note_result, reason_of
 
 _scratches: set[Path] = set()
-"""Files that are not yet in their places."""
+"""Temporary files that have not yet replaced their targets."""
 
 
 def check_target(
     path: str | PathLike[str], suffixes: tuple[str, ...] = (), kind: str = "output", *, overwrite: bool = False
 ) -> None:
-    """Raise OutputError unless a file can be written; one there already is left as it is.
+    """Raise OutputError unless a file can be written; an existing file is left unchanged.
 
     Parameters
     ----------
     path
-        The file, in a folder that exists.
+        File in an existing folder.
     suffixes
-        Endings that it may have; any when there are none.
+        Permitted endings; any ending if empty.
     kind
-        What the file holds, for the message.
+        Kind of content, for the message.
     overwrite
-        Whether it may be a file that this process has read as an input.
+        Whether the file may be one that this process has read as an input.
 
     Raises
     ------
     OutputError
-        The ending is another, the folder does not exist, the file is an input, or nothing may be written there.
+        If the ending is not permitted, the folder does not exist, the file is an input, or it cannot be written.
     """
     name = fspath(path)
     if suffixes and Path(name).suffix.lower() not in suffixes:
@@ -63,7 +63,7 @@ def check_target(
 def _check_replaceable(target: Path, overwrite: bool) -> None:
     if target.is_dir():
         raise OutputError("is a directory, the name of a file is needed")
-    if target.is_symlink():  # though links were followed
+    if target.is_symlink():  # a link in spite of realpath
         raise OutputError("is a circle of symbolic links")
     if not target.exists():
         return
@@ -78,27 +78,27 @@ def _check_replaceable(target: Path, overwrite: bool) -> None:
 
 @contextmanager
 def replacing(path: str | PathLike[str], *, overwrite: bool = False) -> Iterator[Path]:
-    """Give a file beside the target to write to, and put it in the place of the target only when that went well.
+    """Yield a temporary file beside the target, which replaces the target after success.
 
-    A file that is replaced hands its permissions and its owner on. What is written is on the disk before it takes its
-    place, and nothing else is left behind, also where SIGTERM ends the process.
+    The new file gets the permissions and the owner of the file that it replaces. It is synchronized to the disk before
+    it replaces the target, and removed otherwise, also if SIGTERM ends the process.
 
     Parameters
     ----------
     path
-        The target; a symbolic link stays one, and what it points to is replaced.
+        Target; a symbolic link is kept, and the file to which it points is replaced.
     overwrite
-        Whether it may be a file that this process has read as an input.
+        Whether the target may be a file that this process has read as an input.
 
     Raises
     ------
     OutputError
-        The file cannot be written; what was there before is unchanged.
+        If the file cannot be written; an existing file is unchanged.
     """
     try:
         target = Path(os.path.realpath(path))
         _check_replaceable(target, overwrite)
-        # a name that starts with a dot is in nobody's way, and the ending tells programs what to write
+        # the leading dot hides the file, and the ending tells programs the format
         scratch = target.with_name(f".jounce-{secrets.token_hex(6)}{target.suffix}")
         with cleanup_on_signal(lambda: scratch.unlink(missing_ok=True)), _removed(scratch):
             before = target.stat() if target.exists() else None
@@ -114,19 +114,19 @@ def replacing(path: str | PathLike[str], *, overwrite: bool = False) -> Iterator
 
 
 def _replace_target(scratch: Path, target: Path, before: os.stat_result | None) -> None:
-    """Put a whole file in the place of the target, with the owner and permissions of the one there."""
+    """Move a complete file onto the target, with the owner and permissions of the existing one."""
     _sync(scratch)
     if before is not None and not _copy_ownership(scratch, before):
-        shutil.copyfile(scratch, target)  # only the file itself keeps an owner who is another
+        shutil.copyfile(scratch, target)  # a file of another owner is overwritten, because only that keeps the owner
         _sync(target)
         return
     scratch.replace(target)
-    with suppress(OSError):  # not every system opens folders
+    with suppress(OSError):  # not every system can open folders
         _sync(target.parent)
 
 
 def _copy_ownership(scratch: Path, before: os.stat_result) -> bool:
-    """Give a file the owner and permissions of another; return whether the owner could be kept."""
+    """Give a file the owner and permissions of another; return whether the owner could be set."""
     if hasattr(os, "chown"):
         made = scratch.stat()
         if (made.st_uid, made.st_gid) != (before.st_uid, before.st_gid):
@@ -148,7 +148,7 @@ def _sync(path: Path) -> None:
 
 @contextmanager
 def _removed(scratch: Path) -> Iterator[None]:
-    """Remove a file at the end, also where a signal ends the process that Python leaves to the system."""
+    """Remove a file at the end of the context, also if an unhandled signal ends the process."""
 
     def stop(number: int, _frame: Any) -> None:
         for path in tuple(_scratches):
@@ -158,7 +158,7 @@ def _removed(scratch: Path) -> Iterator[None]:
         os.kill(os.getpid(), number)
 
     watched = []
-    if threading.current_thread() is threading.main_thread():  # others may set no handlers
+    if threading.current_thread() is threading.main_thread():  # other threads cannot set handlers
         ends = [getattr(signal, name, None) for name in ("SIGTERM", "SIGHUP")]
         watched = [number for number in ends if number is not None and signal.getsignal(number) is signal.SIG_DFL]
     try:

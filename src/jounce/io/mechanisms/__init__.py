@@ -1,1 +1,1 @@
-"""Files of mechanisms: their keys and schema, how they are read, written, and converted."""
+"""Mechanism files: their keys and schema, reading, writing, and conversion."""

@@ -1,4 +1,4 @@
-"""Plate cams from files: the law of a follower, the follower, and the base circle."""
+"""Plate cams from files: the follower, its law, and the base circle."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ from jounce.trajectory.law_checks.unit_doubts import values_of
 from jounce.units.dimensions import Dimension
 from jounce.units.expression import check_parameter_name
 
-FAR_OFF = 20.0  # times the other lengths of a cam, which are more alike than those of a mechanism
+FAR_OFF = 20.0  # ratio to the other lengths of a cam, which are more alike than those of a mechanism
 KEYS = ("title", "parameters", "units", "cam", "follower", "law")
 CAM_KEYS = ("base_radius", "sense", "count")
 FOLLOWERS = {
@@ -62,22 +62,21 @@ def load_cam(
         A file with the keys ``cam`` (``base_radius``, ``sense``, ``count``), ``follower`` (``type`` translating or
         oscillating, ``shape``, and its lengths), ``law``, and optional ``title``, ``parameters`` and ``units``.
     allow
-        Folders besides that of the file that files of samples may be below.
+        Folders besides that of the file below which sample files may lie.
     set_
-        ``NAME=VALUE`` of parameters, in the place of those of the file.
+        Parameters as ``NAME=VALUE``, instead of those of the file.
     count : int, optional
-        Points of the table, in the place of those of the file.
+        Number of points of the table, instead of that of the file.
 
     Returns
     -------
     PlateCam
-        With the units of the file.
+        Cam with the units of the file.
 
     Raises
     ------
     MechanismFileError
-        The file cannot be read or something in it is wrong: the message names the file, the line, the entry and the
-        value.
+        If the file cannot be read or contains an error: the message names the file, the line, the entry and the value.
 
     Examples
     --------
@@ -143,7 +142,7 @@ class _CamFile:
     def _warn_of_lengths(
         self, base: float, follower: TranslatingFollower | OscillatingFollower, law: AbstractMotion
     ) -> None:
-        """Warn of a lift, or a length without a unit, that would suit the others in millimeters."""
+        """Warn of a lift, or of a length without a unit, that resembles the others only in millimeters."""
         fields = {("follower", field.name): getattr(follower, field.name) for field in dataclasses.fields(follower)}
         lengths: dict[tuple[str, ...], float] = {("cam", "base_radius"): base}
         lengths |= {at: abs(x) for at, x in fields.items() if isinstance(x, int | float) and x}
@@ -160,7 +159,7 @@ class _CamFile:
                 warn_caller(UnitWarning(str(fault)))
 
     def _is_plain(self, raw: Any) -> bool:
-        """Return whether a length is a number without a unit, or the parameter of one."""
+        """Return whether a length is a number without a unit, or a parameter with such a value."""
         return isinstance(
             (self.data.get("parameters") or {}).get(raw, raw) if isinstance(raw, str) else raw, int | float
         )
@@ -190,7 +189,7 @@ class _CamFile:
             raise self.source.error(error.message, ("follower", str(error.name)), value=error.value) from None
 
     def _law(self, quantity: str) -> AbstractMotion:
-        """Return the law by the cam angle, with numbers in the place of parameters."""
+        """Return the law as a function of the cam angle, with numbers in the place of parameters."""
         context = {"names": self.parameters, "dimensions": self.dimensions, "uses": {}, "lapse": "angle"}
         check = motion(quantity, {"t": (("angle", 1),)}).__metadata__[0].function
         try:

@@ -27,28 +27,28 @@ from jounce.units.values import parse_value
 def converted(
     path: str | PathLike[str], target: str | PathLike[str], allow: Iterable[str | PathLike[str]] = ()
 ) -> tuple[dict[str, Any], dict[Path, str]]:
-    """Return the data of a mechanism file, checked, values as they are written, for a file elsewhere.
+    """Return the checked data of a mechanism file, with values as written, for a file in another place.
 
     Parameters
     ----------
     path
-        The file.
+        Mechanism file.
     target
-        Where the data are to go: files of samples are named from there.
+        Path of the new file, relative to which sample files are named.
     allow
-        Folders besides that of the file that files of samples may be below.
+        Folders besides that of the file below which sample files may lie.
 
     Returns
     -------
     data : dict
-        By the keys of the schema.
+        Data by the keys of the schema.
     samples : dict of Path to str
-        Files of samples to be copied beside the target, since they do not lie below it, by where they are to go.
+        Sample files outside the folder of the target, to be copied, by their new paths.
 
     Raises
     ------
     MechanismFileError
-        The file cannot be read or something in it is wrong.
+        If the file cannot be read or contains an error.
 
     Examples
     --------
@@ -70,7 +70,7 @@ def converted(
 def _move_samples(
     node: Any, path: str | PathLike[str], there: Path, allow: Iterable[str | PathLike[str]], copies: dict[Path, str]
 ) -> None:
-    """Name files of samples from another folder, and note those that have to go there."""
+    """Rename sample files relative to another folder, and record those to be copied."""
     folders = [Path(os.path.realpath(folder)) for folder in (there, *allow)]
     for entry in node.values() if isinstance(node, dict) else node if isinstance(node, list) else ():
         if isinstance(entry, dict) and isinstance(entry.get("samples"), str):
@@ -79,30 +79,30 @@ def _move_samples(
                 entry["samples"] = Path(os.path.relpath(file, folders[0])).as_posix()
             else:
                 target = there / Path(file).name
-                while copies.setdefault(target, file) != file:  # another of the same name
+                while copies.setdefault(target, file) != file:  # a different file of the same name
                     target = target.with_name(f"{target.stem}_{target.suffix}")
                 entry["samples"] = target.name
         _move_samples(entry, path, there, allow, copies)
 
 
 def assigned(robot: Robot, texts: Iterable[str], option: str, *, law: bool) -> dict[str, Any]:
-    """Return values or laws of joints from ``JOINT=VALUE``, with units.
+    """Return values or laws of joints from texts ``JOINT=VALUE`` with units.
 
     Parameters
     ----------
     robot : Robot
-        Says which joints slide.
+        Robot with the joints.
     texts : iterable of str
-        A number in SI units, a number with a unit, or, for a law, an expression of t.
+        Texts; a value is a number in SI units, a number with a unit, or, for a law, an expression of t.
     option : str
-        Their name, for messages.
+        Option by which they are given, for messages.
     law : bool
-        Whether expressions of t are taken.
+        Whether expressions of t are permitted.
 
     Raises
     ------
     JounceError
-        A name is no joint, or a value does not fit.
+        If a name is no joint, or a value does not suit the joint.
 
     Examples
     --------
@@ -131,12 +131,12 @@ def _number_or_text(text: str) -> float | str:
 
 
 def with_file_names(robot: Robot) -> tuple[Robot, dict[str, str]]:
-    """Return a robot whose names can stand in a mechanism file, and what was renamed.
+    """Return a robot whose names are valid in a mechanism file, and the changed names.
 
     Raises
     ------
     RobotError
-        The robot cannot be rebuilt.
+        If the robot cannot be rebuilt.
 
     Examples
     --------
@@ -174,7 +174,7 @@ def with_file_names(robot: Robot) -> tuple[Robot, dict[str, str]]:
 
 
 def _with_joints(coupling: Any, names: Mapping[str, str]) -> Any:
-    """Return a tendon or the drive of a ball with other names of joints."""
+    """Return a tendon, or the drive of a ball joint, with other names of joints."""
     if isinstance(coupling, Tendon):
         return dataclasses.replace(coupling, weights={names[name]: x for name, x in coupling.weights.items()})
     return dataclasses.replace(coupling, joints=[names[name] for name in coupling.joints])
@@ -202,25 +202,25 @@ def robot_mechanism(
     hold: bool = False,
     drives: bool = True,
 ) -> Mechanism:
-    """Return a robot as a mechanism for a file: coordinates as outputs, and what its drivers must exert.
+    """Return a robot as a mechanism for a file, with coordinates and driver loads as outputs.
 
     Parameters
     ----------
     robot : Robot
-        Its names can stand in a file.
+        Robot whose names are valid in a file.
     start : dict of str to float
-        Coordinates near which it is assembled, rad or m; zero where none are given.
+        Coordinates near which it is assembled, rad or m; zero by default.
     laws : dict of str to law
-        Coordinates that are driven.
+        Laws of the driven coordinates.
     hold : bool
-        Whether the other coordinates are held where they start, as far as loops leave them free.
+        Whether the other coordinates are held at their start; refused for robots with loops.
     drives : bool
-        Whether the damping and the armature of the joints are taken over.
+        Whether the damping and the armature of the joints are included.
 
     Raises
     ------
     RobotError
-        The robot cannot be such a mechanism, or its loops cannot be closed near the start.
+        If the robot cannot be such a mechanism, or its loops cannot be closed near the start.
     """
     laws = dict(laws)
     if hold:

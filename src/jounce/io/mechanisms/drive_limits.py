@@ -26,27 +26,27 @@ OTHER_WORDS = {
 
 @under_own_settings
 def load_drive_limits(path: str | PathLike[str], mechanism: Mechanism) -> dict[str, Limits]:
-    """Read limits of the drivers and outputs of a mechanism from a file, as `retime` keeps them.
+    """Read limits of the drivers and outputs of a mechanism from a file, for `retime`.
 
     The file has the keys ``drivers`` and ``outputs``, with entries by name: ``velocity``, ``acceleration`` and
-    ``jerk``, and of drivers ``effort`` (force or torque) and ``effort_rate`` (yank).
+    ``jerk``, and for drivers ``effort`` (force or torque) and ``effort_rate`` (yank).
 
     Parameters
     ----------
     path
         A file ending in .yaml, .yml, .toml or .json.
     mechanism : Mechanism
-        Whose drivers and outputs they are.
+        Mechanism with the drivers and outputs.
 
     Returns
     -------
     dict of str to Limits
-        By name of driver or output.
+        Limits by the name of the driver or output.
 
     Raises
     ------
     MechanismFileError
-        The file cannot be read or something in it is wrong: the message names the file, the line and the entry.
+        If the file cannot be read or contains an error: the message names the file, the line and the entry.
 
     Examples
     --------

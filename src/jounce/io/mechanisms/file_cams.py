@@ -1,4 +1,4 @@
-"""Cams of a file: what leads them by name, a driver, a joint, an initial condition or an output, and what they are."""
+"""Cams of a file, and their leaders by name: a driver, a joint, an initial condition or an output."""
 
 from __future__ import annotations
 
@@ -24,14 +24,14 @@ PAIRS = {"revolute": "angle", "prismatic": "length"}
 
 @dataclasses.dataclass(frozen=True)
 class CamEntry:
-    """A cam whose leader is not known yet.
+    """A cam before its leader is resolved.
 
     Attributes
     ----------
     follower : AbstractConstraint
-        The driver that has its law.
+        Driver with the law of the follower.
     of : str
-        The name of its leader.
+        Name of the leader.
     """
 
     follower: Any
@@ -39,16 +39,18 @@ class CamEntry:
 
 
 def coordinates_by_name(data: Mapping[str, Any], space: str, driven: Mapping[str, str]) -> dict[str, str]:
-    """Return what may lead a cam, an angle or a length, by name; a driver goes before a joint, that before an output.
+    """Return the kind, angle or length, of each coordinate that may lead a cam, by name.
+
+    Drivers precede joints, which precede outputs.
 
     Parameters
     ----------
     data : mapping
-        The file.
+        Data of the file.
     space : str
         planar or spatial.
     driven : mapping of str to str
-        What drivers and initial conditions prescribe, by their names.
+        Kinds of the coordinates that drivers and initial conditions prescribe, by name.
     """
     kinds: dict[str, str] = {}
     for name, raw in _entries(data, "outputs"):
@@ -79,11 +81,11 @@ def with_leaders(source: Source, space: str, elements: dict[str, dict[str, Any]]
     Parameters
     ----------
     source : Source
-        The file.
+        Source of the file.
     space : str
         planar or spatial.
     elements : dict of str to dict
-        Joints, drivers, forces, initial conditions and outputs by kind and name.
+        Joints, drivers, forces, initial conditions and outputs, by kind and name.
     """
 
     def leader(name: str) -> Any:

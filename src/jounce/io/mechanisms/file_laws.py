@@ -1,4 +1,4 @@
-"""From what a file says of laws to laws: samples are read from their files, and names of drivers become their laws."""
+"""Laws of a mechanism file: samples are read from their files, and names of drivers resolved to their laws."""
 
 from __future__ import annotations
 
@@ -20,30 +20,30 @@ from jounce.trajectory import (
 
 
 class FileLaws:
-    """The laws of a file.
+    """Resolves the laws of a file.
 
     Parameters
     ----------
     source : Source
-        The file.
+        Source of the file.
     drivers : dict of str to dict
-        The values of the drivers by key, as the schema gives them: other laws may follow theirs.
+        Values of the drivers by key, as the schema gives them; other laws may follow their laws.
     """
 
     def __init__(self, source: Source, drivers: Mapping[str, Any]):
         self.source, self.drivers = source, drivers
 
     def law(self, location: Location, value: Any, following: tuple[str, ...] = ()) -> Any:
-        """Return a value with samples and followed drivers turned into laws, also where it is a list of laws.
+        """Return a value with samples and followed drivers resolved to laws, also within a list of laws.
 
         Parameters
         ----------
         location : tuple
-            Its place in the file.
+            Location of the value in the file.
         value : object
-            As the schema gives it.
+            Value as the schema gives it.
         following : tuple of str, optional
-            The drivers that the law is already followed by.
+            Drivers that depend on the law.
         """
         if isinstance(value, tuple):
             return tuple(self.law((*location, index), entry, following) for index, entry in enumerate(value))
@@ -90,7 +90,7 @@ class FileLaws:
         return self.source.read_named(given.cam, (*location, "cam"), path_of)
 
     def of_cam(self, location: Location, value: Any) -> tuple[Any, str]:
-        """Return the law of a cam, of its leader in the place of the time, and the name of the leader."""
+        """Return the law of a cam as a function of its leader, and the name of the leader."""
         if hasattr(value, "samples"):
             return self._spline(location, value), value.of
         return value.law, value.driver

@@ -1,4 +1,4 @@
-"""Mechanisms from files."""
+"""Reading of mechanism files."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ from jounce.trajectory import Expression
 from jounce.units.values import stated_dimensions
 
 _Locations = dict[str, tuple[Location, tuple[FileKey, ...]]]
-"""Where in the file the elements of a mechanism stand, by dotted name, and the keys of each."""
+"""Locations in the file, and keys, of the elements of a mechanism, by dotted name."""
 
 
 @under_own_settings
@@ -42,25 +42,25 @@ def load(path: str | PathLike[str], *, allow: Iterable[str | PathLike[str]] = ()
     Parameters
     ----------
     path
-        A file ending in .yaml, .yml, .toml or .json. Values in it are in SI units unless they say otherwise.
+        File ending in .yaml, .yml, .toml or .json. Its values are in SI units unless they state others.
     allow
-        Folders besides that of the file that files of samples may be below.
+        Folders besides that of the file below which sample files may lie.
 
     Returns
     -------
     Mechanism
-        With the instants of the file's time grid, if it has one.
+        Mechanism, with the instants of the time grid of the file, if any.
 
     Raises
     ------
     MechanismFileError
-        The file cannot be read or something in it is wrong: the message names the file, the line, the entry and the
-        value, and the nearest valid name where one is unknown.
+        If the file cannot be read or contains an error: the message names the file, the line, the entry and the value,
+        and the nearest valid name instead of an unknown one.
 
     Warns
     -----
     UnitWarning
-        A number without a unit is likely meant in degrees or millimeters.
+        If a number without a unit is likely in degrees or millimeters.
 
     Examples
     --------
@@ -87,7 +87,7 @@ def load(path: str | PathLike[str], *, allow: Iterable[str | PathLike[str]] = ()
 
 
 def _space(source: Source) -> str:
-    """Return the space of a file, the one key that decides how the others are read."""
+    """Return the space of a file, which decides how its other keys are read."""
     if not isinstance(source.data, dict):
         raise source.error("a mechanism file is a mapping with the keys space, bodies, joints, ...", value=source.data)
     source.data = {key: value for key, value in source.data.items() if value is not None or key == "space"}
@@ -100,15 +100,15 @@ def _space(source: Source) -> str:
 
 
 def _validate(source: Source, space: str) -> dict[str, Any]:
-    """Check a file against the schema; return its values by key, with numbers and expressions in place of text."""
-    with importing.lock:  # all kinds of outputs are known to the schema, and so the subpackages that compute them
+    """Return the values of a file by key, checked against the schema, with numbers and expressions for text."""
+    with importing.lock:  # the schema imports all subpackages that define outputs
         from pydantic import ValidationError
 
         from jounce.io.mechanisms.schema.models import file_model
         from jounce.io.mechanisms.schema.schema_errors import first_problem
 
     parameters = source.data.get("parameters")
-    names = dict.fromkeys(parameters if isinstance(parameters, dict) else ())  # found at once, however many
+    names = dict.fromkeys(parameters if isinstance(parameters, dict) else ())  # a dictionary for fast look-up
     bodies = source.data.get("bodies", {})
     if not bodies:
         raise source.error("a mechanism needs at least one moving body", ("bodies",), value=bodies)
@@ -132,7 +132,7 @@ def _validate(source: Source, space: str) -> dict[str, Any]:
 
 
 def _driven_quantities(drivers: object, space: str) -> dict[str, str]:
-    """Return what drivers drive, by their names: an angle, a length, or anything where that is not known (yet)."""
+    """Return the kinds of the coordinates of drivers by name: an angle, a length, or any if not known yet."""
     kinds, quantities = dict(catalogue(space, "driver")), {}
     for name, raw in drivers.items() if isinstance(drivers, dict) else ():
         given = raw if isinstance(raw, dict) else {}
@@ -143,7 +143,7 @@ def _driven_quantities(drivers: object, space: str) -> dict[str, str]:
 
 
 def _plain(model: Any) -> dict[str, Any]:
-    """Return the values of a model by the keys of the file; one level, the models inside stay."""
+    """Return the values of a model by the keys of the file, without converting nested models."""
     return {field.alias: getattr(model, name) for name, field in type(model).model_fields.items()}
 
 
@@ -174,7 +174,7 @@ def _build(source: Source, space: str, model: dict[str, Any], locations: _Locati
 
 
 def _body(source: Source, space: str, name: str, given: dict[str, Any], parameters: dict[str, Any]) -> Body:
-    """Build a body; values that depend on parameters stay expressions of them."""
+    """Return a body; values that depend on parameters remain expressions."""
     if isinstance(given["inertia"], dict):
         from jounce.io.mechanisms.values.inertia_forms import expanded
 
@@ -193,7 +193,7 @@ def _body(source: Source, space: str, name: str, given: dict[str, Any], paramete
 
 
 def _arguments(keys: tuple[FileKey, ...], given: dict[str, Any]) -> dict[str, Any]:
-    """Turn values by key into values by field; keys not given are left to their defaults."""
+    """Return values by field, given those by key, without the keys that are not given."""
     arguments = {}
     for key in keys:
         value = given[key.key]
@@ -205,8 +205,8 @@ def _arguments(keys: tuple[FileKey, ...], given: dict[str, Any]) -> dict[str, An
 def _elements(
     laws: FileLaws, space: str, section: str, models: dict[str, Any], locations: _Locations
 ) -> dict[str, Any]:
-    """Build joints, drivers, forces or outputs, and note where their fields stand in the file."""
-    from jounce.io.mechanisms.schema.output_types import output_types  # as the schema, which was imported before
+    """Return joints, drivers, forces or outputs by name, and record the locations of their fields."""
+    from jounce.io.mechanisms.schema.output_types import output_types  # the schema is imported by now
 
     outputs = {f"{space}_{tag.replace(' ', '_')}": kind for tag, (_, kind) in output_types(space).items()}
     elements = {}
@@ -227,14 +227,14 @@ def _elements(
             arguments["bodies"] = given["bodies"] if kind.body_count > 1 else (given["body"],)
         try:
             elements[name] = CamEntry(kind(**arguments), of) if cam else kind(**arguments)
-        except JounceError as error:  # of a constructor, which knows its fields only
+        except JounceError as error:  # a constructor names its field only
             error.name = f"{name_in_file}.{error.name}" if error.name else name_in_file
             raise
     return elements
 
 
 def _check_values(mechanism: Mechanism) -> None:
-    """Check what depends on the values of parameters: finite numbers, lengths above zero, axes that are not zero."""
+    """Raise an error for values that the parameters make invalid: not finite, lengths not positive, zero axes."""
     mechanism = with_output_drivers(mechanism)
     parameters, components = mechanism.parameter_values, POSITION_COMPONENTS[mechanism.space]
     for kind, elements in mechanism.elements.items():
