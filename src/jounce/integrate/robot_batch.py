@@ -1,4 +1,4 @@
-"""Many simulations of one robot in joint coordinates that differ in where they begin and in masses of links."""
+"""Many simulations of one robot in joint coordinates, with different initial states and link masses."""
 
 import inspect
 from collections.abc import Callable, Mapping
@@ -26,7 +26,7 @@ RATE, MASS = ".rate", ".mass"
 
 
 def traced_robot_batch(guarded: Callable[..., Any], robot: Robot, *arguments: Any, **keywords: Any) -> Batch:
-    """Return a batch of a robot of which JAX traces something, from a function that refuses that."""
+    """Return a batch of a robot with traced values, by the function under its guard against tracers."""
     return inspect.unwrap(guarded)(robot, *arguments, **keywords)
 
 
@@ -41,14 +41,15 @@ def simulate_robots(
     longest_step: float,
     **options: Any,
 ) -> Batch:
-    """Return the runs of a robot, its joints as outputs; see `jounce.simulate_batch`.
+    """Return the runs of a robot, with its joints as outputs; see `jounce.simulate_batch`.
 
-    Outputs are arrays of JAX, which have derivatives, where it traces something.
+    Outputs are JAX arrays with derivatives if JAX traces any values.
 
     Raises
     ------
     RobotError
-        A name is none of those that runs may differ in, values are not finite or of unequal number, or a mass is none.
+        If a name is not that of a parameter of runs, values are not finite, their numbers differ, or a mass is not
+        valid.
     """
     order, method = checked_options(order, method, tolerance, longest_step)
     options |= {"method": method, "tolerance": float(tolerance), "longest_step": float(longest_step)}
@@ -87,9 +88,9 @@ def simulate_robots(
     def traced_run(start: tuple[Robot, Any]) -> TracedRobotMotion:
         return traced_robot_motion(simulate_robot, start[0], instants, order, state=start[1], **options)
 
-    options["strict"] = traced  # what fails has no derivatives, and raises
+    options["strict"] = traced  # a traced run that fails has no derivatives, and raises
     q: Any
-    if traced:  # one after another, as JAX traces in one thread
+    if traced:  # one after another, since JAX traces in one thread
         motions = list(map(traced_run, starts))
         runs, q = [motion.simulation for motion in motions], jnp.stack([motion.q for motion in motions])
     else:
@@ -103,7 +104,7 @@ def simulate_robots(
 
 
 def _checked(robot: Robot, parameters: Mapping[str, Any]) -> dict[str, Any]:
-    """Return what runs differ in, by name, each of shape (runs,)."""
+    """Return the parameters of runs by name, each of shape (runs,)."""
     massive = [name for name, link in robot.links.items() if link.inertia is not None]
     valid = [*robot.joint_names, *(x + RATE for x in robot.joint_names), *(x + MASS for x in massive)]
 

@@ -1,4 +1,4 @@
-"""From a robot and the forces of its joints to its motion, in joint coordinates."""
+"""The simulation of a robot under joint forces, in joint coordinates."""
 
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, TypedDict
@@ -29,7 +29,7 @@ from jounce.robot.recursions.tree_equations import TreeEquations
 from jounce.robot.robot import Robot
 from jounce.trajectory.laws.user_laws import law_or_number
 
-MOST = 1_000_000
+MOST = 1_000_000  # attempted steps of a run
 
 
 class RobotOptions(TypedDict, total=False):
@@ -51,7 +51,7 @@ class RobotSimulationOptions(SimulationOptions, RobotOptions, total=False):
 
 
 def check_robot_options(mechanism: object, given: Mapping[str, Any]) -> None:
-    """Raise JounceError for an option that there is not, or that belongs to simulations of robots only."""
+    """Raise JounceError for an unknown option, or for an option of robots in the simulation of a mechanism."""
     for name in given:
         if name not in ROBOT_OPTIONS:
             raise JounceError(f"simulate has no such option; {did_you_mean(name, ROBOT_OPTIONS)}", name=name)
@@ -78,7 +78,7 @@ def simulate_robot(
     strict: bool,
     progress: Callable[[int, int], None] | None = None,
 ) -> RobotSimulation:
-    """Return the motion of a robot; see `jounce.simulate`, which checks what is common to all simulations."""
+    """Return the motion of a robot; see `jounce.simulate`, which checks the options of all simulations."""
     if robot.closures:
         message = "this robot has loops; simulate the mechanism that it is: jn.simulate(robot.mechanism(...), ...)"
         raise RobotError(message, name=robot.name, value=list(robot.closures))
@@ -136,7 +136,7 @@ def _start(
     base: BaseMotion | None,
     instant: float,
 ) -> RobotState:
-    """Return the state at the beginning, driven joints on their laws."""
+    """Return the initial state, with driven joints on their laws."""
     levels, mask = start_levels(robot, state), np.asarray(problem.equations.driven)
     if mask.any():
         time = np.array([[instant]])
@@ -152,7 +152,7 @@ def _start(
 
 
 class RobotRun(AbstractRun):
-    """A run of a robot, by series of an order."""
+    """A run of a robot by series of a fixed order."""
 
     def __init__(
         self,

@@ -1,9 +1,8 @@
-"""Steps of a simulation, divided where what is differentiated moves faster than the motion itself.
+"""Steps of a simulation, divided where derivatives of the motion vary faster than the motion itself.
 
-A body at rest, or in even motion, is simulated in steps as long as the span: its series ends, whatever forces would do
-to it. The series by which it changes with a mass or a force does not end, and carries only so far. So each step is
-looked at by how its series changes with the state at its beginning and with each value that is traced, and is divided
-until all of these converge within it.
+A body at rest or in uniform motion is simulated in one step, since its series ends. The series of its derivative with
+respect to a mass or a force does not end, and converges only within some radius. Each step is therefore divided until
+the series of its derivatives, with respect to the initial state and each traced value, converge within the parts.
 """
 
 from collections.abc import Collection, Sequence
@@ -30,18 +29,18 @@ from jounce.kinematics.sensitivity.jacobian_series import solver
 MOST_STEPS = 2**17
 MOST_DIRECTIONS = 16
 HALVINGS = 17
-FINER = 100.0  # times less is left out of the series of parts than of those of steps, which are fewer
+FINER = 100.0  # truncation errors of parts are this much smaller than those of steps, which are fewer
 
-ROUNDS = 3  # each makes a state behind a kink and its instant better by as much as the time to it is short
+ROUNDS = 3  # of refinement of a state behind a kink; each gains a factor of the time to the kink
 
 
 class Kinks(NamedTuple):
-    """Which pieces lead over kinks.
+    """The pieces that lead over kinks.
 
     Attributes
     ----------
     begins : array of shape (steps,)
-        From when on instants belong to a piece, s: behind a kink to the one after it.
+        First instant of each piece, s; instants behind a kink belong to the piece after it.
     back : array of bool, shape (steps,)
         Whether a piece begins behind a kink and goes back to it.
     velocity, spin : array of shape (steps, components, bodies)
@@ -55,18 +54,18 @@ class Kinks(NamedTuple):
 
 
 class Pieces(NamedTuple):
-    """Steps, or parts of steps, one after the other.
+    """Consecutive steps, or parts of steps.
 
     Attributes
     ----------
     start, length : array of shape (steps,)
         s; lengths are negative backward in time.
     state : State
-        At the start of each, (steps, components, bodies).
+        States at the starts, (steps, components, bodies).
     used : array of bool, shape (steps, order + 1)
-        Which coefficients of the series are used.
+        Whether each coefficient of the series is used.
     kinks : Kinks, optional
-        Where there are some.
+        Kinks, if there are any.
     """
 
     start: Float[np.ndarray, " step"]
@@ -76,27 +75,27 @@ class Pieces(NamedTuple):
     kinks: Kinks | None = None
 
     def at(self, instants: Float[np.ndarray, " time"]) -> Int[np.ndarray, " time"]:
-        """Return in which of them instants are."""
+        """Return the indices of the pieces that contain instants."""
         sign = -1.0 if self.length[0] < 0 else 1.0
         begins = self.start if self.kinks is None else self.kinks.begins
         index = np.searchsorted(sign * begins, sign * instants, "right") - 1
         return np.clip(index, 0, len(self.start) - 1)
 
     def padded(self) -> "Pieces":
-        """Return as many as a power of two, the last again and again with no length: few lengths are compiled."""
+        """Return the pieces padded to a power of two by pieces of no length, so that few sizes are compiled."""
         count = len(self.start)
         fill = np.minimum(np.arange(power_of_two(count)), count - 1)
         return self.chosen(fill)._replace(length=np.where(np.arange(len(fill)) < count, self.length[fill], 0.0))
 
     def chosen(self, which: Int[np.ndarray, " chosen"]) -> "Pieces":
-        """Return some of them."""
+        """Return the pieces with given indices."""
         return jax.tree.map(lambda part: part[which], self)
 
     def over(self, kinks: dict[int, Break]) -> "Pieces":
-        """Return pieces of which some, by index, go to kinks only, and the next begin behind these all the same.
+        """Return the pieces with those of given indices ending at kinks.
 
-        So none begins at a kink, where rounding would decide on which side it is. In between are pieces that go back
-        to the kink, where the two sides meet.
+        The next pieces still begin behind the kinks, so that none begins at a kink, where rounding would decide its
+        side. Between them, additional pieces go back to the kink, where the two sides meet.
         """
         if not kinks:
             return self
@@ -125,16 +124,16 @@ def divided_steps(
     dense : DenseOutput
         The steps.
     equations, plain : Equations
-        Of which JAX traces some leaves, and with plain numbers in their places.
+        Equations with some leaves traced by JAX, and the same with plain numbers in their places.
     allowed : float or None
-        Error of a step in a change, relative; the steps are not divided unless given.
+        Relative error of a derivative in a step; None leaves the steps undivided.
     kinks : collection of Break
-        Of forces, that steps go over; these are not divided.
+        Kinks of forces within steps; these steps are not divided.
 
     Raises
     ------
     UnsupportedError
-        If there would be too many.
+        If too many steps would be needed.
     """
     leaves, structure = jax.tree.flatten(equations)
     numbers, plain_structure = jax.tree.flatten(plain)
@@ -153,7 +152,7 @@ def divided_steps(
         lacking = lacking[~np.isin(lacking, [kink.step for kink in kinks])]
         if not lacking.size:
             return pieces.over(over)
-        if not used[lacking].all():  # a body that hardly moves took a long step of low order: first with all orders
+        if not used[lacking].all():  # a body that hardly moves took a long step of low order: try all orders first
             used[lacking] = True
             continue
         parts = count.copy()
@@ -168,7 +167,7 @@ def divided_steps(
 
 
 def _used_coefficients(dense: DenseOutput) -> Bool[np.ndarray, "step order"]:
-    """Return which coefficients steps were taken with: all, where the series ended before it could be cut."""
+    """Return the coefficients with which steps were taken: all of a series that ended before it could be cut."""
     used = np.any([np.any(np.asarray(part) != 0, axis=tuple(range(2, part.ndim))) for part in dense.polynomial], axis=0)
     orders = np.arange(used.shape[1])
     last = np.max(np.where(used, orders, 0), axis=1, keepdims=True)
@@ -178,7 +177,7 @@ def _used_coefficients(dense: DenseOutput) -> Bool[np.ndarray, "step order"]:
 def _parts(
     dense: DenseOutput, used: Bool[np.ndarray, "step order"], count: Int[np.ndarray, " step"]
 ) -> tuple[Pieces, Int[np.ndarray, " part"]]:
-    """Return the parts that steps have, and of which step each is."""
+    """Return the parts of steps, and the index of the step of each part."""
     which = np.repeat(np.arange(len(count)), count)
     part = np.concatenate([np.arange(number) for number in count])
     length = np.asarray(dense.length)[which] / count[which]
@@ -190,11 +189,11 @@ def _parts(
 def _needed(
     sizes: Float[np.ndarray, "part order direction step"], pieces: Pieces, duration: float, allowed: float
 ) -> Int[np.ndarray, " step"]:
-    """Return into how many parts, powers of two, steps are to be divided.
+    """Return the numbers of parts, powers of two, into which steps are to be divided.
 
-    What is left out of a series is what follows the orders that are kept: the sizes known of it, or, where all are
-    kept, as much less than the last two terms as those are less than the two before. It counts by the largest change,
-    that of velocities over the whole duration.
+    The truncation error is that of the known terms that are left out or, if all are kept, is extrapolated: its ratio to
+    the last two terms is the ratio of those to the two before. It is relative to the largest change, with velocities
+    multiplied by the whole duration.
     """
     positions, velocities = sizes
     orders = np.arange(len(positions))[:, None, None]
@@ -212,9 +211,9 @@ def _needed(
 
 
 def _directions(numbers: Sequence[Any]) -> tuple[list[np.ndarray], np.ndarray]:
-    """Return in which directions values change, (directions, ...) each, and by how much the state does in these.
+    """Return the directions of change of values, (directions, ...) each, and of the state.
 
-    Some values change at a time, by random numbers, and last the state alone.
+    Each direction changes some values by random numbers; the last changes the state alone.
     """
     random = np.random.default_rng(0)
     count = min(len(numbers), MOST_DIRECTIONS)
@@ -233,7 +232,7 @@ def _sizes(
     *,
     moving: tuple[int, ...],
 ) -> tuple[Numbers, Numbers]:
-    """Return the sizes of the series of changes, of places and of velocities: (order + 1, directions, steps) each."""
+    """Return the sizes of the series of changes of positions and velocities, (order + 1, directions, steps) each."""
     leaves, structure = jax.tree.flatten(equations)
     order, length = pieces.used.shape[1] - 1, equations.system.column_scale[0]
     state = pieces.state.map(lambda part: jnp.moveaxis(part, 0, -1))
@@ -257,16 +256,16 @@ def _sizes(
 
 
 def series_through(equations: Equations, state: State, time: Instants, order: int) -> State:
-    """Return the series of the motion through a state, which JAX may differentiate in either mode."""
+    """Return the series of the motion through a state, which JAX can differentiate in either mode."""
     inverse = _inverse(equations.matrix(state, time), jax.lax.stop_gradient(equations.factored(state, time).inverse()))
     return expand(equations, state, time, order, DenseInverse(inverse), reversible=True).state
 
 
 def _inverse(matrix: Any, known: Any) -> Any:
-    """Return the inverse of matrices, which is known, with the derivatives that it has.
+    """Return the known inverse of matrices, with its derivatives.
 
-    As the solution of equations: of a rule by `jax.custom_jvp` JAX keeps nothing where it computes again what it did
-    not keep (`jax.checkpoint`), so that derivatives of gradients were wrong.
+    It is written as a linear solve: with a rule by `jax.custom_jvp`, derivatives of gradients were wrong, since JAX
+    drops the rule when it recomputes values under `jax.checkpoint`.
     """
 
     def product(a: Any, b: Any) -> Any:

@@ -1,7 +1,8 @@
-"""Numbers of a robot that are exactly zero or one, as part of the key of a program.
+"""Numbers of a robot that are exactly zero or one, as part of the cache key of its program.
 
-Where all joints turn about parallel axes of the scene, most products in the equations of motion have a factor that is
-zero for certain, and a program that is made for these zeros leaves them out. A robot with others has another program.
+If all joints of a robot are revolute about parallel axes, most products in the equations of motion have a factor that
+is a known zero. A program compiled for these zeros leaves the products out; a robot with other zeros has its own
+program.
 """
 
 import dataclasses
@@ -17,22 +18,22 @@ import numpy as np
 from jounce.base.modules import with_fields
 from jounce.robot.recursions.tree_equations import TreeEquations
 
-FIELDS = ("rotation", "position", "center", "inertia", "turning")  # of a tree, where zeros leave products out
+FIELDS = ("rotation", "position", "center", "inertia", "turning")  # of a tree, whose zeros eliminate products
 INDICES = ("slot", "parent_slot", "coordinate")
 ZERO, ONE = 1, 2
-OF_TURN = np.array([[1, 1, 0], [1, 1, 0], [0, 0, 1]], bool)  # where the matrix of a turn about z is not zero
+OF_TURN = np.array([[1, 1, 0], [1, 1, 0], [0, 0, 1]], bool)  # nonzero entries of a rotation about z
 
 
 @dataclasses.dataclass(frozen=True)
 class ExactNumbers:
-    """Which numbers of a tree are exactly zero, or one.
+    """The numbers of a tree that are exactly zero or one.
 
     Attributes
     ----------
     codes : bytes
         `ZERO`, `ONE` or 0 for each number of the fields, one after another.
     indices : bytes
-        `INDICES` of the tree, one after another, which say how it branches and which joint follows another.
+        `INDICES` of the tree, one after another, which define its branches and followers.
     """
 
     codes: bytes
@@ -40,7 +41,7 @@ class ExactNumbers:
 
     @classmethod
     def of_parallel(cls, equations: TreeEquations) -> "ExactNumbers | None":
-        """Return those of a tree on the ground whose joints turn about parallel axes of the scene; None for others."""
+        """Return the exact numbers of a grounded tree whose joints are revolute about parallel axes; otherwise None."""
         tree = equations.tree
         numbers = np.concatenate([getattr(tree, name).ravel() for name in FIELDS])
         codes = (ZERO * (numbers == 0) + ONE * (numbers == 1)).astype(np.uint8)
@@ -55,7 +56,7 @@ class ExactNumbers:
         return cls(codes.tobytes(), b"".join(getattr(tree, name).tobytes() for name in INDICES))
 
     def known(self, equations: TreeEquations) -> TreeEquations:
-        """Return equations with these numbers, NaN beside them in their arrays, and forms in place of other arrays."""
+        """Return equations with the exact numbers, NaN for other numbers, and shapes in place of other arrays."""
 
         def of_field(_: Any, codes: np.ndarray) -> Any:
             return np.where(codes == 0, np.nan, codes == ONE)
@@ -63,7 +64,7 @@ class ExactNumbers:
         return self._replaced(forms_of(equations), of_field)
 
     def put(self, equations: TreeEquations) -> TreeEquations:
-        """Return the same equations, with constants in a program for these numbers."""
+        """Return the same equations, with the exact numbers as constants of a program."""
 
         def of_field(array: Any, codes: np.ndarray) -> Any:
             return jnp.where(codes == 0, array, (codes == ONE).astype(float))
@@ -82,13 +83,13 @@ class ExactNumbers:
 
 
 def forms_of(tree: Any) -> Any:
-    """Return a tree with the shape and the type of each array in its place."""
+    """Return a pytree with the shape and type of each array in its place."""
     return jax.tree.map(lambda x: jax.ShapeDtypeStruct(jnp.shape(x), jnp.result_type(x)), tree)
 
 
 @lru_cache(maxsize=100)
 def _are_parallel(rotations: bytes, turning: bytes, ancestors: bytes) -> bool:
-    """Tell from the zeros of a tree whether its joints turn about parallel axes of the scene."""
+    """Return, from the zeros of a tree, whether all its joints are revolute about parallel axes."""
     count = len(turning)
     may_differ = np.frombuffer(rotations, np.uint8).reshape(count, 3, 3) != ZERO
     moves = np.frombuffer(ancestors, bool).reshape(count, count)

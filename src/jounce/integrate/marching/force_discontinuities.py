@@ -1,4 +1,4 @@
-"""Over a kink of a force: the series of the motion from both sides meet where their accelerations agree."""
+"""Motion over a kink of a force: the series of both sides meet at the instant at which their accelerations agree."""
 
 import math
 from typing import Any, NamedTuple
@@ -11,18 +11,18 @@ from jounce.dynamics.forward.accelerations import State
 from jounce.integrate.marching.divided_steps import Kinks
 from jounce.integrate.steps.methods import evaluated
 
-KINKED = 4  # coefficients of a motion about a kink, for derivatives up to the third
+KINKED = 4  # coefficients of the motion at a kink, for derivatives up to the third
 
 
 class Kinked(NamedTuple):
-    """The motion at a kink, by its series before.
+    """The motion at a kink, by the series before it.
 
     Attributes
     ----------
     series : State
-        Its first coefficients in the time from the instant that the kink has.
+        First coefficients in the time from the instant of the kink.
     late : array of shape (1,)
-        By how much that instant changes, s: it has no value.
+        Variation of that instant, s; its value is zero, and only its derivative counts.
     """
 
     series: State
@@ -30,7 +30,7 @@ class Kinked(NamedTuple):
 
 
 def shifted(series: State, step: Any = 0.0) -> State:
-    """Return the first coefficients of series about a time `step` away."""
+    """Return the first coefficients of series, expanded about a time `step` later."""
 
     def part(c: Any) -> Any:
         padded = jnp.concatenate([c, jnp.zeros((KINKED, *c.shape[1:]))])
@@ -45,20 +45,20 @@ def shifted(series: State, step: Any = 0.0) -> State:
 
 
 def refined_kink_state(state: State, series: State, length: Any, kinked: Kinked, over: Kinks) -> tuple[State, Any]:
-    """Return the state behind a kink, and how much the instant of the kink changes, better than they are.
+    """Return refined values of the state behind a kink, and of the variation of the instant of the kink.
 
-    The series through the state goes back to the kink and meets that from before there.
+    The series through the state, continued back to the kink, meets the series from before the kink.
 
     Parameters
     ----------
     state, series : State
-        Behind the kink.
+        State behind the kink, and the series through it.
     length : array of shape (1,)
-        From there to the kink, s.
+        Time from the state to the kink, s.
     kinked : Kinked
-        The other side.
+        The motion before the kink.
     over : Kinks
-        Of this piece.
+        The kink of this piece.
     """
 
     def rates(series: State, since: Any) -> State:
@@ -74,5 +74,5 @@ def refined_kink_state(state: State, series: State, length: Any, kinked: Kinked,
 
 
 def with_value(x: Any, value: Any) -> Any:
-    """Return a value that changes as another number does."""
+    """Return a value with the derivatives of another number."""
     return value + (x - jax.lax.stop_gradient(x))

@@ -1,4 +1,4 @@
-"""Events of robots: instants at which a joint, a rate of it, or a function of the state crosses a value."""
+"""Events of robots: crossings of a value by a joint coordinate, its derivative, or a function of the state."""
 
 import dataclasses
 from collections.abc import Callable
@@ -19,20 +19,21 @@ from jounce.robot.robot import Robot
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class JointEvent:
-    """A crossing of a value by a joint of a robot, by one of its derivatives, or by a function of the state.
+    """A crossing of a value by a joint coordinate of a robot, by its derivative, or by a function of the state.
 
-    What begins at the value, or touches it and turns back, does not cross it.
+    A quantity that begins at the value, or touches it and turns back, does not cross it.
 
     Parameters
     ----------
     of : str or callable
-        Name of a joint; or a function of time, q and rates, of one sample, by operations of JAX, that returns a number.
+        Name of a joint; or a JAX function of time, q and rates of one sample that returns a number.
     value : float, default 0
-        That is crossed.
+        The value that is crossed.
     derivative : int, default 0
-        Of a joint: which time derivative crosses it, up to 4; 1 with value 0 finds turning points.
+        Order of the time derivative of a joint coordinate that crosses the value, up to 4; order 1 with value 0 finds
+        turning points.
     direction : int, default 0
-        1 for rising crossings only, -1 for falling ones, 0 for both; as time goes on, also in a run backward.
+        1 for rising crossings only, -1 for falling ones, 0 for both; with increasing time, also in a run backward.
     terminal : bool, default False
         Whether the simulation ends at the first crossing.
 
@@ -62,7 +63,7 @@ class JointEvent:
 
 
 class JointEventDetector(AbstractDetector):
-    """The crossings of one event of a robot."""
+    """The detector of one event of a robot."""
 
     def __init__(self, event: JointEvent, robot: Robot):
         super().__init__(event)
@@ -103,11 +104,11 @@ class JointEventDetector(AbstractDetector):
 
 @jax.jit
 def _at_samples(function: SampleFunction | None, time: Any, q: Any, rates: Any) -> Any:
-    """Return the values of a function of the state at samples, which stand last."""
+    """Return the values of a function of the state at samples; the sample axis is last."""
     assert function is not None
     return function(time, q, rates)
 
 
 def _at(coefficients: np.ndarray, since: np.ndarray, derivative: int) -> np.ndarray:
-    """Return values of a derivative of polynomials, (steps, order + 1), at times from their beginnings."""
+    """Return the values of a derivative of polynomials, (steps, order + 1), at times from their beginnings."""
     return np.asarray(polyval(since, polyder(coefficients.T, derivative)[..., None], tensor=False))

@@ -1,4 +1,4 @@
-"""Marching through time: steps chosen, taken, projected, checked, and kept as polynomials."""
+"""Time stepping: choice, projection and check of steps, and their storage as polynomials."""
 
 import enum
 from collections.abc import Callable
@@ -22,61 +22,61 @@ from jounce.jet import Jet
 from jounce.kinematics.continuation.instant_program import of_design
 from jounce.mechanism.transmissions.axis_angles import measures_angle
 
-# part of the time so far, or of the time left: a shorter step that is refused ends the run
+# relative to the time so far or the time left: a refused step that is shorter ends the run
 SMALLEST_STEP = lookahead.FINEST / 8.0
-# factor on a step that is tried again: no power of two, so that it does not end where other steps have ended
+# factor on a step that is tried again: not a power of two, so that it does not end where other steps have ended
 REFUSED = 0.45
-SHORT = 1.0 / 4.0  # part of the longest step so far: shorter steps are allowed smaller errors, see `furthest`
+SHORT = 1.0 / 4.0  # of the longest step so far: shorter steps are allowed smaller errors, see `furthest`
 STUCK = 64  # steps in a row that hardly advance and end a run: a force switches without end
-AT_LEAST, AT_MOST = 64, 512  # least and most steps tried in a call; progress and events are looked at between calls
-NUMBERS = 2**15  # of polynomials in a call: to make room for more takes longer than another call
+AT_LEAST, AT_MOST = 64, 512  # least and most steps tried in a call; progress and events are checked between calls
+NUMBERS = 2**15  # numbers of polynomials in a call: to allocate more takes longer than another call
 FEW_RUNS, MANY_RUNS = 8, 64  # runs that XLA marches side by side; more do not fit into the cache
-STUBBORN = 3  # refusals in a row, more than a smooth motion needs: the step may begin at a kink
+STUBBORN = 3  # refusals in a row that a smooth motion does not need: the step may begin at a kink
 
 
 class Outcome(enum.IntEnum):
-    """What became of a run."""
+    """The outcome of a run."""
 
     RUNNING = 0
     ARRIVED = 1
-    COLLAPSED = 2  # steps became too small to move on
+    COLLAPSED = 2  # steps became too small to advance
     LOST = 3  # the motion is not finite from the start
-    UNEXPANDED = 4  # the motion is to be expanded at the start, by the first of the steps tried
-    UNBALANCED = 5  # the energy would change, though nothing adds or removes any
+    UNEXPANDED = 4  # the first attempt expands the motion at the start
+    UNBALANCED = 5  # the energy would change, though nothing adds or removes energy
 
 
 MOVING = np.array([Outcome.RUNNING, Outcome.UNEXPANDED])
 
 
 class IntegratorState(NamedTuple):
-    """How far a batch of runs has come."""
+    """The current state of a batch of runs."""
 
     time: Lanes  # s
-    rest: Lanes  # what the time is greater by than that number, which is rounded, s
+    rest: Lanes  # rounding remainder of the time, to be added to it, s
     expansion: Expansion
-    refused: Indices  # number of steps refused from here, one after the other
+    refused: Indices  # number of consecutive refusals from this state
     outcome: Indices  # see Outcome
-    mobility: Float[Numbers, "body batch"]  # how readily forces move the bodies here, as `mobility_of` gives it
-    singular: Flags  # whether the equations of motion are near to singular here
-    blocked: Indices  # index of the force or law over which no step is possible from here, or -1
-    angles: AnglesOfForces  # about axes, that forces measure here, with their turns, rad, as `measured` gives them
-    longest: Lanes  # step so far, s
-    crossing: Indices  # number of steps, one after the other, too short to matter, over what is not known
-    short: Indices  # number of steps one after the other that hardly move on, whatever they lead over
-    balance: energy_balance.Balance  # of the energy, where that is to be kept
+    mobility: Float[Numbers, "body batch"]  # mobility of the bodies, from `mobility_of`
+    singular: Flags  # whether the equations of motion are nearly singular
+    blocked: Indices  # index of the force or law that blocks steps from this state, or -1
+    angles: AnglesOfForces  # angles about axes that forces measure, with their revolutions, rad, from `measured`
+    longest: Lanes  # longest step so far, s
+    crossing: Indices  # number of consecutive negligibly short steps over an unresolved force or law
+    short: Indices  # number of consecutive steps that hardly advance
+    balance: energy_balance.Balance  # energy balance, if energy is conserved
 
 
 class RunLimits(NamedTuple):
-    """Where runs go, and in what steps."""
+    """The end of runs, and bounds of their steps."""
 
-    stop: Number  # s; steps end there exactly
-    tolerance: Number  # of the error of a step, rad or sizes of the mechanism
-    longest: Number | Float[Numbers, "*batch"]  # step, s
-    start: Number  # when they began, s
+    stop: Number  # s; the last step ends exactly at it
+    tolerance: Number  # error of a step, rad or sizes of the mechanism
+    longest: Number | Float[Numbers, "*batch"]  # longest step, s
+    start: Number  # beginning of the runs, s
 
 
 class DenseOutput(NamedTuple):
-    """Steps one after the other, as polynomials; while they are taken, the batch is the last axis.
+    """Consecutive steps as polynomials; while they are taken, the batch is the last axis.
 
     Attributes
     ----------
@@ -85,9 +85,9 @@ class DenseOutput(NamedTuple):
     polynomial : State
         Coefficients in the time from the start, (steps, order + 1, components, bodies).
     kink : array of int, shape (steps,)
-        Index of a force or law that is not resolved over a step, which is too short to matter, or -1: `watched_names`.
+        Index, in `watched_names`, of a force or law that a negligibly short step does not resolve, or -1.
     angles : tuple of array of shape (steps, instances)
-        About axes at the start, rad, for each group of forces that measures some.
+        Angles about axes at the starts, rad, for each group of forces that measures them.
     """
 
     start: Float[Any, "steps *batch"]
@@ -98,14 +98,15 @@ class DenseOutput(NamedTuple):
 
     @property
     def end(self) -> float:
-        """Where the last step ends, s."""
+        """End of the last step, s."""
         return float(self.start[-1] + self.length[-1])
 
 
 def unexpanded(equations: Equations, state: State, time: Lanes, *, order: int) -> IntegratorState:
-    """Return the start of runs from states on the constraints; the first step that `march` tries expands the motion.
+    """Return the start of runs from states on the constraints; the first attempt of `march` expands the motion.
 
-    Angles about axes have the turns of what they are near to in the equations. The arrays are of NumPy, but for these.
+    Angles about axes have the revolutions of their reference angles in the equations. All arrays but these angles are
+    NumPy arrays.
     """
     *_, bodies, lanes = state.position.shape
     size, columns = equations.system.shape
@@ -138,35 +139,35 @@ def _measured(equations: Equations, state: State) -> AnglesOfForces:
 def march(
     equations: Equations, current: IntegratorState, limits: RunLimits, *, method: AbstractMethod, count: int
 ) -> tuple[IntegratorState, tuple[DenseOutput, Bool[Numbers, "steps batch"]], Int[Numbers, ""]]:
-    """Take up to `count` steps of a run toward a time; `march_runs` is for many.
+    """Take up to `count` steps of a run; `march_runs` advances many runs.
 
     Parameters
     ----------
     equations : Equations
-        Of the mechanism.
+        Equations of motion of the mechanism.
     current : IntegratorState
-        Where to go on from.
+        State to continue from.
     limits : RunLimits
-        Where to go, and in what steps.
+        End of the run, and bounds of its steps.
     method : AbstractMethod
-        How steps are taken.
+        Integration method.
     count : int
-        Steps to try at most.
+        Largest number of attempts.
 
     Returns
     -------
     current : IntegratorState
     steps : tuple of DenseOutput and array of bool, shape (steps, batch)
-        Steps tried, in the order of trial, and whether they were taken.
+        Attempted steps in their order, and whether they were taken.
     tried : int
-        How many of them there are.
+        Number of attempts.
     """
     attempt = _attempt(equations, current, limits, method)
     return attempts(attempt, current, room_for_steps(method, current, count), count)
 
 
 def attempts(attempt: Callable[[Any], tuple[Any, Any]], current: Any, room: Any, count: int) -> tuple[Any, Any, Any]:
-    """Return where up to so many attempts at a step lead, room with what they give, and how many there were."""
+    """Return the state after up to `count` attempts, the buffer filled with their steps, and their number."""
 
     def unfinished(carry: Any) -> Any:
         current, _, tried = carry
@@ -189,14 +190,14 @@ def march_runs(
     method: AbstractMethod,
     steps: int,
 ) -> tuple[IntegratorState, tuple[DenseOutput, Bool[Numbers, "steps batch"]]]:
-    """Do what `march` does for runs that differ in values of their mechanism, each until it has ended.
+    """Take steps as `march` does, for runs that differ in values of their mechanism, each until it ends.
 
     Parameters
     ----------
     shared : tuple
-        Equations, alone or first of others; and limits, as for `march`.
+        Equations, or a tuple that begins with them; and limits, as for `march`.
     lanes : tuple
-        Of each run: its `own` values, as `of_design` has them, and where to go on from.
+        For each run: its `own` values, as for `of_design`, and the state to continue from.
     method, steps
         As `method` and `count` of `march`.
 
@@ -204,7 +205,7 @@ def march_runs(
     -------
     current : IntegratorState
     steps : tuple
-        As `march` returns them; after its end, a run repeats its last step, which is not taken.
+        As from `march`; after its end, a run repeats its last step as not taken.
     """
     (values, limits), (own, current) = shared, lanes
     equations, *_ = of_design(values, own)
@@ -219,7 +220,7 @@ def march_runs(
             return current, (last, jnp.zeros_like(taken))
 
         current, steps = jax.lax.cond(jnp.any(jnp.isin(current.outcome, MOVING)), attempt, stand, current)
-        put = jax.lax.dynamic_update_index_in_dim  # at one place for all runs, which would else go on to it alone
+        put = jax.lax.dynamic_update_index_in_dim  # one index for all runs; otherwise each run would need its own
         return current, jax.tree.map(lambda x, s: put(x, s, k, 0), previous, steps)
 
     return jax.lax.fori_loop(0, steps, turn, (current, room_for_steps(method, current, steps)))
@@ -228,7 +229,7 @@ def march_runs(
 def _attempt(
     equations: Equations, current: IntegratorState, limits: RunLimits, method: AbstractMethod
 ) -> Callable[[IntegratorState], tuple[IntegratorState, tuple[DenseOutput, Any]]]:
-    """Return what tries a step of each run that has not ended, with the arguments of `march`."""
+    """Return a function that attempts a step of each run that has not ended; arguments as for `march`."""
     stop, tolerance, longest, started = limits
     length, duration = equations.system.column_scale[0], jnp.abs(stop - started)
     order, bodies = len(current.expansion.state.position) - 1, current.expansion.state.position.shape[2]
@@ -239,7 +240,7 @@ def _attempt(
         running, opening = (current.outcome == int(x) for x in (Outcome.RUNNING, Outcome.UNEXPANDED))
         left = stop - current.time - current.rest
 
-        # how long the step is: as the series carries, and as what lies ahead permits
+        # length of the step: as far as the series converges, and as the lookahead permits
         usual = SHORT * current.longest
         start, reach, allowed = method.prepared(current.expansion, length, tolerance, current.singular, usual)
         wished = jnp.minimum(reach, jnp.minimum(longest, jnp.abs(left)))
@@ -261,18 +262,18 @@ def _attempt(
         step = jnp.where(running, step, 0.0)
         time, rest = (jnp.where(running, x, y) for x, y in ((time, current.time), (rest, current.rest)))
 
-        # where it leads
+        # end of the step
         there = equations.near(angles.at(step))
         arrived = method.arrive(there, start, current.time, step)
         state, distance, inverse = projected(there, arrived, time[None])
-        state = jax.tree.map(lambda a, b: jnp.where(opening, a, b), arrived, state)  # it is on the constraints already
+        state = jax.tree.map(lambda a, b: jnp.where(opening, a, b), arrived, state)  # already on the constraints
         expansion = expand(there, state, time[None], order, inverse)
         acceleration, multipliers = expansion.acceleration[:1], expansion.multipliers[:1]  # no step needs their rates
         expansion = expansion._replace(acceleration=acceleration, multipliers=multipliers)
         error = method.error(start, expansion, step, length)
         polynomial = method.polynomial(start, expansion, step)
 
-        # whether it is taken
+        # acceptance
         good = _finite(expansion) & jnp.isfinite(distance) & (error <= MARGIN * allowed) & running & look.resolved
         if method.controlled:
             suspect = (look.kink >= 0) & (size < tried) | (current.refused >= STUBBORN)
@@ -288,7 +289,7 @@ def _attempt(
             balance = jax.tree.map(lambda a, b: jnp.where(opening, a, b), begun, balance)
             good = good & balanced
 
-        # what becomes of the run
+        # outcome of the run
         tiny = jnp.abs(step) < SMALLEST_STEP * jnp.maximum(jnp.abs(current.time), jnp.abs(stop - current.time))
         broken = current.balance.broken | (running & ~balanced)
         stopped = jnp.where(~broken, int(Outcome.COLLAPSED), int(Outcome.UNBALANCED))
@@ -327,14 +328,14 @@ def _attempt(
 
 
 def steps_between_looks(numbers: int, *, watched: bool) -> int:
-    """Return how many steps are tried in a call: few where an event may end the run, or polynomials are long.
+    """Return the number of steps tried in a call: few if an event may end the run, or if polynomials are long.
 
     Parameters
     ----------
     numbers : int
-        Of the polynomials of a step.
+        Number of coefficients of the polynomials of a step.
     watched : bool
-        Whether events are looked for.
+        Whether events are detected.
     """
     return AT_LEAST if watched else min(max(NUMBERS // numbers, AT_LEAST), AT_MOST)
 
@@ -342,7 +343,7 @@ def steps_between_looks(numbers: int, *, watched: bool) -> int:
 def room_for_steps(
     method: AbstractMethod, current: IntegratorState, count: int
 ) -> tuple[DenseOutput, Bool[Numbers, "steps batch"]]:
-    """Return room for steps and whether they were taken."""
+    """Return an empty buffer for steps and whether they were taken."""
     time, expansion = current.time, current.expansion
     polynomial = jax.eval_shape(method.polynomial, expansion, expansion, time)
     room = DenseOutput(time, time, polynomial, current.blocked, current.angles), current.singular
@@ -350,10 +351,10 @@ def room_for_steps(
 
 
 def _kick_matters(kick: Lanes, step: Lanes, duration: Number, bound: Lanes, current: IntegratorState) -> Flags:
-    """Tell where a kink at the beginning of a step kicks bodies so that they move by more than is harmless in the run.
+    """Return whether a kink at the beginning of a step displaces bodies by more than is harmless in the run.
 
-    What is left of it in the accelerations at the end is no next term of a series there: `kick` is the displacement
-    within the step of accelerations that are wrong all along it.
+    Beside a kink, the error of the accelerations at the end is not the next term of a series: `kick` is the
+    displacement in the step by accelerations that are wrong throughout.
     """
     duration = jnp.maximum(duration, jnp.abs(step))
     moved = kick * duration / jnp.maximum(jnp.abs(step), SHORTEST * duration)

@@ -1,7 +1,8 @@
-"""Steps of a robot in joint coordinates: Taylor series of its motion, each looked at along its way before it is taken.
+"""Steps of a robot in joint coordinates: Taylor series of its motion, checked along each step before it is taken.
 
-There are no constraints, so that nothing is projected. What a series cannot know, a pulse or a jump of a force ahead,
-shows where the equations of motion give other accelerations on the way than the series: a step ends before it.
+There are no constraints, and so no projection. A pulse or jump of a force ahead is not contained in the series, but it
+shows as a difference between the accelerations of the equations of motion and those of the series: the step ends before
+it.
 """
 
 from typing import Any, NamedTuple
@@ -27,33 +28,33 @@ from jounce.robot.algorithms.wrench_laws import WrenchLaws
 from jounce.robot.model.joint_laws import AbstractJointLaws
 from jounce.robot.recursions.tree_equations import TreeEquations, TreeState, Unknowns, free_base
 
-SMOOTH_POINTS = 3  # of a step where nothing jumps: there the series departs from the equations most at the end
+SMOOTH_POINTS = 3  # points of a step without jumps, where the error of the series is largest at the end
 STUCK = 64  # steps in a row that hardly advance and end a run: a force switches without end
-STUCK_STEP = 10 * SHORTEST  # part of the run: joints that stick switch after steps little longer than the shortest
-AGAIN = 10  # steps over a jump in a row that may end where there is no finite value, before the run is given up
-SHORT = 1e-5  # part of the step that the series allows: a shorter step leads over a jump
-STEEP = 1e-3  # part of the usual step: a force that makes a step shorter may jump
-UNSEEN = 1e-12  # displacement of a joint by what a step overlooks, rad or sizes of the robot; less beside a jump
-NOISE = 32.0  # multiple of what the equations miss at the start of a series that counts as rounding along the step
+STUCK_STEP = 10 * SHORTEST  # of the run: sticking joints switch after steps little longer than the shortest
+AGAIN = 10  # steps over a jump in a row that may end without a finite value, before the run is given up
+SHORT = 1e-5  # of the step that the series allows: a shorter step leads over a jump
+STEEP = 1e-3  # of the usual step: a force that makes a step shorter may jump
+UNSEEN = 1e-12  # displacement of a joint that a step may overlook, rad or sizes of the robot; less beside a jump
+NOISE = 32.0  # multiple of the residual at the start of a series that counts as rounding along the step
 
 
 class RobotProblem(Module):
-    """What moves a robot.
+    """The equations of motion and the laws of forces and motions of a robot.
 
     Attributes
     ----------
     equations : TreeEquations
-        Of the tree.
+        Equations of motion of the tree.
     forces : AbstractJointLaws
-        Of its joints.
+        Laws of the joint forces.
     prescribed : AbstractJointLaws
-        Coordinates of driven joints; only their second derivatives count here.
+        Laws of the coordinates of driven joints; their second derivatives enter the equations.
     scale : array of shape (n,)
-        What counts as one in a coordinate: 1 rad, or the size of the robot.
+        Unit of each coordinate: 1 rad, or the size of the robot.
     length : float
         Size of the robot, m.
     wrenches : WrenchLaws
-        That act on its links.
+        Laws of the wrenches on links.
     """
 
     equations: TreeEquations
@@ -65,23 +66,23 @@ class RobotProblem(Module):
 
     @property
     def blind(self) -> bool:
-        """Whether nothing of it could be overlooked: no law changes."""
+        """Whether no law varies, so that a series cannot overlook anything."""
         return not (self.forces.changing or self.prescribed.changing or self.wrenches.changing)
 
     @property
     def smooth(self) -> bool:
-        """Whether its equations are sums and products of coordinates, rates, sines and cosines, with no jump."""
+        """Whether the equations consist of sums and products of coordinates, rates, sines and cosines only."""
         return self.blind and not (self.equations.drives and self.equations.tree.shape.rubbing)
 
     def motion(self, state: RobotState) -> TreeState:
-        """Return where all bodies are."""
+        """Return the motion of all bodies."""
         base = None
         if state.position is not None:
             base = free_base(state.position, state.quaternion, state.twist)
         return self.equations.motion(state.coordinates, state.rates, base)
 
     def applied(self, motion: TreeState, time: Float[Numbers, "1 batch"]) -> tuple[Unknowns, tuple[Any, ...]]:
-        """Return the forces and the wrenches in a state; what drives a joint is what it takes."""
+        """Return the joint forces and wrenches in a state; the forces of driven joints are zero, as they follow."""
         free = 1.0 - jnp.asarray(self.equations.driven)[:, None]
         forces = free * self.forces(time, motion.coordinates, motion.rates)
         pushes = self.wrenches(time[0], motion.coordinates, motion.rates)
@@ -104,11 +105,11 @@ class RobotProblem(Module):
         return motion_series(self.equations, motion, self.applied, *given, reversible=reversible, still=still)
 
     def made_for(self, exact: ExactNumbers) -> "RobotProblem":
-        """Return it with constants of a program in the place of some numbers."""
+        """Return the problem with exact numbers as constants of a program."""
         return with_fields(self, equations=exact.put(self.equations))
 
     def still(self, exact: ExactNumbers) -> ConstantEntries | None:
-        """Return what does not change in its motion if only some of its numbers are known; None where that fails."""
+        """Return the entries that stay constant in any motion, given only the exact numbers; None if that fails."""
         from jounce.execution.llvm.certain_numbers import certain_numbers
 
         known = with_fields(forms_of(self), equations=exact.known(self.equations))
@@ -149,13 +150,13 @@ class RobotProblem(Module):
         return coordinates[2:] * (numbers * (numbers + 1.0))[:, None, None]
 
     def departures(self, state: RobotState, rates: RobotState, time: Any) -> tuple[Any, Any]:
-        """Return by how much the equations give other accelerations than a path, and how large those are, in its sizes.
+        """Return the differences between accelerations of the equations and of a path, and the latter, both scaled.
 
-        Both of shape (n + 6 or n, batch).
+        Both have shape (n or n + 6, batch).
         """
         motion = self.motion(state)
         trial = Unknowns(rates.rates, rates.twist)
-        if self.prescribed.changing:  # what is prescribed is no matter of the equations
+        if self.prescribed.changing:  # prescribed accelerations do not follow from the equations
             driven = self._prescribed_accelerations(state, time, 0)[0]
             mask = jnp.asarray(self.equations.driven)[:, None]
             gap = mask * (driven - rates.rates)
@@ -176,36 +177,36 @@ class RobotProblem(Module):
 
 
 class RobotSteps(NamedTuple):
-    """Steps one after the other, as polynomials in the time from their beginnings, (steps, order + 1, n).
+    """Consecutive steps as polynomials in the time from their beginnings, (steps, order + 1, n).
 
-    While they are taken, there is a last axis of one.
+    While they are taken, there is an additional last axis of length one.
     """
 
     start: Float[Any, "steps *batch"]
     length: Float[Any, "steps *batch"]
     polynomial: RobotState
-    kink: Bool[Any, "steps *batch"]  # whether a jump lies in a step, which is too short to matter
+    kink: Bool[Any, "steps *batch"]  # whether the step is a negligibly short one over a jump
 
     @property
     def end(self) -> float:
-        """Where the last step ends, s."""
+        """End of the last step, s."""
         return float(self.start[-1] + self.length[-1])
 
 
 class Progress(NamedTuple):
-    """How far a run has come."""
+    """The current state of a run."""
 
     time: Lanes  # s, of shape (1,)
     state: RobotState
     outcome: Int[Numbers, ""]
-    stuck: Int[Numbers, ""]  # steps of no length one after the other
-    crossing: Int[Numbers, ""]  # steps over a jump one after the other
-    rest: Lanes  # what the time is greater by than that number, which is rounded, s
-    longest: Lanes  # step so far, s
+    stuck: Int[Numbers, ""]  # consecutive steps of negligible length
+    crossing: Int[Numbers, ""]  # consecutive steps over a jump
+    rest: Lanes  # rounding remainder of the time, to be added to it, s
+    longest: Lanes  # longest step so far, s
 
 
 def _departures(problem: RobotProblem, polynomial: RobotState, time: Any, since: Any, *, one_by_one: bool) -> Any:
-    """Return what `RobotProblem.departures` gives at places on a step, for all at once or one after another."""
+    """Return `RobotProblem.departures` at points of a step, all at once or one after another."""
 
     def at_points(since: Any) -> Any:
         state, rates = at(polynomial, since), rates_at(polynomial, since)
@@ -217,7 +218,7 @@ def _departures(problem: RobotProblem, polynomial: RobotState, time: Any, since:
 
 
 def _sizes(problem: RobotProblem, polynomial: RobotState) -> Any:
-    """Return the sizes of the coefficients of places from order one on, rad or sizes of the robot."""
+    """Return the sizes of the position coefficients from order one on, rad or sizes of the robot."""
     levels = len(polynomial.rates)
     numbers = jnp.arange(1.0, levels + 1)[:, None]
     scale = jnp.asarray(problem.scale)[None, :, None]
@@ -241,30 +242,30 @@ def march_robot(
     count: int,
     exact: ExactNumbers | None = None,
 ) -> tuple[Progress, tuple[RobotSteps, Bool[Numbers, "steps 1"]], Int[Numbers, ""]]:
-    """Take up to `count` steps toward a time.
+    """Take up to `count` steps of a run.
 
     Parameters
     ----------
     problem : RobotProblem
-        What moves the robot.
+        Equations and laws of the robot.
     current : Progress
-        Where to go on from.
+        State to continue from.
     limits : RunLimits
-        Where it goes, and in what steps.
+        End of the run, and bounds of its steps.
     order : int
-        Of the series.
+        Order of the series of accelerations.
     count : int
-        Steps to try at most.
+        Largest number of attempts.
     exact : ExactNumbers, optional
-        Of the robot, for which the program is made.
+        Exact numbers of the robot for which the program is compiled.
 
     Returns
     -------
     current : Progress
     steps : tuple of RobotSteps and array of bool, shape (steps, 1)
-        Steps tried, in the order of trial, and whether they were taken.
+        Attempted steps in their order, and whether they were taken.
     tried : int
-        How many of them there are.
+        Number of attempts.
     """
     problem, still = (problem, None) if exact is None else (problem.made_for(exact), problem.still(exact))
     stop, tolerance, longest, started = limits
@@ -275,10 +276,10 @@ def march_robot(
     one_by_one = problem.smooth and exact is not None and small
 
     def look(polynomial: RobotState, time: Any, step: Any, first: Any, usual: Any) -> tuple[Any, Any]:
-        """Return the error that a part of the places on a step shows, as part of what is allowed, and if it is finite.
+        """Return the error at some points of a step, relative to the allowed error, and whether all values are finite.
 
-        A velocity that is wrong goes on to the end of the run, so that jumps count by what they move until then. What
-        the equations miss at the beginning, where the series follows from them, is rounding.
+        A wrong velocity acts until the end of the run, so jumps count by the displacement until then. The residual at
+        the beginning, where the series satisfies the equations, is rounding.
         """
         shares = jnp.concatenate([jnp.zeros(1), (first + jnp.arange(1.0, points + 1)) / _point_count(step)])
         since = jnp.minimum(shares, 1.0) * step
@@ -294,9 +295,9 @@ def march_robot(
         return float(points) if problem.blind else jnp.maximum(RUN_POINTS * jnp.abs(step) / duration, points)
 
     def fits(polynomial: RobotState, time: Any, step: Any, usual: Any) -> tuple[Any, Any, Any]:
-        """Tell whether a step keeps to the equations all along, whether it is finite, and whether it leads over a jump.
+        """Return whether a step satisfies the equations throughout, is finite, and crosses a jump.
 
-        Nothing else shows on a step that hardly moves on.
+        On a step of negligible length, an error can only be a jump.
         """
 
         def further(carry: Any) -> Any:
@@ -317,7 +318,7 @@ def march_robot(
         sizes = _sizes(problem, whole)
         known = jnp.all(jnp.isfinite(sizes[:NEEDED]))
         sizes = jnp.where(jnp.isfinite(sizes), sizes, jnp.inf)
-        # beside a jump the upper terms are rounding, which grows: steps that it made shorter would never lead away
+        # beside a jump the upper terms are growing rounding: steps that these shorten would never leave the jump
         least, lasting = (HARMLESS, duration) if problem.smooth else (0.0, None)
         allowed = jnp.full(time.shape, jnp.maximum(tolerance, least))
         used, reach = furthest(sizes, allowed, UNUSUAL * current.longest, lasting)
@@ -336,7 +337,7 @@ def march_robot(
 
         def open_(carry: Any) -> Any:
             low, high, _ = carry
-            nearer = (high - low > NEAR * low) & (low < STEEP * usual)  # to a jump; what is only steep is seen better
+            nearer = (high - low > NEAR * low) & (low < STEEP * usual)  # to a jump; steep forces need none
             return jnp.where(low > 0, (low < high) & nearer, high > 0.25 * shortest)
 
         good, _, over = fits(polynomial, time[0], direction * step, usual)
@@ -350,7 +351,7 @@ def march_robot(
         short = (step < SHORT * wished) & ~last
         stuck = steps_counted(current.stuck, step, duration, longest=STUCK_STEP)
         moves = known & (low > 0) & (stuck < STUCK)
-        # no number at the very end of a step over a jump
+        # the value at the very end of a step over a jump is not finite
         again = known & (low == 0.0) & (stuck < STUCK) & (current.crossing < AGAIN)
         outcome = jnp.where(last, int(Outcome.ARRIVED), int(Outcome.RUNNING))
         failed = jnp.where(again, int(Outcome.RUNNING), jnp.where(known, int(Outcome.COLLAPSED), int(Outcome.LOST)))

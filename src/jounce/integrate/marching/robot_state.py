@@ -1,4 +1,4 @@
-"""Where a robot is and how it moves, as numbers and as polynomials in time."""
+"""The state of a robot, as numbers and as polynomials in time."""
 
 from collections.abc import Mapping
 from typing import Any, NamedTuple
@@ -16,14 +16,14 @@ from jounce.robot.robot import Robot
 
 
 class RobotState(NamedTuple):
-    """Where a robot is and how it moves, or the coefficients of that, order first; the batch is last.
+    """Positions and velocities of a robot, or their coefficients, order first; the batch is last.
 
     Attributes
     ----------
     coordinates, rates : array of shape (n, batch)
         rad or m, and by s.
     position, quaternion, twist : array of shape (3 or 4 or 6, batch), or None
-        Of a free base, as in `BaseMotion`.
+        Pose and twist of a free base, as in `BaseMotion`.
     """
 
     coordinates: Any
@@ -34,17 +34,17 @@ class RobotState(NamedTuple):
 
 
 def start_levels(robot: Robot, state: Any) -> Any:
-    """Return the coordinates and rates at the start, (2, n): at rest at zero unless given; JAX may trace them.
+    """Return the coordinates and rates at the start, (2, n), by default at rest at zero; JAX may trace them.
 
     Raises
     ------
     RobotError
-        If there is no joint of a name, or they are not finite or of another shape.
+        If a name is not that of a joint, or the values are not finite or have another shape.
     """
     names = robot.joint_names
     if isinstance(state, Mapping):
         known = {name: 0.0 if is_traced(x) else x for name, x in state.items()}
-        q = robot.coordinates(**known)  # which checks them
+        q = robot.coordinates(**known)  # checks the names and values
         state = [[state.get(name, x) for name, x in zip(names, q, strict=True)], np.zeros(len(names))]
     shape = 2, len(names)
     if is_traced(state):
@@ -56,12 +56,12 @@ def start_levels(robot: Robot, state: Any) -> Any:
 
 
 def polynomial_of(series: MotionSeries) -> RobotState:
-    """Return the coefficients of a series as those of a state."""
+    """Return the coefficients of a motion series as a state."""
     return RobotState(series.coordinates, series.rates, series.position, series.quaternion, series.twist)
 
 
 def at(polynomial: RobotState, since: Lanes) -> RobotState:
-    """Return the values of polynomials, with a quaternion of unit length, at times from their beginnings."""
+    """Return the values of polynomials, with a normalized quaternion, at times from their beginnings."""
     state = jax.tree.map(lambda c: _value(c, since), polynomial)
     if state.quaternion is None:
         return state
@@ -78,7 +78,7 @@ def rates_at(polynomial: RobotState, since: Lanes) -> RobotState:
 
 
 def _value(coefficients: Any, since: Any) -> Any:
-    """Return values of polynomials by a loop over the orders: what is compiled is to stay small."""
+    """Return values of polynomials by a loop over the orders, which keeps the compiled code small."""
     count = len(coefficients)
     shape = (coefficients.shape[1], jnp.broadcast_shapes(coefficients.shape[2:], since.shape)[0])
 

@@ -1,4 +1,4 @@
-"""A run of a simulation: its steps, the events in them, and how it ends."""
+"""A run of a simulation: its steps, their events, and its end."""
 
 import abc
 from collections.abc import Callable, Sequence
@@ -17,29 +17,29 @@ FAILED = Outcome.COLLAPSED, Outcome.LOST, Outcome.UNBALANCED
 
 
 class AbstractRun(abc.ABC):
-    """One run: its steps so far, the events in them, and how it ended.
+    """One run: its steps so far, their events, and its end.
 
     Parameters
     ----------
     current : IntegratorState or Progress
-        Where it begins.
+        Initial state.
     limits : RunLimits
-        Where it goes, and in what steps.
+        End of the run, and bounds of its steps.
     detectors : sequence of AbstractDetector
-        Of the events that are looked for.
+        Detectors of the requested events.
 
     Attributes
     ----------
     current : IntegratorState or Progress
-        Where it has come to.
+        Current state.
     happened : list of list of float
-        For each event the times at which it happened, s.
+        For each event, the times at which it happened, s.
     stopped_at : float or None
-        When a terminal event ended the run, s.
+        Time of the terminal event that ended the run, s.
     ending : tuple of Status and str
-        Why steps did not go on, and where to look.
+        Reason why the steps ended, and a hint where to look.
     backends : set of str
-        What has computed.
+        Backends that took the steps.
     """
 
     def __init__(self, current: Any, limits: RunLimits, detectors: Sequence[AbstractDetector]):
@@ -53,15 +53,15 @@ class AbstractRun(abc.ABC):
 
     @abc.abstractmethod
     def attempted(self) -> tuple[Any, tuple[Any, Any], Any]:
-        """Return where some attempts at a step lead, the steps and whether they were taken, and how many there were."""
+        """Return the state after some attempts, the attempted steps and whether they were taken, and their number."""
 
     @abc.abstractmethod
     def initial_step(self) -> Any:
-        """Return the start as a step of no length."""
+        """Return the start as a step of zero length."""
 
     @abc.abstractmethod
     def explained(self) -> tuple[Status, str]:
-        """Return why steps did not go on, and where to look."""
+        """Return the reason why the steps ended, and a hint where to look."""
 
     @property
     def steps(self) -> Any:
@@ -69,7 +69,7 @@ class AbstractRun(abc.ABC):
         return jax.tree.map(lambda *parts: np.concatenate(parts), *self.parts)
 
     def go(self, instants: np.ndarray, progress: Callable[[int, int], None] | None) -> None:
-        """March from the first to the last instant."""
+        """Take steps until the run ends, with a report of progress."""
         while self.current.outcome.item() in GOING and self.stopped_at is None:
             if (part := self._march()) is not None:
                 self.parts.append(self._until_stopped(part))
@@ -82,18 +82,18 @@ class AbstractRun(abc.ABC):
             self.ending = self.explained()
 
     def _march(self) -> Any:
-        """Go on by some steps, and return those that were taken; None if there are none."""
+        """Attempt some steps, and return those that were taken; None if there are none."""
         self.current, (steps, taken), count = self.attempted()
         self.backends.add(backend_of(steps))
         taken = np.asarray(taken)[: int(count), 0]
         if not taken.any():
             return None
-        # a view, unless some were refused: they are joined, and so copied, at the end
+        # a view, unless some were refused; the steps are joined, and so copied, at the end
         chosen = slice(len(taken)) if taken.all() else np.flatnonzero(taken)
         return jax.tree.map(lambda x: np.asarray(x)[chosen, ..., 0], steps)
 
     def _until_stopped(self, part: Any) -> Any:
-        """Note the events in some steps; return those up to the first that is terminal, the last step cut there."""
+        """Record the events in some steps, and return the steps up to the first terminal event, the last one cut."""
         events = [
             (step, after, which)
             for which, detector in enumerate(self.detectors)

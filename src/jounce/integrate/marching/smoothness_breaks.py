@@ -1,7 +1,7 @@
-"""Where the series of one step of a simulation do not go on as those of the next: kinks and jumps of forces and laws.
+"""Kinks and jumps of forces and laws, found where the series of a step does not continue that of the previous step.
 
-On either side of a kink of a force the motion is analytic, and the accelerations of both sides agree where the kink is.
-So it is found, to rounding, from the series of the step that goes over it and of the next.
+On either side of a kink of a force the motion is analytic, and the accelerations of both sides agree at the kink. The
+instant of the kink therefore follows, to rounding, from the series of the step over it and of the next step.
 """
 
 import math
@@ -14,13 +14,13 @@ from numpy.polynomial.polynomial import polyder, polyval
 from jounce.integrate.marching.marching import DenseOutput
 
 SLIGHT = 1e-12  # of accelerations: rounding
-FAINT = 1e-9  # of velocities, accelerations and jerks: a difference below does not count
-PLAIN = 1e-3  # of jerks: so much differs where the steps themselves saw no kink, as one may begin exactly at it
-ASIDE = 1e-3  # of a step: a kink lies so near to where it is found, at least
-ALIKE = 0.1  # of a difference: it stays the same all along a step that goes over a kink or a jump, but for this
-LAST = 4  # terms of a series that tell what it leaves out
-BEYOND = 100.0  # times these
-ROUNDS = 3
+FAINT = 1e-9  # of velocities, accelerations and jerks: a smaller difference does not count
+PLAIN = 1e-3  # of jerks: least difference at a kink that no step noted, because a step begins exactly at it
+ASIDE = 1e-3  # of a step: largest error of the instant of a kink
+ALIKE = 0.1  # of a difference: its largest variation along a step over a kink or a jump
+LAST = 4  # terms of a series that estimate its truncation error
+BEYOND = 100.0  # times these terms: a larger difference is a jump
+ROUNDS = 3  # Newton iterations
 
 
 Terms = Float[np.ndarray, "order part"]
@@ -35,13 +35,13 @@ class Break(NamedTuple):
     step : int
         Number of the step that goes over it.
     order : int
-        The lowest time derivative of places that jumps: 1 for a kink of a motion law, 2 for a jump of a force, 3 for
-        its kink.
+        The lowest time derivative of positions that jumps: 1 for a kink of a motion law, 2 for a jump of a force, 3 for
+        a kink of a force.
     since : float
-        When it is, from the beginning of the step, s; its end where forces or laws jump.
+        Time from the beginning of the step, s; the end of the step for jumps of forces or laws.
     velocity, spin : array of shape (components, bodies)
-        Weights for the difference of accelerations before and after; their sum with them grows as time does, by one
-        each second, and vanishes at the kink.
+        Weights of the difference of accelerations before and after the kink; the weighted sum has the slope 1/s in time
+        and vanishes at the kink.
     """
 
     step: int
@@ -52,7 +52,7 @@ class Break(NamedTuple):
 
 
 def breaks(dense: DenseOutput, length: float) -> list[Break]:
-    """Return the kinks and jumps that steps go over, or begin and end at.
+    """Return the kinks and jumps within steps, or between them.
 
     Parameters
     ----------
@@ -80,7 +80,7 @@ def breaks(dense: DenseOutput, length: float) -> list[Break]:
 def _jerk_jumps(
     series: Float[np.ndarray, "step order part"], length: Float[np.ndarray, " step"], largest: float
 ) -> Bool[np.ndarray, " step-1"]:
-    """Tell of all steps but the last whether the jerk at their end is plainly another than that of the next."""
+    """Return for all steps but the last whether the jerk at the end clearly differs from that of the next step."""
     orders = np.arange(2, series.shape[1])
     with np.errstate(all="ignore"):
         factors = orders * (orders - 1) * np.asarray(length)[:-1, None] ** (orders - 2)
@@ -91,9 +91,10 @@ def _jerk_jumps(
 def _between(
     before: Terms, after: Terms, over: float, noted: bool, largest: list[float]
 ) -> tuple[int, float, Float[np.ndarray, " part"]]:
-    """Return the lowest derivative that jumps from one step to the next or 0, when, and the weights of a kink.
+    """Return the lowest derivative that jumps from one step to the next or 0, its time, and the weights of a kink.
 
-    Steps that are `noted` go over something. `largest` are the sizes of the first coefficients in the whole run.
+    A step is `noted` if the lookahead found it to cross a kink or jump. `largest` has the largest sizes of the first
+    coefficients in the whole run.
     """
     none = np.zeros(before.shape[1])
     if not (over and np.isfinite(before).all() and np.isfinite(after).all()):
@@ -103,7 +104,7 @@ def _between(
         return _derivative(before, since, level) - _derivative(after, since - over, level)
 
     def stays(level: int) -> bool:
-        """Tell a jump from the foot of a pulse, that begins within the step."""
+        """Return whether the difference is constant along the step, as at a jump but not at the foot of a pulse."""
         there = gap(over, level)
         return bool(np.abs(gap(0.0, level) - there).max() <= ALIKE * np.abs(there).max())
 
@@ -123,7 +124,7 @@ def _between(
         size = math.sqrt(square)
         rest = ASIDE * size * abs(over) + BEYOND * SLIGHT * sizes[1]
         aside = ASIDE if noted else SLIGHT
-        low = -aside if noted else 1.0 - aside  # where the steps saw nothing, a kink can be between them alone
+        low = -aside if noted else 1.0 - aside  # an unnoted kink can only be between steps
         within = low <= since / over <= 1.0 + aside and np.abs(gap(since, order - 2)).max() <= rest
         within = within and np.abs(gap(since, order - 1) - bend).max() <= ALIKE * size
         plain = size * abs(over) > SLIGHT * largest[1] and differ(2, FAINT * sizes[2] if noted else PLAIN * largest[2])
@@ -137,7 +138,7 @@ def _between(
 
 
 def _left_out(series: Terms, since: float, level: int) -> float:
-    """Return the size of the last terms of a derivative of a series, which tell what it leaves out."""
+    """Return the size of the last terms of a derivative of a series, as an estimate of the truncation error."""
     orders = np.flatnonzero(np.abs(series).max(axis=1))[-LAST:]
     orders = orders[orders >= max(level, len(series) // 2)]
     factors = np.array([math.perm(int(k), level) for k in orders], float)
@@ -146,5 +147,5 @@ def _left_out(series: Terms, since: float, level: int) -> float:
 
 
 def _derivative(series: Terms, since: float, level: int) -> Float[np.ndarray, " part"]:
-    """Return a derivative of series at a time from where they begin."""
+    """Return a derivative of series at a time from their beginning."""
     return np.asarray(polyval(since, polyder(series, level)))

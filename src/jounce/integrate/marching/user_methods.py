@@ -1,4 +1,4 @@
-"""Integration methods of users: what they compute is read off when a run begins."""
+"""User-defined integration methods, identified by the programs that they trace to when a run begins."""
 
 from collections.abc import Callable
 from typing import Any
@@ -16,19 +16,19 @@ METHODS = ("prepared", "longest_step", "arrive", "polynomial", "error", "expansi
 
 
 def _of_method(name: str) -> Callable[..., Any]:
-    """Return a method that calls the one of this name of the user's."""
+    """Return a method that calls the user's method of this name."""
     return lambda self, *arguments: getattr(self.method, name)(*arguments)
 
 
 class ReadIntegrator(AbstractMethod):
-    """A method of a user, identified by what it computes.
+    """A user-defined integration method, identified by its traced program.
 
     Parameters
     ----------
     method : AbstractMethod
-        As the user wrote it.
+        The user's method.
     key : tuple
-        Of what it computes, with all its numbers.
+        Key of its traced program, with all constants.
     """
 
     method: AbstractMethod
@@ -43,7 +43,7 @@ class ReadIntegrator(AbstractMethod):
 
 
 def integrator(method: AbstractMethod, equations: Equations, current: IntegratorState) -> AbstractMethod:
-    """Return a method for a run that begins in a state: one of a user as what it computes now."""
+    """Return a method for a run that begins in a state; a user-defined method is identified by its current program."""
     kind = type(method)
     if all(belongs_to_package(getattr(kind, name)) for name in METHODS) and not changes_parts(kind, (AbstractMethod,)):
         return method

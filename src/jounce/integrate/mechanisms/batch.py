@@ -1,4 +1,4 @@
-"""Many simulations of one mechanism side by side: initial conditions, masses, forces and lengths by parameters."""
+"""Many simulations of one mechanism side by side, with different parameters."""
 
 import functools
 from collections.abc import Mapping
@@ -53,8 +53,8 @@ from jounce.mechanism.transmissions.axis_angles import measures_angle, raw_angle
 from jounce.mechanism.transmissions.turn_counting import counted_along
 from jounce.robot.robot import Robot
 
-LANES = 128  # runs marched in one call: more take memory, of fewer Python takes longer
-STEPS = 16  # tried before runs that have ended make room for others
+LANES = 128  # runs advanced in one call: more need memory, fewer more time in Python
+STEPS = 16  # attempts before runs that have ended make room for others
 
 
 @of_traced_robots(traced_robot_batch)
@@ -72,32 +72,32 @@ def simulate_batch(
 ) -> Batch:
     """Return many simulations of a mechanism that differ in its parameters, or of a robot, computed side by side.
 
-    Initial conditions differ where their laws have parameters. What is compiled serves all runs.
+    Initial conditions differ if their laws have parameters. The programs are compiled once for all runs.
 
     Parameters
     ----------
     mechanism : Mechanism or Robot
         As for `simulate`.
     parameters : dict of str to array_like of shape (runs,), or pandas.DataFrame
-        Values of some parameters in each run, SI; of a table, by the names of its columns. Runs of a robot differ in
-        coordinates at the start, by the name of the joint, in velocities there, ``JOINT.rate``, and in masses,
-        ``LINK.mass``, which leave the moments about the center of mass as they are.
+        Values of some parameters in each run, SI; the columns of a table are parameters. For a robot: coordinates at
+        the start, by the name of the joint; velocities at the start, ``JOINT.rate``; and masses, ``LINK.mass``, with
+        unchanged moments about the center of mass.
     time, order, method, tolerance, longest_step
-        As for `simulate`; each run has steps of its own.
+        As for `simulate`; each run has its own steps.
     **robot
-        Of a robot only, and alike in all runs: as for `simulate`, but for ``base``. What ``state`` gives holds for
-        joints that the runs do not differ in.
+        For robots, the same in all runs: as for `simulate`, except ``base``. The ``state`` applies to joints that the
+        parameters do not name.
 
     Returns
     -------
     Batch
-        A run that fails does not stop the others: `status` says so. Of a robot of which JAX traces parameters, the
-        ``state`` or inertias, ``outputs`` are arrays of JAX, which have derivatives; a run that fails raises.
+        A run that fails does not stop the others, but has a `status`. If JAX traces parameters, ``state`` or inertias
+        of a robot, ``outputs`` are JAX arrays with derivatives, and a run that fails raises an error.
 
     Raises
     ------
     JounceError
-        If a parameter does not exist, or values are not finite or of unequal number; and as `simulate`.
+        If a parameter does not exist, values are not finite, or their numbers differ; and as for `simulate`.
 
     Examples
     --------
@@ -141,7 +141,7 @@ def simulate_batch(
         runs.start_runs(some, *starts.of(some))
 
     first_chunk, *others = runs.chunks(np.arange(len(rows)))
-    start_runs(first_chunk)  # which makes room for all runs
+    start_runs(first_chunk)  # allocates the arrays for all runs
     with Threads(thread_count()) as pool:
         list(pool.map(start_runs, others))
         while len(runs.moving):
@@ -153,9 +153,9 @@ def simulate_batch(
 
 
 class _Runs:
-    """The runs of a batch on their way; those that still move are marched side by side, however far they are.
+    """The runs of a batch; those that have not ended are advanced side by side, each at its own time.
 
-    Only outputs at the requested instants are stored, not the steps: derivatives there follow from the equations of
+    Only outputs at the requested instants are stored, not the steps; their derivatives follow from the equations of
     motion.
     """
 
@@ -175,18 +175,18 @@ class _Runs:
         self._made = parametric.of(rows)
         self._reached = np.zeros((len(rows), len(instants)), bool)
         self._direction = np.sign(limits.stop - limits.start)
-        self._expansion = max(derivatives_of_motion(parametric.mechanism, order), 2)  # two, by which turns are counted
+        self._expansion = max(derivatives_of_motion(parametric.mechanism, order), 2)  # 2 for the count of revolutions
         self._current: Any = None
         self._values: dict[int, np.ndarray] = {}  # of each group, (runs, time, order + 1, components, outputs)
-        self._begun = np.full(len(rows), instants[0])  # the time at which the last step began
-        self._angles: dict[int, np.ndarray] = {}  # the series of turning outputs there
+        self._begun = np.full(len(rows), instants[0])  # start of the last step
+        self._angles: dict[int, np.ndarray] = {}  # series of turning outputs at that time
         outputs = parametric.model.system.outputs
         self._measuring = [which for which, group in enumerate(outputs) if measures_angle(group)]
-        self._turns: dict[int, np.ndarray] = {}  # angles about axes where the last step ended, (instances, runs)
+        self._turns: dict[int, np.ndarray] = {}  # angles about axes at the end of the last step, (instances, runs)
 
     @property
     def moving(self) -> np.ndarray:
-        """The runs that are still on their way."""
+        """The runs that have not ended."""
         return np.flatnonzero(np.isin(self._current.outcome, MOVING))
 
     @property
@@ -217,7 +217,7 @@ class _Runs:
         return [runs[np.minimum(np.arange(k, k + self.width), len(runs) - 1)] for k in range(0, len(runs), self.width)]
 
     def start_runs(self, runs: np.ndarray, state: State, of_forces: Turns, of_outputs: Turns) -> None:
-        """Set runs off from states on the constraints, with the turns that angles about axes have there."""
+        """Start runs from states on the constraints, with given revolutions of angles about axes."""
         equations, time = self._made.at(runs)[0].near(of_forces), np.full(len(runs), self.instants[0])
         current = unexpanded(equations, state, time, order=self.method.expansion_order(float(self.limits.tolerance)))
         current, begun = jax.tree.map(np.asarray, current), dict(zip(self._measuring, of_outputs, strict=True))
@@ -230,7 +230,7 @@ class _Runs:
         self._note(runs, np.zeros(len(runs), int), current.expansion.state, time, current.angles, begun)
 
     def advance(self, runs: np.ndarray) -> None:
-        """March runs by some steps, and note what they pass."""
+        """Advance runs by some steps, and store their outputs at the instants that they pass."""
         current = jax.tree.map(lambda x: x[..., runs], self._current)
         method = integrator(self.method, self._made.at(runs)[0], current)
         shared, how = (RunLimits(*map(np.asarray, self.limits)),), {"method": method, "steps": STEPS}
@@ -264,7 +264,7 @@ class _Runs:
             whole[..., runs] = part
 
     def _counted(self, runs: np.ndarray, steps: DenseOutput) -> dict[int, np.ndarray]:
-        """Return the series of turning outputs where steps begin, turns counted on, steps and runs last."""
+        """Return the series of turning outputs at the starts of steps, revolutions counted; steps and runs last."""
         counted = {}
         time = np.concatenate([self._begun[runs][None], steps.start])
         self._begun[runs] = time[-1]
@@ -289,9 +289,9 @@ class _Runs:
         taken: np.ndarray,
         positions: tuple[np.ndarray, np.ndarray, np.ndarray],
     ) -> dict[int, np.ndarray]:
-        """Return angles about axes near positions, (instances, positions) for each group of outputs, and count them on.
+        """Return angles about axes near positions, (instances, positions) for each group of outputs; update the counts.
 
-        The positions are given by step, lane and share of the step.
+        Positions are given by step, lane and share of the step.
         """
         lane, step = np.nonzero(taken.T)
         if not lane.size:
@@ -322,10 +322,10 @@ class _Runs:
         angles: tuple[np.ndarray, ...],
         before: dict[int, np.ndarray],
     ) -> None:
-        """Keep the outputs of runs at instants, given by number, a time into steps that began at others.
+        """Store the outputs of runs at instants, given by index, from the polynomials of steps and their starts.
 
-        What forces measure where the steps begin is known, and so are the series of turning outputs there, but at the
-        start, and angles about axes near the instants.
+        `angles` are those that forces measure at the starts. `before` has the series of turning outputs at the starts,
+        except at the initial instant, and the angles about axes near the instants.
         """
         for lanes in self.chunks(np.arange(len(runs))):
             turned_by = tuple(angle[:, lanes] for angle in angles)
@@ -347,14 +347,14 @@ class _Runs:
 
 
 def turned(before: np.ndarray, after: np.ndarray, since: np.ndarray) -> np.ndarray:
-    """Return the whole turns, in rad, by which an angle is too far ahead of an earlier one and of its derivatives.
+    """Return the whole revolutions, in rad, to subtract from an angle to continue an earlier one.
 
     Parameters
     ----------
     before, after : array of shape (order + 1, ...)
         Taylor coefficients of the angle, to the second at least; where `before` is NaN, no turns are counted.
     since : array
-        Time from the one to the other, s.
+        Time from the earlier to the later angle, s.
     """
     rise = since / 2 * (before[1] + after[1]) + since**2 / 6 * (before[2] - after[2])
     return np.nan_to_num(whole_periods(after[0] - before[0] - rise))

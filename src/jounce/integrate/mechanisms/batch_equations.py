@@ -1,4 +1,4 @@
-"""One mechanism with many values of its parameters: the equations of motion and the starts of all runs of a batch."""
+"""The equations of motion and the initial states of all runs of a batch, from values of parameters."""
 
 import dataclasses
 from collections.abc import Sequence
@@ -31,25 +31,25 @@ from jounce.mechanism.building.starting_guess import starting_guess
 from jounce.mechanism.system import POSITION_COMPONENTS
 from jounce.mechanism.transmissions.axis_angles import measures_angle, raw_angles
 
-STAGES = 8  # in which parameters go from those of the first run to their own, so that positions follow
-LARGEST_STAGE = 0.5  # rad, by which a driver may turn in a stage: angles about axes count their turns on the way
+STAGES = 8  # of the continuation in the parameters from those of the first run
+LARGEST_STAGE = 0.5  # rad, of a driver in a stage, so that revolutions of angles about axes can be counted
 
 
 Turns = tuple[Float[np.ndarray, "instance run"], ...]
-"""Angles about axes with their turns, rad, for each group that measures some."""
+"""Angles about axes with their revolutions, rad, for each group that measures them."""
 
 
 class ParametricMechanism:
-    """A mechanism whose values follow from parameters: those that do have one entry for each run, last.
+    """A mechanism with values for each run, last, where these depend on parameters.
 
     Parameters
     ----------
     mechanism : Mechanism
-        With the values of one run.
+        Mechanism with the values of one run.
     model : Model
-        Built from it.
+        Model built from it.
     names : tuple of str
-        Parameters in which the runs differ.
+        Parameters that differ between runs.
     """
 
     def __init__(self, mechanism: Mechanism, model: Model, names: tuple[str, ...]):
@@ -64,7 +64,7 @@ class ParametricMechanism:
         return Equations(system, masses, gravity, self.scale, model.pose_type, self.saddle), model.system.outputs
 
     def of(self, rows: np.ndarray) -> VariedTree:
-        """Return equations of motion and outputs for values of the parameters, (runs, parameters), a lane for each."""
+        """Return equations of motion and outputs for parameters, (runs, parameters), with one lane for each run."""
         if self._has_values_of_guess() and self.guesses_differ(rows):
             return VariedTree.joined([self._of_one_run(row) for row in rows.tolist()], self._nominal)
 
@@ -75,24 +75,24 @@ class ParametricMechanism:
         return VariedTree.traced(made, rows, self._nominal)
 
     def _of_one_run(self, row: Sequence[float]) -> tuple[Equations, Any]:
-        """Return those of one run, with values that follow from its own starting guess."""
+        """Return equations and outputs of one run, with values that follow from its own starting guess."""
         varied = self.varied(row)
         system = dataclasses.replace(self.model.system, groups=build(varied).system.groups)
         return self._made(varied, build(varied, like=dataclasses.replace(self.model, system=system)))
 
     def varied(self, row: Any) -> Mechanism:
-        """Return the mechanism with values of the parameters in which the runs differ."""
+        """Return the mechanism with the parameters of one run."""
         return self.mechanism.with_parameters(**dict(zip(self.names, row, strict=True)))
 
     def guesses_differ(self, rows: np.ndarray) -> bool:
-        """Tell whether the starting guess of the bodies depends on what the runs differ in."""
+        """Return whether the starting guess of the bodies differs between runs."""
         components = POSITION_COMPONENTS[self.mechanism.space]
         guesses = (starting_guess(m, m.parameter_values, components) for m in map(self.varied, rows.tolist()))
         first = jax.tree.leaves(next(guesses))
         return any(not np.array_equal(a, b) for g in guesses for a, b in zip(jax.tree.leaves(g), first, strict=True))
 
     def _has_values_of_guess(self) -> bool:
-        """Tell whether the offset of a joint, or the sign of its Euler parameters, follows from the starting guess."""
+        """Return whether the starting guess determines the offset of a joint, or the sign of its Euler parameters."""
         joints = self.mechanism.joints.values()
         offset = any("offset" in value_fields(type(j)) and getattr(j, "offset", 0.0) is None for j in joints)
         return offset or any(hasattr(j, "sense") for j in joints)
@@ -101,10 +101,10 @@ class ParametricMechanism:
 def mapped_runs(
     function: Mapped, made: VariedTree, runs: np.ndarray, shared: tuple[Any, ...], lanes: tuple[Any, ...], **static: Any
 ) -> tuple[Any, str]:
-    """Return what a function gives for some runs, and the name of what computes it.
+    """Return the result of a function for some runs, and the name of its backend.
 
-    What `ParametricMechanism.of` returned for all runs is the first thing that they share, and what each has of its
-    own the first of its lane, as `of_design` takes it.
+    The function receives the shared values of `made`, from `ParametricMechanism.of`, before `shared`, and the values of
+    each run before `lanes`, as for `of_design`.
     """
     shared, lanes = (made.at(runs[:1]), *shared), (made.own(runs), *lanes)
     program = function.program(shared, lanes, large=LARGE, **static)
@@ -112,21 +112,20 @@ def mapped_runs(
 
 
 class BatchStart:
-    """Consistent states of runs at the start: positions followed from those of the first run, least velocities.
+    """Consistent initial states of runs: positions by continuation from the first run, and least velocities.
 
-    Where the starting guess of bodies that are free to move differs, there is no such way, and each run is assembled
-    from its own guess.
+    If bodies are free to move and their starting guess differs, each run is assembled from its own guess instead.
 
     Parameters
     ----------
     parametric : ParametricMechanism
-        Of the runs.
+        The mechanism of the runs.
     begun : ParametricMechanism
-        With the initial conditions as drivers.
+        The same with the initial conditions as drivers.
     state : State
-        Of the first run.
+        Initial state of the first run.
     rows : array of shape (runs, parameters)
-        The parameters of all.
+        Parameters of all runs.
     instant : float
         s.
     """
@@ -140,7 +139,7 @@ class BatchStart:
         instant: float,
     ):
         self._parametric, self._state, self._rows, self._instant = parametric, state, rows, instant
-        self.failed: dict[int, Status] = {}  # runs that have no start, and why
+        self.failed: dict[int, Status] = {}  # runs without an initial state, with the reason
         self._made, self._stages = parametric.of(rows), list[VariedTree]()
         equations, coordinates = begun.model.system.shape
         rank = begun.model.system.rank
@@ -152,7 +151,7 @@ class BatchStart:
         self._stages = [begun.of(rows[0] + stage * change) for stage in range(1, count)] + [last]
 
     def _turned(self, equations: Equations, count: int) -> float:
-        """Return by how much drivers of angles about axes turn from the first run to another at most, rad."""
+        """Return the largest difference of drivers of angles about axes between the first run and any other, rad."""
         clock, largest = Jet([np.full((1, 1), self._instant)]), 0.0
         for group in filter(measures_angle, equations.system.groups):
             law = np.asarray(group.element.motion(clock).coefficients[0])
@@ -161,7 +160,7 @@ class BatchStart:
         return largest if np.isfinite(largest) else 0.0
 
     def of(self, runs: np.ndarray) -> tuple[State, Turns, Turns]:
-        """Return the states of some runs, and the angles about axes that forces and outputs measure there."""
+        """Return the initial states of some runs, and the angles about axes that forces and outputs measure."""
         equations, outputs = self._made.at(runs)
         measuring = [group for group in (*equations.system.forces, *outputs) if measures_angle(group)]
         angles = [np.broadcast_to(group.element.datum.near, (group.instances, len(runs))) for group in measuring]
@@ -181,7 +180,7 @@ class BatchStart:
         return start
 
     def _put_one(self, starts: tuple[State, Turns, Turns], lanes: Bool[np.ndarray, " lane"], run: int) -> None:
-        """Put a run to which no way from the first leads together from its own guess; NaN where that fails."""
+        """Set the initial state of a run that continuation did not reach, from its own guess; NaN if that fails."""
         try:
             start = consistent_start(self._parametric.varied(self._rows[run].tolist()), self._instant)
         except JounceError as error:
@@ -198,14 +197,14 @@ class BatchStart:
 
 @mapped(widths=(FEW_RUNS, MANY_RUNS))
 def followed(shared: tuple[Any, Any], lanes: tuple[dict[int, Any], State]) -> tuple[State, Any]:
-    """Return states on the constraints with least velocities, and which of them could be put there.
+    """Return states on the constraints with least velocities, and whether each was reached.
 
     Parameters
     ----------
     shared : tuple
-        Equations, alone or first of others; and the instant, s.
+        Equations, or a tuple that begins with them; and the instant, s.
     lanes : tuple
-        Of each run: its `own` values, as `of_design` has them, and a state nearby.
+        For each run: its `own` values, as for `of_design`, and a state nearby.
     """
     (values, instant), (own, state) = shared, lanes
     equations, *_ = of_design(values, own)
@@ -229,9 +228,9 @@ def outputs_of_runs(
     shared : tuple
         Equations and outputs.
     lanes : tuple
-        Of each run: its `own` values, as `of_design` has them, and what `expanded` takes.
+        For each run: its `own` values, as for `of_design`, and the lanes of `expanded`.
     order
-        As `expanded` has it.
+        As for `expanded`.
     """
     (values,), (own, motion) = shared, lanes
     *_, series = expanded.function(of_design(values, own), motion, order)

@@ -25,27 +25,27 @@ from jounce.mechanism.transmissions.axis_angles import measures_angle
 def ode_term(mechanism: Mechanism, time: float = 0.0) -> "OrdinaryEquation":
     """Return the equations of motion of a mechanism as ``y' = f(t, y, args)``, for the solvers of diffrax.
 
-    Accelerations come from the same matrix as in `simulate`, but nothing puts the bodies back onto the constraints:
-    they drift off as far as the tolerance of the solver lets them. The extra ``jounce[integrators]`` has diffrax.
+    Accelerations come from the same matrix as in `simulate`, but without projection: bodies drift off the constraints
+    within the tolerance of the solver. The extra ``jounce[integrators]`` installs diffrax.
 
     Parameters
     ----------
     mechanism : Mechanism
-        With masses; its `initial` conditions give the start.
+        Mechanism with masses; its `initial` conditions determine the initial state.
     time : float, default 0
         The start, s.
 
     Returns
     -------
     OrdinaryEquation
-        The term, the state to start from, and how to read what a solver gives.
+        The term, the initial state, and a method that converts the result of a solver.
 
     Raises
     ------
     MechanismError
         If diffrax is not installed, or the mechanism is not valid.
     AssemblyError, MobilityError
-        As `simulate` does.
+        As for `simulate`.
 
     Examples
     --------
@@ -84,14 +84,14 @@ def ode_term(mechanism: Mechanism, time: float = 0.0) -> "OrdinaryEquation":
 
 
 class CountedState(NamedTuple):
-    """A state with the angles about axes that forces measure: positions tell them up to whole turns.
+    """A state with the angles about axes that forces measure, since positions give them only up to whole revolutions.
 
     Attributes
     ----------
     position, attitude, velocity, spin : array of shape (components, bodies)
         As in `State`.
     angles : tuple of array of shape (instances,)
-        rad; carried along by their rates, they need to be right to within half a turn only.
+        rad; integrated from their rates, they need only be right to within half a turn.
     """
 
     position: Numbers
@@ -108,13 +108,15 @@ class OrdinaryEquation:
     Parameters
     ----------
     term : diffrax.ODETerm
-        Its `args` are the equations of motion.
+        Term whose `args` are the equations of motion.
     state : State or CountedState
-        To start from: arrays of shape (components, bodies); with angles where forces in space measure some.
+        Initial state: arrays of shape (components, bodies), with angles if forces in space measure them.
     equations : Equations
-        To pass as ``args``: a pytree of masses, lengths and the rest, to differentiate by or to change.
+        To pass as ``args``: a pytree of masses, lengths and other values, which can be changed or differentiated by.
     mechanism : Mechanism
-        What was given.
+        The mechanism.
+    start : ConsistentStart
+        The mechanism with its consistent initial state.
     """
 
     term: Any
@@ -124,9 +126,9 @@ class OrdinaryEquation:
     start: ConsistentStart
 
     def motion(self, time: ArrayLike, states: State | CountedState, order: int = 4) -> Simulation:
-        """Return what a solver gives at instants as a motion, with derivatives of any order.
+        """Return the states of a solver as a motion, with derivatives of any order.
 
-        They follow from the equations of motion at the states, which are put back onto the constraints.
+        The states are projected onto the constraints; their derivatives follow from the equations of motion.
 
         Parameters
         ----------
@@ -154,7 +156,7 @@ def state_rates(time: Any, state: State | CountedState, equations: Equations) ->
     state : State or CountedState
         Positions and velocities.
     equations : Equations
-        Of the mechanism.
+        Equations of motion of the mechanism.
     """
     if isinstance(state, CountedState):
         equations = equations.near(tuple(part[..., None] for part in state.angles))
@@ -168,7 +170,7 @@ def state_rates(time: Any, state: State | CountedState, equations: Equations) ->
 
 
 def _rates(time: Any, state: State, equations: Equations) -> tuple[State, State]:
-    """Return the rate of a state, and the state with Euler parameters of unit length, a batch of one."""
+    """Return the rate of a state, and the state with normalized Euler parameters as a batch of one."""
     state = state.map(lambda part: part[..., None])
     state = state._replace(attitude=normalized(state.attitude))
     clock = jnp.reshape(jnp.asarray(time, float), (1, 1))

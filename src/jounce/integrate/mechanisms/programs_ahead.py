@@ -1,4 +1,4 @@
-"""The programs of a run, made in another thread while its start is looked for."""
+"""The programs of a run, compiled in another thread while its initial state is computed."""
 
 from functools import cache, partial
 from typing import Any
@@ -46,24 +46,24 @@ def prepare_run(
     *,
     watched: bool,
 ) -> None:
-    """Have the programs made of the steps of a run, and of the motion within them, if all they depend on is known.
+    """Compile the programs of steps and of dense output in the background, if all they depend on is known.
 
     Parameters
     ----------
     mechanism : Mechanism
-        What is to move.
+        The mechanism.
     model : Model
-        Of it, with initial conditions or without; the bodies need not be assembled.
+        Its model, with or without initial conditions; the bodies need not be assembled.
     instants : array of shape (time,)
-        At which the motion is requested, s.
+        Requested instants, s.
     order : int
         Highest derivative of the outputs.
     method : AbstractMethod
-        How steps are taken.
+        Integration method.
     limits : RunLimits
-        Where the run goes, and in what steps.
+        End of the run, and bounds of its steps.
     watched : bool
-        Whether events are looked for.
+        Whether events are detected.
     """
     if (model.system.rank_is_open and not mechanism.initial) or thread_count() < 2:
         return
@@ -82,7 +82,7 @@ def prepare_run(
         return equations, unexpanded(equations, at_rest(free(), free().guess), instants[:1], order=length)
 
     def one(part: Any, axes: int) -> jax.ShapeDtypeStruct:
-        """Return the form of what a step has, of an instant."""
+        """Return the shape, for one instant, of a part of the steps."""
         return jax.ShapeDtypeStruct((*part.shape[1:axes], 1), float)
 
     def steps() -> None:

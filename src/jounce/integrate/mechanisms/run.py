@@ -1,4 +1,4 @@
-"""A run of a mechanism: marched step by step, and explained where it does not go on."""
+"""A run of a mechanism: its steps, and the explanation if they fail."""
 
 import dataclasses
 from collections.abc import Sequence
@@ -24,12 +24,12 @@ from jounce.kinematics import Status
 from jounce.kinematics.position_analysis.curve_ends import ends_of
 from jounce.mechanism.building.element_indices import force_names
 
-AHEAD = 1e-9  # of the time so far: where steps collapse, what is not finite lies that close
-FEW = 4  # derivatives that are looked at for one that is not finite
+AHEAD = 1e-9  # of the time so far: distance of the instant beyond collapsed steps that is checked for finite values
+FEW = 4  # derivatives that are checked for finite values
 
 
 class MechanismRun(AbstractRun):
-    """A run of a mechanism; `watched` where a user looks for events."""
+    """A run of a mechanism; `watched` tells whether the user requests events."""
 
     def __init__(
         self,
@@ -57,7 +57,7 @@ class MechanismRun(AbstractRun):
         return DenseOutput(np.asarray(current.time), np.zeros(1), polynomial, np.full(1, -1), angles)
 
     def note_ends(self, first: int) -> None:
-        """Tell that the run ended at an end of a curve, if one of the events from the first on happened."""
+        """Set the ending to an end of a curve if one of the events from index `first` on happened."""
         for k, ends in enumerate(ends_of(self.start.model)):
             for beyond_high in (False, True):
                 for instant in self.happened[first + 2 * k + beyond_high]:
@@ -65,7 +65,7 @@ class MechanismRun(AbstractRun):
                     self.stopped_at = None
 
     def explained(self) -> tuple[Status, str]:
-        """Return why steps did not go on, and where to look: a force that is not finite, or the most urgent body."""
+        """Return the reason why the steps ended, and the force, joint or body to look at."""
         current = self.current
         series, time = current.expansion.state, current.time.item()
         here = dataclasses.replace(self.start, equations=self.start.equations.near(current.angles))
@@ -96,12 +96,12 @@ class MechanismRun(AbstractRun):
 
 
 def unsound_forces(start: ConsistentStart, sound: Bool[np.ndarray, " force"]) -> str:
-    """Name the applied forces that are not sound."""
+    """Return the names of the applied forces that are not sound, as text."""
     return ", ".join(f"forces.{n}" for n, good in zip(force_names(start.model), sound, strict=True) if not good)
 
 
 def _unfit(start: ConsistentStart, state: State, instant: float) -> str:
-    """Name the applied forces that are not finite in a state."""
+    """Return the names of the applied forces that are not finite in a state, as text."""
     system = start.equations.system
     if not system.forces:
         return ""
@@ -114,7 +114,7 @@ def _finite_forces(equations: Equations, state: State, time: Instants) -> Bool[N
 
 
 def _unfit_rates(start: ConsistentStart, coordinates: Coordinates, instant: float) -> str:
-    """Name the applied forces of which a low derivative is not finite at an instant, where their values may be."""
+    """Return the names of the applied forces with low derivatives that are not finite at an instant, as text."""
     known = np.isfinite(coordinates["position"]).reshape(len(coordinates["position"]), -1).all(axis=1)
     order = min(int(np.argmin(np.append(known, False))) - 1, FEW)
     if order < 1:
@@ -122,7 +122,7 @@ def _unfit_rates(start: ConsistentStart, coordinates: Coordinates, instant: floa
     pose = pose_of(cut(coordinates, order), start.model.pose_type)
     clock, names = Jet.variable(np.array([[instant]]), order), []
     for group, members in zip(start.equations.system.forces, start.model.forces, strict=True):
-        with np.errstate(all="ignore"):  # errors name what is not finite
+        with np.errstate(all="ignore"):  # nonfinite values are reported by name
             sizes = np.stack([np.asarray(c) for c in group.force(pose, clock).dense().coefficients])
         sizes = np.broadcast_to(sizes, (*sizes.shape[:2], len(members), 1))
         good = np.atleast_1d(np.isfinite(sizes).all(axis=(0, 1, 3)))

@@ -1,4 +1,4 @@
-"""From a mechanism with masses and forces to its motion."""
+"""The simulation of a mechanism with masses and forces."""
 
 import dataclasses
 from collections.abc import Callable, Mapping, Sequence
@@ -74,35 +74,36 @@ def simulate(
     Parameters
     ----------
     mechanism : Mechanism or Robot
-        With masses. Joints and drivers may leave degrees of freedom; drivers go on prescribing what they drive.
+        A mechanism with masses, or a robot. Joints and drivers may leave degrees of freedom; drivers prescribe their
+        coordinates throughout.
     time : array_like of shape (time,), optional
-        Instants, s, increasing, or decreasing to go backward; those of the mechanism unless given. The first is the
+        Instants, s, increasing, or decreasing for a run backward; by default those of the mechanism. The first is the
         start.
     order : int, default 4
         Highest derivative of the outputs, up to 30.
     method : AbstractMethod, optional
-        `Taylor` unless given.
+        Integration method, by default `Taylor`.
     tolerance : float, default 1e-15
-        Of the error of a step, rad or sizes of the mechanism; 1e-17 to 0.01.
+        Error of a step, rad or sizes of the mechanism; 1e-17 to 0.01.
     initial : dict of str to driver, optional
-        In the place of ``mechanism.initial``: each fixes one coordinate and its rate at the start.
+        Initial conditions instead of ``mechanism.initial``: each fixes one coordinate and its rate at the start.
     events : sequence of Event, or of JointEvent for a robot, optional
-        Crossings to look for.
+        Crossings to detect.
     longest_step : float, optional
-        s.
+        Largest length of a step, s.
     strict : bool, default True
-        Raise if an instant is not reached. Otherwise it is NaN and `Motion.status` says why.
+        Raise an error if an instant is not reached. Otherwise its values are NaN, and `Motion.status` has the reason.
     progress : callable, optional
         Called with the number of instants passed and their total.
     **robot
-        Of a robot only. `state`: q and q', of shape (2, n), or a mapping of joints to coordinates; at rest at zero
-        unless given. `torque`: the forces of its joints, N m or N: n numbers; a function of time, q and q' of one
-        sample, by operations of JAX, that returns n; or a mapping of joints to numbers, expressions of ``t``, of the
-        names of joints and of their rates as ``NAME_d1``, motion laws, and functions that return one force. `driven`: a
-        mapping of joints to laws of time (motions, expressions, functions, numbers) that they follow at any force.
-        `drives`: False leaves out armature, damping and friction, which count otherwise. `base`: the `BaseMotion` with
-        which a base that moves freely begins. `wrenches`: a sequence of `Wrench`, of constants, functions of time, or
-        functions of time, q and q', that return three components.
+        For robots. `state`: q and q', of shape (2, n), or a mapping of joints to coordinates; by default at rest at
+        zero. `torque`: the joint forces, N m or N: n numbers; a JAX function of time, q and q' of one sample that
+        returns n numbers; or a mapping of joints to numbers, expressions of ``t``, of the names of joints and of their
+        rates as ``NAME_d1``, motion laws, and functions that return one force. `driven`: a mapping of joints to laws of
+        time (motions, expressions, functions, numbers) that they follow with any force. `drives`: False leaves out
+        armature inertia, damping and friction, which are included by default. `base`: the initial `BaseMotion` of a
+        free base. `wrenches`: a sequence of `Wrench`, of constants, functions of time, or functions of time, q and q',
+        that return three components.
 
     Returns
     -------
@@ -111,13 +112,13 @@ def simulate(
     Raises
     ------
     MechanismError
-        If the mechanism, the instants or an option is not valid, or a body that can move has no mass.
+        If the mechanism, the instants or an option is not valid, or a movable body has no mass.
     AssemblyError
         If joints, drivers and initial conditions contradict each other.
     MobilityError
         If the start is a singular position.
     SolveError
-        If the motion cannot be followed to an instant (with `strict`); it holds the motion up to there.
+        If, with `strict`, the motion does not reach an instant; the error has the motion up to that point.
     UnsupportedError
         If JAX traces anything but values of the mechanism.
 
@@ -183,7 +184,7 @@ def simulate(
 
 
 def _check_event(event: object, mechanism: Mechanism) -> None:
-    """Raise MechanismError unless an event looks at an output that the mechanism can have."""
+    """Raise MechanismError unless an event watches an output that the mechanism can have."""
     if not isinstance(event, Event):
         raise MechanismError("must be a jn.Event", name="events", value=event)
     check_output(event.output, mechanism, "events")
@@ -191,7 +192,7 @@ def _check_event(event: object, mechanism: Mechanism) -> None:
 
 
 def _detector_of(event: Event, mechanism: Mechanism, start: ConsistentStart) -> EventDetector:
-    """Return what looks for an event, or raise if its output has no such component."""
+    """Return the detector of an event, or raise MechanismError if its output has no such component."""
     group = output_group(event.output, mechanism, start.model)
     pose = start.equations.pose(start.state)
     components = jax.eval_shape(lambda: group.evaluate(pose).coefficients[0]).shape[0]
@@ -206,7 +207,7 @@ def _detector_of(event: Event, mechanism: Mechanism, start: ConsistentStart) -> 
 
 
 def _events_at_ends(start: ConsistentStart) -> list[Event]:
-    """Return events that end a run where a point comes to an end of its curve: two for each parameter with ends."""
+    """Return terminal events for points at the ends of their curves: two for each parameter with ends."""
     events = []
     for ends in ends_of(start.model):
         output = (ParameterOutput if ends.is_only else ParametersOutput)(ends.joint)
@@ -216,7 +217,7 @@ def _events_at_ends(start: ConsistentStart) -> list[Event]:
 
 
 def _check_ends(start: ConsistentStart, instant: float) -> None:
-    """Raise SolveError where a point starts beyond an end of its curve."""
+    """Raise SolveError if a point starts beyond an end of its curve."""
     curves = ends_of(start.model)
     if curves and (beyond := beyond_end(curves, {"position": np.asarray(with_ground(start.state.position))})):
         status = Status.END_OF_CURVE
@@ -224,7 +225,7 @@ def _check_ends(start: ConsistentStart, instant: float) -> None:
 
 
 def _check_forces(start: ConsistentStart, instant: float) -> None:
-    """Raise SolveError where an applied force has no finite value at the start."""
+    """Raise SolveError if an applied force has no finite value at the start."""
     names = unsound_forces(start, start.sound)
     if names:
         status = Status.INADMISSIBLE

@@ -30,21 +30,21 @@ class Batch(Displayed):
     time : numpy.ndarray of shape (time,)
         s.
     parameters : dict of str to numpy.ndarray of shape (runs,)
-        What the runs differ in.
+        Parameters of each run.
     outputs : dict of str to numpy.ndarray
         Outputs of the mechanism, or coordinates of the robot by joint, with derivatives, (runs, time, order + 1) or
-        (runs, time, order + 1, component), SI; NaN where a run did not get so far. Forces and energies, which follow
-        from a whole motion, are left out.
+        (runs, time, order + 1, component), SI; NaN at instants that a run did not reach. Forces and energies, which
+        follow from a whole motion, are left out.
     status : numpy.ndarray of int, shape (runs, time)
-        See `Status`.
+        A `Status` for each run and instant.
     steps : numpy.ndarray of int, shape (runs,)
-        Steps taken.
+        Number of steps of each run.
     mechanism : Mechanism or Robot
-        As it was given.
+        The mechanism or robot.
     order : int
         Highest derivative of the outputs.
     backend : str
-        Which arithmetic gave the numbers: "llvm", machine code, or "xla", with the device unless that is the processor.
+        Backend that computed the results: "llvm", machine code, or "xla", with the device unless it is the processor.
     """
 
     time: Float[np.ndarray, " time"]
@@ -58,7 +58,7 @@ class Batch(Displayed):
 
     @property
     def dataset(self) -> Any:
-        """The results as an `xarray.Dataset` of the form that `jounce.solve_batch` returns, of the dimension ``run``.
+        """The results as an `xarray.Dataset` in the form of `jounce.solve_batch`, with the dimension ``run``.
 
         Variables are the outputs, with their units, the ``status``, and the ``steps`` of each run; parameters are
         coordinates.

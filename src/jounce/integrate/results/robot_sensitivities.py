@@ -1,10 +1,8 @@
-"""The motion of a simulated robot as a function of inertias and of the state at the start: its steps once more.
+"""Derivatives of a simulated robot motion with respect to inertias and the initial state, by its recorded steps.
 
-Lengths of steps are held.
-
-How long steps are is taken from the simulation, and so are all numbers: the program here adds to them how they change.
-A change may move faster than the motion, as beside an equilibrium, where the motion has no series to speak of: steps
-are divided until the series of every change of the state converges on them.
+The lengths of the steps and all values are those of the simulation; the program here adds their derivatives. A
+derivative may vary faster than the motion, as beside an equilibrium, where the series of the motion is trivial. Steps
+are therefore divided until the series of every derivative by the state converges on them.
 """
 
 import dataclasses
@@ -34,10 +32,10 @@ from jounce.robot.algorithms.forward_dynamics import coordinates_of
 from jounce.robot.robot import Robot
 
 ORDER = 24  # of the series of a step
-CONVERGED = 1e-16  # of a change: the last terms of its series
-LAST = 4  # terms that are looked at, since every other one may vanish
-PARTS = 4096  # of one step at most
-PADDED = 16  # by so many the steps go up, so that motions of about as many share a program
+CONVERGED = 1e-16  # of a derivative: largest last terms of its series
+LAST = 4  # terms that are tested, since every other term may vanish
+PARTS = 4096  # largest number of parts of a step
+PADDED = 16  # multiple to which the number of steps is padded, so that similar motions share a program
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -45,12 +43,12 @@ R = TypeVar("R")
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class TracedRobotMotion:
-    """The motion of a simulated robot of which JAX traces inertias or the state at the start.
+    """The motion of a simulated robot with inertias or an initial state traced by JAX.
 
     Attributes
     ----------
     robot : Robot
-        As it was given.
+        The robot.
     time : numpy.ndarray of shape (time,)
         s.
     order : int
@@ -58,7 +56,7 @@ class TracedRobotMotion:
     q : jax.Array of shape (time, order + 1, n)
         Coordinates and their derivatives, rad or m by s.
     simulation : RobotSimulation
-        At the values that JAX traces.
+        Simulation at the values of the tracers.
     """
 
     robot: Robot
@@ -69,12 +67,12 @@ class TracedRobotMotion:
 
 
 def of_traced_robots(traced: Callable[..., Any]) -> Callable[[Callable[P, R]], Callable[P, R]]:
-    """Return what guards a function of mechanisms and robots, with something to do where JAX traces those of robots.
+    """Return a decorator that redirects calls with values of robots traced by JAX to another function.
 
     Parameters
     ----------
     traced : callable
-        It gets the function, the robot, and further arguments as they were given.
+        Function that receives the decorated function, the robot, and the further arguments.
     """
 
     def guarded(function: Callable[P, R]) -> Callable[P, R]:
@@ -94,12 +92,12 @@ def of_traced_robots(traced: Callable[..., Any]) -> Callable[[Callable[P, R]], C
 def traced_robot_motion(
     simulate: Callable[..., Any], robot: Robot, *positional: Any, **options: Any
 ) -> TracedRobotMotion:
-    """Return the motion of a robot as a function of its inertias and of the state at the start.
+    """Return the motion of a robot as a differentiable function of its inertias and its initial state.
 
     Raises
     ------
     UnsupportedError
-        For events, a free base, within `jax.jit` or `jax.vmap`, and where a force jumps.
+        For events, a free base, calls within `jax.jit` or `jax.vmap`, and forces that jump.
     """
     for name in ("events", "base"):
         if options.get(name):
@@ -130,7 +128,7 @@ def traced_robot_motion(
 
 
 def _begun(robot: Robot, problem: RobotProblem, first: RobotState, state: Any) -> RobotState:
-    """Return the state at the start, with what JAX traces of it; driven joints are on their laws."""
+    """Return the initial state with its tracers; driven joints follow their laws."""
     if not is_traced(state):
         return first
     q, rates = start_levels(robot, state)[..., None]
@@ -142,7 +140,7 @@ def _begun(robot: Robot, problem: RobotProblem, first: RobotState, state: Any) -
 def _recorded(
     simulate: Callable[..., Any], robot: Robot, positional: tuple[Any, ...], options: dict[str, Any]
 ) -> RobotSimulation:
-    """Return the simulation at the values that JAX traces."""
+    """Return the simulation at the values of the tracers."""
     names = [name for name, link in robot.links.items() if isinstance(link.inertia, TracedInertia)]
 
     def simulated(values: tuple[Any, Any]) -> RobotSimulation:
@@ -165,7 +163,7 @@ def _recorded(
 
 
 def _divided(problem: RobotProblem, simulation: RobotSimulation) -> tuple[np.ndarray, np.ndarray]:
-    """Return the starts and lengths of the steps of a simulation, divided as changes of the state ask for."""
+    """Return the starts and lengths of the steps of a simulation, divided so that derivatives converge."""
     steps = simulation.steps
     states = jax.tree.map(lambda c: np.moveaxis(np.asarray(c)[:, 0], 0, -1), steps.polynomial)
     count = len(steps.start)
@@ -186,7 +184,7 @@ def _divided(problem: RobotProblem, simulation: RobotSimulation) -> tuple[np.nda
 
 @compiled(narrow=True)
 def _growth(problem: RobotProblem, states: RobotState, time: Any) -> Any:
-    """Return how large the terms of the series of changes of the state are, by change, (order, step)."""
+    """Return the largest terms of the series of derivatives by the state, (order, step)."""
 
     def coefficients(q: Any, rates: Any) -> Any:
         state = states._replace(coordinates=q, rates=rates)
@@ -212,7 +210,7 @@ def _marched(
     *,
     levels: int,
 ) -> Any:
-    """Return Taylor coefficients of the coordinates at instants, as steps lead there from a start."""
+    """Return the Taylor coefficients of the coordinates at instants, after recorded steps from an initial state."""
 
     def series(state: RobotState, time: Any) -> RobotState:
         return polynomial_of(problem.series(state, time[None], ORDER, reversible=True))

@@ -1,4 +1,4 @@
-"""The result of a simulation of a robot: coordinates with derivatives of any order, torques, energy and events."""
+"""The result of a robot simulation: coordinates with derivatives of any order, torques, energy and events."""
 
 import dataclasses
 import itertools
@@ -35,21 +35,21 @@ from jounce.units.shown_units import derivatives_of, time_axes
 if TYPE_CHECKING:
     import xarray
 
-WIDTHS = (8, 64)  # instants that are computed together: those of a short list, and of a long one
-MUCH_LONGER = 1e3  # than the step over a jump are those beside it
-CLOSE = 1e-5  # of the longest step: steps that come so near to a jump are of that
+WIDTHS = (8, 64)  # instants computed together, for short and for long lists
+MUCH_LONGER = 1e3  # ratio of the steps beside a jump to the step over it
+CLOSE = 1e-5  # of the longest step: steps this close to a jump belong to it
 
 
 class RobotSimulation(Tabulated):
     """The motion of a robot under forces of its joints, at the requested instants and at any other.
 
     At each instant the derivatives of every order follow from the equations of motion, not from the steps. `status`
-    says of each instant whether it was reached; values are NaN where it was not.
+    tells for each instant whether it was reached; values are NaN if it was not.
 
     Attributes
     ----------
     robot : Robot
-        As it was given.
+        The robot.
     time : numpy.ndarray of shape (time,)
         s.
     order : int
@@ -57,18 +57,18 @@ class RobotSimulation(Tabulated):
     q : numpy.ndarray of shape (time, order + 1, n)
         Coordinates and their derivatives, rad or m by s.
     base : BaseMotion or None
-        Of a free base, its twist with derivatives to `order`, at least to 1.
+        Motion of a free base; its twist has derivatives to `order`, at least to 1.
     status : numpy.ndarray of shape (time,)
         A `Status` for each instant.
     faults : dict of int to str
-        What failed at an instant.
+        Failures by the index of the instant.
     events : list of list of float
         For each requested event, the times at which it happened, s.
     steps : RobotSteps
-        As polynomials.
+        Steps as polynomials.
     backend : str
-        Which arithmetic gave the numbers, of steps and of what is found at instants: "llvm", "xla" (with the device
-        unless that is the processor), or both.
+        Backend that computed the steps and the values at instants: "llvm", "xla" (with the device unless it is the
+        processor), or both.
     """
 
     def __init__(
@@ -125,7 +125,7 @@ class RobotSimulation(Tabulated):
 
     @property
     def kinks(self) -> list[float]:
-        """Times at which a force had a jump or a kink, s: derivatives do not exist there."""
+        """Times of jumps and kinks of forces, s, at which derivatives do not exist."""
         length, kink = np.abs(self.steps.length), self.steps.kink
         ends = self.steps.start + self.steps.length
         indices = [k for k in np.flatnonzero(kink) if k == 0 or length[: k + 1].max() > MUCH_LONGER * length[k]]
@@ -134,10 +134,10 @@ class RobotSimulation(Tabulated):
 
     @cached_property
     def torque(self) -> Float[np.ndarray, "time level n"]:
-        """Torques and forces of the joints with their rates to the order - 2, (time, order - 1, n), N m or N by s.
+        """Torques and forces of the joints with rates to `order` - 2, (time, order - 1, n), N m or N by s.
 
-        Those of driven joints are what it takes to drive them. Where drives count, they are the torques before
-        armature, damping and friction.
+        They include those required by driven joints. With drives, they are the torques before armature inertia,
+        damping and friction.
         """
         pairs = zip(self._wrenches, self._problem.wrenches.parts, strict=True)
         wrenches = [self._along_motion(*both) for both in pairs]
@@ -148,12 +148,12 @@ class RobotSimulation(Tabulated):
         return np.asarray(torques if self.base is None else torques[..., 6:])
 
     def _along_motion(self, wrench: Wrench, parts: Sequence[WrenchPart]) -> Wrench:
-        """Return a wrench with its values along the motion where it depends on the state; functions as they were."""
+        """Return a wrench with parts that depend on the state replaced by their values along the motion."""
         values = {name: self._along(part) for name, part in zip(("force", "torque"), parts, strict=True)}
         return dataclasses.replace(wrench, **values)
 
     def _along(self, part: WrenchPart) -> Any:
-        """Return the derivatives of a function of time and state along the motion, or what depends on time alone."""
+        """Return the derivatives of a function of time and state along the motion; a part of time alone unchanged."""
         given = part.constant if part.function is None else part.at
         if not part.of_state:
             return given
@@ -183,7 +183,7 @@ class RobotSimulation(Tabulated):
 
     @cached_property
     def applied(self) -> Float[np.ndarray, "time n"]:
-        """Forces that the laws of the joints give, (time, n), N m or N; none of those that are driven."""
+        """Forces of the joint laws, (time, n), N m or N; zero for driven joints."""
         return np.where(self.status == Status.OK, self._in_states(forces_at), np.nan).T
 
     @property
@@ -193,7 +193,7 @@ class RobotSimulation(Tabulated):
 
     @property
     def kinetic_energy(self) -> Float[np.ndarray, " time"]:
-        """Kinetic energy, that of armatures included where drives count, J, shape (time,)."""
+        """Kinetic energy, with that of armatures if drives are included, J, shape (time,)."""
         return self._energies[0]
 
     @cached_property
@@ -202,7 +202,7 @@ class RobotSimulation(Tabulated):
         return np.where(self.status == Status.OK, energies, np.nan)
 
     def _in_states(self, function: Mapped) -> Any:
-        """Return what a function of the problem and of the state at an instant gives for all of them."""
+        """Return the values of a function of the problem and of the state at all instants."""
         return function.along(self._problem, (self._state, self.time))
 
     def at(self, time: ArrayLike, order: int | None = None) -> "RobotSimulation":
@@ -211,9 +211,9 @@ class RobotSimulation(Tabulated):
         Parameters
         ----------
         time : array_like of shape (time,)
-            s; those outside of what was simulated are NaN.
+            Instants, s; values outside of the simulated time are NaN.
         order : int, optional
-            Highest derivative; that of this simulation unless given.
+            Highest derivative; by default that of this simulation.
         """
         instants = chosen_instants(time, RobotError)
         order = self.order if order is None else order
@@ -239,17 +239,16 @@ class RobotSimulation(Tabulated):
 def expanded_robot(
     problem: RobotProblem, lanes: tuple[RobotState, Lanes, Lanes], order: int
 ) -> tuple[RobotState, Float[Numbers, "level n batch"], Any]:
-    """Return states at instants, and Taylor coefficients there, which follow from the equations of motion.
+    """Return states at instants, and their Taylor coefficients from the equations of motion.
 
     Parameters
     ----------
     problem : RobotProblem
-        What moves the robot.
+        Equations and laws of the robot.
     lanes : tuple
-        Of each instant: the polynomial of the step that it is in, the time since the beginning of that, s, and the
-        instant itself, s.
+        For each instant: the polynomial of its step, the time since the beginning of the step, s, and the instant, s.
     order : int
-        Coefficients of the coordinates go to the order + 2, those of the twist of a free base to the order + 1.
+        Coefficients of the coordinates have orders to `order` + 2, those of the twist of a free base to `order` + 1.
     """
     polynomial, since, time = lanes
     state = at(polynomial, since)
@@ -271,6 +270,6 @@ def energy_at(problem: RobotProblem, lanes: tuple[RobotState, Lanes]) -> tuple[L
 
 @mapped(widths=WIDTHS)
 def forces_at(problem: RobotProblem, lanes: tuple[RobotState, Lanes]) -> Float[Numbers, "n batch"]:
-    """Return the forces of the laws of the joints in states at instants, N m or N."""
+    """Return the forces of the joint laws in states at instants, N m or N."""
     state, time = lanes
     return problem.forces(time[None], state.coordinates, state.rates)

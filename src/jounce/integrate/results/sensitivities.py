@@ -1,13 +1,12 @@
-"""The motion of a simulation as a function of what JAX traces in a mechanism: its steps once more, with lengths held.
+"""Derivatives of a simulated motion with respect to traced values of a mechanism, by its recorded steps.
 
-What was decided on the way, how long steps are and where they end, is taken from the simulation, and so are all
-states: the program here adds to them how they change. Steps are divided where a change moves faster than the motion.
-The motion is expanded at the beginning of each step, its series evaluated at the end, and the result put on the
-constraints, as the integrator does it. The corrections that put it there vanish but for rounding, so that the matrices
-that they are found with need no derivatives.
+The lengths of the steps and all states are those of the simulation; the program here adds their derivatives. Steps are
+divided where a derivative varies faster than the motion. As in the integrator, the motion is expanded at the beginning
+of each step, the series is evaluated at its end, and the result is projected onto the constraints. The corrections of
+the projection vanish up to rounding, so their matrices need no derivatives.
 
-Over a kink of a force the state is carried to the instant of the kink by the series of one side, and on from there by
-that of the other, and the instant changes with the state: it is where the accelerations of both sides agree.
+Over a kink of a force, the series of one side carries the state to the instant of the kink, and that of the other side
+carries it on. The instant varies with the state: it is where the accelerations of both sides agree.
 """
 
 import dataclasses
@@ -55,25 +54,25 @@ from jounce.mechanism.outputs.base import lost_orders
 from jounce.mechanism.transmissions.axis_angles import measures_angle
 
 AT_REST = 1e-12  # m/s and rad/s
-CONVERGED = 1e-13  # what is left out of the series of a change in a step, by the change
+CONVERGED = 1e-13  # relative truncation error of the series of a derivative in a step
 AS_GUESSED = 1e-9  # rad or sizes of the mechanism
 
 
 def traced_simulation(simulate: Callable[..., Simulation], given: Mapping[str, Any]) -> Any:
-    """Return the simulation of a mechanism of which JAX traces some values.
+    """Return the simulation of a mechanism with some values traced by JAX.
 
     Parameters
     ----------
     simulate : callable
-        Simulates a mechanism of plain numbers.
+        Function that simulates a mechanism of plain numbers.
     given : mapping
         Its arguments by name.
 
     Raises
     ------
     UnsupportedError
-        For a method other than `Taylor`, for events, for forces that count turns of an angle about an axis, and where a
-        force or a velocity jumps.
+        For a method other than `Taylor`, for events, for forces that count revolutions of an angle about an axis, and
+        for a force or a velocity that jumps.
     MechanismError
         If constraints are redundant.
     """
@@ -106,7 +105,7 @@ def traced_simulation(simulate: Callable[..., Simulation], given: Mapping[str, A
 def _recorded(
     simulate: Callable[..., Simulation], mechanism: Mechanism, options: Mapping[str, Any]
 ) -> tuple[Simulation, Mechanism] | None:
-    """Return the simulation at the values that JAX traces, and the mechanism that has them; None if it knows none."""
+    """Return the simulation at the values of the tracers, and its mechanism; None if the values are not known."""
     values, made = template(mechanism)
 
     def simulated(values: tuple[Any, ...]) -> tuple[Simulation, Mechanism]:
@@ -121,7 +120,7 @@ def _as_floats(values: list[Any]) -> tuple[Any, ...]:
 
 
 def _called(simulate: Callable[..., Any], mechanism: Mechanism, options: Mapping[str, Any]) -> TracedMotion:
-    """Return a simulation within `jax.jit` or `jax.vmap`: what is compiled calls it, one mechanism after another."""
+    """Return a simulation within `jax.jit` or `jax.vmap`, where the program calls it on the host for each mechanism."""
     order = checked_order(options.get("order", 4))
     instants = given_instants(mechanism, options.get("time"), instants_of)
     (values, made), levels = template(mechanism), order + max(lost_orders(mechanism.outputs.values()), 1) + 1
@@ -139,14 +138,14 @@ def _called(simulate: Callable[..., Any], mechanism: Mechanism, options: Mapping
 
 
 def _solved(simulation: Simulation, coordinates: dict[str, Any]) -> Solved:
-    """Return what is kept of a simulation, with these coordinates."""
+    """Return the solved values of a simulation, with given coordinates."""
     angles, status = _angles(simulation), simulation.status.astype(float)
     length = np.float64(simulation.model.length)
     return Solved(coordinates, status, length, angles, angles.angle[0], simulation.continued_outputs)
 
 
 def _angles(simulation: Simulation) -> Angles:
-    """Return the angles about axes that the outputs of a simulation measure, with their turns at its instants."""
+    """Return the angles about axes that outputs measure, with their revolutions at the instants of the simulation."""
     outputs = simulation.model.system.outputs
     angles = angles_of(simulation.model, (simulation.model.system.forces, outputs))
     measured = [k for k, group in enumerate(outputs) if measures_angle(group)]
@@ -155,7 +154,7 @@ def _angles(simulation: Simulation) -> Angles:
 
 
 def _model_of(mechanism: Mechanism, simulation: Simulation) -> tuple[Model, Equations]:
-    """Return the model and the equations of motion as functions of what JAX traces."""
+    """Return the model and the equations of motion as functions of the traced values."""
     state = simulation.dense_output.polynomial.map(lambda part: np.asarray(part)[0, :1, ..., None])
     first, known = first_of(pose_coordinates(state)), simulation.equations
     model = traced_model(mechanism, simulation.model.length, _angles(simulation), first)
@@ -167,7 +166,7 @@ def _model_of(mechanism: Mechanism, simulation: Simulation) -> tuple[Model, Equa
 
 
 def _allowed(options: Mapping[str, Any]) -> float | None:
-    """Return the relative error of a step in a change, or None where steps are chosen, not controlled."""
+    """Return the allowed relative error of a derivative in a step, or None if steps have a given length."""
     if not (options.get("method") or Taylor()).controlled:
         return None
     return max(CONVERGED, 100.0 * float(options.get("tolerance") or 0.0))
@@ -190,7 +189,7 @@ def _kinks(simulation: Simulation) -> list[Break]:
 
 
 def _start(mechanism: Mechanism, simulation: Simulation, equations: Equations) -> State:
-    """Return the state at the start: it changes so that joints, drivers and initial conditions go on holding."""
+    """Return the initial state, with derivatives by which joints, drivers and initial conditions remain satisfied."""
     known = simulation.dense_output.polynomial.map(lambda part: jnp.asarray(part)[0, 0, ..., None])
     instant = np.array([[simulation.dense_output.start[0]]])
     begun = traced_model(initial_as_drivers(mechanism), simulation.model.length)
@@ -217,9 +216,10 @@ def _jacobian(equations: Equations, state: State, instant: Instants) -> Float[Nu
 def _assembled(
     equations: Equations, known: State, guess: tuple[Any, Any], inverse: Float[Numbers, "column row"], instant: Instants
 ) -> State:
-    """Return a known state as it changes with positions and attitudes of the starting guess.
+    """Return a known state with derivatives by the positions and attitudes of the starting guess.
 
-    It changes by the shortest step onto the constraints, as that of the assembly: `inverse` is that of the Jacobian.
+    As in the assembly, the state is the guess moved by the shortest step onto the constraints. `inverse` is the
+    pseudoinverse of the Jacobian.
     """
     state = known._replace(position=guess[0], attitude=guess[1])
     state = _moved(equations, state, instant, lambda gap: -(inverse @ gap))
@@ -228,7 +228,7 @@ def _assembled(
 
 
 def _moved(equations: Equations, state: State, time: Instants, change: Callable[[Numbers], Numbers]) -> State:
-    """Return a state with positions moved by the changes of coordinates that follow from what joints lack there."""
+    """Return a state with positions moved by changes of coordinates, a function of the residuals."""
     rest_pose = equations.pose_at_rest(state.position, state.attitude)
     gap = equations.system.residual(rest_pose, Jet([time])).coefficients[0]
     pose = rest_pose.displaced(*equations.system.coordinates(change(gap), rest_pose.shifts))
@@ -236,7 +236,7 @@ def _moved(equations: Equations, state: State, time: Instants, change: Callable[
 
 
 def _check_guessed(mechanism: Mechanism, simulation: Simulation, known: State) -> None:
-    """Raise UnsupportedError unless a start that is not prescribed is the starting guess itself, at rest."""
+    """Raise UnsupportedError unless an initial state that is not prescribed is the starting guess itself, at rest."""
     guess = at_rest(simulation.model, simulation.model.guess)
     away = np.abs(guess.position - known.position).max() / simulation.model.length
     turned = np.abs(guess.attitude - known.attitude).max()
@@ -252,7 +252,7 @@ def _check_guessed(mechanism: Mechanism, simulation: Simulation, known: State) -
 def _coordinates(
     simulation: Simulation, equations: Equations, pieces: Pieces, start: State, order: int
 ) -> dict[str, Any]:
-    """Return the Taylor coefficients of the coordinates at the instants, as the steps lead there from a start."""
+    """Return the Taylor coefficients of the coordinates at the instants, after recorded steps from an initial state."""
     instants = simulation.time
     chosen = pieces.at(instants)
     since = instants - pieces.start[chosen]
@@ -270,9 +270,9 @@ def _marched(
     *,
     order: int,
 ) -> State:
-    """Return the series of the motion at instants, (order + 1, ..., time), after a march over pieces that are known.
+    """Return the series of the motion at instants, (order + 1, ..., time), after a march over recorded pieces.
 
-    What comes of the march has the values that are known at the beginnings of the pieces.
+    States at the beginnings of the pieces have the recorded values.
     """
     begun, lengths, known, used, kinks = pieces
     max_order = used.shape[1] - 1

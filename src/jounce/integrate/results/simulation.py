@@ -34,7 +34,7 @@ from jounce.mechanism.outputs.base import lost_orders
 from jounce.mechanism.system import Group
 from jounce.mechanism.transmissions.axis_angles import AttitudeHistory, measures_angle, with_turns
 
-# ratio of the steps before and after a jump or kink to the step over it; a steep force takes several short ones
+# ratio of the steps before and after a jump or kink to the step over it; a steep force takes several short steps
 MUCH_LONGER = 1e3
 FEW_INSTANTS = 8  # width of a program for a few instants, such as those at the end of a long run
 APPROACH = 4  # steps up to a jump or kink, each of which may be much shorter than the one before it
@@ -43,26 +43,26 @@ APPROACH = 4  # steps up to a jump or kink, each of which may be much shorter th
 class Simulation(Motion):
     """The motion of a mechanism under its forces, at the requested instants and at any other.
 
-    All that `Motion` offers is there: outputs, points and angles with their derivatives, forces of joints. At each
-    instant the derivatives of every order follow from the equations of motion, not from the steps.
+    It has all attributes and methods of `Motion`. At each instant the derivatives of every order follow from the
+    equations of motion, not from the steps.
 
     Attributes
     ----------
     energy : numpy.ndarray of shape (time,)
-        Kinetic energy, potential energy in gravity, and what springs have stored, J.
+        Kinetic energy, potential energy in gravity, and energy stored in springs, J.
     drift : numpy.ndarray of shape (time,)
-        Largest residual of all joints and drivers, rad or sizes of the mechanism, on the positions.
+        Largest residual of all joints and drivers on positions, rad or sizes of the mechanism.
     mobility : str
         Degrees of freedom and the bodies that have them.
     events : list of list of float
         For each requested event, the times at which it happened, s.
     kinks : list of tuple of float and str
-        When a force or a motion law had a jump or a kink, s, and which.
-    dense : DenseOutput
-        The steps, as polynomials.
+        Times of jumps and kinks of forces and motion laws, s, with the name of the force or law.
+    dense_output : DenseOutput
+        The steps as polynomials.
     steps_backend : str
-        Which arithmetic took the steps; none unless they were taken here. `backend` also tells what expanded the
-        motion at the instants.
+        Backend that took the steps; empty for steps of another solver. `backend` includes that of the motion at the
+        instants.
     """
 
     def __init__(
@@ -100,7 +100,7 @@ class Simulation(Motion):
             undefined = np.flatnonzero(bad.any(axis=0))
             status[undefined] = int(Status.UNDEFINED)
             faults |= {int(lane): f"output {names[int(np.argmax(bad[:, lane]))]}" for lane in undefined}
-        if lost.any():  # the state is known there, but not its derivatives
+        if lost.any():  # the state is known, but not its derivatives
             reason = ending[0] if ending[0] == Status.LOCKED else Status.INADMISSIBLE
             status[lost], faults[int(np.argmax(lost))] = int(reason), ending[1]
         values = tuple(plain_derivatives(np.asarray(series)) for series in groups)
@@ -121,7 +121,7 @@ class Simulation(Motion):
         return self._start.equations
 
     def steps_at(self, instants: np.ndarray) -> np.ndarray:
-        """Return the step in which each instant is, by index."""
+        """Return the index of the step of each instant."""
         return steps_of(self.dense_output, instants)[1]
 
     def output_values(self, group: int) -> np.ndarray:
@@ -135,9 +135,9 @@ class Simulation(Motion):
 
     @property
     def kinks(self) -> list[tuple[float, str]]:
-        """Times at which a force or a motion law had a jump or a kink, s, and its name; derivatives do not exist there.
+        """Times of jumps and kinks of forces and motion laws, s, with names; derivatives do not exist at them.
 
-        A step over such a place is made so short that it costs no digits, and the next may be long again.
+        The step over a jump or kink is so short that it costs no digits, and the next step may be long again.
         """
         kink, length = self.dense_output.kink, np.abs(self.dense_output.length)
         names = watched_names(self._start.model)
@@ -145,7 +145,7 @@ class Simulation(Motion):
         short = MUCH_LONGER * length[:-1]
         indices = np.flatnonzero((kink[:-1] >= 0) & (length[1:] > short) & (np.array(before) > short))
         since = {int(k): float(self.dense_output.length[k]) for k in indices}
-        # series that do not go on as the next tell when it was; and after a long approach they alone tell that it was
+        # series that the next step does not continue give the time, and after a long approach they alone show the kink
         since |= {x.step: x.since for x in breaks(self.dense_output, float(self.model.length)) if kink[x.step] >= 0}
         return [(float(self.dense_output.start[k] + since[k]), names[kink[k]]) for k in sorted(since)]
 
@@ -160,9 +160,9 @@ class Simulation(Motion):
         Parameters
         ----------
         time : array_like of shape (time,)
-            s; those outside of what was simulated are NaN.
+            Instants, s; values outside of the simulated time are NaN.
         order : int, optional
-            Highest derivative; that of this simulation unless given.
+            Highest derivative; by default that of this simulation.
         """
         instants = chosen_instants(time, MechanismError)
         order = self.order if order is None else order
@@ -171,7 +171,7 @@ class Simulation(Motion):
 
     @property
     def energy(self) -> Array[np.ndarray, " time"]:
-        """Kinetic energy, potential energy in gravity, and what springs have stored, J, shape (time,)."""
+        """Kinetic energy, potential energy in gravity, and energy stored in springs, J, shape (time,)."""
         return self._checked[0]
 
     @property
@@ -186,12 +186,12 @@ class Simulation(Motion):
 
     @cached_property
     def forces(self) -> tuple[Group, ...]:
-        """The applied forces, in the groups of the model, with the turns of angles about axes at every instant."""
+        """The applied forces, in the groups of the model, with the revolutions of angles about axes at each instant."""
         return with_turns(self.model.system.forces, self._angles)
 
     @cached_property
     def _attitudes(self) -> AttitudeHistory:
-        """The attitudes of all bodies in space along the steps; there are none of states that another solver gave."""
+        """The attitudes of all bodies in space along the steps, or at the states of another solver."""
         dense = self.dense_output
         if not dense.length.any():
             return AttitudeHistory(self._attitudes_at(dense.start), dense.start)
@@ -212,11 +212,11 @@ class Simulation(Motion):
     def _counted(
         self, group: Group, series: Float[np.ndarray, "order component instance time"], instants: np.ndarray
     ) -> Float[np.ndarray, "order component instance time"]:
-        """Return the series of outputs at instants; angles known up to whole turns go on from step to step."""
+        """Return the series of outputs at instants, with revolutions of angles counted from step to step."""
         dense = self.dense_output
         if not group.element.turning:
             return series
-        if not dense.length.any():  # no steps: states that another solver gave
+        if not dense.length.any():  # no steps: states of another solver
             series[0] = counted_by_rates(series[0], series[1], instants)
             return series
         if measures_angle(group):
@@ -243,7 +243,7 @@ class Simulation(Motion):
 
 
 def chosen_instants(time: ArrayLike, error: type[JounceError]) -> Float[np.ndarray, " time"]:
-    """Return the instants at which a simulation is evaluated again, s; raise the error unless there is one at least."""
+    """Return the instants at which a simulation is evaluated again, s; raise `error` if there is none."""
     instants = np.atleast_1d(seconds("time", time, error))
     if instants.ndim != 1 or not instants.size:
         raise error("must be an instant, or a list of at least one", name="time", value=time)
@@ -251,7 +251,7 @@ def chosen_instants(time: ArrayLike, error: type[JounceError]) -> Float[np.ndarr
 
 
 def steps_of(dense: DenseOutput | RobotSteps, instants: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return which instants the steps reach, and the step in which each of them is."""
+    """Return whether the steps reach each instant, and the index of its step."""
     direction = 1.0 if dense.length[0] >= 0 else -1.0
     rounding = 1e-14 * max(abs(dense.start[0]), abs(dense.end))
     reached = (direction * (instants - dense.start[0]) >= -rounding) & (direction * (instants - dense.end) <= rounding)
@@ -265,7 +265,7 @@ def status_of(
     reached: Bool[np.ndarray, " time"],
     ending: tuple[Status, str],
 ) -> tuple[Int[np.ndarray, " time"], dict[int, str]]:
-    """Return the status of instants, the first beyond the last step with the reason why it was the last, and faults."""
+    """Return the status of instants, with the reason of the end at the first one beyond the last step, and faults."""
     status = np.where(reached, int(Status.OK), int(Status.NOT_REACHED))
     beyond = np.flatnonzero(~reached & (np.abs(instants - dense.start[0]) > abs(dense.end - dense.start[0])))
     if ending[0] == Status.OK or not beyond.size:
@@ -275,15 +275,15 @@ def status_of(
 
 
 def at_steps(part: np.ndarray, chosen: Int[np.ndarray, " batch"]) -> np.ndarray:
-    """Return what chosen steps have along the first axis, along the last one."""
+    """Return the entries of chosen steps, with the step axis moved from first to last."""
     last = (*range(1, part.ndim), 0)
     if len(chosen) < len(part):
         return part[chosen].transpose(last)
-    return part.transpose(last).take(chosen, axis=-1)  # lies in one piece; to turn so many around takes longer
+    return part.transpose(last).take(chosen, axis=-1)  # contiguous; transposing so many entries later takes longer
 
 
 def derivatives_of_motion(mechanism: Mechanism, order: int) -> int:
-    """Return the highest derivative of the motion that outputs up to an order need."""
+    """Return the order of the motion that outputs with derivatives up to an order require."""
     return order + max(1, lost_orders(mechanism.outputs.values()))
 
 
@@ -291,15 +291,15 @@ def derivatives_of_motion(mechanism: Mechanism, order: int) -> int:
 def expanded(
     shared: tuple[Equations, tuple[Group, ...]], lanes: tuple[AnglesOfForces, State, Lanes, Lanes], order: int
 ) -> tuple[State, AnglesOfForces, tuple[Float[Numbers, "_ _ _ batch"], ...]]:
-    """Return the Taylor coefficients of the motion at instants, from the equations there.
+    """Return the Taylor coefficients of the motion at instants, from the equations of motion.
 
     Parameters
     ----------
     shared : tuple
         Equations, and outputs.
     lanes : tuple
-        Of each instant: angles about axes that forces measure at the beginning of the step it is in, the polynomial of
-        the step, the time since then, s, and the instant itself.
+        For each instant: angles about axes that forces measure at the beginning of its step, the polynomial of the
+        step, the time since its beginning, s, and the instant.
     order : int
         Highest coefficient.
 
@@ -308,9 +308,9 @@ def expanded(
     state : State
         Coefficients, (order + 1, components, bodies, instants).
     angles : tuple of array
-        About axes that forces measure, at the instants.
+        Angles about axes that forces measure at the instants.
     outputs : tuple of array
-        Their series, as `output_series` gives them.
+        Series of the outputs, as from `output_series`.
     """
     (equations, outputs), (angles, polynomial, step, instants) = shared, lanes
     equations = equations.near(angles)

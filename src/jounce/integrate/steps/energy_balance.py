@@ -1,7 +1,7 @@
-"""The energy of a motion, kept along its steps: where nothing takes or gives any, it must not change.
+"""The energy balance along the steps of a motion: without sources and losses the energy must not change.
 
-Steps end on the constraints whatever those have been in between, so that neither positions nor velocities tell of a
-joint that has jumped, or has a kink at which velocities must jump. The energy does.
+Steps end on the constraints whatever those were in between. A joint that jumps, or has a kink at which velocities must
+jump, therefore leaves no trace in positions and velocities, but changes the energy.
 """
 
 from collections.abc import Callable
@@ -25,7 +25,7 @@ from jounce.rigid.pose import Pose
 # part of the largest kinetic energy and of the largest change of the potential: rounding of the sum
 ENERGY_TOLERANCE = 1e-8
 OFFSET = 1e-12  # part of all energies that counts as rounding, however little energy is exchanged
-EXCHANGED = 1e-13  # part of the power of a force by which it may differ from the rate of the energy that it stores
+EXCHANGED = 1e-13  # relative difference of the power of a force and the rate of its stored energy that is rounding
 
 
 class Energies(NamedTuple):
@@ -34,11 +34,11 @@ class Energies(NamedTuple):
     Attributes
     ----------
     kinetic, potential : array
-        The latter in gravity and in springs.
+        Kinetic energy, and potential energy in gravity and springs.
     size : array
-        Sum of the sizes of all of them.
+        Sum of the absolute values of all energies.
     exchanging : array of bool
-        Whether a force takes or gives energy there that it does not store.
+        Whether a force supplies or dissipates energy that it does not store.
     """
 
     kinetic: Lanes
@@ -48,20 +48,20 @@ class Energies(NamedTuple):
 
 
 class Balance(NamedTuple):
-    """What is known of the energy of runs up to where they are; arrays of shape (batch,).
+    """The energy balance of runs up to their current states; arrays of shape (batch,).
 
     Attributes
     ----------
     start : Energies
-        Where they began.
+        Energies at the start.
     exchanged : array
-        Largest kinetic energy so far, and largest change of the other, J.
+        Largest of the kinetic energy and the change of the potential energy so far, J.
     leeway : array
-        By how much it may have changed by the errors that steps are allowed, J.
+        Change of the energy that the allowed errors of the steps permit, J.
     open : array of bool
-        Whether something has taken or given energy.
+        Whether energy has been supplied or dissipated.
     broken : array of bool
-        Whether a step from near here was refused because the energy would have changed.
+        Whether a step nearby was refused because the energy would have changed.
     """
 
     start: Energies
@@ -72,9 +72,10 @@ class Balance(NamedTuple):
 
 
 def is_balanced(equations: Equations, state: State, time: Instants) -> bool:
-    """Tell whether the energy of a mechanism is to be kept: nothing moves it, and forces say what energy they store.
+    """Return whether the energy balance of a mechanism is checked.
 
-    It is looked at where a joint could be overlooked, at less than a tenth of the cost of a step.
+    It is checked if no law of time moves the mechanism, all forces state their stored energy, and the series could
+    overlook a joint. The check costs less than a tenth of a step.
     """
     at_rest, pose = equations.pose_at_rest(state.position, state.attitude), equations.pose(state)
     groups, forces = equations.system.groups, equations.system.forces
@@ -93,12 +94,12 @@ def is_balanced(equations: Equations, state: State, time: Instants) -> bool:
 
 
 def _is_moved(group: Group, at_rest: Pose, time: Instants) -> bool:
-    """Tell whether the residual of joints or drivers depends on time."""
+    """Return whether the residual of joints or drivers depends on time."""
     return uses(jax.make_jaxpr(lambda now: group.residual(at_rest, Jet([now])).coefficients[0])(time))
 
 
 def energies(equations: Equations, pose: Pose, clock: Jet) -> Energies:
-    """Return the energies in poses with velocities, and whether a force takes or gives any there."""
+    """Return the energies in poses with velocities, and whether a force supplies or dissipates energy."""
     lanes = clock.shape[-1]
     masses, gravity = equations.masses, equations.gravity
     translation, rotation = body_energy(pose, *masses, 0)
@@ -115,13 +116,13 @@ def energies(equations: Equations, pose: Pose, clock: Jet) -> Energies:
 
 
 def begun(energies: Energies) -> Balance:
-    """Return what is known of the energy where runs begin."""
+    """Return the energy balance at the start of runs."""
     nothing = jnp.zeros_like(energies.kinetic)
     return Balance(energies, energies.kinetic, nothing, energies.exchanging, nothing > 0)
 
 
 def unknown(nothing: Lanes) -> Balance:
-    """Return a placeholder, of zeros, for the energy of runs of which the start is not known yet."""
+    """Return a placeholder of zeros for the energy balance before the start."""
     none = np.zeros(nothing.shape, bool)
     return Balance(Energies(nothing, nothing, nothing, none), nothing, nothing, none, none)
 
@@ -132,11 +133,11 @@ def followed(balance: Balance, energies: Energies, leeway: Lanes) -> tuple[Balan
     Parameters
     ----------
     balance : Balance
-        So far.
+        Energy balance so far.
     energies : Energies
-        At the end of a step.
+        Energies at the end of a step.
     leeway : array of shape (batch,)
-        By how much the error that the step is allowed may change a velocity, times the square root of a mass.
+        Change of a velocity by the allowed error of the step, times the square root of a mass.
     """
     change = energies.potential - balance.start.potential
     exchanged = jnp.maximum(balance.exchanged, jnp.maximum(energies.kinetic, jnp.abs(change)))

@@ -22,20 +22,20 @@ from jounce.mechanism import AbstractOutput
 from jounce.mechanism.system import Group
 
 _ANGLES = np.pi * (np.arange(20)[::-1] + 0.5) / 20
-NODES = 0.5 + 0.5 * np.cos(_ANGLES)  # Chebyshev nodes in a step, or in a piece of one
+NODES = 0.5 + 0.5 * np.cos(_ANGLES)  # Chebyshev nodes in a step, or in a piece of it
 INTERPOLATION = np.cos(np.arange(20)[:, None] * _ANGLES) * np.where(np.arange(20) == 0, 0.05, 0.1)[:, None]
-ENDS = np.array([0.0, 1.0])  # where polynomials are compared with the outputs that they stand for
-AT_ENDS = np.stack([(-1.0) ** np.arange(20), np.ones(20)])  # values of the Chebyshev polynomials there
-LAST = 4  # coefficients of a polynomial whose size tells how accurate it is
-RESOLVED = 1e-12  # a piece is resolved where they are less than this part of its largest value
-LEAST = 1e-3  # part of the largest value in a step that the one in a piece counts as at least: below it is rounding
-BLURRED = 1e-8  # last coefficients below this that are no smaller on half a piece are rounding errors
-SPLITS = 40  # halvings of a step: they find a kink of a distance, or half a turn of an angle at once
+ENDS = np.array([0.0, 1.0])  # points at which polynomials are compared with the outputs that they interpolate
+AT_ENDS = np.stack([(-1.0) ** np.arange(20), np.ones(20)])  # values of the Chebyshev polynomials at the ends
+LAST = 4  # last coefficients of a polynomial, whose size estimates its error
+RESOLVED = 1e-12  # a piece is resolved if the error is below this part of its largest value
+LEAST = 1e-3  # of the largest value in a step: least size of a piece for relative errors
+BLURRED = 1e-8  # last coefficients below this that do not shrink on half a piece are rounding errors
+SPLITS = 40  # halvings of a step, which resolve a kink of a distance, or a sudden half turn of an angle
 MOST_PIECES = 256  # pieces of a step on average
 WIDTHS = (64,)  # instants evaluated together: one program serves few and many
 REAL = 1e-4  # part of a step: a smaller imaginary part may be that of a multiple real root, blurred by rounding
 FAINT = 1e-14  # part of the coefficients of a polynomial: smaller values are rounding errors
-NEIGHBORHOOD = 1e-3  # part of a step: distance from a root at which the sign is looked at
+NEIGHBORHOOD = 1e-3  # part of a step: distance from a root at which the sign is evaluated
 EDGE = 1e-9  # part of a step: a root at its very end may be found just beyond it, and again in the next step
 
 
@@ -43,20 +43,20 @@ EDGE = 1e-9  # part of a step: a root at its very end may be found just beyond i
 class Event:
     """A crossing of a value by an output, or by one of its derivatives.
 
-    What begins at the value, or touches it and turns back, does not cross it. Turns of angles count.
+    A quantity that begins at the value, or touches it and turns back, does not cross it. Angles count revolutions.
 
     Parameters
     ----------
     output : AbstractOutput
-        Any output, also one of a user's own: its value is a function on the jets of bodies.
+        Any output of poses, also a user-defined one.
     value : float, default 0
-        That is crossed, in the unit of the output (of its derivative).
+        The value that is crossed, in the unit of the output or its derivative.
     derivative : int, default 0
-        Which time derivative crosses it: 1 with value 0 finds turning points.
+        Order of the time derivative that crosses the value; 1 with value 0 finds turning points.
     component : int or str, default 0
-        Of a vector output: counted from 0, or as datasets call it, such as ``"y"``.
+        Component of a vector output: an index from 0, or its name in datasets, such as ``"y"``.
     direction : int, default 0
-        1 for rising crossings only, -1 for falling ones, 0 for both; as time goes on, also in a run backward.
+        1 for rising crossings only, -1 for falling ones, 0 for both; with increasing time, also in a run backward.
     terminal : bool, default False
         Whether the simulation ends at the first crossing.
 
@@ -93,9 +93,9 @@ class Event:
 
 
 def check_crossing(event: Any, error: type[JounceError], **most: int) -> None:
-    """Raise an error unless the value, the direction and whole numbers of an event, up to some limits, are valid.
+    """Raise `error` unless the value, the direction and the whole numbers of an event, up to their limits, are valid.
 
-    The value becomes a number of Python, whichever it is.
+    The value is converted to a Python float.
     """
     number = real_numbers("value", event.value, error, "a finite number")
     if number.ndim or not np.isfinite(number):
@@ -108,9 +108,9 @@ def check_crossing(event: Any, error: type[JounceError], **most: int) -> None:
 
 
 def pose_coordinates(state: State) -> dict[str, Any]:
-    """Return Taylor coefficients of states, order first, as those of the pose of all bodies, the ground first.
+    """Return the coordinates of the poses of all bodies, the ground first, from Taylor coefficients of states.
 
-    Those that JAX does not trace become arrays of NumPy.
+    Arrays without tracers become NumPy arrays.
     """
     position, attitude, _, spin = state if is_traced(state) else state.map(np.asarray)
     if attitude.shape[1] == 1:
@@ -140,7 +140,7 @@ class Pieces(NamedTuple):
     ----------
     step : array of int, shape (pieces,)
     begin, end : array of shape (pieces,)
-        Of each piece, as shares of its step.
+        Beginning and end of each piece, as shares of its step.
     series : array of shape (levels, components, instances, pieces, nodes)
         Taylor coefficients of the outputs.
     """
@@ -151,7 +151,7 @@ class Pieces(NamedTuple):
     series: Float[np.ndarray, "levels component instance piece node"]
 
     def time(self, start: Float[np.ndarray, " step"], length: Float[np.ndarray, " step"]) -> Any:
-        """Return the times of all nodes one after another, from where steps begin and how long they are, s."""
+        """Return the times of all nodes, flattened, from the starts and lengths of steps, s."""
         share = self.begin[:, None] + (self.end - self.begin)[:, None] * NODES
         return (start[self.step][:, None] + share * length[self.step][:, None]).ravel()
 
@@ -164,9 +164,9 @@ def in_pieces(
     pose_type: type,
     judged: Callable[[np.ndarray], Float[np.ndarray, "*quantity piece node"]],
 ) -> Pieces:
-    """Return outputs in pieces of steps, so short that polynomials through their nodes are the outputs.
+    """Return outputs in pieces of steps that are short enough for accurate interpolation by polynomials.
 
-    Steps reach a small part of where the series of the motion converge, not those of outputs: the distance of points
+    Steps are well within the convergence radius of the series of the motion, but not of outputs: the distance of points
     that pass each other, or an angle about an axis that a vector passes, changes in a small part of a step.
 
     Parameters
@@ -176,13 +176,13 @@ def in_pieces(
     polynomial : State
         Coefficients in the time from the beginnings of steps, (steps, coefficients, components, bodies).
     length : array of shape (steps,)
-        Of the steps, s.
+        Lengths of the steps, s.
     order : int
-        Highest coefficient of the outputs; what is shorter by nature is as long as it can be.
+        Highest coefficient of the outputs; outputs that use up derivatives have as many as possible.
     pose_type : type
         PlanarPose or SpatialPose.
     judged : callable
-        Returns of their series what polynomials must follow, the nodes last.
+        Function from the series to the quantities that polynomials must interpolate, with the nodes last.
     """
     count = len(length)
     step, begin, end = np.arange(count), np.zeros(count), np.ones(count)
@@ -209,9 +209,9 @@ def in_pieces(
 def _unresolved(
     values: Float[np.ndarray, "quantity piece places"], step: Int[np.ndarray, " piece"], size: Any
 ) -> tuple[Float[np.ndarray, "quantity step"], Float[np.ndarray, " piece"]]:
-    """Return how far polynomials through the nodes of pieces are from quantities, as a part of these.
+    """Return the sizes of quantities in steps, and the relative errors of their interpolation in pieces.
 
-    Also return how large the quantities are in the steps, which is found from the steps themselves, where it is None.
+    The sizes are computed if `size` is None, when the pieces are the steps themselves.
     """
     coefficients = values[..., :-2] @ INTERPOLATION.T
     local = np.abs(coefficients).max(axis=-1)
@@ -225,9 +225,10 @@ def _unresolved(
 def _at(
     group: Group, polynomial: State, since: Float[np.ndarray, "piece node"], order: int, pose_type: type
 ) -> Float[np.ndarray, "levels component instance piece node"]:
-    """Return outputs at times into steps as Taylor coefficients.
+    """Return the Taylor coefficients of outputs at times into steps.
 
-    A few at many places cost less than many at one: the program for high orders of an angle takes minutes to compile.
+    Low orders at many points are used instead of high orders at one, since the program for high orders of an angle
+    takes minutes to compile.
     """
     count = polynomial.position.shape[1]
     j, k = np.arange(order + 1)[:, None], np.arange(count)
@@ -241,7 +242,7 @@ def _at(
 
 
 class AbstractDetector(abc.ABC):
-    """The crossings of one event, an Event or JointEvent, along a run, of which the steps come piece by piece."""
+    """A detector of the crossings of one event, an Event or JointEvent, in consecutive parts of a run."""
 
     def __init__(self, event: Any):
         self.event = event
@@ -250,12 +251,12 @@ class AbstractDetector(abc.ABC):
 
     @abc.abstractmethod
     def detect(self, part: Any) -> list[tuple[int, float]]:
-        """Return the crossings in the next steps, each as the number of the step and the time from its beginning."""
+        """Return the crossings in the next steps, each as the index of the step and the time from its beginning."""
 
     def _crossings(
         self, values: Float[np.ndarray, "piece node"], pieces: Iterable[tuple[int, float, float]], part: Any
     ) -> list[tuple[int, float]]:
-        """Return the crossings in pieces of steps: their steps, and where they begin and end as shares of these."""
+        """Return the crossings in pieces, each given by its step and by its beginning and end as shares of the step."""
         events = []
         for (k, begin, end), coefficients in zip(pieces, (values - self.event.value) @ INTERPOLATION.T, strict=True):
             length = part.length[k]
@@ -270,12 +271,12 @@ class AbstractDetector(abc.ABC):
 
 
 class EventDetector(AbstractDetector):
-    """The crossings of one event of a mechanism.
+    """The detector of one event of a mechanism.
 
     Parameters
     ----------
     event : Event
-        What is looked for.
+        The event.
     group : Group
         Its output, as a group of one.
     pose_type : type
@@ -285,14 +286,14 @@ class EventDetector(AbstractDetector):
     def __init__(self, event: Event, group: Group, pose_type: type):
         super().__init__(event)
         self._group, self._pose_type = group, pose_type
-        self._angle = np.zeros((3, 0))  # time, angle with its turns, and rate, at the last node so far
+        self._angle = np.zeros((3, 0))  # time, angle with revolutions, and rate at the last node so far
 
     def detect(self, part: Any) -> list[tuple[int, float]]:
         """See `AbstractDetector`."""
         start, length = part.start, part.length
         derivative, element = self.event.derivative, self._group.element
         order, component = derivative + element.lost_orders + 1, self.event.component
-        smooth = max(derivative, 1) if element.turning else derivative  # rates have no whole turns
+        smooth = max(derivative, 1) if element.turning else derivative  # rates have no revolutions
         pieces = in_pieces(
             self._group, part.polynomial, length, order, self._pose_type, lambda x: x[smooth : smooth + 1, component, 0]
         )
@@ -310,16 +311,16 @@ class EventDetector(AbstractDetector):
 
 
 def crossings(coefficients: Float[np.ndarray, " order"], *, first: bool = False) -> list[tuple[float, float]]:
-    """Return where a polynomial changes its sign in [0, 1], and the sense: 1 where it rises through zero.
+    """Return the sign changes of a polynomial in [0, 1], each with its sense: 1 for rising, -1 for falling.
 
-    Places at which it touches zero and turns back do not count.
+    Roots at which it touches zero and turns back do not count.
 
     Parameters
     ----------
     coefficients : array of shape (order + 1,)
-        Of Chebyshev polynomials on [0, 1], lowest first.
+        Coefficients of Chebyshev polynomials on [0, 1], lowest first.
     first : bool, default False
-        Whether a sign change at 0 itself does not count: there the polynomial begins.
+        Whether 0 is the beginning of the run, at which a sign change does not count.
 
     Examples
     --------
@@ -337,7 +338,7 @@ def crossings(coefficients: Float[np.ndarray, " order"], *, first: bool = False)
         roots = np.append(roots, 0.0)
     clusters: list[list[float]] = []
     for root in np.sort(roots):
-        # roots between which the polynomial stays at rounding are one place
+        # roots between which the polynomial stays within rounding count as one
         if clusters and abs(polynomial(0.5 * (clusters[-1][-1] + root))) <= faint:
             clusters[-1].append(float(root))
         else:
@@ -354,9 +355,9 @@ def crossings(coefficients: Float[np.ndarray, " order"], *, first: bool = False)
 
 
 def _real_roots(polynomial: np.polynomial.Chebyshev) -> Float[np.ndarray, " root"]:
-    """Return the roots of a polynomial that may be real, in and about [0, 1], each corrected by Newton's method."""
+    """Return the possibly real roots of a polynomial in and near [0, 1], each corrected by Newton's method."""
     sizes = np.abs(polynomial.coef)
-    last = np.flatnonzero(sizes > 1e-17 * sizes.max())[-1]  # what is below rounding has no root near
+    last = np.flatnonzero(sizes > 1e-17 * sizes.max())[-1]  # coefficients below rounding have no roots nearby
     polynomial = polynomial.truncate(last + 1)
     roots = polynomial.roots() if last else np.zeros(0)
     real = np.real(roots[(np.abs(np.imag(roots)) <= REAL) & (np.abs(np.real(roots) - 0.5) < 0.5 + 10 * NEIGHBORHOOD)])

@@ -1,7 +1,7 @@
-"""What a Taylor series cannot overlook: programs of few sums, products, sines and cosines.
+"""Programs that a Taylor series cannot overlook: sums, products, sines and cosines, of low degree.
 
-The first coefficients of a polynomial of low degree tell all of it, wherever it is looked at, and those of a sine its
-waves. Those of a bell, a step or a table tell nothing of what lies beside the place.
+The first Taylor coefficients determine a polynomial of low degree anywhere, and the waves of a sine. Those of a bell, a
+step or a table say nothing about its values elsewhere.
 """
 
 from collections.abc import Sequence
@@ -12,14 +12,14 @@ from jax.extend.core import ClosedJaxpr, Literal
 from jounce.jet.programs.operations import ADDITIVE, REARRANGING
 from jounce.jet.programs.reader import inner_program
 
-MAX_DEGREE = 8  # of what is moving: a power such as x**40 is flat, and then a wall
+MAX_DEGREE = 8  # in the arguments: a power such as x**40 is flat, and then a wall
 SUMS = (ADDITIVE | REARRANGING | frozenset(["neg", "optimization_barrier"])) - {"select_n", "gather", "dynamic_slice"}
 WAVES = frozenset(["sin", "cos"])
 PRODUCTS = frozenset(["mul", "dot_general"])
 
 
 def is_plain(program: ClosedJaxpr) -> bool:
-    """Tell whether a program is of sums, products, sines and cosines of its arguments, and of low degree.
+    """Return whether a program consists of sums, products, sines and cosines of its arguments, of low degree.
 
     Examples
     --------
@@ -34,7 +34,7 @@ def is_plain(program: ClosedJaxpr) -> bool:
 
 
 def uses(program: ClosedJaxpr) -> bool:
-    """Tell whether the results of a program depend on its arguments.
+    """Return whether the results of a program depend on its arguments.
 
     Examples
     --------
@@ -47,7 +47,7 @@ def uses(program: ClosedJaxpr) -> bool:
 
 
 def _degrees(jaxpr: Any, arguments: Sequence[int]) -> list[int] | None:
-    """Return the degrees of the results in what moves, zero for what does not; None where there is none."""
+    """Return the degrees of the results in the arguments, zero for constants; None if there is no degree."""
     known: dict[Any, int] = dict.fromkeys(jaxpr.constvars, 0) | dict(zip(jaxpr.invars, arguments, strict=True))
 
     def of(variable: Any) -> int:
@@ -63,7 +63,7 @@ def _degrees(jaxpr: Any, arguments: Sequence[int]) -> list[int] | None:
 
 
 def _made(equation: Any, degrees: list[int]) -> list[int] | None:
-    """Return the degrees of the results of an operation."""
+    """Return the degrees of the results of an operation, or None if there is no degree."""
     name, inner = equation.primitive.name, inner_program(equation.params)
     if name in SUMS:
         return [max(degrees)] * len(equation.outvars)

@@ -1,4 +1,4 @@
-"""Functions that run on the host, on numbers that JAX traces: at once, or called by what JAX compiles or maps."""
+"""Functions that run on the host with the values of JAX tracers: at once, or as callbacks of compiled programs."""
 
 from collections.abc import Callable
 from typing import Any
@@ -15,14 +15,14 @@ Values = tuple[Any, ...]
 
 
 def recorded(function: Callable[[Any], Any], values: Any) -> Any:
-    """Return what a function gives of the numbers of values that JAX traces; None where it knows none yet.
+    """Return the result of a function of the concrete values of tracers; None if the values are not known.
 
     Parameters
     ----------
     function : callable
-        Maps such values to anything.
+        Function of concrete values, with any result.
     values : pytree
-        As within `jax.jit` and `jax.vmap` nothing is known of them.
+        Values that JAX may trace; within `jax.jit` and `jax.vmap` they are not known.
     """
     results: list[Any] = []
 
@@ -41,19 +41,18 @@ def recorded(function: Callable[[Any], Any], values: Any) -> Any:
 
 
 def called(function: Callable[[Values], Any], shapes: Any, values: Values) -> Any:
-    """Return what a function gives that decides by numbers, where JAX compiles or maps what they follow from.
+    """Return the result of a function that depends on concrete values, as a callback within `jax.jit` or `jax.vmap`.
 
-    Its derivatives of each order are functions of numbers too, and are called likewise; they are found forward, one
-    value after another.
+    Its derivatives of each order are callbacks, too, computed in forward mode.
 
     Parameters
     ----------
     function : callable
-        Maps values, numbers or such that `jax.jvp` traces, to a pytree of arrays.
+        Function from values, concrete or traced by `jax.jvp`, to a pytree of arrays.
     shapes : pytree of jax.ShapeDtypeStruct
-        Of what it gives.
+        Shapes and types of the result.
     values : tuple of array
-        Of floats.
+        Arrays of floats.
     """
     sizes = [np.shape(value) for value in values]
     ends = np.cumsum([np.prod(size, dtype=int) for size in sizes])
@@ -67,7 +66,7 @@ def called(function: Callable[[Values], Any], shapes: Any, values: Values) -> An
 
 
 def _derivative(function: Callable[[Numbers], Any], shapes: Any, count: int, degree: int) -> Callable[[Numbers], Any]:
-    """Return the derivative of a function of a vector, the directions on the last axes, called on the host."""
+    """Return the derivative of a function of a vector as a callback on the host, with directions on the last axes."""
     slope = function
     for _ in range(degree):
         slope = jax.jacfwd(slope)

@@ -1,10 +1,10 @@
-"""What a step would pass over unseen: forces, motion laws and joints, looked at along its path before it is taken.
+"""Lookahead: the check of forces, motion laws and joints along a step before it is taken.
 
-A Taylor series knows what it has met. A pulse that lies ahead, in time or in place, leaves no trace in it, and both
-ends of a long step may lie beside the pulse. So forces and laws are evaluated on the polynomial of the step at many
-instants, and compared with the polynomial through a few of them: what is analytic over a step is given by these to
-rounding. Where they disagree, and where that would move the mechanism, the step is halved. So it is where the residual
-of a joint does not vanish all along: of those that a series could overlook, as `is_plain` tells.
+A pulse that lies ahead in time or space leaves no trace in a Taylor series, and both ends of a long step may lie beside
+it. Forces and laws are therefore evaluated along the polynomial of the step at many instants, and compared with their
+interpolation from a few nodes, which is accurate to rounding for a function that is analytic over the step. If they
+differ, and the difference would move the mechanism, the step is halved. The same applies if the residual of a joint
+does not vanish along the step, for joints that a series could overlook (`is_plain`).
 """
 
 from typing import Any, NamedTuple
@@ -29,45 +29,45 @@ from jounce.mechanism.laws.driver_outputs import is_turning
 from jounce.mechanism.system import Group, law_left_out
 from jounce.mechanism.transmissions.axis_angles import with_turns
 
-POINTS = 32  # of a step at which it is looked at
-ROUNDS_OF_JOINTS = 4  # factor on their number where joints are looked at
-RUN_POINTS = 8192  # points in the whole run at least, where there are few steps
-HARMLESS = 1e-15  # displacement of a body by something overlooked that does no harm, rad or sizes of the mechanism
-SHAKE = 2.0**-51  # relative change of state and time by which the rounding error of a force is measured
-SPARSE = 7  # one node in so many serves that, changed both ways: a jump beside it shows in one direction only
+POINTS = 32  # of a step that are evaluated
+ROUNDS_OF_JOINTS = 4  # factor on their number if joints are watched
+RUN_POINTS = 8192  # least number of points in the whole run, if there are few steps
+HARMLESS = 1e-15  # displacement of a body that may be overlooked, rad or sizes of the mechanism
+SHAKE = 2.0**-51  # relative change of state and time that measures the rounding error of a force
+SPARSE = 7  # every so many nodes are changed, in both directions, as a jump beside a node shows in one only
 _SHAKEN = (np.tile(NODES[::SPARSE], 2), np.repeat([SHAKE, -SHAKE], len(NODES[::SPARSE])))
-NOISE = 16.0  # multiple of the measured change up to which a difference counts as rounding
-FAINT = 1e-13  # part of a force: rounding error of the polynomial through its values
+NOISE = 16.0  # multiple of the measured rounding error up to which a difference counts as rounding
+FAINT = 1e-13  # part of a force: rounding error of its interpolation
 SHORTEST = 1e-12  # part of the run: the longest step over a jump of a force
 FINEST = 2.0**-60  # part of the run: the first length tried for such a step, about the rounding of positions and times
-COARSER = 4.0  # factor on that length each time that it has not led over the jump, whose place depends on rounding
-AWAY = 1e-9  # part of the run: after a step so long the last jump is left behind
+COARSER = 4.0  # factor on that length after a step that has not crossed the jump, whose position depends on rounding
+AWAY = 1e-9  # part of the run: a longer step leaves the last jump behind
 JUMP = 1e-6  # largest jump of a motion law or a joint in so short a step, rad or sizes of the mechanism
-GAP = 1e-12  # largest residual of joints on the way unless the tolerance allows more, rad or sizes of the mechanism
-NEAR = 1.0 / 16.0  # part of the way to where forces and laws are no longer known: a step ends that close to it
+GAP = 1e-12  # largest residual of joints along a step unless the tolerance allows more, rad or sizes of the mechanism
+NEAR = 1.0 / 16.0  # relative distance to the first unresolved point at which a step ends
 
 
 BodyMobility = Float[Numbers, "body batch"]
-"""How readily each body moves, the ground first, as `mobility_of` gives it."""
+"""Mobility of each body, the ground first, from `mobility_of`."""
 
 Signals = Float[Numbers, "instance batch"]
 """One number for each force and law."""
 
 
 class Lookahead(NamedTuple):
-    """What was seen ahead; arrays of shape (batch,)."""
+    """The result of a lookahead; arrays of shape (batch,)."""
 
-    step: Lanes  # s, shortened where needed
-    resolved: Flags  # whether forces and laws are known over it
-    kink: Indices  # index in `watched_names` of one that is not, over a step too short to matter, or -1
-    limiting: Indices  # index of the one for which it was shortened
+    step: Lanes  # s, shortened if needed
+    resolved: Flags  # whether forces and laws are resolved over the step
+    kink: Indices  # index in `watched_names` of a force or law that a negligibly short step does not resolve, or -1
+    limiting: Indices  # index of the force or law that shortened the step
 
 
 def mobility_of(equations: Equations, inverse: Inverse) -> BodyMobility:
-    """Return how readily generalized forces on each body move the mechanism, from the inverse of the matrix.
+    """Return the mobility of each body, from the inverse of the matrix of the equations.
 
-    The largest acceleration, in rad or sizes of the mechanism by s^2, by a force of one on one of the scaled
-    coordinates of the body; of a large mechanism, a bound for it.
+    It is the largest acceleration, rad or sizes of the mechanism by s^2, caused by a unit force on one of the scaled
+    coordinates of the body; for a large mechanism, a bound of it.
     """
     columns, count = equations.system.shape[1], equations.coordinates
     responses = inverse.responses(columns)[0]
@@ -76,7 +76,7 @@ def mobility_of(equations: Equations, inverse: Inverse) -> BodyMobility:
 
 
 def watched_names(model: Model) -> list[str]:
-    """Return the names of the forces, drivers and constraints of a model, in the order in which they are looked at."""
+    """Return the names of the forces, drivers and constraints of a model, in the order of the lookahead."""
     constraints = [name for _, members in named_groups(model) for name in members]
     return [f"forces.{name}" for name in force_names(model)] + list(model.drivers) + constraints
 
@@ -84,9 +84,9 @@ def watched_names(model: Model) -> list[str]:
 def constraints_to_watch(
     equations: Equations, state: State, time: Instants
 ) -> dict[int, Float[Numbers, "row instance 1"]]:
-    """Return which groups of constraints have residuals that a series could overlook, and the scales of their rows.
+    """Return the groups of constraints with residuals that a series could overlook, with the scales of their rows.
 
-    The law of a driver is looked at by itself.
+    Residuals of drivers are taken without their laws, which are watched separately.
     """
     pose, clock = equations.pose_at_rest(state.position, state.attitude), Jet([time])
     names, first = {}, 0
@@ -117,26 +117,26 @@ def look_ahead(
     bound: Lanes,
     shortest: Lanes,
 ) -> Lookahead:
-    """Return how far a step may go so that no force, no motion law and no joint on its way stays unseen.
+    """Return the longest step over which all forces, motion laws and joints are resolved.
 
     Parameters
     ----------
     equations : Equations
-        Of the mechanism.
+        Equations of motion of the mechanism.
     path : State
         Polynomials of the step in the time from its beginning, (order + 1, components, bodies, batch).
     angles : Angles
-        That forces measure along it.
+        Angles that forces measure along the step.
     mobility : array of shape (bodies, batch)
-        As `mobility_of` gives it.
+        Mobility of the bodies, from `mobility_of`.
     time, step : array of shape (batch,)
-        Where the step begins, and its length, negative backward in time, s.
+        Beginning and length of the step, s; the length is negative backward in time.
     duration : float
-        Of the whole run, s: the longer the step in it, the more points it is looked at.
+        Duration of the whole run, s: longer steps relative to it are evaluated at more points.
     bound : array of shape (batch,)
-        By how much a body may move otherwise than seen, rad or sizes of the mechanism.
+        Displacement of a body that may be overlooked, rad or sizes of the mechanism.
     shortest : array of shape (batch,)
-        Step that may lead over a jump of a force, s: `finest`.
+        Length of a step that may cross a jump of a force, s, from `finest`.
     """
     signals, blank = _Signals(equations, path, angles, time), jnp.full(step.shape, -1)
     if not signals.numbers.size:
@@ -167,7 +167,7 @@ def look_ahead(
         low, high, _, begun = carry
         return ~begun | jnp.any(open_(low, high))
 
-    # the whole step is the first round of the loop, so that what is seen is a part of the program once, and a large one
+    # the whole step is the first iteration of the loop, so that the large code of `seen` is compiled once
     none, whole = jnp.zeros(step.shape), jnp.ones(step.shape)
     nothing = Lookahead(none, jnp.zeros(step.shape, bool), blank, blank)
     low, high, best, _ = jax.lax.while_loop(unfinished, narrowed, (none, whole, nothing, jnp.zeros((), bool)))
@@ -176,7 +176,7 @@ def look_ahead(
 
 
 def finest(duration: Numbers, time: Numbers, crossing: Numbers) -> Numbers:
-    """Return how long a step over a jump may be, s, after so many that have not led over it."""
+    """Return the allowed length of a step over a jump, s, after `crossing` steps that have not crossed it."""
     longer = jnp.minimum(FINEST * COARSER ** crossing.astype(float), SHORTEST)
     return longer * jnp.maximum(duration, jnp.abs(time))
 
@@ -184,18 +184,18 @@ def finest(duration: Numbers, time: Numbers, crossing: Numbers) -> Numbers:
 def steps_counted(
     before: Numbers, step: Numbers, duration: Numbers, count: Numbers | bool = True, longest: float = SHORTEST
 ) -> Numbers:
-    """Return how many short steps follow one another, with one more where `count` says so.
+    """Return the number of consecutive short steps, incremented if the step is short and `count` is true.
 
-    Short are steps of at most a part of the run, `longest`.
+    A step is short if it is at most `longest` times the duration.
     """
     short = jnp.abs(step) <= longest * duration
     return jnp.where(short & count, before + 1, jnp.where(jnp.abs(step) > AWAY * duration, 0, before))
 
 
 class _Signals:
-    """What is looked at along the path of a step: forces, motion laws, and joints that a series could overlook.
+    """The watched values along a step: forces, motion laws, and residuals of joints that a series could overlook.
 
-    Arrays have the instances and the batch last. `numbers` tells where each instance is in `watched_names`.
+    Arrays have the instances and the batch last. `numbers` has the index of each instance in `watched_names`.
     """
 
     def __init__(self, equations: Equations, path: State, angles: Angles, time: Lanes):
@@ -226,7 +226,7 @@ class _Signals:
         self._split = sum(counts[: len(forces)]), sum(counts[:plain])
 
     def allowed(self, bound: Lanes, short: Flags) -> Signals:
-        """Return what may be overlooked; over the shortest steps forces may jump, laws and joints hardly."""
+        """Return the allowed departures; over the shortest steps forces may jump, laws and joints hardly."""
         forces, laws = self._split
         index = np.arange(len(self.numbers))[:, None]
         least = jnp.where(index < laws, bound[None], jnp.maximum(MARGIN * bound, GAP)[None])
@@ -234,10 +234,10 @@ class _Signals:
         return jnp.where(short[None], jump, least)
 
     def departure(self, step: Lanes, duration: Number, mobility: BodyMobility) -> tuple[Signals, Signals]:
-        """Return how far forces and laws are from the polynomials through the nodes of a step, and what that moves.
+        """Return the departures of forces and laws from their interpolation, and the displacements that they cause.
 
-        Of joints, how far they are from being fulfilled. What may be rounding is taken off. The second is in rad or
-        sizes of the mechanism: of a force, what its departure over the step moves bodies by in the whole run.
+        The departures of joints are their residuals. Possible rounding is subtracted. Displacements are in rad or sizes
+        of the mechanism; that of a force is the effect of its departure on bodies until the end of the run.
         """
         points, shakes = (np.concatenate(parts) for parts in zip((NODES, 0.0 * NODES), _SHAKEN, strict=True))
         signals = jax.vmap(lambda s, shake: self._values(s * step, shake))(points, shakes)
@@ -253,7 +253,7 @@ class _Signals:
         size = jnp.max(jnp.abs(knots), axis=0)
         shaken = jnp.abs(shaken.reshape(2, -1, *shaken.shape[1:]) - knots[None, ::SPARSE])
         noise = NOISE * jnp.max(jnp.min(shaken, axis=0), axis=0) + FAINT * size
-        noise = jnp.minimum(noise, self._noisiest[None, :, None])  # what jumps where it is looked at is no rounding
+        noise = jnp.minimum(noise, self._noisiest[None, :, None])  # a jump at a node is no rounding
 
         def look(k: Any, carry: tuple[Any, Any]) -> tuple[Any, Any]:
             share = (k * POINTS + jnp.arange(POINTS)).astype(float) / (count - 1.0)  # both ends too
@@ -267,7 +267,7 @@ class _Signals:
         return largest, self._moved(largest, mean * jnp.abs(step * duration)[None], mobility)
 
     def _moved(self, largest: Signals, impulse: Signals, mobility: BodyMobility) -> Signals:
-        """Return by how much bodies move for departures of forces, by their impulses in N s^2, and of laws."""
+        """Return the displacements of bodies by departures of forces, from their impulses in N s^2, and of laws."""
         length, parts, first = self._equations.system.column_scale[0], [], 0
         for group in self._given:
             reached = jnp.max(jnp.stack([mobility[np.array(slot)] for slot in group.bodies]), axis=0)
@@ -281,9 +281,9 @@ class _Signals:
         return jnp.concatenate([*parts, largest[first:]])
 
     def _values(self, since: Lanes, shake: Float[Numbers, ""] | float) -> Float[Numbers, "component instance batch"]:
-        """Return forces and laws a time after the beginning of the step.
+        """Return the watched values at a time from the beginning of the step.
 
-        With `shake`, time and all coordinates are changed relatively by so much, this way and that.
+        With `shake`, time and all coordinates have relative changes of this size, with different signs.
         """
         lanes = since.shape[-1]
         clock = Jet.variable(((self._time + since) * (1.0 + shake))[None], 1)
@@ -308,18 +308,18 @@ class _Signals:
 def _combined(
     weights: Float[Numbers, "place node"], values: Float[Numbers, "node component instance batch"]
 ) -> Float[Numbers, "place component instance batch"]:
-    """Return sums of values with weights; for a product of matrices XLA would call a library."""
+    """Return weighted sums of values, written out, since XLA would call a library for a matrix product."""
     return jnp.sum(weights[:, :, None, None, None] * values[None], axis=1)
 
 
 def _signs(shape: tuple[int, ...]) -> Float[np.ndarray, "component body 1"]:
-    """Return signs for components of bodies, without a pattern that a force may be blind to."""
+    """Return irregular signs for components of bodies, to which no force is likely to be blind."""
     components, bodies = (np.arange(n) for n in shape)
     return np.where(np.sin(1.0 + 3.0 * components[:, None] + 5.0 * bodies**2) > 0, 1.0, -1.0)[:, :, None]
 
 
 def _chebyshev(x: Float[Numbers, " place"]) -> Float[Numbers, "polynomial place"]:
-    """Return the Chebyshev polynomials at some places."""
+    """Return the Chebyshev polynomials at some points."""
     polynomials = [jnp.ones_like(x), x]
     while len(polynomials) < len(INTERPOLATION):
         polynomials.append(2.0 * x * polynomials[-1] - polynomials[-2])

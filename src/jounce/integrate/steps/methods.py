@@ -1,4 +1,4 @@
-"""Integration methods: how far a step may go, where it arrives, how well, and its polynomial in between."""
+"""Integration methods: the length, end, error and polynomial of a step."""
 
 import abc
 import math
@@ -24,10 +24,10 @@ LOWEST_ORDER = 4
 NEEDED = LOWEST_ORDER + 2
 # near a singular position: upper coefficients that grow geometrically from less than this are rounding errors
 FAINT = 1e-10
-# response to a gap of one, in largest masses: 30 and more where rounding hides coefficients, else below 26
+# response to a unit gap, in largest masses: 30 and more if rounding hides coefficients, otherwise below 26
 BRACED = 20.0
-NEAR = 1e-6  # near a pole: how far a body moves within the radius of a series, rad or sizes of the mechanism
-ROUGH = 1e-11  # tolerance of a step where rounding hides coefficients, rad or sizes of the mechanism
+NEAR = 1e-6  # near a pole: least motion within the radius of a series, rad or sizes of the mechanism
+ROUGH = 1e-11  # tolerance of a step if rounding hides coefficients, rad or sizes of the mechanism
 MARGIN = 10.0  # an error estimate up to this many times the tolerance is accepted, since estimates are rough
 ROUNDING = 1e-14  # relative error of an acceleration that does not show that a step is too long
 
@@ -35,13 +35,13 @@ ROUNDING = 1e-14  # relative error of an acceleration that does not show that a 
 class AbstractMethod(Module):
     """A one-step method on Taylor expansions of the constrained motion.
 
-    Every step starts from the expansion of the motion at its beginning, ends on the constraints, and is accepted where
-    the accelerations of the equations there agree with those of its polynomial.
+    Every step starts from the expansion of the motion at its beginning, ends on the constraints, and is accepted if the
+    accelerations of the equations of motion at its end agree with those of its polynomial.
     """
 
     @property
     def controlled(self) -> bool:
-        """Whether steps are chosen by their error, and shortened where a force on the way would stay unseen."""
+        """Whether steps are chosen by their error, and shortened by the lookahead."""
         return getattr(self, "step", None) is None
 
     @abc.abstractmethod
@@ -50,46 +50,45 @@ class AbstractMethod(Module):
 
     @abc.abstractmethod
     def longest_step(self, sizes: Sizes, tolerance: Number) -> Lanes:
-        """Return how far a step may go, s.
+        """Return the longest step within the tolerance, s.
 
         Parameters
         ----------
         sizes : array of shape (order + 1, batch)
             Sizes of the Taylor coefficients 1 to order + 1 of the positions, rad or sizes of the mechanism.
         tolerance : float
-            Of the error of a step, in the same measure.
+            Error of a step, in the same units.
         """
 
     def prepared(
         self, expansion: Expansion, length: Number, tolerance: Number, singular: Flags, usual: Lanes
     ) -> tuple[Expansion, Lanes, Lanes]:
-        """Return the expansion as the step shall use it, how far that may go, s, and by which tolerance to judge it.
+        """Return the expansion for the step, the longest step with it, s, and the allowed error.
 
-        Steps that are shorter than usual, as those from a jump of a force on, may leave out less (`in_proportion`): a
-        place that is wrong by so much means a velocity that is wrong by as much by the time of the step, and that goes
-        on to the end of the run.
+        Steps shorter than usual, such as those after a jump of a force, are allowed smaller errors (`in_proportion`): a
+        position error divided by the short time of the step is a velocity error, which acts until the end of the run.
 
         Parameters
         ----------
         expansion : Expansion
-            At the beginning of the step.
+            Expansion at the beginning of the step.
         length : float
             Size of the mechanism, m.
         tolerance : float
-            Of the error of the step, rad or sizes of the mechanism.
+            Error of the step, rad or sizes of the mechanism.
         singular : array of bool, shape (batch,)
-            Whether the equations of motion are near to singular there, as `near_singular` tells.
+            Whether the equations of motion are nearly singular, from `near_singular`.
         usual : array of shape (batch,)
-            Length of a step that is not short, s; zero where none is known.
+            Length of a step that is not short, s; zero if not known.
         """
         step = self.longest_step(coefficient_sizes(expansion, length), tolerance)
         return expansion, step, in_proportion(jnp.full(step.shape, tolerance), step, usual)
 
     @abc.abstractmethod
     def arrive(self, equations: Equations, expansion: Expansion, time: Lanes, step: Lanes) -> State:
-        """Return the state at the end of a step, not yet on the constraints; `time` is that of its beginning.
+        """Return the state at the end of a step, before projection; `time` is that of its beginning.
 
-        Angles about axes that forces measure have, in the equations, the turns of the end of the step.
+        In `equations`, angles about axes that forces measure have the revolutions of the end of the step.
         """
 
     @abc.abstractmethod
@@ -102,7 +101,7 @@ class AbstractMethod(Module):
 
 
 def evaluated(polynomial: State, step: Lanes) -> State:
-    """Return the values of the polynomials of a state a time `step` away."""
+    """Return the values of the polynomials of a state at a time `step` from their beginning."""
     return polynomial.map(lambda c: _horner(c, step))
 
 
@@ -112,7 +111,7 @@ def _horner(
     def added(value: Any, coefficient: Any) -> tuple[Any, None]:
         return value * step[None, None] + coefficient, None
 
-    if traces_one_instant():  # one turn is written there, instead of all of them
+    if traces_one_instant():  # a loop has one iteration in the code instead of all of them
         return jax.lax.scan(added, coefficients[-1], coefficients[:-1], reverse=True)[0]
     value = coefficients[-1]
     for coefficient in coefficients[-2::-1]:
@@ -121,17 +120,16 @@ def _horner(
 
 
 def near_singular(equations: Equations, inverse: Inverse) -> Flags:
-    """Tell where rows of the constraints are about to depend on each other, from the inverse of the matrix."""
+    """Return whether constraint rows are nearly dependent, from the inverse of the matrix of the equations."""
     return inverse.responses(equations.system.shape[1])[1] > BRACED
 
 
 def _is_growing_rounding(sizes: Sizes) -> Flags:
-    """Tell where the upper coefficients may be rounding that grows geometrically.
+    """Return whether the upper coefficients may be rounding that grows geometrically.
 
-    A force of which only the foot has been met grows so too: near a singular position alone is it rounding.
-
-    Where the motion itself would hardly get on within the radius that they show, there is a pole in the way, whose
-    series grow faintly too: it must not be passed.
+    Coefficients also grow at the foot of a force; only near a singular position are they rounding. If the motion hardly
+    advances within their radius of convergence, a pole lies ahead, whose series grow from faint terms as well, and the
+    step must not pass it.
     """
     count = len(sizes)
     middle, top = (jnp.log(jnp.maximum(jnp.max(sizes[max(k - 4, 0) : k], axis=0), 1e-300)) for k in (count // 2, count))
@@ -143,14 +141,14 @@ def _is_growing_rounding(sizes: Sizes) -> Flags:
 def coefficient_sizes(expansion: Expansion, length: Number) -> Sizes:
     """Return the sizes of the Taylor coefficients 1 to order + 1 of positions, rad or sizes of the mechanism.
 
-    Those that are no finite numbers are infinite.
+    Values that are not finite become infinite.
     """
     velocity, spin = (jnp.max(jnp.abs(c), axis=(1, 2)) for c in expansion.state[2:])
     sizes = jnp.maximum(velocity / length, spin) / jnp.arange(1.0, len(velocity) + 1)[:, None]
     attitude = expansion.state.attitude
     if attitude.shape[1] == 1:
         return _finite_or_infinite(sizes)
-    # Euler parameters of a body that spins evenly go on where its angular velocity has no more terms
+    # the series of Euler parameters of a body with constant angular velocity does not end
     turned = 2.0 * jnp.max(jnp.abs(attitude[1:]), axis=(1, 2))
     return _finite_or_infinite(jnp.concatenate([jnp.maximum(sizes[:-1], turned), sizes[-1:]]))
 
@@ -160,9 +158,9 @@ def _finite_or_infinite(sizes: Sizes) -> Sizes:
 
 
 def reach(sizes: Sizes, first: int) -> Lanes:
-    """Return the time in which no Taylor term from the order `first` on exceeds one.
+    """Return the time within which no Taylor term from the order `first` on exceeds one.
 
-    All of them count: the last two may vanish together, as those of a body at rest or at a turning point do.
+    All terms count, since the last two may vanish together, as for a body at rest or at a turning point.
     """
     orders = jnp.arange(1.0, len(sizes) + 1)[first - 1 :]
     roots = jnp.power(jnp.maximum(sizes[first - 1 :], 1e-300), -1.0 / orders[:, None])
@@ -170,31 +168,31 @@ def reach(sizes: Sizes, first: int) -> Lanes:
 
 
 def in_proportion(allowed: Lanes, step: Lanes, usual: Lanes) -> Lanes:
-    """Return the error that is allowed of steps, less of those that are shorter than usual."""
+    """Return the allowed error of steps, reduced in proportion for steps shorter than usual."""
     return allowed * jnp.minimum(step / jnp.maximum(usual, 1e-300), 1.0)
 
 
 def furthest(
     sizes: Sizes, allowed: Lanes, usual: Lanes | None = None, duration: Number | None = None
 ) -> tuple[Bool[Numbers, "order batch"], Lanes]:
-    """Return which coefficients of series to keep, from order zero on, so that they carry furthest, and how far, s.
+    """Return the coefficients of series to keep, from order zero on, for the longest step, and its length, s.
 
     Parameters
     ----------
     sizes : array of shape (order + 1, batch)
-        Of the coefficients from order one on.
+        Sizes of the coefficients from order one on.
     allowed : array of shape (batch,)
-        Error of a step.
+        Allowed error of a step.
     usual : array of shape (batch,), optional
-        Length of steps, s, below which the error is allowed by the square of the proportion: rounding beside a jump
-        grows from term to term, so that all that is allowed is left out.
+        Usual length of steps, s; shorter steps are allowed an error reduced by the square of the ratio, since rounding
+        beside a jump grows from term to term and uses up the whole allowance.
     duration : float, optional
-        Of the run, s, to whose end a velocity moves on that the step leaves wrong by the error of its accelerations.
+        Duration of the run, s; the velocity error of a step, from its accelerations, acts until the end of the run.
     """
     orders = np.arange(1.0, len(sizes) + 1)
     roots = -jnp.log(jnp.maximum(sizes, 1e-300)) / orders[:, None]  # logarithms: powers would cost far more
     cuts = np.arange(LOWEST_ORDER, len(sizes))[:, None]
-    counted = (slice((k + 1) // 2 - 1, k + 1) for k in cuts[:, 0])  # the upper half of what is kept, and the next
+    counted = (slice((k + 1) // 2 - 1, k + 1) for k in cuts[:, 0])  # the upper half of the kept terms, and the next
     reaches = jnp.stack([jnp.min(roots[part], axis=0) for part in counted])
     steps = reaches + jnp.log(allowed)[None] / (cuts + 1.0)
     if duration is not None:
@@ -210,14 +208,14 @@ def furthest(
 
 
 class Taylor(AbstractMethod):
-    """Taylor series of the constrained motion, of a chosen order or one that suits the tolerance.
+    """Taylor series of the constrained motion, with a given order or one that fits the tolerance.
 
     Parameters
     ----------
     order : int, optional
-        From 4 to 40; from the tolerance unless given.
+        From 4 to 40; by default from the tolerance.
     step : float, optional
-        The length of all steps, s; by a control of the error unless given.
+        Length of all steps, s; by default from error control.
 
     Examples
     --------
@@ -236,11 +234,11 @@ class Taylor(AbstractMethod):
         check_step(self.step)
 
     def expansion_order(self, tolerance: float) -> int:
-        """Return the order: of all, the one that takes the fewest terms for a unit of time, at this tolerance."""
+        """Return the given order, or that with the fewest terms for a unit of time at this tolerance."""
         return self.order or min(max(round(-0.75 * math.log(tolerance)), 6), 28)
 
     def longest_step(self, sizes: Sizes, tolerance: Number) -> Lanes:
-        """Return the step at which the terms of the upper half of the orders point to an error within tolerance."""
+        """Return the step at which the terms of the upper half of the orders predict the tolerated error."""
         if self.step is not None:
             return jnp.full(sizes.shape[1], self.step, float)
         count = len(sizes)
@@ -249,11 +247,11 @@ class Taylor(AbstractMethod):
     def prepared(
         self, expansion: Expansion, length: Number, tolerance: Number, singular: Flags, usual: Lanes
     ) -> tuple[Expansion, Lanes, Lanes]:
-        """Return the series cut where it carries furthest, and how far that is.
+        """Return the series truncated for the longest step, the length of the step, and its allowed error.
 
-        Near a singular position the higher coefficients drown in rounding: the cut series is then much the better one.
-        Its error may be larger, so that the step passes over the singular position: rounding grows with the inverse of
-        the distance from there, and steps that keep it small would come near, and nearer.
+        Near a singular position the higher coefficients are rounding, and the truncated series is much better. Its
+        allowed error is larger, so that the step passes the singular position: rounding grows with the inverse of the
+        distance from it, and steps that keep the error small would only approach it.
         """
         if self.step is not None:
             return super().prepared(expansion, length, tolerance, singular, usual)
@@ -275,7 +273,7 @@ class Taylor(AbstractMethod):
         return start.state
 
     def error(self, start: Expansion, end: Expansion, step: Lanes, length: Number) -> Lanes:
-        """Return what accelerations at the end depart by from the series, as the displacement that is left out."""
+        """Return the error of the accelerations of the series at the end, converted to a displacement."""
         if self.step is not None:
             return jnp.zeros_like(step)
         order = len(start.state.position) - 1
@@ -296,7 +294,7 @@ def _largest(x: Float[Numbers, "component body batch"]) -> Lanes:
 
 
 def check_step(step: object) -> None:
-    """Refuse a length of steps that is no positive number; None leaves it to the control of the error."""
+    """Raise JounceError unless the length of steps is a positive number, or None for error control."""
     if step is None or isinstance(step, jax.Array):
         return
     if isinstance(step, bool) or not isinstance(step, (int, float)) or not (step > 0 and math.isfinite(step)):

@@ -1,9 +1,8 @@
-"""Two-point formulas of Obreshkov: derivatives of both ends of a step, up to the same order. Sommer 2024, section 7.
+"""Two-point Obreshkov formulas with derivatives of the same order at both ends of a step. Sommer 2024, section 7.
 
 With the Taylor coefficients c of ``y = (position, attitude, velocity, spin)`` at the two ends of a step h,
-``y_1 = y_0 + sum_j p! (2p-j)! / ((2p)! (p-j)!) h^j (c_0[j] - (-1)^j c_1[j])``, j = 1..p, is right to order 2p. The end
-is on both sides: it is found by iteration. Of the velocities the formula takes accelerations with p = 1, jerk with
-p = 2, jounce with p = 3.
+``y_1 = y_0 + sum_j p! (2p-j)! / ((2p)! (p-j)!) h^j (c_0[j] - (-1)^j c_1[j])``, j = 1..p, has order 2p. The formula is
+implicit, and solved by iteration. For velocities it uses accelerations with p = 1, jerk with p = 2, jounce with p = 3.
 """
 
 import math
@@ -24,20 +23,20 @@ from jounce.jet.algebra import total
 MOST_ITERATIONS = 80
 CONVERGED = 1e-15  # change in an iteration, rad or sizes of the mechanism
 STALLED = 1e-13  # a change below this that no longer shrinks is rounding
-HIGHER_COEFFICIENTS = 4  # beyond the first in the error: some vanish at rest and at turning points
+HIGHER_COEFFICIENTS = 4  # beyond the first one of the error: some vanish at rest and at turning points
 
 
 class Obreshkov(AbstractMethod):
     """Implicit two-point formula on accelerations, jerk, jounce and crackle of both ends of a step.
 
-    It is symmetric in time and has no more than its order asks for in derivatives: half of it.
+    It is symmetric in time, and uses derivatives up to half its order.
 
     Parameters
     ----------
     order : int, default 6
         4 (with jerk), 6 (with jounce) or 8; 2 is the trapezoidal rule, with accelerations alone.
     step : float, optional
-        The length of all steps, s; by a control of the error unless given.
+        Length of all steps, s; by default from error control.
 
     Raises
     ------
@@ -65,11 +64,11 @@ class Obreshkov(AbstractMethod):
         return self.order // 2
 
     def expansion_order(self, tolerance: float) -> int:
-        """Return the order of the expansions: beyond the formula's own, where the step is to be chosen."""
+        """Return the order of the expansions, higher than that of the formula if the step is to be chosen."""
         return self.derivatives_used if self.step is not None else self.order + HIGHER_COEFFICIENTS
 
     def longest_step(self, sizes: Sizes, tolerance: Number) -> Lanes:
-        """Return the step at which the leading error, or the next where that vanishes, is the tolerance."""
+        """Return the step at which the leading nonvanishing term of the error equals the tolerance."""
         if self.step is not None:
             return jnp.full(sizes.shape[1], self.step, float)
         first = self.order + 1
@@ -77,7 +76,7 @@ class Obreshkov(AbstractMethod):
         return reach(sizes, first) * (tolerance / constant) ** (1.0 / first)
 
     def arrive(self, equations: Equations, expansion: Expansion, time: Lanes, step: Lanes) -> State:
-        """Return the end that fulfills the formula, not finite where the iteration for it does not converge."""
+        """Return the end that satisfies the formula, NaN if the iteration does not converge."""
         measure = _measure(equations.system.column_scale[0], step)
         later = (time + step)[None]
         known = _known(expansion, step, self.derivatives_used)
@@ -103,9 +102,9 @@ class Obreshkov(AbstractMethod):
         return end.map(lambda x: jnp.where(good, x, jnp.nan))
 
     def polynomial(self, start: Expansion, end: Expansion, step: Lanes) -> State:
-        """Return the polynomial that has the derivatives of the formula at both ends, of degree order + 1."""
+        """Return the polynomial of degree order + 1 with the derivatives of the formula at both ends."""
         upper = jnp.asarray(_hermite(self.derivatives_used))
-        length = jnp.where(step == 0.0, 1.0, step)  # runs that have arrived stand still
+        length = jnp.where(step == 0.0, 1.0, step)  # runs that have arrived have steps of zero length
 
         def joined(c0: Any, c1: Any) -> Any:
             count = self.derivatives_used + 1
@@ -118,7 +117,7 @@ class Obreshkov(AbstractMethod):
         return State(*map(joined, start.state, end.state))
 
     def error(self, start: Expansion, end: Expansion, step: Lanes, length: Number) -> Lanes:
-        """Return how far the end departs from the formula of the next order."""
+        """Return the departure of the end from the formula of the next order."""
         if self.step is not None:
             return jnp.zeros_like(step)
         p, measure = self.derivatives_used + 1, _measure(length, step)
@@ -129,21 +128,21 @@ class Obreshkov(AbstractMethod):
 
 
 def _known(expansion: Expansion, step: Lanes, max_derivative: int) -> State:
-    """Return what the formula takes from the start of a step."""
+    """Return the part of the formula from the start of a step."""
     return State(*(c[0] + _terms(c, step, max_derivative) for c in expansion.state))
 
 
 def _terms(
     coefficients: Float[Numbers, "order component body batch"], step: Lanes, max_derivative: int
 ) -> Float[Numbers, "component body batch"]:
-    """Return what the formula adds for the derivatives of one end; seen from the other end, the step is negative."""
+    """Return the derivative terms of one end in the formula; for the other end the step is negative."""
     p = max_derivative
     weights = {j: math.perm(p, j) / math.perm(2 * p, j) for j in range(1, p + 1)}
     return total(w * step[None, None] ** j * coefficients[j] for j, w in weights.items())
 
 
 def _hermite(p: int) -> np.ndarray:
-    """Return how the upper coefficients follow from the ends, in units of the step.
+    """Return the Hermite matrix from the ends to the upper coefficients, in units of the step.
 
     Rows: coefficients p + 1 .. 2p + 1. Columns: the difference of the values, the coefficients 1..p of the start, and
     those of the end. At the end, ``c_1[j] = sum_k binomial(k, j) a[k]``.
@@ -153,8 +152,8 @@ def _hermite(p: int) -> np.ndarray:
     def at_end(orders: np.ndarray) -> np.ndarray:
         return np.array([[math.comb(k, j) for k in orders] for j in range(p + 1)], float)
 
-    inverse = np.rint(np.linalg.inv(at_end(upper)))  # its determinant is one: whole numbers
-    start = inverse @ at_end(lower)[:, 1:]  # that of the value is in the difference
+    inverse = np.rint(np.linalg.inv(at_end(upper)))  # the determinant is one, so entries are whole numbers
+    start = inverse @ at_end(lower)[:, 1:]  # the value itself is part of the difference
     return np.concatenate([inverse[:, :1], -start, inverse[:, 1:]], axis=1)
 
 
@@ -171,7 +170,7 @@ def _size(change: State, measure: tuple[Any, ...]) -> Lanes:
 
 
 def _has_converged(change: Lanes, before: Lanes) -> Flags:
-    """Tell where an iteration has come to its end, or can come to none."""
+    """Return whether an iteration has converged, or has failed with nonfinite values."""
     return (
         (change <= CONVERGED) | ((change <= STALLED) & (change >= before)) | ~jnp.isfinite(change) & (change != jnp.inf)
     )

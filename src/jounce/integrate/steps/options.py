@@ -1,4 +1,4 @@
-"""Options of simulations: what is valid, and the instants that are requested."""
+"""Options of simulations: their checks, and the requested instants."""
 
 from collections.abc import Callable, Mapping
 from typing import Any, TypedDict
@@ -13,11 +13,11 @@ from jounce.mechanism import time_grid
 from jounce.mechanism.time import TimeLike
 
 TAYLOR = Taylor()
-TOLERANCES = (1e-17, 1e-2)  # below rounding there is still energy to be kept: what series leave out adds up
+TOLERANCES = (1e-17, 1e-2)  # below rounding, truncation errors still add up in the energy
 
 
 class SimulationOptions(TypedDict, total=False):
-    """How a simulation is computed: the options of `jounce.simulate` that are for all systems."""
+    """The options of `jounce.simulate` for mechanisms and robots."""
 
     method: AbstractMethod | None
     tolerance: float
@@ -51,6 +51,6 @@ def instants_of(time: TimeLike | None, parameters: Mapping[str, Any]) -> Float[n
     try:
         backward = bool(time[-1] < time[0])
     except TypeError:
-        backward = False  # no numbers: refused below
+        backward = False  # not numbers: refused below
     instants = time_grid(list(time)[::-1] if backward else time, parameters)
     return instants[::-1] if backward else instants

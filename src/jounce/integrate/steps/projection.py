@@ -1,4 +1,4 @@
-"""Back onto the constraints: positions and velocities corrected by the least amount, measured by the masses."""
+"""Projection onto the constraints: mass-weighted least corrections of positions and velocities."""
 
 from typing import Any
 
@@ -9,35 +9,35 @@ from jounce.dynamics.forward.accelerations import Attitudes, Equations, Instants
 from jounce.jet import Jet
 
 MOST_ITERATIONS = 10
-LARGEST_GAP = 1e-9  # of redundant constraints, rad or sizes of the mechanism: by more they contradict each other
+LARGEST_GAP = 1e-9  # of redundant constraints, rad or sizes of the mechanism; beyond it they contradict each other
 CLOSE = 4e-15  # distance, in the same unit, over which the inverse of the matrix changes by rounding only
-ROUNDING = 1e-15  # size of a correction, in the same unit, that leaves nothing to correct
+ROUNDING = 1e-15  # correction, in the same unit, that is rounding
 
 
 @jax.jit  # traced once for the steps of a run and for the motion within them
 def projected(equations: Equations, state: State, time: Instants) -> tuple[State, Lanes, Inverse]:
-    """Return the nearest state that fulfills the constraints and their rates, and how far positions moved.
+    """Return the nearest state that satisfies the constraints and their rates, and the correction of positions.
 
-    The correction of positions is that of least kinetic energy, were it a velocity; that of velocities likewise.
+    The corrections of positions and of velocities are least in the norm of the mass matrix.
 
     Parameters
     ----------
     equations : Equations
-        Of the mechanism.
+        Equations of motion of the mechanism.
     state : State
-        Near the constraints.
+        State near the constraints.
     time : array of shape (1, batch)
-        Its instant, s.
+        The instant, s.
 
     Returns
     -------
     State
-        With Euler parameters of unit length.
+        The projected state, with normalized Euler parameters.
     distance : array of shape (batch,)
-        Size of the first correction of positions, rad or sizes of the mechanism; not finite where it failed, or
+        Size of the first correction of positions, rad or sizes of the mechanism; not finite if the projection failed or
         redundant constraints contradict each other.
     inverse : DenseInverse or SaddleInverse
-        Of the equations' matrix at this state, which `expand` takes.
+        Inverse of the matrix of the equations at this state, for `expand`.
     """
     clock, lanes = Jet([time]), time.shape[-1]
     position, attitude = state.position, normalized(state.attitude)
@@ -55,7 +55,7 @@ def projected(equations: Equations, state: State, time: Instants) -> tuple[State
     def iterate(carry: Any) -> Any:
         position, attitude, _, last, first, count, _ = carry
         near = ~jnp.any((last > 1e-9) & jnp.isfinite(last)) | (count >= MOST_ITERATIONS)
-        inverting = near & (count > 0)  # the matrix alone, once more: a branch of its own would be compiled twice
+        inverting = near & (count > 0)  # one more factorization; a branch for it would be compiled twice
         factor, gap = correction(position, attitude)
         column = equations.least_change(factor, gap)
         size = jnp.where(inverting, last, jnp.max(jnp.abs(column), axis=0))
@@ -76,7 +76,7 @@ def projected(equations: Equations, state: State, time: Instants) -> tuple[State
 
 
 def normalized(attitude: Attitudes) -> Attitudes:
-    """Return Euler parameters of unit length; angles as they are."""
+    """Return Euler parameters of unit length; angles unchanged."""
     if attitude.shape[0] == 1:
         return attitude
     return attitude / jnp.sqrt(jnp.sum(attitude * attitude, axis=0))[None]

@@ -1,4 +1,4 @@
-"""Integration methods by name, as commands take them: those of the library, and those that users register."""
+"""Integration methods by name, for the commands: those of the library, and those that users register."""
 
 from __future__ import annotations
 
@@ -17,19 +17,19 @@ _methods: dict[str, Callable[[float | None], AbstractMethod]] = {
 
 
 def register_method(name: str, make: Callable[[float | None], AbstractMethod]) -> None:
-    """Make an integration method known by name, so that ``jounce simulate --method NAME --import FILE.py`` finds it.
+    """Register an integration method by name, so that ``jounce simulate --method NAME --import FILE.py`` finds it.
 
     Parameters
     ----------
     name : str
-        As on the command line; a name that is there is replaced.
+        Name on the command line; an existing name is replaced.
     make : callable
-        Returns the method; it takes the length of all steps, s, or None for error control.
+        Function that returns the method from the length of all steps, s, or None for error control.
 
     Raises
     ------
     MechanismError
-        The name is empty.
+        If the name is empty.
 
     Examples
     --------
@@ -49,14 +49,14 @@ def method_named(name: str, step: float | None = None) -> AbstractMethod:
     Parameters
     ----------
     name : str
-        ``taylor``, ``obreshkov-4``, ``obreshkov-6``, ``obreshkov-8``, or one that was registered.
+        ``taylor``, ``obreshkov-4``, ``obreshkov-6``, ``obreshkov-8``, or a registered name.
     step : float, optional
-        Length of all steps, s; the error is controlled unless given.
+        Length of all steps, s; by default from error control.
 
     Raises
     ------
     MechanismError
-        No method has this name, or the step is not valid.
+        If no method has this name, or the step is not valid.
 
     Examples
     --------

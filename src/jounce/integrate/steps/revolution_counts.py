@@ -1,7 +1,7 @@
-"""Turns of the angles about axes that forces measure, counted along the steps of a simulation.
+"""Revolutions of the angles about axes that forces measure, counted along the steps of a simulation.
 
-An attitude tells such an angle up to whole turns. Each step begins with the angle known, and follows it along the path
-at places so close to each other that no half turn lies between two of them.
+An attitude determines such an angle only up to whole revolutions. Each step begins with a known angle, which is
+followed along the path at points less than half a turn apart.
 """
 
 from typing import Any, NamedTuple
@@ -19,11 +19,11 @@ from jounce.integrate.steps.methods import evaluated
 from jounce.jet import Jet
 from jounce.mechanism.transmissions.axis_angles import measures_angle
 
-POINTS_IN_STEP = 16  # in a step: series carry over about one turn in it at most
+POINTS_IN_STEP = 16  # a series converges over at most about one turn
 
 
 AnglesOfForces = tuple[Float[Numbers, "_ batch"], ...]
-"""For each group of forces that measures an angle about an axis, those of its instances, rad."""
+"""For each group of forces that measures an angle about an axis, the angles of its instances, rad."""
 
 
 class Angles(NamedTuple):
@@ -32,16 +32,16 @@ class Angles(NamedTuple):
     Parameters
     ----------
     samples : tuple of array of shape (points, instances, batch)
-        For each group of forces that measures an angle about an axis, at even parts of the step, rad.
+        For each group of forces that measures an angle about an axis, the angles at equal parts of the step, rad.
     step : array of shape (batch,)
-        s.
+        Length of the step, s.
     """
 
     samples: tuple[Float[Numbers, "point _ batch"], ...]
     step: Lanes
 
     def at(self, since: Lanes) -> AnglesOfForces:
-        """Return the angles a time after the beginning, (instances, batch) each, to within half a turn."""
+        """Return the angles at a time from the beginning, (instances, batch) each, to within half a turn."""
         if not self.samples:
             return ()
         share = jnp.clip(since / jnp.where(self.step == 0.0, 1.0, self.step), 0.0, 1.0)
@@ -53,7 +53,7 @@ class Angles(NamedTuple):
 def measured(equations: Equations, state: State) -> AnglesOfForces:
     """Return the angles about axes that forces measure in a state, (instances, batch) each, rad.
 
-    They have the turns of what they are near to in the equations.
+    Their revolutions are those of the reference angles in the equations.
     """
     groups = [group for group in equations.system.forces if measures_angle(group)]
     if not groups:
@@ -70,13 +70,13 @@ def followed(equations: Equations, angles: AnglesOfForces, path: State, step: La
     Parameters
     ----------
     equations : Equations
-        Of the mechanism.
+        Equations of motion of the mechanism.
     angles : tuple of array of shape (instances, batch)
-        At the beginning.
+        Angles at the beginning.
     path : State
-        Coefficients in the time from there, (order + 1, components, bodies, batch).
+        Coefficients in the time from the beginning, (order + 1, components, bodies, batch).
     step : array of shape (batch,)
-        s.
+        Length of the step, s.
     """
     if not angles:
         return Angles((), step)
@@ -92,7 +92,7 @@ def followed(equations: Equations, angles: AnglesOfForces, path: State, step: La
 def attitudes_at(
     series: Float[Numbers, "place order 4 bodies"], since: Float[np.ndarray, " place"]
 ) -> Float[np.ndarray, "4 bodies+1 place"]:
-    """Return the Euler parameters of all bodies, the ground first, a time into steps of known Taylor coefficients."""
+    """Return the Euler parameters of all bodies, the ground first, at times into steps given by Taylor coefficients."""
     attitudes = polyval(since[:, None, None], np.swapaxes(series, 0, 1), tensor=False)
     return np.asarray(turns_with_ground(np.moveaxis(attitudes, 0, -1)))
 
@@ -100,12 +100,12 @@ def attitudes_at(
 def attitudes_along(
     series: Float[Numbers, "step order 4 bodies"], length: Float[np.ndarray, " step"], points: int
 ) -> Float[np.ndarray, "4 bodies+1 place"]:
-    """Return the Euler parameters of all bodies, the ground first, at even parts of steps, and at the end of the last.
+    """Return the Euler parameters of all bodies, the ground first, at equal parts of steps and at the end of the last.
 
-    Steps are of known Taylor coefficients, and follow one another.
+    The steps are consecutive, and given by Taylor coefficients.
     """
     known = np.asarray(series).reshape(*series.shape[:2], -1)
-    with np.errstate(over="ignore"):  # powers of long steps, in which bodies turn evenly
+    with np.errstate(over="ignore"):  # powers of long steps, in which bodies turn uniformly
         powers = length[:, None, None] ** np.arange(series.shape[1])[:, None]
     terms = np.multiply(known, powers, where=known != 0, out=np.zeros_like(known))
     shares = (np.arange(points)[:, None] / points) ** np.arange(series.shape[1])
