@@ -1,4 +1,4 @@
-"""How functions of arrays are run: compiled by XLA or as machine code, kept, in threads and in chunks.
+"""Execution of functions of arrays: compilation by XLA or to machine code, storage of programs, threads, and chunks.
 
-It knows nothing of mechanisms and robots. What it computes in double precision it says function by function.
+It knows nothing of mechanisms and robots. Functions that compute in double precision are decorated one by one.
 """

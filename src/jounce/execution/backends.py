@@ -1,4 +1,4 @@
-"""Which arithmetic computes: machine code made by LLVM, or XLA, which takes its place where there is none."""
+"""The choice of backend: machine code by LLVM, or XLA where there is no machine code."""
 
 import os
 from collections.abc import Iterable
@@ -18,12 +18,12 @@ _warned: set[str] = set()
 
 
 def uses_machine_code() -> bool:
-    """Tell whether there is to be machine code: there is a compiler, and nothing forbids it."""
+    """Return whether machine code is used: a compiler is installed, and nothing forbids it."""
     return os.environ.get(VARIABLE, "") != "0" and self_test.is_usable() and on_processor()
 
 
 def xla_backend() -> str:
-    """Return the name of XLA as what computes, with its device unless that is the processor.
+    """Return the name of XLA as a backend, with its device unless it is the processor.
 
     Examples
     --------
@@ -35,12 +35,12 @@ def xla_backend() -> str:
 
 
 def backend_of(results: Any) -> str:
-    """Return the name of what has computed results of a compiled function: machine code puts them in NumPy's arrays."""
+    """Return the name of the backend of the results of a compiled function: machine code returns NumPy arrays."""
     return LLVM if all(isinstance(x, np.ndarray) for x in jax.tree.leaves(results)) else xla_backend()
 
 
 def joined(backends: Iterable[str]) -> str:
-    """Return the names of what has computed parts of a result, each once.
+    """Return the names of the backends of the parts of a result, each once.
 
     Examples
     --------
@@ -52,9 +52,9 @@ def joined(backends: Iterable[str]) -> str:
 
 
 def warn_of_missing(what: str) -> None:
-    """Warn, once for each operation and each limit, that XLA computes what there is no machine code for.
+    """Warn, once for each operation and each limit, that XLA computes a program without machine code.
 
-    Of what is made beforehand, and may not be needed, it warns when it is.
+    A program that is compiled ahead may not be needed; its warning waits until it is.
     """
     if what in _warned or is_ahead():
         return

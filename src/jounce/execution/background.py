@@ -1,7 +1,7 @@
-"""Programs by their cache keys, each made once, and those that will be needed made in another thread beforehand.
+"""Programs by cache key, each compiled once, and compilation ahead of need in a background thread.
 
-Tracing has Python's lock, LLVM and XLA compile without it. So one thread works for all; who waits for a program that it
-makes takes up what comes next meanwhile.
+Tracing holds Python's lock, while LLVM and XLA compile without it, so a single background thread suffices. A thread
+that waits for its program takes the next job from the queue meanwhile.
 """
 
 import contextlib
@@ -25,28 +25,28 @@ _thread = threading.local()
 
 
 class ByKey:
-    """Programs by their cache keys: the first thread that asks for one makes it, and others wait for it."""
+    """Programs by cache key: the first thread that requests a program makes it, and other threads wait for it."""
 
     def __init__(self) -> None:
-        self._made: dict[Any, Future[Any]] = {}  # those under way included
+        self._made: dict[Any, Future[Any]] = {}  # including programs in progress
         self._programs: dict[Any, Any] = {}
         self._lock = threading.Lock()
 
     def __len__(self) -> int:
-        """How many there are, those under way included."""
+        """Return the number of programs, including those in progress."""
         return len(self._made)
 
     def clear(self) -> None:
-        """Forget them."""
+        """Forget all programs."""
         self._made.clear()
         self._programs.clear()
 
     def values(self) -> list[Any]:
-        """Return those that are there."""
+        """Return the finished programs."""
         return list(self._programs.values())
 
     def get(self, key: Any, make: Callable[[], Any]) -> Any:
-        """Return the program of a key, which is made unless another thread has it or is about to."""
+        """Return the program of a key; make it unless another thread has made it or is making it."""
         if (program := self._programs.get(key, self)) is not self:
             return program
         with self._lock:
@@ -62,27 +62,27 @@ class ByKey:
             future.set_result(result)
         while not future.done() and _took_up_next():
             pass
-        if future.exception() is not None:  # of a thread whose program may not be needed any more
+        if future.exception() is not None:  # the failure of another thread, whose job may be out of date
             return self.get(key, make)
         return future.result()
 
 
 def prepare_later(job: Callable[[], Any], name: str, arguments: Any, *static: Any) -> None:
-    """Do a job in another thread, for the programs that it has made; what it raises is dropped.
+    """Run a job that compiles programs in the background thread; its errors are dropped.
 
-    That is done the first time that a job of a name is given for arguments of such a structure and such shapes, unless
-    there is one thread to compute.
+    A job runs once for each name and each structure and shapes of the arguments. Nothing runs if computation is
+    limited to one thread.
 
     Parameters
     ----------
     job : callable
-        To be called.
+        Function to call.
     name : str
-        Of the job.
+        Name of the job.
     arguments : pytree of array
-        On the form of which its programs depend.
+        Arguments whose structure and shapes determine its programs.
     *static
-        On what else they do.
+        Other values that determine its programs.
     """
     global _worker
     if thread_count() < 2:
@@ -99,22 +99,22 @@ def prepare_later(job: Callable[[], Any], name: str, arguments: Any, *static: An
 
 
 def is_ahead() -> bool:
-    """Tell whether what this thread does is a job whose programs are made beforehand."""
+    """Return whether this thread runs a job that compiles programs ahead of need."""
     return getattr(_thread, "busy", False)
 
 
 def is_compiling() -> bool:
-    """Tell whether some thread still compiles what was to be there beforehand."""
+    """Return whether the background thread is still compiling."""
     return _worker is not None and _worker.is_alive()
 
 
 def _work() -> None:
-    while threading.main_thread().is_alive() and _took_up_next():  # a program that ends waits for one job at most
+    while threading.main_thread().is_alive() and _took_up_next():  # a process that ends waits for one job at most
         pass
 
 
 def _took_up_next() -> bool:
-    """Do the next job that is queued; tell whether there was one, and this thread is not at one already."""
+    """Run the next job in the queue; return False if there is none, or if this thread already runs a job."""
     if is_ahead():
         return False
     try:

@@ -1,4 +1,4 @@
-"""Values at many instants, computed in chunks of a few lengths, so that one program serves grids of any length."""
+"""Evaluation at many instants in chunks of a few lengths, so that one program serves grids of any length."""
 
 from collections.abc import Callable
 from typing import Any, TypeVar
@@ -23,24 +23,24 @@ def in_chunks(
     filled: bool = True,
     threads: int | None = None,
 ) -> Result:
-    """Return what a function of indices of instants gives, for all of them; few lengths of chunks are compiled.
+    """Return the results of a function of indices of instants, in chunks of few lengths and several threads.
 
-    Chunks are computed in several threads at once; the function must let them.
+    The function must be safe to call from several threads at once.
 
     Parameters
     ----------
     function : callable
-        Maps indices to a pytree of arrays with the instants along the axis.
+        Function from indices to a pytree of arrays with the instants along the axis.
     count : int
-        How many instants there are; the index of what stands in for one is -1 where there is none.
+        Number of instants; if it is zero, the function is called with the index -1.
     widths : tuple of int
-        Lengths of chunks, increasing: the first that holds all instants, or else the last.
+        Increasing lengths of chunks: the first that holds all instants, or else the last, is used.
     axis : int, default -1
-        Of the instants in the results.
+        Axis of the instants in the results.
     filled : bool, default True
-        Whether the last chunk is filled up; what a `Mapped` makes needs none of that, and returns arrays of its own.
+        Whether the last chunk is padded; programs of a `Mapped` need no padding, and return new arrays.
     threads : int, optional
-        How many compute; as `thread_count` says unless given.
+        Number of threads, by default that of `thread_count`.
     """
     if not filled and count <= widths[-1]:
         return function(np.arange(count))
@@ -54,7 +54,7 @@ def in_chunks(
         parts = list(pool.map(computed, range(0, max(count, 1), width)))
 
     def whole(*arrays: np.ndarray) -> np.ndarray:
-        joined = np.concatenate(arrays, axis)  # a copy that its user may write to
+        joined = np.concatenate(arrays, axis)  # a copy, so that users may write to it
         return joined[(slice(None),) * (axis % joined.ndim) + (slice(count),)]
 
     return jax.tree.map(whole, *parts)

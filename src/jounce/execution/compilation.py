@@ -1,4 +1,4 @@
-"""How functions of arrays are compiled: as machine code, or by XLA for what JAX traces and what has no code."""
+"""Compilation of functions of arrays: to machine code, or by XLA under JAX transformations and without machine code."""
 
 import inspect
 import os
@@ -15,25 +15,25 @@ from jounce.execution.device import on_processor
 from jounce.execution.translated import Translated, all_shaped
 from jounce.settings import check_process, under_own_settings
 
-LARGE = 32  # numbers of an array that stays in memory in machine code of one instant
+LARGE = 32  # size of arrays that stay in memory in the machine code of one instant; smaller ones are unrolled
 _NOTHING = jax.tree.structure(())
 
 
 UNENDING = ("simplify-while-loops", "while-loop-invariant-code-motion", "while-loop-constant-sinking", "reshape-mover")
-"""XLA's passes that undo each other's work, some twenty or thirty times: those over loops, which have nothing for them
-to do here, and one that moves reshapes to where its simplifier does not want them."""
+"""XLA passes that undo each other's work twenty or thirty times: those over loops, which have nothing to do in programs
+of this package, and one that moves reshapes to places from which the simplifier moves them back."""
 
 
 def compiler_options(*, narrow: bool = False) -> dict[str, Any] | None:
-    """Return options that halve XLA's compile time of long chains of small operations, without making them slower.
+    """Return options that halve XLA's compile time of long chains of small operations at the same speed.
 
-    They are private to XLA: those that a release does not know are left out. There are none on a GPU.
+    They are private to XLA; unknown ones are left out for other releases. There are none on a GPU.
 
     Parameters
     ----------
     narrow : bool, default False
-        Whether arrays are so short that most of the time is that of calling operations: then LLVM need not do more
-        than the first level of its optimizations, a fifth of the time in which a program is compiled.
+        Whether arrays are so short that calls dominate the run time. LLVM then uses only its first level of
+        optimization, which saves a fifth of the compile time.
     """
     if not on_processor():
         return None
@@ -44,13 +44,13 @@ def compiler_options(*, narrow: bool = False) -> dict[str, Any] | None:
 
 
 def _level_is_set() -> bool:
-    """Tell whether the environment says how much LLVM is to optimize."""
+    """Return whether the environment sets the optimization level of LLVM."""
     return "xla_backend_optimization_level" in os.environ.get("XLA_FLAGS", "")
 
 
 @cache
 def _known_options() -> frozenset[str]:
-    """Return which of the options this release of XLA has; JAX 0.11, for one, came without the older emitters."""
+    """Return the options that this release of XLA knows; JAX 0.11, for example, has no older emitters."""
     options = {"xla_cpu_use_fusion_emitters": False, "xla_disable_hlo_passes": "", "xla_backend_optimization_level": 1}
     if _are_known(options):
         return frozenset(options)
@@ -71,11 +71,11 @@ class ByXla:
     Parameters
     ----------
     function : callable
-        Of arrays, of pytrees of them, and of static arguments.
+        Function of arrays, of pytrees of arrays, and of static arguments.
     static : tuple of str
         Names of the static arguments.
     narrow : bool, optional
-        Whether its arrays are short, as `compiler_options` has it.
+        Whether the arrays are short, as for `compiler_options`.
     """
 
     def __init__(self, function: Callable[..., Any], static: tuple[str, ...], *, narrow: bool = False):
@@ -83,13 +83,13 @@ class ByXla:
 
     @cached_property
     def jitted(self) -> Any:
-        """The function as `jax.jit` returns it."""
+        """The function compiled by `jax.jit` with the options."""
         options = compiler_options(narrow=self.narrow)
         return jax.jit(self.function, static_argnames=self.static, compiler_options=options)
 
     @cached_property
     def _within(self) -> Any:
-        """The function within a program of which it is a part: JAX takes options for the whole only."""
+        """The function without options, for use within another program: JAX takes options for whole programs only."""
         return jax.jit(self.function, static_argnames=self.static)
 
     @under_own_settings
@@ -103,23 +103,23 @@ class ByXla:
 
 
 class Compiled:
-    """A function compiled at its first call: to machine code, by XLA where JAX traces it or there is no code for it.
+    """A function compiled at its first call: to machine code, or by XLA if JAX traces it or there is no machine code.
 
     Parameters
     ----------
     function : callable
-        Of arrays, of pytrees of them, and of static arguments.
+        Function of arrays, of pytrees of arrays, and of static arguments.
     static : tuple of str
         Names of the static arguments.
     made_of : tuple of callable, optional
-        Functions of the package that say what it computes, where it is none of them itself.
+        Functions of the package that define what it computes, if it is not one of them itself.
     narrow : bool, optional
-        Whether its arrays are short in a program of XLA, as `compiler_options` has it.
+        Whether the arrays are short in programs of XLA, as for `compiler_options`.
     brief : bool, optional
-        Whether it is called so seldom, or has so little to compute, that one waits longer for the compiler: then LLVM
-        optimizes nothing, in a seventh of the time.
+        Whether calls are so few or so short that compilation dominates: LLVM then does not optimize, in a seventh of
+        the time.
     otherwise : mapping of str to object, optional
-        Static arguments for XLA, in the place of those given.
+        Static arguments for XLA that replace the given ones.
     """
 
     def __init__(
@@ -152,25 +152,25 @@ class Compiled:
 
     @under_own_settings
     def prepare(self, *arguments: Any, **keywords: Any) -> None:
-        """Make the machine code for arrays of these shapes, or `jax.ShapeDtypeStruct` in their places.
+        """Compile the machine code for arrays or `jax.ShapeDtypeStruct` of given shapes.
 
-        XLA compiles when it is called.
+        XLA compiles at the first call instead.
         """
         _, _, static, leaves, tree = self._parts(arguments, keywords)
         self._code(all_shaped(leaves), tree, static)
 
     def _parts(self, arguments: tuple[Any, ...], keywords: dict[str, Any]) -> tuple[Any, Any, dict[str, Any], Any, Any]:
-        """Return the arguments without static ones, these, and the leaves and the structure of the others."""
+        """Return the arguments without static ones, the static ones, and the leaves and structure of the former."""
         keywords |= zip(self._names[self._traced :], arguments[self._traced :], strict=False)
         arguments = arguments[: self._traced]
         static = {name: keywords.pop(name) for name in self._static if name in keywords}
         return arguments, keywords, static, *jax.tree.flatten((arguments, keywords))
 
     def _code(self, arrays: list[Any], tree: Any, static: Mapping[str, Any]) -> Any:
-        """Return machine code for arguments, None where there is none."""
+        """Return the machine code for arguments; None if there is none."""
         return self.machine_code.program((arrays, tree), ((), _NOTHING), static, large=LARGE)
 
 
 def compiled(*static: str, **how: Any) -> Callable[[Callable[..., Any]], Compiled]:
-    """Compile the decorated function at its first call, with these static arguments, as `Compiled` has it."""
+    """Return a decorator that compiles a function at its first call; see `Compiled`."""
     return lambda function: Compiled(function, static, **how)

@@ -1,4 +1,4 @@
-"""What programs run on: a processor, whose cache their batches have to fit, or a GPU, which they have to fill."""
+"""The device that runs programs: a processor, whose cache batches must fit, or a GPU, which batches must fill."""
 
 from typing import Any, TypeVar
 
@@ -11,7 +11,7 @@ T = TypeVar("T")
 
 @under_own_settings
 def on_processor() -> bool:
-    """Tell whether JAX computes on the processor: its default device where one is chosen, else its first backend.
+    """Return whether JAX computes on the processor: its default device if one is chosen, otherwise its first backend.
 
     Examples
     --------
@@ -31,5 +31,5 @@ def device_name() -> str:
 
 
 def resident(arrays: T) -> T:
-    """Return arrays that many programs take, where they are computed: a processor reads those of NumPy as they are."""
+    """Return shared arguments of many programs on their device; a processor reads NumPy arrays without a transfer."""
     return arrays if on_processor() else jax.device_put(arrays)

@@ -1,8 +1,8 @@
-"""A function of one instant, run for many: by machine code, or by XLA where there is none; the same calls for both.
+"""A function of one instant mapped over many, by machine code or by XLA with the same interface.
 
-XLA calls one operation on arrays after another, and each goes through memory. In machine code all operations on an
-instant follow one another in the registers of the processor, several instants at a time (`jounce.execution.llvm`).
-Instants may start from the results of others: they are solved in rounds, each of as many instants as go side by side.
+XLA calls one array operation after another, each through memory. Machine code does all operations on an instant in the
+registers of the processor, several instants at a time (`jounce.execution.llvm`). Instants that start from the results
+of others are solved in rounds, each with as many instants as there are lanes.
 """
 
 import dataclasses
@@ -27,58 +27,58 @@ from jounce.execution.threads import Threads
 from jounce.execution.translated import Translated, all_shaped
 from jounce.settings import under_own_settings
 
-WIDTHS = (8, 256)  # instants that XLA's programs are for: each compiles once
-GPU_WIDTH = 2**15  # the same on a GPU, which they have to fill
-STARTS = 64  # instants from which those of rounds of XLA start
-FEWEST_TOGETHER, MOST_TOGETHER = 64, 1024  # instants of one call of machine code where a loop gives them
+WIDTHS = (8, 256)  # instants of XLA programs, each compiled once
+GPU_WIDTH = 2**15  # the same on a GPU, which batches must fill
+STARTS = 64  # multiple to which the number of starting instants of XLA rounds is padded
+FEWEST_TOGETHER, MOST_TOGETHER = 64, 1024  # instants of one call of machine code in a loop
 CACHED_ENTRIES = 2**17  # numbers of their arguments: a megabyte
-SIDE_BY_SIDE = 128  # samples along the first axis that XLA computes side by side, so that the cache holds them
+SIDE_BY_SIDE = 128  # samples along the first axis that XLA computes at once, so that they fit into the cache
 Rounds = Callable[[Int[np.ndarray, "round lane"]], None]
-_published: dict[str, Program] = {}  # by the names under which other machine code calls them
+_published: dict[str, Program] = {}  # programs by the names by which other machine code calls them
 
 
 @dataclasses.dataclass(frozen=True)
 class OnLlvm:
-    """Machine code of a function of one instant, with what all instants share."""
+    """Machine code of a function of one instant, with its shared arguments."""
 
     machine_code: Program
     shared: Sequence[np.ndarray]
 
     @property
     def backend(self) -> str:
-        """What it computes by."""
+        """Name of the backend."""
         return LLVM
 
     def __call__(self, lanes: Any, threads: int = 1) -> Any:
-        """Return the results for many instants, which are shared among threads where they lie along the first axis."""
+        """Return the results for many instants, divided among threads if they lie along the first axis."""
         leaves = [np.asarray(leaf) for leaf in jax.tree.leaves(lanes)]
         if threads == 1:
             return self.machine_code(self.shared, leaves)
         with Threads(threads, compiled=True) as pool:
-            parts = 4 * threads  # none is to wait long for another
+            parts = 4 * threads  # so that no thread waits long for another
             return self.machine_code(self.shared, leaves, parts, pool.map)
 
     def together(self, entries: int) -> tuple[int, ...]:
-        """Return how many instants of so many numbers each are computed in a call where a loop gives them."""
+        """Return the number of instants of one call in a loop, for a number of entries of each instant."""
         return (max(FEWEST_TOGETHER, min(MOST_TOGETHER, CACHED_ENTRIES // max(1, entries))),)
 
     def rounds(
         self, lanes: tuple[Any, Any, Any], results: Any, sources: Int[np.ndarray, " time"], links: Sequence[int]
     ) -> Rounds:
-        """Return what solves instants in rounds, of which later ones start from the results of earlier ones.
+        """Return the runner that solves instants in rounds, where later rounds start from the results of earlier ones.
 
         Parameters
         ----------
         lanes : tuple
-            The arguments of an instant in three parts, instants last: those that it takes from its source, those that
-            are its own, and those that all have the same, of one instant. They are read as they are in each round.
+            The arguments of an instant in three parts, instants last: those linked to its source, its own, and those
+            held for all instants, of one instant. Each round reads their current values.
         results : pytree
-            Arrays that the results are written to, those of the first part among them unless all sources are beyond the
-            instants or in the round before; None for what is not needed.
+            Output arrays. Those of linked arguments are the same arrays, unless all sources are beyond the instants or
+            in the previous round. None for results that are not needed.
         sources : array of int, shape (time,)
-            Index of the source of each instant; below zero if it is its lane of the round before.
+            Index of the source of each instant; negative for the same lane of the previous round.
         links : sequence of int
-            Which leaf of the results each leaf of the first part is taken from.
+            For each leaf of the linked arguments, the index of the leaf of the results that it is taken from.
         """
         leaves: Any = [[np.asarray(leaf) for leaf in jax.tree.leaves(group)] for group in lanes]
         stored = jax.tree.leaves(results, is_leaf=lambda x: x is None)
@@ -86,12 +86,12 @@ class OnLlvm:
 
     @property
     def width(self) -> int:
-        """How many instants a round has: as many as a vector holds."""
+        """Number of instants in a round: the lanes of a vector."""
         return self.machine_code.width
 
     @cached_property
     def name(self) -> str:
-        """Name by which other machine code calls it, as `called` has it."""
+        """Name by which other machine code calls the program; see `called`."""
         name = self.machine_code.name
         if name not in _published:
             self.machine_code.publish()
@@ -100,25 +100,26 @@ class OnLlvm:
 
 
 def called(name: str, shared: Any, lanes: Any) -> Any:
-    """Return the results of machine code as part of a program that becomes machine code, too."""
+    """Return the results of published machine code as part of a traced program that becomes machine code."""
     return _published[name].in_program(jax.tree.leaves(shared), jax.tree.leaves(lanes))
 
 
 @dataclasses.dataclass(frozen=True)
 class OnXla:
-    """XLA's programs of a function of one instant, for instants side by side, with what all of them share.
+    """XLA programs of a function of one instant, for instants side by side, with its shared arguments.
 
     Parameters
     ----------
     mapped : Mapped
         The function.
     shared : pytree
+        Shared arguments.
     form : PyTreeDef
         Structure of the arguments of an instant.
     how : tuple
         Static arguments, by name.
     width : int
-        How many instants a round has.
+        Number of instants in a round.
     """
 
     mapped: "Mapped"
@@ -129,11 +130,11 @@ class OnXla:
 
     @property
     def backend(self) -> str:
-        """What it computes by."""
+        """Name of the backend."""
         return xla_backend()
 
     def __call__(self, lanes: Any, threads: int = 1) -> Any:
-        """Return the results for many instants, which are computed in blocks of few sizes, shared among threads."""
+        """Return the results for many instants, computed in blocks of few sizes, divided among threads."""
         axis = 0 if self.mapped.rows else -1
         lanes = jax.tree.map(np.asarray, lanes)
         count = jax.tree.leaves(lanes)[0].shape[axis]
@@ -144,20 +145,20 @@ class OnXla:
 
         return in_chunks(computed, count, (self._block_width(count),), axis, threads=threads)
 
-    def together(self, entries: int) -> tuple[int, ...]:  # noqa: ARG002 - see there
-        """Return how many instants are computed in a call where a loop gives them: few, or many."""
+    def together(self, entries: int) -> tuple[int, ...]:  # noqa: ARG002 - the interface of `OnLlvm`
+        """Return the numbers of instants of one call in a loop: few, or many."""
         return self.mapped.widths
 
     def _block_width(self, count: int) -> int:
-        """Return how many instants of so many are computed in one call."""
+        """Return the number of instants of one call, for a total count."""
         small, *middle, large = self.mapped.widths if on_processor() else (SIDE_BY_SIDE, GPU_WIDTH)
-        # half of a large block at least is in use, so that no more than twice is computed
+        # at least half of a large block is used, so that at most twice the work is done
         return small if count <= small else middle[0] if middle and count <= large // 2 else large
 
     def rounds(
         self, lanes: tuple[Any, Any, Any], results: Any, sources: Int[np.ndarray, " time"], links: Sequence[int]
     ) -> Rounds:
-        """Return what solves instants in rounds, as that of `OnLlvm`; the arrays are written when all are solved."""
+        """Return the runner of rounds, as for `OnLlvm`; the output arrays are written when all rounds are solved."""
         linked, own, held = map(jax.tree.leaves, lanes)
         stored = jax.tree.leaves(results, is_leaf=lambda x: x is None)
         recorded = tuple(k for k, whole in enumerate(stored) if whole is not None or k in links)
@@ -171,7 +172,7 @@ class OnXla:
                 index[order[::-1]] = np.arange(len(order))[::-1]
             source = sources[order]
             here = np.where(source < 0, np.arange(len(order)) - self.width, index[source])
-            before = np.unique(source[here < 0])  # those that are not solved here
+            before = np.unique(source[here < 0])  # sources that are not among the targets
             source = np.where(here < 0, total + np.searchsorted(before, source), here)
             room = STARTS * _power(-(-len(before) // STARTS))
             starts = [padded(x[..., before], room) for x in linked]
@@ -187,40 +188,40 @@ class OnXla:
 
 
 def _power(count: int) -> int:
-    """Return the first power of four that is no less: sizes for which programs are compiled are few."""
+    """Return the least power of four that is not below a count, so that few sizes are compiled."""
     return 4 ** math.ceil(math.log(max(1, count), 4))
 
 
 def _taken(array: np.ndarray, indices: Int[np.ndarray, " lane"], axis: int) -> np.ndarray:
-    """Return some instants of an array; zeros where it has none."""
+    """Return some instants of an array; zeros if it has none."""
     if array.shape[axis]:
         return np.take(array, indices, axis)
     return np.zeros((len(indices), *array.shape[1:]) if axis == 0 else (*array.shape[:-1], len(indices)), array.dtype)
 
 
 def at_lanes(arrays: Any, lanes: Int[np.ndarray, " lane"] | Bool[np.ndarray, " lane"]) -> Any:
-    """Return arrays at some instants, which are along their last axis."""
+    """Return arrays at some instants along their last axis."""
     return jax.tree.map(lambda x: x[..., lanes], arrays)
 
 
 class Mapped:
-    """A function of one instant, of which `program` makes what runs it for many.
+    """A function of one instant that can be run for many.
 
     Parameters
     ----------
     function : callable
-        Of two pytrees of arrays, shared by all instants and of instants, which are along the last axis, as of its
-        results; and of static arguments by name. Machine code is made of it with one instant.
+        Function of two pytrees of arrays, shared by all instants and of instants along the last axis, as in its
+        results, and of static arguments by name. Machine code is compiled from it for one instant.
     by_xla : callable, optional
-        The same for many instants, where another form suits XLA better.
+        The same function in a form that suits XLA better for many instants.
     rows : bool, default False
-        Whether arrays of many instants, those given and the results, have the instants along their first axis.
+        Whether arrays of many instants, arguments and results, have the instants along their first axis.
     made_of : tuple of callable, optional
-        Functions of the package that say what it computes, where it is none of them itself.
+        Functions of the package that define what it computes, if it is not one of them itself.
     widths : tuple of int, optional
-        Instants that XLA's programs are for, increasing.
+        Increasing numbers of instants of XLA programs.
     narrow : bool, default False
-        Whether the arrays are short in XLA's programs, as `ByXla` has it.
+        Whether the arrays are short in XLA programs, as for `ByXla`.
     """
 
     def __init__(
@@ -238,7 +239,7 @@ class Mapped:
         self.machine_code = Translated(function, made_of, rows=rows)
         self.on_xla = ByXla(self._block_of_rows if rows else self._block, ("how",), narrow=narrow)
         self.in_rounds = ByXla(self._in_rounds, ("how",))
-        self.__wrapped__, self.__doc__ = function, function.__doc__  # by which a name in the package is known as its
+        self.__wrapped__, self.__doc__ = function, function.__doc__  # so that `structure` finds it by name
 
     @under_own_settings
     def program(
@@ -250,16 +251,16 @@ class Mapped:
         width: Callable[[], int] | None = None,
         **static: Any,
     ) -> OnLlvm | OnXla:
-        """Return what runs it for arguments of a structure; `lanes` are an example of these.
+        """Return the program for arguments of a structure, of which `lanes` are an example.
 
         Parameters
         ----------
         shared, lanes : pytree
-            Of arrays, or of their shapes and types, as the function has them.
+            Arguments of the function, or their shapes and types.
         large : int, optional
-            Arrays of more numbers are in memory in machine code, as `object_file` has it.
+            Size beyond which arrays stay in memory in machine code, as for `object_file`.
         width : callable, optional
-            Returns how many instants a round of XLA has.
+            Function that returns the number of instants in a round of XLA.
         **static
             Further arguments of the function.
         """
@@ -281,18 +282,18 @@ class Mapped:
         large: int = LARGE,
         **static: Any,
     ) -> Any:
-        """Return the results for so many instants, and the name of what computes them.
+        """Return the results for all instants, and the name of the backend.
 
         Parameters
         ----------
         shared : pytree
-            As `program` takes it.
+            As for `program`.
         lanes_of : callable
-            Returns the arguments of some instants, by their indices; of few, they are made once.
+            Function from indices of instants to their arguments; it is called once for few instants.
         count : int
-            How many instants there are, at least one.
+            Number of instants, at least one.
         large : int, optional
-            Arrays of more numbers are in memory in machine code, as `object_file` has it.
+            Size beyond which arrays stay in memory in machine code, as for `object_file`.
         **static
             Further arguments of the function.
         """
@@ -307,12 +308,12 @@ class Mapped:
         return in_chunks(lambda some: program(lanes_of(some)), count, widths, filled=False), program.backend
 
     def along(self, shared: Any, lanes: Any, *, large: int = LARGE, **static: Any) -> Any:
-        """Return the results for all instants of arrays, which are along their last axis, as `at_instants` does."""
+        """Return the results for all instants of arrays along their last axis, as `at_instants` does."""
         count = np.shape(jax.tree.leaves(lanes)[0])[-1]
         return self.at_instants(shared, partial(at_lanes, lanes), count, large=large, **static)[0]
 
     def prepare(self, shared: Any, lanes: Any, *, large: int = LARGE, **static: Any) -> None:
-        """Make the machine code that `along` calls; XLA's programs depend on how many instants there are."""
+        """Compile the machine code that `along` calls; XLA programs depend on the number of instants."""
         self.program(shared, lanes, large=large, **static)
 
     def _block(self, shared: Any, lanes: Any, how: tuple[tuple[str, Any], ...]) -> Any:
@@ -332,9 +333,9 @@ class Mapped:
     def _in_rounds(
         self, shared: Any, starts: Sequence[Any], others: tuple[Any, Any], order: tuple[Any, Any], how: Any
     ) -> Any:
-        """Return the results of instants in the order of rounds, as `OnXla.rounds` puts them.
+        """Return the results of instants in the order of rounds, for `OnXla.rounds`.
 
-        Each round is written in one piece, for which XLA has fast code: it has none for numbers put here and there.
+        Each round is written as one contiguous block, for which XLA has fast code, unlike for scattered numbers.
         """
         (own, held), (sources, turns), (links, recorded, width, form, static) = others, order, how
         total = len(sources)
@@ -364,5 +365,5 @@ class Mapped:
 
 
 def mapped(**how: Any) -> Callable[[Callable[..., Any]], Mapped]:
-    """Make a `Mapped` of the decorated function."""
+    """Return a decorator that makes a function `Mapped`."""
     return lambda function: Mapped(function, **how)

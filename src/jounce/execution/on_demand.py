@@ -1,4 +1,4 @@
-"""Arrays by name, each computed when it is first requested."""
+"""Arrays by name, each computed at its first request."""
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import Any
@@ -11,16 +11,16 @@ from jounce.settings import under_own_settings
 
 
 class OnDemand(Mapping[str, Any]):
-    """A mapping whose values are computed when they are first requested, and kept. To JAX it is a tree of them all.
+    """A mapping whose values are computed at their first request and cached. For JAX it is a pytree of all values.
 
     Parameters
     ----------
     names : iterable of str
-        In their order.
+        Names in their order.
     compute : callable
-        Returns the value of a name, and those that are found with it, by their names.
+        Function from a name to its value and others that are computed with it, by name.
     known : dict, optional
-        Where they are kept.
+        Cache of the values.
 
     Examples
     --------
@@ -46,7 +46,7 @@ class OnDemand(Mapping[str, Any]):
         return self._known[name]
 
     def __contains__(self, name: object) -> bool:
-        """Tell whether a name is among them; nothing is computed."""
+        """Return whether a name is in the mapping; nothing is computed."""
         return name in self._names
 
     def __iter__(self) -> Iterator[str]:
@@ -54,7 +54,7 @@ class OnDemand(Mapping[str, Any]):
         return iter(self._names)
 
     def __len__(self) -> int:
-        """Return how many there are."""
+        """Return the number of names."""
         return len(self._names)
 
     def __repr__(self) -> str:
@@ -63,7 +63,7 @@ class OnDemand(Mapping[str, Any]):
 
 
 def read_only_arrays(arrays: dict[str, Any]) -> dict[str, Any]:
-    """Make arrays of NumPy read-only, as they are views of what others use; those that JAX traces are so anyway."""
+    """Make NumPy arrays read-only, as they are views of shared arrays; JAX arrays are read-only anyway."""
     for array in arrays.values():
         if isinstance(array, np.ndarray):
             array.setflags(write=False)

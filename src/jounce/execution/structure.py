@@ -1,8 +1,8 @@
-"""What a program is compiled for, described in words that stay the same from one process to the next.
+"""Cache keys of compiled programs: descriptions of their structure that are the same in all processes.
 
-Two descriptions may be equal only where the programs are: a wrong program would give wrong numbers without a sign of
-it. So every kind of value that may make a difference is known here, and what is not known has no description: functions
-and classes that users wrote, above all, whose text nobody can tell from their names.
+Equal descriptions must imply equal programs, since a wrong program would silently give wrong numbers. Every kind of
+value that may make a difference is therefore handled explicitly, and other values have no description: above all
+functions and classes of users, whose names do not determine their text.
 """
 
 from __future__ import annotations
@@ -28,23 +28,23 @@ from jounce.base.jax_internals import trace_settings as settings
 from jounce.execution.llvm import machine
 
 PACKAGE = Path(__file__).parents[1]
-LIBRARIES = ("jax", "jaxlib", "numpy")  # whose releases decide what is traced and compiled
-OPTIONS = ("jax_disable_most_optimizations",)  # of JAX, beside those by which it distinguishes its own programs
-MARGIN = 2.0  # s, between the clock of files and that of processes
+LIBRARIES = ("jax", "jaxlib", "numpy")  # whose releases determine traced and compiled programs
+OPTIONS = ("jax_disable_most_optimizations",)  # of JAX, in addition to its trace context
+MARGIN = 2.0  # s, between the clocks of files and of processes
 CONTAINERS = (tuple, list, dict, type(None))
 
 
 class UndescribedError(Exception):
-    """Something has no description that stays the same."""
+    """A value has no description that is the same in all processes."""
 
 
 def description(value: Any) -> str:
-    """Return what tells a static value from others that are not equal to it.
+    """Return a description that distinguishes a static value from all values that are not equal to it.
 
     Raises
     ------
     UndescribedError
-        Nothing does that would be known in another process too.
+        If there is none that is the same in all processes.
     """
     kind = type(value)
     if value is None or kind in (bool, int, float, complex, str, bytes):
@@ -64,7 +64,7 @@ def description(value: Any) -> str:
         return tree_description(value)
     if isinstance(value, enum.Enum):
         return f"{_own(kind)}.{value.name}"
-    if dataclasses.is_dataclass(value):  # by the fields by which it is compared, as `jax.jit` compares it too
+    if dataclasses.is_dataclass(value):  # by the compared fields, as in `jax.jit`
         compared = [field.name for field in dataclasses.fields(value) if field.compare]
         return f"{_own(kind)}({', '.join(f'{name}={description(getattr(value, name))}' for name in compared)})"
     raise UndescribedError(f"{kind.__module__}.{kind.__qualname__}")
@@ -75,24 +75,24 @@ def _several(values: Any) -> str:
 
 
 def _own(thing: type | types.FunctionType) -> str:
-    """Return the name of a class or a function of this package, by which the same one is found."""
+    """Return the qualified name of a class or function of this package."""
     result: Any = sys.modules.get(thing.__module__)
     origin = getattr(getattr(result, "__spec__", None), "origin", None)
     inside = origin is not None and Path(origin).is_relative_to(PACKAGE)
     for part in thing.__qualname__.split("."):
         result = getattr(result, part, None)
-    if not inside or thing not in (result, getattr(result, "__wrapped__", None)):  # or what a decorator made of it
+    if not inside or thing not in (result, getattr(result, "__wrapped__", None)):  # or wrapped by a decorator
         raise UndescribedError(f"{thing.__module__}.{thing.__qualname__}")
     return f"{thing.__module__}.{thing.__qualname__}"
 
 
 def tree_description(tree: Any) -> str:
-    """Return what tells a tree of JAX from others, as `description` does a value.
+    """Return the description of a JAX tree structure, as `description` does for a value.
 
     Parameters
     ----------
     tree : PyTreeDef
-        With static values in its nodes.
+        Structure with static values in its nodes.
     """
     node = tree.node_data()
     if node is None:
@@ -100,7 +100,7 @@ def tree_description(tree: Any) -> str:
     kind, static = node
     name = kind.__name__ if kind in CONTAINERS else _own(kind)
     if issubclass(kind, tuple):
-        static = None  # its class, once more
+        static = None  # the class again
     return f"{name}<{description(static)}>({', '.join(map(tree_description, tree.children()))})"
 
 
@@ -114,14 +114,14 @@ def cache_key(
     functions : tuple of callable
         Functions of this package.
     tree, leaves
-        The structure of the arguments, and the shape and the type of each leaf.
+        The structure of the arguments, and the shape and type of each leaf.
     static : mapping
         Arguments that are compiled in.
 
     Raises
     ------
     UndescribedError
-        The structure holds something of a user's own, or this package is not what its files say.
+        If the structure contains user code, or this package in memory differs from its files.
     """
     if (changed := altered() or _changed_file()) is not None:
         raise UndescribedError(changed)
@@ -137,7 +137,7 @@ def cache_key(
 
 
 def _described_settings() -> str:
-    parts = [repr(x) for x in settings() if type(x).__name__ != "AxisEnv"]  # of arrays that JAX traces: there are none
+    parts = [repr(x) for x in settings() if type(x).__name__ != "AxisEnv"]  # of axis names, which are not used
     parts += [repr(getattr(jax.config, name, None)) for name in OPTIONS]
     if any(" at 0x" in x for x in parts):
         raise UndescribedError("a setting of JAX")
@@ -145,25 +145,25 @@ def _described_settings() -> str:
 
 
 def _files() -> list[Path]:
-    """Return the files that this package consists of."""
+    """Return the source files of this package."""
     return sorted(PACKAGE.rglob("*.py"))
 
 
 @lru_cache(maxsize=1)
 def _changed_file() -> str | None:
-    """Return a file that was written after this process had begun, which may have imported another text, or None."""
+    """Return a file that was written after this process began, and so may differ from memory; otherwise None."""
     result = {str(file): file.stat() for file in _files()}
     return next((n for n, x in result.items() if max(x.st_mtime, x.st_ctime) > BEGUN - MARGIN), None)
 
 
 @lru_cache(maxsize=1)
 def _surroundings() -> str:
-    """Return what all programs of this process depend on: this package's text, the libraries, the machine."""
+    """Return the common part of all cache keys: the text of this package, the libraries, and the machine."""
     text = hashlib.sha256()
     for file in _files():
         text.update(f"{file.relative_to(PACKAGE).as_posix()} {file.stat().st_size}\n".encode())
         text.update(file.read_bytes())
-    releases = [f"{name} {sys.modules[name].__version__}" for name in LIBRARIES]  # of what is in memory
+    releases = [f"{name} {sys.modules[name].__version__}" for name in LIBRARIES]  # as loaded
     flags = [os.environ.get(name, "") for name in ("XLA_FLAGS", "JAX_PLATFORMS")]
     devices = [f"{device.platform} {device.device_kind}" for device in jax.devices()]
     devices.append(getattr(jax.devices()[0].client, "platform_version", ""))
@@ -172,7 +172,7 @@ def _surroundings() -> str:
 
 
 def _processor() -> str:
-    """Return what tells this kind of processor from others: code is compiled for all that it can do."""
+    """Return a description of the processor, for whose features code is compiled."""
     parts = [platform.machine(), platform.processor(), platform.system(), str(os.cpu_count())]
     listing = Path("/proc/cpuinfo")
     if listing.exists():

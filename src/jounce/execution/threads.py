@@ -1,4 +1,4 @@
-"""Several batches at once, in threads: compiled programs release Python's lock while they run."""
+"""Computation of several batches at once in threads: compiled programs release Python's lock while they run."""
 
 import numbers
 import os
@@ -22,7 +22,7 @@ AHEAD = 2  # results for each thread that may wait to be fetched
 
 
 def thread_count(given: int | Refused | None = None) -> int:
-    """Return how many threads compute: those given, or set by the environment, or the cores that this process has.
+    """Return the number of threads: as given, as set by the environment, or the cores of this process.
 
     Raises
     ------
@@ -40,7 +40,7 @@ def thread_count(given: int | Refused | None = None) -> int:
 
 
 def callers_context() -> Callable[[], AbstractContextManager[Any]]:
-    """Return what makes the context of another thread: what `with` sets in JAX holds for one thread only."""
+    """Return a factory of this thread's context for other threads, since contexts of JAX hold for one thread only."""
     device: Any = getattr(jax.config, "jax_default_device", None)
 
     @contextmanager
@@ -63,14 +63,14 @@ def in_callers_context(function: Callable[[Item], Result]) -> Callable[[Item], R
 
 
 class Threads:
-    """Threads that compute one batch each, while the one that asks waits, started when there are several; to be closed.
+    """A pool of threads that compute one batch each while the caller waits; to be used as a context manager.
 
     Parameters
     ----------
     count : int
-        Of threads; of one, it is that which asks.
+        Number of threads; a single one is that of the caller.
     compiled : bool, default False
-        Whether what they are to compute is compiled already, so that none has to go before the others.
+        Whether the function is compiled already, so that the first item need not go before the others.
     """
 
     def __init__(self, count: int, *, compiled: bool = False):
@@ -86,12 +86,12 @@ class Threads:
             self._pool.shutdown(cancel_futures=True)
 
     def map(self, function: Callable[[Item], Result], items: Iterable[Item]) -> Iterator[Result]:
-        """Yield what a function returns for each item, in their order; it may compute a few of them beforehand.
+        """Yield the results of a function for each item, in order; a few may be computed ahead.
 
-        It is one function, or one compiled program, for all items that these threads map.
+        A pool must map only one function, or functions with one compiled program.
         """
         items = deque(items)
-        if items and not self._compiled:  # what the first one compiles, the others find
+        if items and not self._compiled:  # the first item compiles the program for the others
             self._compiled = True
             yield function(items.popleft())
         if self.count == 1 or len(items) < 2:

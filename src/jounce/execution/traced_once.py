@@ -1,8 +1,8 @@
 """Functions that JAX traces once for a program, however often the program calls them.
 
-`jax.jit` traces a function once for arguments of the same form, and `jax.jvp` and `jax.vmap` transform what it has
-traced once; machine code and XLA write it in the place of each call. Programs share nothing: between two of them a
-user's functions may change.
+`jax.jit` traces a function once for arguments of the same structure and shapes, and `jax.jvp` and `jax.vmap` transform
+the traced program once; machine code and XLA inline it. Nothing is shared between programs, since a user's functions
+may change in between.
 """
 
 import threading
@@ -20,7 +20,7 @@ _thread = threading.local()
 
 @contextmanager
 def one_program() -> Iterator[None]:
-    """Trace a program in this thread, for which functions are traced once."""
+    """Return a context in which this thread traces one program, with each function traced once."""
     before = getattr(_thread, "functions", None)
     _thread.functions = {}
     try:
@@ -30,12 +30,12 @@ def one_program() -> Iterator[None]:
 
 
 def traced_once(*, static: tuple[int, ...] = ()) -> Callable[[Callable[P, R]], Callable[P, R]]:
-    """Decorate a function of pytrees of arrays that programs call several times with arguments of the same form.
+    """Return a decorator of a function of pytrees that programs call several times with the same shapes.
 
     Parameters
     ----------
     static : tuple of int
-        The places of arguments that are no arrays.
+        Positions of arguments that are not arrays.
     """
 
     def decorate(function: Callable[P, R]) -> Callable[P, R]:

@@ -1,8 +1,8 @@
-"""Functions of JAX as machine code: for a single instant, or for many side by side; made once for each structure.
+"""JAX functions as machine code, for a single instant or for many side by side, compiled once for each structure.
 
-XLA makes a program of calls, one for each operation on arrays, and each takes longer than the arithmetic on a few
-numbers. Here one sequence of machine code does all of it (see `jounce.execution.llvm`): of one instant, single values
-are in registers, and loops go over what is larger; of many, the registers hold several instants at a time.
+A program of XLA consists of calls, one for each array operation, which take longer than the arithmetic on a few
+numbers. Here a single sequence of machine code does all operations (see `jounce.execution.llvm`): for one instant,
+small arrays are unrolled to registers and larger ones are loops; for many, registers hold several instants at a time.
 """
 
 import dataclasses
@@ -26,53 +26,53 @@ from jounce.execution.store.programs import current_store, is_in_haste, loaded_o
 from jounce.execution.structure import UndescribedError, cache_key, settings
 from jounce.execution.traced_once import one_program
 
-Group = tuple[Sequence[np.ndarray | jax.ShapeDtypeStruct], Any]  # leaves of a tree, or their forms, and its structure
-LITTLE = 20_000  # numbers that a program is given: of more, even one call takes long
+Group = tuple[Sequence[np.ndarray | jax.ShapeDtypeStruct], Any]  # leaves of a tree, or their shapes, and its structure
+LITTLE = 20_000  # entries of all arguments: with more, even one call is worth optimization
 _thread = threading.local()
 
 
 def all_shaped(leaves: Sequence[Any]) -> list[Any]:
-    """Return leaves as arrays of NumPy; a form, which has only shape and type, stays as it is."""
+    """Return leaves as NumPy arrays; a `jax.ShapeDtypeStruct` stays unchanged."""
     if only_arrays(leaves):
         return list(leaves)
     return [leaf if type(leaf) in (np.ndarray, jax.ShapeDtypeStruct) else np.asarray(leaf) for leaf in leaves]
 
 
 def traces_one_instant() -> bool:
-    """Return whether this thread traces a program of an instant, for which loops are not unrolled beforehand."""
+    """Return whether this thread traces a program for one instant, for which loops should not be unrolled."""
     return getattr(_thread, "tracing", False)
 
 
 @dataclasses.dataclass(frozen=True)
 class WhenMade:
-    """A static argument that is found when a program is made, and not at each call.
+    """A static argument that is computed when a program is made, and not at each call.
 
     Parameters
     ----------
     find : callable
-        Returns it; None where there is to be no machine code. It depends only on the other static arguments, the forms
-        of the arguments, and the whole numbers in their arrays.
+        Function that returns the argument, or None for no machine code. It may depend only on the other static
+        arguments, the shapes of the arguments, and the values of their integer arrays.
     """
 
     find: Callable[[], Any] = dataclasses.field(compare=False)
 
 
 class Translated:
-    """A function of arrays, of which `program` makes machine code.
+    """A function of arrays that is compiled to machine code.
 
     Parameters
     ----------
     function : callable
-        Of two pytrees of arrays, shared by all instants and of the instant, with a last axis of length one, as its
-        results have; and of static arguments. With `single`, it takes the arguments and keywords in the first pytree.
+        Function of two pytrees of arrays, shared by all instants and of one instant, with a last axis of length one, as
+        in its results; and of static arguments. With `single`, the arguments and keywords are in the first pytree.
     made_of : tuple of callable
-        Functions of the package that say what it computes.
+        Functions of the package that define what it computes.
     single : bool, default False
-        Whether there is one instant only.
+        Whether there is only one instant.
     rows : bool, default False
-        Whether arrays of many instants, those given and the results, have the instants along their first axis.
+        Whether arrays of many instants, arguments and results, have the instants along their first axis.
     brief : bool, default False
-        Whether it is called so seldom that, for small arguments, it is compiled with fewer optimizations.
+        Whether calls are so few that, for small arguments, it is compiled without optimization.
     """
 
     def __init__(
@@ -89,22 +89,22 @@ class Translated:
         self._programs = ByKey()
 
     def __len__(self) -> int:
-        """Return the number of programs that were requested, including those without machine code."""
+        """Return the number of requested programs, including those without machine code."""
         return len(self._programs)
 
     def program(self, shared: Group, lanes: Group, static: Mapping[str, Any], *, large: int | None = None) -> Any:
-        """Return the machine code, `Single` or `Program`; None where there is none: no compiler, or no code for it.
+        """Return the machine code, `Single` or `Program`; None if there is no compiler, or no code for an operation.
 
-        Arrays of whole numbers that all instants share, which are indices, are part of the program.
+        Shared integer arrays, which are indices, are compiled in.
 
         Parameters
         ----------
         shared, lanes : tuple
             The leaves of the arguments, or their shapes and types, and their structure.
         static : mapping
-            Further arguments of the function, which may be found when a program is made.
+            Further arguments of the function, possibly `WhenMade`.
         large : int, optional
-            Arrays of more numbers are in memory, as `object_file` has it.
+            Size beyond which arrays stay in memory, as for `object_file`.
         """
         if not uses_machine_code():
             return None
@@ -134,7 +134,7 @@ class Translated:
         return program
 
     def _one(self, shape: tuple[int, ...]) -> tuple[int, ...]:
-        """Return the shape of an instant's part of an array."""
+        """Return the shape of the part of an array for one instant."""
         return (*(shape[1:] if self._rows else shape[:-1]), 1)
 
     def _traced(self, given: Any, lanes: Any, **static: Any) -> Any:
@@ -150,7 +150,7 @@ class Translated:
     def _made(
         self, given: tuple[Any, Any], indices: Mapping[int, np.ndarray], how: dict[str, Any], static: Mapping[str, Any]
     ) -> Single | Program | str | None:
-        """Return a program from the store of programs, or one that is made; or what there is no code for."""
+        """Return a program from the store, or a new one; or the name of the operation that has no code."""
         function = partial(self._traced, **static)
         options: Any = how | {"rows": self._rows, "single": self._single}
         options["brief"] = self._brief and sum(leaf.size for leaf in jax.tree.leaves(given)) <= LITTLE
@@ -159,7 +159,7 @@ class Translated:
             try:
                 with compiling(self.function):
                     binary, results = object_file(function, *given, indices, **options)
-            except UnsupportedOperationError as missing:  # stored, too, as it takes long to find out
+            except UnsupportedOperationError as missing:  # stored, too, since the attempt takes long
                 return b"", str(missing), None
             return binary, tuple(map(jax.tree.leaves, given)), results
 
@@ -172,7 +172,7 @@ class Translated:
         return Single(binary, given, results) if self._single else Program(binary, given, results, rows=self._rows)
 
     def _key(self, given: tuple[Any, Any], indices: Mapping[int, np.ndarray], static: dict[str, Any]) -> str | None:
-        """Return the name of a program in other processes, None where it holds something of a user's own."""
+        """Return the cache key of a program; None if it contains user code."""
         leaves, tree = jax.tree.flatten(given)
         kinds = [*((leaf.shape, str(leaf.dtype)) for leaf in leaves), *indices.values()]
         with suppress(UndescribedError):

@@ -1,4 +1,4 @@
-"""Machine code that calls other machine code: a program for many instants as part of one for a single instant."""
+"""Calls of machine code from machine code: a program for many instants within one for a single instant."""
 
 import math
 from collections.abc import Sequence
@@ -12,12 +12,12 @@ from jounce.execution.llvm.text.views import Array, Stored, contiguous
 
 
 def call(code: Code, equation: Any, given: Sequence[Array]) -> list[Array]:
-    """Write a call of a program that is published, from JAX's call of a foreign function; its lanes are along axes.
+    """Emit a call of a published program for JAX's foreign function call; its lanes are the last axes of arrays.
 
     Raises
     ------
     UnsupportedOperationError
-        If another function is called, or lanes would have to share what it does.
+        If another function is called, or the calling program has several lanes.
     """
     name, result = equation.params["target_name"], [variable.aval for variable in equation.outvars]
     if not (code.single and is_published(name)):
@@ -37,7 +37,7 @@ def call(code: Code, equation: Any, given: Sequence[Array]) -> list[Array]:
 
 
 def _in_one_piece(code: Code, array: Array) -> Stored:
-    """Return an array whose numbers lie one after another from the beginning of its memory on."""
+    """Return a contiguous array at the beginning of its memory."""
     result = stored(code, array)
     whole = result.is_same(contiguous(result.region, result.shape)) or not math.prod(result.shape)
     return result if whole else copied(code, result)

@@ -1,4 +1,4 @@
-"""Which numbers a traced program computes for certain, whatever its unknown inputs are."""
+"""Constant propagation: the numbers that a traced program computes for any values of its unknown inputs."""
 
 import math
 from collections.abc import Sequence
@@ -16,25 +16,25 @@ from jounce.execution.llvm.translation import translate
 
 
 def certain_numbers(program: Any, given: Sequence[Any]) -> list[np.ndarray]:
-    """Return the results of a program as far as they are certain.
+    """Return the constant results of a program.
 
-    The program is translated, and its text is not used: what the translator takes for a constant is certain.
+    The program is translated and its text discarded: a number that the translator folds to a constant is certain.
 
     Parameters
     ----------
     program : ClosedJaxpr
     given : sequence of array
-        Its arguments; NaN stands for a number that is not known, and a form for an array of which none is.
+        Arguments; NaN marks an unknown number, and a shape an array of unknown numbers.
 
     Returns
     -------
     list of array
-        NaN where nothing is certain.
+        Results, NaN where a number is not certain.
 
     Raises
     ------
     UnsupportedOperationError
-        Where the translator has no code for an operation.
+        If the translator has no code for an operation.
     """
     code = Code(1, MOST_LINES, single=True)
 

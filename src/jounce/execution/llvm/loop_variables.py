@@ -1,4 +1,4 @@
-"""Memory for the arrays that a loop changes, or that the ways of a branch make."""
+"""Memory for the arrays that a loop carries, or that the branches of a conditional return."""
 
 import math
 from collections.abc import Collection, Iterator, Mapping, Sequence
@@ -15,22 +15,22 @@ from jounce.execution.llvm.text.stored import copied, is_large, put, stored
 from jounce.execution.llvm.text.values import Region, Value, kind_of
 from jounce.execution.llvm.text.views import Array, Deferred, InMemory, Stored, as_read, contiguous
 
-LEAST_SIZE = 16  # numbers of an array of which constants are looked for: to find that they do not stay costs a turn
+LEAST_SIZE = 16  # least size of an array whose constants are tracked: a failed guess costs one more translation
 
 
 class LoopVariables:
-    """Arrays that a loop or a branch changes, in memory; but for constants that they are known to keep.
+    """Arrays that a loop or a conditional changes, in memory except for entries known to stay constant.
 
     Parameters
     ----------
     code : Code
-        What is written to.
+        Code to emit to.
     avals, lanes : sequence
         Shapes and types of the arrays, and whether their numbers differ from lane to lane.
     invariants : sequence of mapping, optional
-        Of the places in each array at which a constant stays to that constant.
+        For each array, the invariant constants by index.
     regions : sequence of Region or None, optional
-        Memory of arrays that are changed in their places.
+        Memory of arrays that are changed in place.
     """
 
     def __init__(
@@ -42,7 +42,7 @@ class LoopVariables:
         regions: Sequence[Region | None] | None = None,
     ):
         self.invariants: list[dict[int, Value]] = list(map(dict, invariants)) if invariants else [{} for _ in avals]
-        self._stored: dict[tuple[int, int], list[tuple[Value, slice]]] = {}  # constants, and by which lines
+        self._stored: dict[tuple[int, int], list[tuple[Value, slice]]] = {}  # constants, and their lines
         self.code, self.shapes = code, [aval.shape for aval in avals]
         self.large = [is_large(code, aval) for aval in avals]
         self.regions = [
@@ -54,15 +54,14 @@ class LoopVariables:
         ]
 
     def load(self, ways: int = 0, new: Sequence[Array] | None = None) -> list[Array]:
-        """Return the arrays as they are; large ones stay where they are.
+        """Return the current arrays; large ones stay in memory.
 
         Parameters
         ----------
         ways : int, default 0
-            By how many ways they were stored so far, of which one was taken, if constants are to be known that all
-            of them have stored.
+            Number of branches that have stored the arrays, so that constants stored by all of them are known.
         new : sequence of array, optional
-            What the lanes that are written for have in their place; a number that is there already is not loaded.
+            New arrays of the active lanes; a number that is already in its place is not loaded.
         """
 
         def number(which: int, k: int, there: Value | None) -> Value:
@@ -83,7 +82,7 @@ class LoopVariables:
 
     @contextmanager
     def held(self) -> Iterator[None]:
-        """Keep the memory while the loop is written."""
+        """Keep the memory while the loop is emitted."""
         before = len(self.code.held)
         self.code.held += self.regions
         try:
@@ -92,10 +91,10 @@ class LoopVariables:
             del self.code.held[before:]
 
     def store(self, arrays: Sequence[Array]) -> None:
-        """Change the arrays: where a number is what was there when it was loaded, there is nothing to do."""
+        """Store the arrays; numbers that are unchanged since they were loaded are not stored."""
         targets = [contiguous(region, shape) for region, shape in zip(self.regions, self.shapes, strict=True)]
         changing = {target.region for target, array in zip(targets, arrays, strict=True) if not target.is_same(array)}
-        read_first = [  # what is a part of an array that changes is read before
+        read_first = [  # arrays that are parts of changing arrays are copied first
             copied(self.code, array) if _reads_others(array, target, changing) else array
             for target, array in zip(targets, arrays, strict=True)
         ]
@@ -114,14 +113,14 @@ class LoopVariables:
                     self._stored.setdefault((number, k), []).append((value, lines))
 
     def note_rows(self, rows: Sequence[Array], length: int) -> None:
-        """Take note of the constants in rows of which a loop makes one in each of so many turns."""
+        """Record the constants in rows that a loop makes, one in each of `length` iterations."""
         for known, row in zip(self.invariants, rows, strict=True):
             if not isinstance(row, InMemory):
                 constants = [(k, value) for k, value in enumerate(flat(row)) if may_be_invariant(value)]
                 known |= {turn * row.size + k: value for turn in range(length) for k, value in constants}
 
     def note_invariants(self, ways: int) -> None:
-        """Take back what stored a constant that is the same in all ways, each written in a scope of its own."""
+        """Remove the stores of constants that are the same in all branches, each emitted in its own scope."""
         for (which, k), stores in self._stored.items():
             if (value := self._same_in(which, k, ways)) is not None:
                 self.invariants[which][k] = value
@@ -129,7 +128,7 @@ class LoopVariables:
                     self.code.lines[lines] = [""] * (lines.stop - lines.start)
 
     def _same_in(self, which: int, k: int, ways: int) -> Value | None:
-        """Return the constant that all of so many ways have stored in a place."""
+        """Return the constant that all branches have stored at an index; None if they differ."""
         stored = [value for value, _ in self._stored.get((which, k), ())]
         if len(stored) != ways or not all(is_same_constant(stored[0], value) for value in stored):
             return None
@@ -137,19 +136,19 @@ class LoopVariables:
 
 
 def may_be_invariant(value: Value) -> bool:
-    """Tell whether a value is a constant double, of which matrices of certain zeros are full."""
+    """Return whether a value is a constant double, as many entries of matrices with known zeros."""
     return value.constant is not None and value.kind == "f"
 
 
 def invariants_of(code: Code, array: Array) -> dict[int, Value]:
-    """Return the constants of a matrix that a loop begins with, by their places, which the loop may keep."""
+    """Return the constants of an initial array of a loop by index, which the loop may keep."""
     if isinstance(array, InMemory) or code.large is not None or array.size < LEAST_SIZE:
         return {}
     return {k: value for k, value in enumerate(flat(array)) if may_be_invariant(value)}
 
 
 def still_invariant(invariants: Mapping[int, Value], array: Array) -> dict[int, Value]:
-    """Return the constants of an array that are there after a turn of a loop as before."""
+    """Return the invariants that an array still has after an iteration."""
     if not invariants or isinstance(array, InMemory):
         return {}
     values = flat(array)
@@ -157,7 +156,7 @@ def still_invariant(invariants: Mapping[int, Value], array: Array) -> dict[int, 
 
 
 def chosen(code: Code, choice: Value, new: Sequence[Array], old: Sequence[Array]) -> list[Array]:
-    """Return new arrays in lanes where a truth value holds, old ones elsewhere."""
+    """Return new arrays in lanes where a truth value holds, and old arrays elsewhere."""
 
     def either(x: Array, y: Array) -> Array:
         if not isinstance(x, InMemory) and not isinstance(y, InMemory):
@@ -176,18 +175,18 @@ def chosen(code: Code, choice: Value, new: Sequence[Array], old: Sequence[Array]
 
 
 def _reads_others(array: Array, target: Stored, changing: Collection[Region]) -> bool:
-    """Tell whether an array reads other numbers that change than the one in whose place a number is put."""
+    """Return whether an array reads changing numbers other than the one that each number replaces."""
     read = array.given if isinstance(array, Deferred) else [array] if isinstance(array, Stored) else []
     return any(part.region in changing and not target.is_same(part) for part in read)
 
 
 class Homes:
-    """Where values are in memory, while ways are written of which each lane takes one.
+    """The memory locations of values while branches are emitted, of which each lane takes one.
 
     Parameters
     ----------
     arrays : sequence of array
-        That the ways are given.
+        Arguments of the branches.
     """
 
     def __init__(self, arrays: Sequence[Array]):
@@ -196,14 +195,14 @@ class Homes:
         self._changed: list[Value] = []
 
     def restore(self) -> None:
-        """Begin another way: what those before have changed in its place, they have changed in other lanes."""
+        """Begin another branch: earlier branches have changed memory in other lanes only."""
         for value, home in self._homes:
             if value.home is None:
                 self._changed.append(value)
                 value.home = home
 
     def forget(self, regions: Sequence[Region | None]) -> None:
-        """End with all ways: what was changed, and the memory of some arrays, holds the values of before no more."""
+        """End the branches: changed values, and those in some regions, are no longer in memory."""
         for value in self._changed:
             value.home = None
         for value, home in self._homes:
@@ -212,7 +211,7 @@ class Homes:
 
 
 def unchanged(ways: Sequence[Any], inputs: Sequence[Array]) -> list[Array | None]:
-    """Return which results of ways are arguments of theirs that all of them leave as they are; None for others."""
+    """Return the results that are unchanged arguments in all branches; None for other results."""
     result: list[Array | None] = []
     for variables in zip(*(way.outvars for way in ways), strict=True):
         indices = {way.invars.index(x) if x in way.invars else None for way, x in zip(ways, variables, strict=True)}
@@ -224,20 +223,20 @@ def unchanged(ways: Sequence[Any], inputs: Sequence[Array]) -> list[Array | None
 def changed_in_place(
     code: Code, which: Value, first: Any, inputs: Sequence[Array], results: Sequence[int]
 ) -> list[Region | None]:
-    """Return where results of ways are changed in the memory of a loop, as their first way leaves them as they are.
+    """Return the loop memory of results that can be changed in place, since the first branch leaves them unchanged.
 
     Parameters
     ----------
     code : Code
-        What is written to.
+        Code to emit to.
     which : Value
-        Number of the way that a lane takes.
+        Index of the branch that a lane takes.
     first : Jaxpr
-        The first way.
+        The first branch.
     inputs : sequence of array
-        Arguments of the ways.
+        Arguments of the branches.
     results : sequence of int
-        Numbers of the results.
+        Indices of the results.
     """
     given = dict(zip(first.invars, inputs, strict=True))
     regions: list[Region | None] = []

@@ -1,4 +1,4 @@
-"""Text for LLVM as machine code of this computer, in the memory of this process or as bytes for another one."""
+"""Compilation of LLVM text to machine code of this computer, loaded in this process or as an object file."""
 
 import ctypes
 import os
@@ -11,15 +11,15 @@ from pathlib import Path
 from typing import Any
 
 HASTE = ("-regalloc=fast", "-enable-misched=false")  # options of LLVM
-LONG = 10_000  # lines, for which another process is worth its start
-LONGEST = 60_000  # lines, beyond which haste is worth slower code
-_lock = threading.Lock()  # LLVM's state is one for the process
+LONG = 10_000  # lines, from which a separate compiler process is worth its start
+LONGEST = 60_000  # lines, beyond which fast compilation is worth slower code
+_lock = threading.Lock()  # LLVM's state is global to the process
 _published: set[str] = set()
 
 
 @lru_cache(maxsize=1)
 def _binding() -> Any:
-    import llvmlite.binding as binding  # here, since most commands need no compiler
+    import llvmlite.binding as binding  # a local import, since most commands need no compiler
 
     binding.initialize_native_target()
     binding.initialize_native_asmprinter()
@@ -28,7 +28,7 @@ def _binding() -> Any:
 
 @lru_cache(maxsize=1)
 def processor() -> tuple[str, str, str]:
-    """Return the compiler's release, the processor and what it can do, on which machine code depends."""
+    """Return the release of the compiler, the processor and its features, on which machine code depends."""
     import llvmlite
 
     with _lock:
@@ -37,13 +37,13 @@ def processor() -> tuple[str, str, str]:
 
 
 def vector_width() -> int:
-    """Return how many doubles a vector of this processor has."""
+    """Return the number of doubles in a vector of this processor."""
     can = processor()[2].split(",")
     return 8 if "+avx512f" in can else 4 if "+avx" in can else 2
 
 
 def _allowed_level() -> int:
-    """Return how much LLVM may optimize: nothing where the environment asks this of XLA."""
+    """Return the optimization level of LLVM: 0 if the environment sets it for XLA, otherwise 1."""
     levels = re.findall(r"--xla_backend_optimization_level=(\S+)", os.environ.get("XLA_FLAGS", ""))
     return 0 if levels[-1:] == ["0"] else 1
 
@@ -60,12 +60,12 @@ def compiled(text: str, *, hasty: bool = False, brief: bool = False) -> bytes:
     Parameters
     ----------
     text : str
-        Of the module.
+        Text of the module.
     hasty : bool, default False
-        Whether a third of the time is worth more than code that is twice as fast. Its results are the same. What is
-        short is compiled as ever: the start of a process, which haste takes, would cost more than it saves.
+        Whether to compile in a third of the time to code that is half as fast, with the same results. Short modules are
+        compiled as usual, since the required compiler process costs more than it saves.
     brief : bool, default False
-        Whether it is called so seldom that a seventh of the time is worth more than that: LLVM optimizes nothing.
+        Whether to compile without optimization in a seventh of the time, for code that is called seldom.
     """
     if brief:
         return _compiled_here(text, 0)
@@ -77,7 +77,7 @@ def compiled(text: str, *, hasty: bool = False, brief: bool = False) -> bytes:
 
 
 def core_count() -> int:
-    """Return how many cores this process may use."""
+    """Return the number of cores that this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
@@ -89,13 +89,13 @@ def _compiled_here(text: str, level: int = 1) -> bytes:
 
 
 def _compiled_elsewhere(text: str, hasty: bool) -> bytes | None:
-    """Return what another process compiles, None if there can be none.
+    """Return the machine code compiled by another process; None if it cannot run.
 
-    So this one need not wait for LLVM's lock; and LLVM's options are those of a process.
+    This process then need not hold LLVM's lock; and the options of LLVM are global to a process.
     """
-    if not Path(sys.executable or "").name.startswith("python"):  # it may be an application that has Python within
+    if not Path(sys.executable or "").name.startswith("python"):  # may be an application that embeds Python
         return None
-    # by its file, as by its name it would import JAX; -P: nothing of the folder that this file is in
+    # run as a file, since the module would import JAX; -P keeps its folder off the import path
     words = [sys.executable, "-P", __file__, *(HASTE if hasty else ())]
     try:
         return subprocess.run(words, input=text.encode(), capture_output=True, check=True).stdout
@@ -104,7 +104,7 @@ def _compiled_elsewhere(text: str, hasty: bool) -> bytes | None:
 
 
 def is_published(name: str) -> bool:
-    """Tell whether machine code that calls a function of this name finds it."""
+    """Return whether machine code can call a function of this name."""
     return name in _published
 
 
@@ -114,7 +114,7 @@ class MachineCode:
     Parameters
     ----------
     binary : bytes
-        The object file, made by `compiled` on a processor like this one.
+        Object file from `compiled` on a processor like this one.
     """
 
     def __init__(self, binary: bytes):
@@ -131,13 +131,13 @@ class MachineCode:
         self.rounds = ctypes.CFUNCTYPE(None, *addresses, *numbers, *addresses, ctypes.c_int64)(rounds)
 
     def publish(self, name: str) -> None:
-        """Let machine code that is loaded from here on call `run` by a name, as long as this one is kept."""
+        """Let machine code that is loaded later call `run` by a name, as long as this object exists."""
         with _lock:
             _binding().add_symbol(name, self._address)
             _published.add(name)
 
     def __call__(self, addresses: Any, lanes: int) -> None:
-        """Run it: without Python's lock, so in several threads at once."""
+        """Run the code without Python's lock, so that several threads can run it at once."""
         self._run(addresses, lanes)
 
 

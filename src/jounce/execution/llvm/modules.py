@@ -1,4 +1,4 @@
-"""The module of LLVM that computes a function of JAX: its text, and its machine code."""
+"""The LLVM module of a JAX function: its text, and its machine code."""
 
 from collections.abc import Callable, Mapping
 from typing import Any
@@ -20,9 +20,9 @@ from jounce.execution.llvm.text.values import Region, UnsupportedOperationError,
 from jounce.execution.llvm.text.views import Array, Stored, contiguous
 from jounce.execution.llvm.translation import translate
 
-LARGE = 64  # numbers of an array that stays in memory where code with single values alone was too long
-MOST_MEMORY = 2**20  # bytes of the stack: threads have little
-MOST_HEAP = 2**30  # bytes elsewhere
+LARGE = 64  # size of arrays that stay in memory if fully unrolled code is too long
+MOST_MEMORY = 2**20  # bytes on the stack: threads have little
+MOST_HEAP = 2**30  # bytes on the heap
 ATTRIBUTES = """attributes #0 = { nounwind willreturn memory(none) }
 attributes #2 = { nounwind willreturn memory(none) "min-legal-vector-width"="512" "prefer-vector-width"="512" }
 attributes #1 = { nounwind "min-legal-vector-width"="512" "prefer-vector-width"="512" }
@@ -41,31 +41,31 @@ def object_file(
     hasty: bool = False,
     brief: bool = False,
 ) -> tuple[bytes, Any]:
-    """Return the machine code of a function of one instant, as an object file, and the form of its results.
+    """Return the machine code of a function of one instant, as an object file, and the shapes of its results.
 
     Parameters
     ----------
     function : callable
-        Of two pytrees of arrays, those that all instants share and those of the instant; their last axis is of length
-        one, as is that of all results.
+        Function of two pytrees of arrays: those that all instants share, and those of the instant, with a last axis of
+        length one, as in all results.
     shared, lanes : pytree
-        Of arrays, or of what has the shape and type of one.
+        Arrays, or objects with their shapes and types.
     known : mapping
-        Leaves of `shared`, by their numbers, whose values are part of the program.
+        Leaves of `shared`, by index, whose values are compiled in.
     rows : bool, default False
-        Whether arrays of many instants, those given and the results, have the instants along their first axis.
+        Whether arrays of many instants, arguments and results, have the instants along their first axis.
     large : int, optional
-        Arrays of more numbers stay in memory, and operations on them are loops: shorter code that takes longer. None
-        unless given or, for lack of another code, `LARGE`.
+        Size beyond which arrays stay in memory, with loops over them: shorter but slower code. By default none do or,
+        if there is no unrolled code, those larger than `LARGE`.
     single : bool, default False
-        Whether there is one instant only, all of whose arrays are in `shared`.
+        Whether there is only one instant, with all arrays in `shared`.
     hasty, brief : bool, default False
-        As `compiled` has them.
+        As for `compiled`.
 
     Raises
     ------
     UnsupportedOperationError
-        Where there is no code for it, or too much; or a release of JAX that was not tried writes it otherwise.
+        If there is no code for the function, the code is too long, or an untested release of JAX traces it differently.
     """
     count = len(jax.tree.leaves(shared))
     with without_garbage_collection():
@@ -73,7 +73,7 @@ def object_file(
         closed = in_plain_operations(traced)
         try:
             text = _written(closed, count, known, vector_width(), rows=rows, large=large, single=single)
-        except (AttributeError, KeyError, TypeError) as failure:  # of what JAX says of an operation, under another name
+        except (AttributeError, KeyError, TypeError) as failure:  # JAX describes an operation by other names
             if is_tested_release():
                 raise
             raise UnsupportedOperationError(f"JAX {jax.__version__}, which was not tried: {failure!r}") from failure
@@ -81,7 +81,7 @@ def object_file(
 
 
 def _written(*program: Any, large: int | None, **how: Any) -> str:
-    """Return the text of a module; where single values are too many or have no code, with large arrays in memory."""
+    """Return the text of a module; with large arrays in memory if unrolled code is too long or does not exist."""
     try:
         return _text(*program, large=large, **how)
     except UnsupportedOperationError:
@@ -196,7 +196,7 @@ def _write(code: Code, number: int, array: Array, *, rows: bool) -> None:
 
 
 def _lane_by_lane(name: str, count: int, width: int) -> str:
-    """Return the text of a function of C's library for a vector."""
+    """Return the text of a vector function that calls a C library function for each lane."""
     vector, lines = f"<{width} x double>", []
     for lane in range(width):
         lines += [f"%e{lane}_{k} = extractelement {vector} %a{k}, i64 {lane}" for k in range(count)]

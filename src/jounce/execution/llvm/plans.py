@@ -1,7 +1,7 @@
-"""In which order a program of JAX is written: calls within it are part of it, and numbers used once are written late.
+"""The order in which a JAX program is emitted: calls are inlined, and numbers used once are computed late.
 
-Where arrays may be in memory, what repeats is written once, and what no result needs is not written: no one else would
-find out. Of single values, the text and LLVM do, and those that repeat need not be kept.
+If arrays may be in memory, repeated operations are emitted once, and unused operations not at all, since no later stage
+removes them. For unrolled code, the text and LLVM do this, without keeping repeated operations.
 """
 
 from collections.abc import Collection, Mapping, Sequence
@@ -14,50 +14,50 @@ from jax.extend.core import Literal
 from jounce.base.jax_internals import is_by_certain_entries, is_subroutine
 
 CALLS = ("jit", "pjit", "closed_call", "core_call", "custom_jvp_call", "custom_vjp_call", "checkpoint", "remat2")
-"""Operations that call a program, which is written in their place unless it is a subroutine."""
+"""Operations that call a program, which is inlined unless it is a subroutine."""
 
 VIEWS = ("broadcast_in_dim", "reshape", "squeeze", "expand_dims", "transpose")
-"""Operations that repeat where they do: they are no work, and what is used once need not be in memory."""
+"""Operations that are repeated if the program repeats them: they are free, and operands used once need no memory."""
 
 
 @dataclass(eq=False, slots=True)  # not frozen, as values are not: there are many
 class Variable:
-    """What an operation has found, or a constant of a program."""
+    """The result of an operation, or a constant of a program."""
 
     aval: Any  # its shape and type
 
 
 @dataclass(eq=False, slots=True)
 class Operation:
-    """An operation, with the names that an equation of JAX has for its parts."""
+    """An operation, with the attribute names of an equation of JAX."""
 
     primitive: Any
     params: Mapping[str, Any]
     invars: Sequence[Any]
     outvars: Sequence[Any]
-    sparse: bool  # whether a constant zero is an entry that is not there
+    sparse: bool  # whether a constant zero is a structural zero
 
 
 @dataclass(frozen=True, eq=False)
 class Plan:
-    """A program without calls, and when its variables are read.
+    """A program with calls inlined, and the lifetimes of its variables.
 
     Attributes
     ----------
     operations : sequence of Operation
-        In their order.
+        Operations in their order.
     results : sequence of Variable or Literal
-        Of the program.
+        Results of the program.
     constants : mapping
-        Of variables to the values of the programs that are called.
+        Values of the constants of inlined programs, by variable.
     delayed : mapping
-        Of operations, by number, to the one that wants their numbers, once; they may be computed there. Results are
-        used after all of them.
+        Operations whose numbers are computed where they are used: for each index, that of the only reading operation,
+        with results read after all operations.
     last : mapping
-        Of variables to the number of the last operation that reads them; results are read after all of them. Where
-        nothing is delayed, no array is in memory, and nobody asks for it, nor for `ends`.
+        For each variable, the index of the last operation that reads it; results are read after all operations. Without
+        delayed operations, no array is in memory, and neither `last` nor `ends` is needed.
     ends : mapping
-        Of operations to the variables that are not read after them.
+        For each operation, the variables that no later operation reads.
     """
 
     operations: Sequence[Operation]
@@ -69,7 +69,7 @@ class Plan:
 
 
 def plan_of(program: Any, deferred: Collection[str], reading: Collection[str]) -> Plan:
-    """Return how a program is written.
+    """Return the plan of a program.
 
     Parameters
     ----------
@@ -77,7 +77,7 @@ def plan_of(program: Any, deferred: Collection[str], reading: Collection[str]) -
     deferred : collection of str
         Operations whose numbers may be computed where they are used.
     reading : collection of str
-        Others that read a number once.
+        Other operations that read each number once.
     """
     operations: list[Operation] = []
     constants: dict[Any, Any] = {}
@@ -102,23 +102,21 @@ def _written(
     whole: bool,
     sparse: bool = False,
 ) -> list[Any]:
-    """Add the operations of a program, those that it calls among them, and return its results.
+    """Append the operations of a program, with those of called programs, and return its results.
 
     Parameters
     ----------
     program : Jaxpr
     names : dict
-        Of its variables to those of the whole; what is not there has the same name. A program that is called twice has
-        other names each time.
+        New names of its variables; others keep their names. A program that is called twice has new names each time.
     known : dict or None
-        Of what tells the operations so far from each other to their results: what repeats is there once. None where
-        each is written.
+        Results of earlier operations by key, so that repeated operations are emitted once; None to repeat them.
     alike : dict
-        Of results to the first ones that are the same.
+        The first equal result of each result.
     whole : bool
-        Whether it is called by none.
+        Whether the program is not called by another one.
     sparse : bool, default False
-        Whether it is called by certain entries.
+        Whether the program is marked by `by_certain_entries`.
     """
 
     def name(variable: Any) -> Any:
@@ -155,7 +153,7 @@ def _written(
 
 
 def _key(equation: Any, given: Sequence[Any], alike: Mapping[Any, Any], sparse: bool) -> Any:
-    """Return what distinguishes an operation from others, None where that is not known."""
+    """Return the key that identifies an operation; None if there is none."""
 
     def number(x: Any) -> Any:
         if isinstance(x, Literal):
@@ -173,10 +171,10 @@ def _key(equation: Any, given: Sequence[Any], alike: Mapping[Any, Any], sparse: 
 
 
 def _needed(operations: Sequence[Operation], results: Sequence[Any]) -> list[Operation]:
-    """Return the operations on which results depend."""
+    """Return the operations on which results depend, and those with side effects."""
     read, needed = {x for x in results if not isinstance(x, Literal)}, []
     for operation in reversed(operations):
-        acts = not operation.outvars or "call" in operation.primitive.name  # prints, or runs what is not seen here
+        acts = not operation.outvars or "call" in operation.primitive.name  # prints, or calls opaque code
         if acts or not read.isdisjoint(operation.outvars):
             read |= {x for x in operation.invars if not isinstance(x, Literal)}
             needed.append(operation)
@@ -184,14 +182,14 @@ def _needed(operations: Sequence[Operation], results: Sequence[Any]) -> list[Ope
 
 
 def _called(equation: Any) -> tuple[Any, Sequence[Any]]:
-    """Return the program that is called, and the values of its constants."""
+    """Return the called program, and the values of its constants."""
     p = equation.params
     called = next(p[name] for name in ("jaxpr", "call_jaxpr", "fun_jaxpr") if name in p)
     return (called.jaxpr, called.consts) if hasattr(called, "jaxpr") else (called, ())
 
 
 def _readers(operations: Sequence[Operation], results: Sequence[Any]) -> dict[Any, list[int]]:
-    """Return the numbers of the operations that read each variable, in their order; results are read after all."""
+    """Return the indices of the operations that read each variable, in order; results are read after all operations."""
     readers: dict[Any, list[int]] = {}
     for number, read in enumerate([*(operation.invars for operation in operations), results]):
         for variable in read:

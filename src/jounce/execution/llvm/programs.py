@@ -1,4 +1,4 @@
-"""A function of one instant as a program that runs it for many side by side."""
+"""Machine code of a function of one instant, run for one instant or for many side by side."""
 
 import ctypes
 import hashlib
@@ -17,21 +17,21 @@ from jounce.execution.llvm.rounds import Column, RoundRunner
 
 
 class Layout:
-    """Where arrays are in one piece of memory: NumPy takes long to tell the address of an array.
+    """The layout of arrays in one block of memory, since NumPy takes long to return the address of an array.
 
     Parameters
     ----------
     kinds : sequence of tuple
         Shapes and types of the arrays.
     begin : int, default 0
-        Bytes before them.
+        Bytes before the arrays.
 
     Attributes
     ----------
     offsets : array of int
-        Of the arrays, in bytes.
+        Offsets of the arrays in bytes.
     end : int
-        Of them all.
+        End of the last array in bytes.
     """
 
     def __init__(self, kinds: Sequence[tuple[tuple[int, ...], Any]], begin: int = 0):
@@ -47,29 +47,29 @@ class Layout:
         self._places = list(zip(self._kinds, self.offsets.tolist(), strict=True))
 
     def put(self, memory: np.ndarray, arrays: Sequence[np.ndarray]) -> None:
-        """Copy arrays of these shapes and types to their places in a memory of bytes."""
+        """Copy arrays of the layout's shapes and types to their places in a block of bytes."""
         room = memoryview(memory)  # pyright: ignore[reportArgumentType]
         for members, index in self._groups:
             parts: Any = [arrays[k] for k in members]
             try:
                 room[index] = b"".join(parts)
-            except (BufferError, TypeError, ValueError):  # numbers of an array do not lie one after another
+            except (BufferError, TypeError, ValueError):  # an array is not contiguous
                 room[index] = b"".join([x.tobytes() for x in parts])
 
     def views(self, memory: np.ndarray) -> list[np.ndarray]:
-        """Return the arrays in a memory of bytes."""
+        """Return the arrays in a block of bytes as views."""
         return [np.ndarray(*kind, memory, index) for kind, index in self._places]
 
 
 class Single:
-    """Machine code of a function of one instant, for it alone.
+    """Machine code of a function, run for one instant.
 
     Parameters
     ----------
     binary : bytes
-        From `modules.object_file`, with `single`.
+        Object file from `modules.object_file`, with `single`.
     given, results : pytree
-        Of what has the shapes and types of the arguments and of the results.
+        Objects with the shapes and types of the arguments and of the results.
     """
 
     def __init__(self, binary: bytes, given: Any, results: Any):
@@ -81,7 +81,7 @@ class Single:
         self._offsets = np.concatenate([self._given.offsets, self._results.offsets])
 
     def __call__(self, given: Sequence[np.ndarray]) -> Any:
-        """Return the results, for the leaves of the arguments, of the shapes and types that the program is for."""
+        """Return the results for the leaves of the arguments, which have the shapes and types of the program."""
         memory = lend(self._results.end)
         first = address_of(memory)
         np.add(self._offsets, first, out=memory[: self._addresses].view(np.int64))
@@ -96,9 +96,10 @@ class Program:
     Parameters
     ----------
     binary : bytes
-        From `modules.object_file`.
+        Object file from `modules.object_file`.
     given, results : pytree
-        Of what has the shapes and types of the arguments, shared and of an instant, and of the results for an instant.
+        Objects with the shapes and types of the arguments, shared and of one instant, and of the results of one
+        instant.
     rows : bool, default False
         As for `object_file`.
     """
@@ -112,7 +113,7 @@ class Program:
         leaves, self._structure = jax.tree.flatten(results)
         self._results = [(leaf.shape[:-1], leaf.dtype) for leaf in leaves]
         self.width, self._rows = vector_width(), rows
-        # code that does not read some arrays is the same for others in their place
+        # programs that differ only in unread arguments have the same code
         read = repr((self._shared, self._lanes, self._results)).encode()
         self.name = f"jounce_{hashlib.sha256(binary + read).hexdigest()[:32]}"
 
@@ -126,9 +127,9 @@ class Program:
         shared, lanes : sequence of array
             Leaves of the arguments; instants along the last axis, or along the first.
         parts : int, default 1
-            Among how many calls of the machine code the instants are shared, where they lie along the first axis.
+            Number of calls of the machine code that share the instants, if these lie along the first axis.
         each : callable, optional
-            What makes these calls, in the manner of `map`; the machine code may run in several threads.
+            Function like `map` that makes these calls; the machine code may run in several threads.
         """
         axis = 0 if self._rows else -1
         count = lanes[0].shape[axis]
@@ -166,19 +167,19 @@ class Program:
         sources: np.ndarray,
         links: Sequence[int],
     ) -> RoundRunner:
-        """Return what solves instants in rounds, of which later ones start from the results of earlier ones.
+        """Return the runner that solves instants in rounds, where later rounds start from the results of earlier ones.
 
         Parameters
         ----------
         shared : sequence of array
-            Leaves of what all instants share.
+            Leaves of the shared arguments.
         lanes : three sequences of array
-            Leaves of the arguments of an instant: those that it takes from its source, those that are its own, and
-            those that all have the same; see `RoundRunner`.
+            Leaves of the arguments of an instant: those linked to its source, its own, and those held for all; see
+            `RoundRunner`.
         results : sequence of array
-            Where the leaves of the results go; None for those that are not needed.
+            Output arrays for the leaves of the results; None for those that are not needed.
         sources, links : sequence of int
-            As `RoundRunner` has them.
+            As for `RoundRunner`.
         """
         if self._rows:
             raise ValueError("instants are along the first axis")
@@ -190,15 +191,15 @@ class Program:
         return RoundRunner(self._run.rounds, shared, *groups, sources, links, self.width)
 
     def publish(self) -> None:
-        """Make it known by its name to machine code, for `in_program`."""
+        """Publish the program by its name to other machine code, for `in_program`."""
         if self._rows:
             raise ValueError("instants are along the first axis")
         self._run.publish(self.name)
 
     def in_program(self, shared: Sequence[Any], lanes: Sequence[Any]) -> Any:
-        """Return the results as part of a program that becomes machine code, for arguments as in a call.
+        """Return the results as part of a traced program that becomes machine code, for arguments as in a call.
 
-        There is at least a vector of lanes. JAX's own call of foreign functions stands for this one (see
+        There must be at least a vector of lanes. The call is represented by JAX's foreign function call (see
         `calls.call`); XLA does not know the name.
         """
         count = lanes[0].shape[-1]
@@ -209,13 +210,13 @@ class Program:
         return jax.tree.unflatten(self._structure, jax.ffi.ffi_call(self.name, shapes)(*shared, *lanes))
 
     def _check(self, shared: Sequence[Any], lanes: Sequence[Any], count: int) -> None:
-        """Raise ValueError unless arrays of so many instants are of the shapes and types that the code reads."""
+        """Raise ValueError unless the arrays, with `count` instants, have the shapes and types of the program."""
         many = [((count, *shape) if self._rows else (*shape, count), dtype) for shape, dtype in self._lanes]
         _agree([*shared, *lanes], [*self._shared, *many])
 
 
 def _agree(arrays: Sequence[Any], expected: Sequence[tuple[tuple[int, ...], Any]]) -> None:
-    """Raise ValueError unless arrays are of the requested shapes and types."""
+    """Raise ValueError unless arrays have the expected shapes and types."""
     result = [(x.shape, x.dtype) for x in arrays]
     if result != expected:
         raise ValueError(f"arrays of {result}, where the program was made for {expected}")

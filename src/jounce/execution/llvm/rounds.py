@@ -1,9 +1,9 @@
-"""A function of one instant run for many in rounds, of which later ones start from what earlier ones have found.
+"""A function of one instant run for many in rounds, where later rounds start from the results of earlier ones.
 
-A round is as many instants as a vector has lanes. The machine code copies what they need from wherever their sources
-are in arrays of the caller, solves them, and copies what it finds to where they are themselves: no call, and no array,
-for each round, and Python's lock is not held for any of them. What starts from the round before may be copied from its
-results, a vector at a time, without any array of the caller.
+A round has as many instants as a vector has lanes. The machine code gathers their arguments from the sources in the
+caller's arrays, solves them, and scatters the results to their own places. There is no Python call and no new array for
+a round, and Python's lock is not held. Arguments from the previous round are copied from its results, a vector at a
+time, without the caller's arrays.
 """
 
 import itertools
@@ -16,14 +16,14 @@ from jaxtyping import Int
 
 from jounce.execution.buffer_pool import address_of
 
-LINE = 64  # bytes of the cache's lines, at which vectors begin
-ENTRY = 8  # bytes of a number that is copied
+LINE = 64  # bytes of a cache line, at which vectors begin
+ENTRY = 8  # bytes of a copied number
 
 
 class Column(NamedTuple):
-    """An argument or a result of an instant, and the array of those of all instants, time last.
+    """An argument or a result of an instant, and its array for all instants, time last.
 
-    None where a result is not needed.
+    The array is None for a result that is not needed.
     """
 
     shape: tuple[int, ...]
@@ -31,12 +31,12 @@ class Column(NamedTuple):
     whole: np.ndarray | None
 
     def addresses(self, least: int) -> list[int]:
-        """Return where each number of the first instant is, in an array of so many instants at least.
+        """Return the addresses of the numbers of the first instant in an array of at least `least` instants.
 
         Raises
         ------
         ValueError
-            If the array is not one that the machine code can read.
+            If the machine code cannot read the array.
         """
         whole: Any = self.whole
         result = whole.shape[:-1], whole.dtype, whole.dtype.itemsize, whole.strides[-1]
@@ -51,21 +51,21 @@ class Column(NamedTuple):
 
     @property
     def size(self) -> int:
-        """How many numbers an instant has."""
+        """Number of entries of an instant."""
         return math.prod(self.shape)
 
     def room(self, width: int) -> int:
-        """Return how many bytes the numbers of a round take, in whole lines of the cache."""
+        """Return the number of bytes of a round, in whole cache lines."""
         return -(-self.size * width * self.dtype.itemsize // LINE) * LINE
 
 
 def rounds_text(width: int) -> str:
     """Return the text of a function `rounds`, which calls `run` for one round after another.
 
-    Its arguments: the addresses for `run`; pairs of addresses, of a number of the first instant and of that of the
-    first lane, in the order in which they are copied, and before these as many for what is read at sources, of the
-    result of the first lane and again of that which is given; how many are read at sources, read at targets, and
-    written at targets; the sources of all instants, the targets of all rounds, and how many rounds there are.
+    Its arguments are: the addresses for `run`; pairs of addresses, each of a number of the first instant and of the
+    same number in the first lane, in the order of copying, preceded by as many pairs for numbers read at sources, each
+    of the result and of the argument in the first lane; the numbers of pairs read at sources, read at targets, and
+    written at targets; the sources of all instants; the targets of all rounds; and the number of rounds.
 
     Parameters
     ----------
@@ -121,7 +121,7 @@ def rounds_text(width: int) -> str:
 
 
 def _copies(name: str, limits: tuple[str, str, str], after: str, copy: Sequence[str]) -> list[str]:
-    """Return a loop over pairs; limits are the block before the loop, the first pair and where they end."""
+    """Return a loop over pairs; limits are the block before the loop, the first pair and the end of the pairs."""
     before, first, stop = limits
     return [
         f"{name}:",
@@ -140,7 +140,7 @@ def _copies(name: str, limits: tuple[str, str, str], after: str, copy: Sequence[
 
 
 def _vector(name: str, width: int) -> list[str]:
-    """Return what copies a result of all lanes to where it is given to those of the next round."""
+    """Return code that copies a result of all lanes to the argument of the next round."""
     of = f"<{width} x i64>"
     return [
         f"%{name}_all = load {of}, ptr %{name}_whole, align 8",
@@ -149,7 +149,7 @@ def _vector(name: str, width: int) -> list[str]:
 
 
 def _started(lane: int, width: int) -> list[str]:
-    """Return what copies the numbers of the source of a lane, if it has one, and goes on to the next lane."""
+    """Return code that copies the numbers of the source of a lane, if it has one, and continues with the next lane."""
     name, after = f"start{lane}", f"lane{lane + 1}" if lane + 1 < width else "known"
     copy = [
         f"%{name}_from = getelementptr i64, ptr %{name}_whole, i64 %source{lane}",
@@ -166,7 +166,7 @@ def _started(lane: int, width: int) -> list[str]:
 
 
 def _gathered(name: str, index: str, width: int) -> list[str]:
-    """Return what copies a number of some instants to where those of a round are side by side."""
+    """Return code that gathers a number of the instants of a round into its vector."""
     of, lines, vector = f"<{width} x i64>", [], "poison"
     for lane in range(width):
         at = f"%{name}_{lane}"
@@ -180,7 +180,7 @@ def _gathered(name: str, index: str, width: int) -> list[str]:
 
 
 def _scattered(name: str, width: int) -> list[str]:
-    """Return what copies a number of the instants of a round to where each of them is."""
+    """Return code that scatters a number of the instants of a round to their places."""
     of = f"<{width} x i64>"
     lines = [f"%{name}_all = load {of}, ptr %{name}_round, align 8"]
     for lane in range(width):
@@ -194,28 +194,28 @@ def _scattered(name: str, width: int) -> list[str]:
 
 
 class RoundRunner:
-    """Machine code that solves instants in rounds, straight from and into arrays of all of them.
+    """Machine code that solves instants in rounds, directly from and into arrays of all instants.
 
     Parameters
     ----------
     run : callable
         The function `rounds` of machine code.
     shared : sequence of array
-        What all instants share.
+        Shared arguments.
     linked, own, held, results : sequence of Column
-        The arguments of an instant in their order: those that it takes from its source, those that are its own, and
-        those that all have the same, from arrays of one instant; and the results.
+        Arguments of an instant in their order: those linked to results of its source, its own, and those held for all
+        instants, from arrays of one instant; and the results.
     sources : array of shape (time,)
-        Index of the source of each instant, in one piece; below zero if it is its lane of the round before.
+        Index of the source of each instant, contiguous; negative for the same lane of the previous round.
     links : sequence of int
-        Which of the results is the one that each of the linked arguments is taken from.
+        For each linked argument, the index of the result that it is taken from.
     width : int
         Lanes of a vector.
 
     Raises
     ------
     ValueError
-        If the machine code would read or write what does not belong to the arrays.
+        If the machine code would access memory outside of the arrays.
     """
 
     def __init__(
@@ -234,7 +234,7 @@ class RoundRunner:
         self._run, self.width, self._sources = run, width, sources
         self._known = min((column.whole.shape[-1] for column in linked if column.whole is not None), default=0)
         self._check_sources()
-        self._arrays = [np.ascontiguousarray(x) for x in shared], columns  # kept, since addresses do not keep them
+        self._arrays = [np.ascontiguousarray(x) for x in shared], columns  # kept alive: addresses do not
         self._common = np.array([address_of(x) for x in self._arrays[0]], np.int64)
         ends = np.cumsum([0, *(column.room(width) for column in columns)])
         self._begins, self._blank = ends[:-1], np.zeros(ends[-1], np.uint8)
@@ -253,10 +253,10 @@ class RoundRunner:
         self._within = np.array([[1, 1]] * len(again) + [[0, 1]] * (len(self._pairs) - len(again)))
 
     def __call__(self, targets: Int[np.ndarray, "round lane"]) -> None:
-        """Solve instants by their indices; in several threads at once, if they have none of them in common.
+        """Solve the instants of given indices; several threads may solve disjoint instants at once.
 
-        The lanes of a round depend on none of the same round; sources are solved, or are in an earlier one. Arrays are
-        read as they are now.
+        The sources of a round must be solved already, or be in an earlier round. The current contents of the arrays are
+        read.
         """
         self._check_sources()
         count, width = len(self._sources), self.width
@@ -266,7 +266,7 @@ class RoundRunner:
         if targets.dtype != np.int64 or targets.shape[1:] != (width,) or not within:
             raise ValueError(f"targets that are not {width} indices below {count} for each round")
         targets = np.ascontiguousarray(targets)
-        memory = np.empty(len(self._blank) + LINE, np.uint8)  # of its own for each call, and so for each thread
+        memory = np.empty(len(self._blank) + LINE, np.uint8)  # a new block for each call, and so for each thread
         first = -address_of(memory) % LINE
         memory[first : first + len(self._blank)] = self._blank
         start = address_of(memory) + first
@@ -275,14 +275,14 @@ class RoundRunner:
         self._run(address_of(addresses), address_of(pairs), *self._counts, *indices, len(targets))
 
     def _check_sources(self) -> None:
-        """Raise ValueError unless sources are indices of the arrays that are read at them."""
+        """Raise ValueError unless all sources are valid indices of the linked arrays."""
         result = self._sources
         if result.dtype != np.int64 or result.max(initial=-1) >= self._known or not result.flags.c_contiguous:
             raise ValueError(f"sources that are no indices below {self._known}")
 
 
 def _pairs(columns: Sequence[Column], begins: Iterator[int], width: int, least: int) -> list[tuple[int, int]]:
-    """Return the address of each number of the first of `least` instants, and where those of a round begin."""
+    """Return pairs of addresses: each number of the first of `least` instants, and its vector in a round."""
     result: list[tuple[int, int]] = []
     for column, begin in zip(columns, begins, strict=False):
         if column.whole is not None:

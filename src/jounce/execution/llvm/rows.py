@@ -1,7 +1,7 @@
-"""Arrays of many instants in which the numbers of each instant lie one after another: the layout of users' arrays.
+"""Arrays with the instants along the first axis, the layout of users' arrays.
 
-A vector wants one number of several instants. So many rows as a vector has lanes are read, as wide as a vector, and
-transposed in the registers; NumPy takes a third as long for it as the torque of an arm.
+A vector holds one number of several instants. As many rows as a vector has lanes are read, in pieces as wide as a
+vector, and transposed in registers. A transpose by NumPy would take a third of the time of the torque of an arm.
 """
 
 from collections.abc import Sequence
@@ -11,7 +11,7 @@ from jounce.execution.llvm.text.values import DTYPES, IN_MEMORY, Value
 
 
 def read(code: Code, pointer: str, size: int, kind: str) -> list[Value]:
-    """Return the numbers of the instants from `%lane` on, so many as each has."""
+    """Return the `size` numbers of each of the instants from `%lane` on."""
     if size == 0:
         return []
     rows, of, hint = _rows(code, pointer, size, kind), f"<{code.width} x {IN_MEMORY[kind]}>", "!invariant.load !0"
@@ -37,7 +37,7 @@ def read(code: Code, pointer: str, size: int, kind: str) -> list[Value]:
 
 
 def write(code: Code, pointer: str, values: Sequence[Value]) -> None:
-    """Put the numbers of the instants from `%lane` on, those of each one after another."""
+    """Emit stores of the numbers of the instants from `%lane` on, those of each instant contiguous."""
     size, kind = len(values), values[0].kind
     rows, of = _rows(code, pointer, size, kind), f"<{code.width} x {IN_MEMORY[kind]}>"
     names = [code.stored_operand(value, of, lanes=True) for value in values]
@@ -55,12 +55,12 @@ def write(code: Code, pointer: str, values: Sequence[Value]) -> None:
 
 
 def _starts(size: int, width: int) -> list[int]:
-    """Return where blocks of columns begin; the last two may share some."""
+    """Return the starts of blocks of columns; the last two may overlap."""
     return [] if size < width else [*range(0, size - width, width), size - width]
 
 
 def _rows(code: Code, pointer: str, size: int, kind: str) -> list[str]:
-    """Return where the numbers of each of the instants begin."""
+    """Return the address of the first number of each instant."""
     first = code.fresh()
     code.lines.append(f"{first} = mul i64 %lane, {size}")
     start = _address(code, pointer, first, kind)
@@ -74,7 +74,7 @@ def _address(code: Code, pointer: str, index: int | str, kind: str) -> str:
 
 
 def _transposed(code: Code, block: Sequence[str], kind: str) -> list[str]:
-    """Return the columns of a square of numbers, of which the rows are given: bit after bit of the places changes."""
+    """Return the columns of a square of numbers from its rows, transposed bit by bit of the indices."""
     width, result = code.width, list(block)
     of, bit = f"<{width} x {IN_MEMORY[kind]}>", 1
     while bit < width:

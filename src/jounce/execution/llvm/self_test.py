@@ -1,6 +1,6 @@
-"""Whether machine code is used here: a small program beside XLA's decides, on systems where none was tried.
+"""The self-test of machine code: on untested systems, a small program is compared with XLA before machine code is used.
 
-Code may ask there for functions that LLVM does not find, and then it ends the process: so it is another one.
+The test runs in another process, since code that calls a function that LLVM does not find ends the process.
 """
 
 import subprocess
@@ -12,23 +12,23 @@ from pathlib import Path
 from jounce.errors import MachineCodeWarning, warn_caller
 
 TRIED = ("linux",)
-HOME = Path(__file__).parents[3]  # the folder that this package is imported from
+HOME = Path(__file__).parents[3]  # the import folder of this package
 LONGEST = 120.0  # s
 CALL = f"import sys; sys.path.insert(0, {str(HOME)!r}); from jounce.execution.llvm import self_test; self_test.check()"
 
 
 @lru_cache(maxsize=1)
 def is_usable() -> bool:
-    """Tell whether there is a compiler, and its code has been tried on this system, or passes a test here."""
-    if find_spec("llvmlite") is None:  # from an installation that leaves out what this package depends on
+    """Return whether a compiler is installed, and this system is a tested one or passes the self-test."""
+    if find_spec("llvmlite") is None:  # installed without dependencies
         return False
     return sys.platform in TRIED or passes()
 
 
 @lru_cache(maxsize=1)
 def passes() -> bool:
-    """Tell whether machine code gives what XLA does on this system; if not, one warning says why."""
-    if not Path(sys.executable or "").name.startswith("python"):  # it may be an application that has Python within
+    """Return whether machine code gives the results of XLA on this system; if not, warn once with the reason."""
+    if not Path(sys.executable or "").name.startswith("python"):  # may be an application that embeds Python
         reason = f"{sys.executable!r} cannot be run as a Python interpreter"
     else:
         try:
@@ -50,9 +50,9 @@ def passes() -> bool:
 
 
 def check() -> None:
-    """Raise AssertionError unless machine code for instants side by side gives what XLA does.
+    """Raise AssertionError unless machine code for instants side by side gives the results of XLA.
 
-    The program has what asks for something outside of it: functions of C's library, memory, loops.
+    The program uses C library functions, memory, and loops.
     """
     import jax
     import jax.numpy as jnp

@@ -1,7 +1,7 @@
-"""Functions of machine code for parts of a program that are used often: written once, and called.
+"""Functions of machine code for parts of a program that are called often, emitted once.
 
-The numbers of their arguments and results are in memory, where those of what a loop or a branch has made are anyway.
-Constants that are known at a call are part of the function, so that a matrix of other certain zeros has another one.
+Their arguments and results are in memory, as are those of loops and conditionals anyway. Constants of a call are
+compiled into the function, so that a matrix with other structural zeros has another function.
 """
 
 from collections.abc import Callable, Sequence
@@ -17,16 +17,16 @@ Write = Callable[[Code, Any, Sequence[Values]], list[Any]]  # a closed program f
 
 @dataclass(frozen=True)
 class Subroutine:
-    """A function that was written."""
+    """An emitted function."""
 
     name: str
     text: str
-    is_read: list[bool]  # each argument
-    results: list[tuple[tuple[int, ...], list[Any]]]  # their shapes, and their numbers that are constants; else None
+    is_read: list[bool]  # for each argument
+    results: list[tuple[tuple[int, ...], list[Any]]]  # shapes, and numbers, None if not constant
 
 
 def call_subroutine(code: Code, equation: Any, given: Sequence[Values], write: Write) -> list[Values]:
-    """Write the call of a program, and the program itself if there is none yet for such arguments."""
+    """Emit the call of a program, and the program itself if it does not exist yet for such arguments."""
     program, values = equation.params["jaxpr"], [flat(array) for array in given]
     if any(kind_of(variable.aval.dtype) != "f" for variable in (*equation.invars, *equation.outvars)):
         return write(code, program, given)
@@ -45,11 +45,11 @@ def call_subroutine(code: Code, equation: Any, given: Sequence[Values], write: W
 
 
 def _pointer_to(code: Code, values: Sequence[Value]) -> str:
-    """Return where an array begins in memory, and put there what is no constant unless all of it is there."""
+    """Return the address of an array in memory; store its variable numbers unless all are in memory already."""
     varying = [(k, value) for k, value in enumerate(values) if value.constant is None]
     region, _ = varying[0][1].home or (None, 0)
     is_there = region is not None and all(value.home == (region, k) for k, value in varying)
-    if region is not None and is_there and region.lanes and not region.given:  # lanes of a number lie side by side
+    if region is not None and is_there and region.lanes and not region.given:  # lanes of a number are contiguous
         return region.pointer
     region = code.room(len(values), "f", lanes=True)
     for k, value in varying:

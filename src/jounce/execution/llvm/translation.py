@@ -1,7 +1,7 @@
-"""A program of JAX for one instant as code for a vector of lanes, each with a way of its own through it.
+"""Translation of a JAX program for one instant to code for a vector of lanes, each with its own control flow.
 
-Where lanes part, all ways that some lane takes are run, and each keeps what its own one gives; a loop runs until the
-last lane that is in it has left. So the results of a lane depend on no other.
+Where lanes diverge, all branches taken by any lane are run, and each lane keeps the results of its own; a loop runs
+until the last lane has left it. So the results of a lane do not depend on other lanes.
 """
 
 from collections.abc import Callable, Sequence
@@ -42,36 +42,36 @@ from jounce.execution.llvm.text.stored import (
 from jounce.execution.llvm.text.values import Region, UnsupportedOperationError, Value, kind_of
 from jounce.execution.llvm.text.views import Array, Deferred, InMemory, contiguous, further
 
-MOST_UNROLLED = 4_000  # lines of a loop of known length that is written turn after turn
-MOST_UNROLLED_IN_MEMORY = 250  # where arrays may stay in memory
-HOPE = 8  # times as many lines as in a later turn may be in one of the first, which later ones have in common with it
+MOST_UNROLLED = 4_000  # lines of an unrolled loop of known length
+MOST_UNROLLED_IN_MEMORY = 250  # the same if arrays may stay in memory
+HOPE = 8  # largest expected ratio of the lines of an early iteration to a later one, which reuses its results
 
 
 def translate(
     code: Code, program: Any, constants_: Sequence[Array], given: Sequence[Array], *, late: bool = False
 ) -> list[Array]:
-    """Write the operations of a program, and return its results.
+    """Emit the operations of a program, and return its results.
 
     Parameters
     ----------
     code : Code
-        What is written to.
+        Code to emit to.
     program : Jaxpr
     constants_, given : sequence of arrays of Value
         Its constants and arguments.
     late : bool, default False
-        Whether numbers of the results may be computed by who wants them next.
+        Whether numbers of the results may be computed where they are used.
 
     Raises
     ------
     UnsupportedOperationError
-        Where there is no code for an operation.
+        If there is no code for an operation.
     """
     plan = code.plans.get(program)
     if plan is None:
         plan = code.plans[program] = plan_of(program, *((DEFERRED, READING) if code.large is not None else ((), ())))
     known: dict[Any, Array] = {}
-    read_last: dict[Region, int] = {}  # by which operation, what is in the memory of arrays
+    read_last: dict[Region, int] = {}  # the last operation that reads each memory
     now = 0
 
     def noted(variable: Any, array: Array) -> None:
@@ -106,7 +106,7 @@ def translate(
 
 
 def _results(code: Code, equation: Any, given: Sequence[Array], *, delayed: bool) -> Sequence[Array]:
-    """Return the results of an operation: by single values, or by loops where an array is large."""
+    """Return the results of an operation: by single values, or by loops over large arrays."""
     name = equation.primitive.name
     if name not in DEFERRED and name not in READING:
         given = [stored(code, array) if isinstance(array, Deferred) else array for array in given]
@@ -124,7 +124,7 @@ def _results(code: Code, equation: Any, given: Sequence[Array], *, delayed: bool
 
 
 def _checked(values: Any, aval: Any) -> Array:
-    """Return values as an array, as NumPy does not for a lone one: of the shape and the kind that JAX has for it."""
+    """Return values as an array, also a single one, after a check of the shape and kind that JAX expects."""
     array = values if isinstance(values, np.ndarray | InMemory) else filled((), [values])
     if array.shape != aval.shape:
         raise AssertionError(f"an array of shape {array.shape} where one of {aval.shape} belongs")
@@ -139,7 +139,7 @@ def _checked(values: Any, aval: Any) -> Array:
 
 
 def _linear_solve(code: Code, equation: Any, given: Sequence[Array]) -> list[Array]:
-    """Write what solves linear equations, whose derivatives JAX has a rule for."""
+    """Emit the solver of linear equations with custom derivatives."""
     lengths = equation.params["const_lengths"]
     first = lengths.matvec + lengths.vecmat
     return _closed(code, equation.params["jaxprs"].solve, given[first : first + lengths.solve], given[sum(lengths) :])
@@ -155,14 +155,14 @@ def _closed(code: Code, closed: Any, *given: Sequence[Array], late: bool = False
 
 
 def _until_settled(code: Code, known: Any, attempt: Callable[[Any], tuple[Any, Any]]) -> Any:
-    """Return what an attempt gives that knows of each array whether its numbers differ from lane to lane.
+    """Return the results of an attempt to emit code whose assumptions hold, such as which arrays differ by lane.
 
     Parameters
     ----------
     known : list of bool, or more
-        What is known of the arrays before.
+        Initial assumptions.
     attempt : callable
-        Writes code, and returns what is so, possibly less than what was known, and its results.
+        Emits code under assumptions, and returns those that hold, possibly weaker ones, and its results.
     """
     while True:
         mark = code.mark()
@@ -174,23 +174,23 @@ def _until_settled(code: Code, known: Any, attempt: Callable[[Any], tuple[Any, A
 
 
 def _in_lanes(arrays: Sequence[Array], already: Sequence[bool] | None = None) -> list[bool]:
-    """Tell which arrays have numbers that differ from lane to lane, or did already."""
+    """Return which arrays have numbers that differ from lane to lane, or did so already."""
     already = [False] * len(arrays) if already is None else already
     return [before or any_lanes([array]) for before, array in zip(already, arrays, strict=True)]
 
 
 def _likely(code: Code, arrays: Sequence[Array], avals: Sequence[Any]) -> list[bool]:
-    """Tell which arrays that a loop changes are taken to differ from lane to lane: all but counts that do not yet."""
+    """Return which arrays that a loop carries are assumed to differ by lane: all but integers that do not yet."""
     return [a or b for a, b in zip(_in_lanes(arrays), _likely_made(code, avals), strict=True)]
 
 
 def _likely_made(code: Code, avals: Sequence[Any]) -> list[bool]:
-    """Tell which arrays that are made are taken to differ from lane to lane."""
+    """Return which new arrays are assumed to differ from lane to lane."""
     return [kind_of(aval.dtype) == "f" and not code.single for aval in avals]
 
 
 def _while(code: Code, equation: Any, given: Sequence[Array]) -> list[Array]:
-    """Write a loop that each lane leaves when its condition no longer holds."""
+    """Emit a loop that each lane leaves when its condition no longer holds."""
     p = equation.params
     split = p["cond_nconsts"], p["cond_nconsts"] + p["body_nconsts"]
     condition, needed, start = given[: split[0]], given[split[0] : split[1]], given[split[1] :]
@@ -206,7 +206,7 @@ def _while(code: Code, equation: Any, given: Sequence[Array]) -> list[Array]:
             before = state.load()
             with code.used(among([*condition, *needed, *before])):
                 goes = code.among_here(_number(code, _closed(code, p["cond_jaxpr"], condition, before)[0]))
-            if goes.lanes and not all(lanes):  # what a lane keeps that has left differs
+            if goes.lanes and not all(lanes):  # a lane that has left keeps its own values
                 return ([True] * len(lanes), invariants), []
             code.branch(code.anywhere(goes), body, end)
             code.begin(body)
@@ -226,7 +226,7 @@ def _while(code: Code, equation: Any, given: Sequence[Array]) -> list[Array]:
 
 
 def _scan(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Array]:
-    """Write a loop of known length over the first axis of arrays."""
+    """Emit a loop of known length over the first axis of arrays."""
     p = equation.params
     fixed, carry = sizes_of_scan(equation)
     needed, start, rows = given[:fixed], given[fixed : fixed + carry], given[fixed + carry :]
@@ -241,7 +241,7 @@ def _scan(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Array]:
     mark = code.mark()
     try:
         return _rolled(code, equation, needed, start, rows)
-    except UnsupportedOperationError:  # of places that change from turn to turn
+    except UnsupportedOperationError:  # of indices that change from iteration to iteration
         code.back_to(mark)
         if (unrolled := _unrolled(code, equation, needed, start, rows, code.most)) is None:
             raise
@@ -249,7 +249,7 @@ def _scan(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Array]:
 
 
 def _needs_known_indices(program: Any) -> bool:
-    """Tell whether a program has operations for which there is code only where their indices are known."""
+    """Return whether a program has operations that need constant indices."""
     return any(
         equation.primitive.name.startswith("scatter")
         or any(map(_needs_known_indices, jaxprs_in_params(equation.params)))
@@ -260,7 +260,7 @@ def _needs_known_indices(program: Any) -> bool:
 def _rolled(
     code: Code, equation: Any, needed: Sequence[Array], start: Sequence[Array], rows: Sequence[Array]
 ) -> list[Array]:
-    """Write a loop of known length as one."""
+    """Emit a loop of known length as a loop."""
     p, size = equation.params, len(start)
     made = [variable.aval for variable in equation.outvars[size:]]
     last = code.constant(p["length"] - 1, "l")
@@ -290,7 +290,7 @@ def _rolled(
                 if array.size:
                     put(code, contiguous(region, array.shape, further(code, 0, at, array.size)), array)
             written.note_rows(results[size:], p["length"])
-            state.store(results[:size])  # after what may be a part of what was carried
+            state.store(results[:size])  # last, since other results may be parts of the carried arrays
             give_back(code, results)
             code.store(counter, 0, code.arithmetic("add", count, code.constant(1, "l")))
             code.branch(code.operand(code.compare("lt", count, last), lanes=False), body, end)
@@ -305,9 +305,9 @@ def _rolled(
 def _unrolled(
     code: Code, equation: Any, needed: Sequence[Array], start: Sequence[Array], rows: Sequence[Array], most: int
 ) -> list[Array] | None:
-    """Return the results of a loop turn after turn; None where that takes more lines than `most`.
+    """Return the results of an unrolled loop; None if it takes more than `most` lines.
 
-    It is given up early where the turns so far, of which the first are longer than the others, leave no hope.
+    It is given up early if the iterations so far, of which the first are the longest, are too long.
     """
     p, mark, before = equation.params, code.mark(), len(code.lines)
     size, result, live = len(start), {}, regions_of([*needed, *rows])
@@ -335,7 +335,7 @@ def _stacked(code: Code, parts: Sequence[Array]) -> Array:
 
 
 def _cond(code: Code, equation: Any, given: Sequence[Array]) -> list[Array]:
-    """Write the ways of a branch of which each lane takes one: all that some lane takes are run."""
+    """Emit the branches of a conditional, of which each lane takes one: all that any lane takes are run."""
     ways, which, inputs = equation.params["branches"], _number(code, given[0]), given[1:]
     which = code.converted(which, "i") if which.kind == "b" else which
     if len(ways) == 1 or which.constant is not None:
@@ -380,7 +380,7 @@ def _cond(code: Code, equation: Any, given: Sequence[Array]) -> list[Array]:
 
 
 def _subroutine(code: Code, equation: Any, given: Sequence[Array]) -> list[Array]:
-    """Write a call of a program that is written once, or that program where arrays may be in memory."""
+    """Emit a call of a subroutine, or inline its program if arrays may be in memory."""
     if code.large is not None:
         return _closed(code, equation.params["jaxpr"], given)
     return [*call_subroutine(code, equation, [values_of(code, array) for array in given], _closed)]

@@ -1,4 +1,4 @@
-"""Compiled programs in the files of a folder of this user, for all of their processes."""
+"""Compiled programs in files of a private folder, for all processes of this user."""
 
 import hashlib
 import os
@@ -11,12 +11,12 @@ from jounce.base.private_folder import PrivateFolder
 VARIABLE = "JOUNCE_CACHE_DIR"
 ENDING = ".program"
 LARGEST = 2**29  # bytes of programs in a folder
-LOOKED_AT = 2**26  # bytes that a process adds between two looks at how much there is
-ABANDONED = 3600.0  # s, after which a file that is being written has no writer any more
+LOOKED_AT = 2**26  # bytes that a process adds between two checks of the size of the folder
+ABANDONED = 3600.0  # s, after which an unfinished file counts as abandoned
 
 
 def chosen_folder() -> Path | None:
-    """Return where compiled programs are kept: JOUNCE_CACHE_DIR, or the user's cache folder; None where nowhere.
+    """Return the folder of compiled programs: JOUNCE_CACHE_DIR, or the user's cache folder; None to store nothing.
 
     Raises
     ------
@@ -36,20 +36,20 @@ def chosen_folder() -> Path | None:
 
 
 class ProgramFolder:
-    """Compiled programs in the files of a folder, each after a digest of itself: what is damaged is removed.
+    """Compiled programs in files of a folder, each behind its digest; damaged files are removed.
 
-    Where the disk is full, programs are not kept; of more than are allowed, those go that were not used for longest.
+    Programs are not stored if the disk is full. Beyond the size limit, the least recently used ones are removed.
 
     Parameters
     ----------
     folder : PrivateFolder
-        Programs run with the rights of who reads them.
+        A private folder, since programs run with the rights of the user who reads them.
     """
 
     def __init__(self, folder: PrivateFolder):
         self._folder = folder
-        self._path = folder.path  # the name by which JAX asks for it
-        self._added = LOOKED_AT  # bytes since this process has looked at how much there is
+        self._path = folder.path  # an attribute that JAX reads
+        self._added = LOOKED_AT  # bytes added since the last check of the size
 
     def get(self, key: str) -> bytes | None:
         """Return the program of this key, or None."""
@@ -61,7 +61,7 @@ class ProgramFolder:
         return None
 
     def put(self, key: str, value: bytes) -> None:
-        """Keep a program, in one step: other processes find all of it or nothing."""
+        """Store a program atomically: other processes find all of it or nothing."""
         self._folder.write(key + ENDING, hashlib.sha256(value).digest() + value)
         self._added += len(value)
         if self._added >= LOOKED_AT:
@@ -69,11 +69,11 @@ class ProgramFolder:
             self._remove_oldest()
 
     def drop(self, key: str) -> None:
-        """Remove a program that is of no use."""
+        """Remove an unusable program."""
         self._folder.remove(key + ENDING)
 
     def _remove_oldest(self) -> None:
-        """Remove the programs that were not used for longest, until no more is kept than is allowed."""
+        """Remove the least recently used programs beyond the size limit."""
         result = sorted(self._folder.files(ENDING))
         total = sum(size for _, size, _ in result)
         for _, size, name in result:

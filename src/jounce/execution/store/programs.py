@@ -1,6 +1,6 @@
-"""Where compiled programs are kept for other processes, and how machine code goes there.
+"""The store of compiled programs for other processes, and the storage of machine code.
 
-That is a folder of the user, unless the environment or `keep_programs` says otherwise.
+The store is a folder of the user, unless the environment or `keep_programs` selects another one.
 """
 
 import io
@@ -19,27 +19,27 @@ from jounce.errors import OutputError, ProgramFolderWarning, warn_caller
 from jounce.execution.store.folder import VARIABLE, ProgramFolder, chosen_folder
 
 PACKAGES = "jounce", "jax", "jaxlib", "numpy"
-PLAIN = ("ndarray", "dtype")  # of NumPy's names
+PLAIN = ("ndarray", "dtype")  # NumPy classes that may be read
 
 
 @runtime_checkable
 class Store(Protocol):
-    """Where programs are kept, by their names: what it gives back was put there, whole and unchanged."""
+    """A store of programs by name, which returns them whole and unchanged."""
 
     def get(self, key: str) -> bytes | None:
         """Return the program of this name, or None."""
         ...
 
     def put(self, key: str, value: bytes) -> None:
-        """Keep a program."""
+        """Store a program."""
         ...
 
     def drop(self, key: str) -> None:
-        """Forget a program that is of no use."""
+        """Remove an unusable program."""
         ...
 
 
-FEW = 100_000  # instants of one command: for fewer, faster code takes longer to compile than it saves
+FEW = 100_000  # instants of a command: for fewer, optimized code takes longer to compile than it saves
 _undecided: Any = object()
 _store: Store | None = _undecided
 _soon = _many = False
@@ -47,21 +47,22 @@ _lock = threading.Lock()
 
 
 def keep_programs(folder: str | Path | None) -> None:
-    """Keep what is compiled from here on in a folder, and take from there what is needed again; None for neither.
+    """Store programs that are compiled from now on in a folder, and reuse those in it; None to store nothing.
 
-    Unless this is called, the folder is that of the environment variable ``JOUNCE_CACHE_DIR`` (none where it is empty),
-    or one for jounce among the user's caches: a second process then starts with the programs of the first. What is kept
-    does not change results; up to half a gigabyte is, those longest without use go first.
+    By default the folder is that of the environment variable ``JOUNCE_CACHE_DIR`` (none if it is empty), or one for
+    jounce among the user's caches, so that a second process starts with the programs of the first. Stored programs do
+    not change results. Up to half a gigabyte is stored; the least recently used programs are removed first.
 
     Parameters
     ----------
     folder : str or Path, or None
-        Made if it is not there. Programs run with the rights of who reads them, so nobody else may write in it.
+        The folder, created if it does not exist. Programs run with the rights of the user who reads them, so nobody
+        else may be able to write to it.
 
     Raises
     ------
     OutputError
-        If it belongs to another user, others may write in it or in a folder that it is in, or it cannot be written.
+        If the folder belongs to another user, others can write to it or to a folder above it, or it cannot be written.
 
     Examples
     --------
@@ -75,13 +76,13 @@ def keep_programs(folder: str | Path | None) -> None:
 
 
 def use_store(store: Store | None) -> None:
-    """Keep what is compiled from here on in a store, and take it from there; None for not."""
+    """Store programs that are compiled from now on in a store, and reuse those in it; None to store nothing."""
     global _store
     _store = store
 
 
 def current_store() -> Store | None:
-    """Return the store that programs go to; the first time, the usual folder is opened."""
+    """Return the current store of programs; the first call opens the default folder."""
     if _store is _undecided:
         with _lock:
             if _store is _undecided:
@@ -90,9 +91,9 @@ def current_store() -> Store | None:
 
 
 def _usual_store() -> Store | None:
-    """Return the programs of the folder chosen by the environment, or of the user's; None where it cannot be used.
+    """Return the store in the folder set by the environment, or in the user's; None if it cannot be used.
 
-    A warning says so only where it was chosen: a home that cannot be written is none of this package's business.
+    A warning is given only if the folder was set: a home that cannot be written is no concern of this package.
     """
     try:
         folder = chosen_folder()
@@ -100,39 +101,39 @@ def _usual_store() -> Store | None:
     except OutputError as error:
         if VARIABLE in os.environ:
             warn_caller(ProgramFolderWarning(f"compiled programs are not stored: {error}"))
-    except (RuntimeError, ValueError):  # there is no home, or a name that no file can have
+    except (RuntimeError, ValueError):  # no home, or an invalid file name
         pass
     return None
 
 
 def expect(instants: int) -> None:
-    """Take note of how many instants this process is about to solve."""
+    """Record the number of instants that this process is about to solve."""
     global _many
     _many = _many or instants > FEW
 
 
 def run_one_command() -> None:
-    """Take note that this process runs one command, whose user waits for it."""
+    """Record that this process runs one command, whose user waits for it."""
     global _soon
     _soon = True
 
 
 def is_in_haste() -> bool:
-    """Tell whether code is compiled for one command, whose user waits for it, of few instants."""
+    """Return whether programs are compiled fast: for one command with few instants, whose user waits for it."""
     return _soon and not _many
 
 
 class Descriptions(pickle.Unpickler):
-    """Reads what a store holds beside code: classes of this package, of JAX and of NumPy, and nothing that is run.
+    """Unpickler of the data stored beside code, restricted to classes of this package, of JAX and of NumPy.
 
     Raises
     ------
     pickle.UnpicklingError
-        If something else is named.
+        If anything else is named.
     """
 
     def find_class(self, module: str, name: str) -> Any:
-        """Return what a name stands for, if it is a class."""
+        """Return the class of a name."""
         package = module.partition(".")[0]
         if package in PACKAGES and module in sys.modules:
             result = super().find_class(module, name)
@@ -147,27 +148,27 @@ def packed(parts: tuple[Any, ...]) -> bytes:
 
 
 def unpacked(content: bytes) -> Any:
-    """Return the parts that `packed` made bytes of."""
+    """Return the parts of bytes from `packed`."""
     return Descriptions(io.BytesIO(zlib.decompress(content))).load()
 
 
 def loaded_or_made(key: str | None, make: Callable[[], tuple[Any, ...]], load: Callable[..., Any]) -> Any:
-    """Return what is loaded from parts that the store has, or that are made, and kept there if they have a name.
+    """Return a program loaded from stored parts, or from new parts, which are stored under the key.
 
     Parameters
     ----------
     key : str or None
-        The name.
+        Key in the store; None to store nothing.
     make : callable
-        Returns the parts, which `pickle` can write.
+        Function that returns the parts, which can be pickled.
     load : callable
-        Of the parts.
+        Function from the parts to the program.
     """
     store = None if key is None else current_store()
     if store is not None and key is not None and (stored := store.get(key)) is not None:
         try:
             return load(*unpacked(stored))
-        except Exception:  # noqa: BLE001 - whatever is wrong with it, it is made again
+        except Exception:  # noqa: BLE001 - a program with any fault is made again
             store.drop(key)
     made = make()
     if store is not None and key is not None:

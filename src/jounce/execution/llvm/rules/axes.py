@@ -13,11 +13,11 @@ from jounce.execution.llvm.text.values import DTYPES, UnsupportedOperationError,
 
 MOST_SORTED = 16  # numbers
 REDUCED = {"sum": "add", "prod": "mul", "max": "max", "min": "min", "and": "and", "or": "or"}
-"""Operations on all numbers along axes, by JAX's names for what they give."""
+"""Operations on all numbers along axes, by JAX's names of the reductions."""
 
 
 def nothing(operation: str, kind: str) -> Any:
-    """Return what an operation gives of no numbers."""
+    """Return the result of an operation on no numbers."""
     if operation in ("add", "mul"):
         return operation == "mul"
     if operation in ("and", "or"):
@@ -29,7 +29,7 @@ def nothing(operation: str, kind: str) -> Any:
 
 
 def combination(code: Code, operation: str) -> Callable[[Value, Value], Value]:
-    """Return what combines two numbers to their sum, product, or the like."""
+    """Return the function that combines two numbers to their sum, product, or the like."""
     return partial(code.logic if operation in ("and", "or") else code.arithmetic, operation)
 
 
@@ -38,7 +38,7 @@ def _combined(code: Code, operation: str, values: Sequence[Value], kind: str) ->
     if not values:
         return code.constant(nothing(operation, kind), kind)
     combined = combination(code, operation)
-    while operation in ("max", "min") and len(values) > 2:  # in any order: half of them at a time wait for no other
+    while operation in ("max", "min") and len(values) > 2:  # a tree, of independent halves: the order does not matter
         values = [*map(combined, values[::2], values[1::2]), *values[len(values) & ~1 :]]
     return reduce(combined, values)
 
@@ -60,7 +60,7 @@ def reduction(operation: str) -> Rule:
 
 
 def extreme(code: Code, equation: Any, given: Sequence[Values]) -> Sequence[Values]:
-    """Return where the largest or smallest number along an axis is, the first of equals; NaN before all."""
+    """Return the index of the largest or smallest number along an axis, the first of equal ones; NaN before all."""
     (axis,) = equation.params["axes"]
     kind, rows = kind_of(equation.params["index_dtype"]), np.moveaxis(given[0], axis, -1)
     result = np.empty(rows.shape[:-1], object)
@@ -75,7 +75,7 @@ def extreme(code: Code, equation: Any, given: Sequence[Values]) -> Sequence[Valu
 
 
 def is_better(code: Code, operation: str, value: Value, best: Value) -> Value:
-    """Tell whether a number is rather what `argmax` or `argmin` looks for than the best before: NaN before all."""
+    """Return whether a number is better than the best so far for `argmax` or `argmin`; NaN is better than all."""
     better = code.compare("gt" if operation == "argmax" else "lt", value, best)
     if value.kind != "f":
         return better
@@ -103,7 +103,7 @@ def cumulative(operation: str) -> Rule:
 
 
 def sorting(code: Code, equation: Any, given: Sequence[Values]) -> Sequence[Values]:
-    """Sort arrays by the first of them, NaN last: neighbors change places until all are in order."""
+    """Sort arrays by the first of them, NaN last, by odd-even transposition."""
     arrays = [np.moveaxis(array, equation.params["dimension"], -1).copy() for array in given]
     size = arrays[0].shape[-1]
     if equation.params["num_keys"] != 1 or size > MOST_SORTED:
@@ -120,7 +120,7 @@ def sorting(code: Code, equation: Any, given: Sequence[Values]) -> Sequence[Valu
 
 
 def _beyond(code: Code, a: Value, b: Value) -> Value:
-    """Tell whether the first of two numbers belongs behind the second."""
+    """Return whether the first of two numbers belongs behind the second."""
     larger = code.compare("lt", b, a)
     if a.kind != "f":
         return larger
@@ -128,7 +128,7 @@ def _beyond(code: Code, a: Value, b: Value) -> Value:
 
 
 def dot(code: Code, equation: Any, given: Sequence[Values]) -> Sequence[Values]:
-    """Return products of matrices: sums over some axes, for each place along those that are joined."""
+    """Return products of matrices: sums over contracted axes, for each index of batch axes."""
     (left_sum, right_sum), (left_batch, right_batch) = equation.params["dimension_numbers"]
     kind = kind_of(equation.outvars[0].aval.dtype)
     left, right = (each(lambda value: code.converted(value, kind), array) for array in given)

@@ -1,4 +1,4 @@
-"""Operations that move elements of arrays, and those that take or put them at indices found by the program."""
+"""Operations that move elements of arrays, and those that read or write elements at computed indices."""
 
 import itertools
 from collections.abc import Mapping, Sequence
@@ -13,9 +13,9 @@ from jounce.execution.llvm.text.arrays import Values, constants, each, filled, i
 from jounce.execution.llvm.text.code import Code, flat
 from jounce.execution.llvm.text.values import DTYPES, UnsupportedOperationError, Value, kind_of
 
-MOST_CANDIDATES = 64  # places of an array among which a number is picked by comparing, and not from memory
+MOST_CANDIDATES = 64  # elements among which one is selected by comparisons, and not loaded from memory
 
-# -- at places that are known -----------------------------------------------------------------------------------------
+# -- at constant indices ----------------------------------------------------------------------------------------------
 
 
 def part(_: Code, equation: Any, given: Sequence[Values]) -> Sequence[Values]:
@@ -71,7 +71,7 @@ def reverse(_: Code, equation: Any, given: Sequence[Values]) -> Sequence[Values]
 
 
 def pad(_: Code, equation: Any, given: Sequence[Values]) -> Sequence[Values]:
-    """Return an array with a number before, after and between its elements; some are cut off where less than none."""
+    """Return an array padded before, after and between its elements; negative padding removes elements."""
     array, filler = given
     result = np.full(equation.outvars[0].aval.shape, filler.item(), object)
     indices, taken = [], []
@@ -99,11 +99,11 @@ def split(_: Code, equation: Any, given: Sequence[Values]) -> Sequence[Values]:
     return np.split(given[0], np.cumsum(equation.params["sizes"])[:-1], axis=equation.params["axis"])
 
 
-# -- at indices -------------------------------------------------------------------------------------------------------
+# -- at computed indices ----------------------------------------------------------------------------------------------
 
 
 def _element(code: Code, index: Value, *values: Value) -> Value:
-    """Return the number at an index, which is in bounds: from memory, or picked by comparing."""
+    """Return the number at an index in bounds, loaded from memory or selected by comparisons."""
     if index.constant is not None:
         return values[int(index.constant)]
     if len(values) > (MOST_CANDIDATES if index.lanes else 2):
@@ -117,7 +117,7 @@ def _element(code: Code, index: Value, *values: Value) -> Value:
 
 
 def _rows(code: Code, whole: Values, index: Value, shape: Sequence[int]) -> Values:
-    """Return rows of an array from an index in bounds on, which is one for all lanes, by way of memory."""
+    """Return rows of an array from an index in bounds on, the same for all lanes, loaded from memory."""
     region, first = in_memory(code, flat(whole))
     start = code.arithmetic("mul", code.converted(index, "l"), code.constant(int(np.prod(whole.shape[1:])), "l"))
     offsets = (code.constant(first + k, "l") for k in range(int(np.prod(shape))))
@@ -125,20 +125,20 @@ def _rows(code: Code, whole: Values, index: Value, shape: Sequence[int]) -> Valu
 
 
 def within(code: Code, index: Value, least: int, most: int) -> Value:
-    """Return an index within bounds."""
+    """Return an index clamped to bounds."""
     below = code.arithmetic("min", index, code.constant(most, index.kind))
     return code.arithmetic("max", below, code.constant(least, index.kind))
 
 
 def clamped_starts(code: Code, shape: Sequence[int], sizes: Sequence[int], starts: Sequence[Values]) -> list[Value]:
-    """Return where a part of an array begins along each axis, moved so that all of it is in bounds."""
+    """Return the start of a part of an array along each axis, clamped so that the part is in bounds."""
     return [
         within(code, start.item(), 0, whole - size) for whole, size, start in zip(shape, sizes, starts, strict=True)
     ]
 
 
 def dynamic_slice(code: Code, equation: Any, given: Sequence[Values]) -> Sequence[Values]:
-    """Return a part of an array that starts at indices, moved so that all of it is in bounds."""
+    """Return a part of an array from start indices on, clamped so that the part is in bounds."""
     array, *starts = given
     for axis, (start, size) in enumerate(zip(starts, equation.params["slice_sizes"], strict=True)):
         rows = np.moveaxis(array, axis, 0)
@@ -158,7 +158,7 @@ def dynamic_slice(code: Code, equation: Any, given: Sequence[Values]) -> Sequenc
 
 
 def dynamic_update_slice(code: Code, _: Any, given: Sequence[Values]) -> Sequence[Values]:
-    """Return an array with a part of it changed that starts at indices, moved so that all of it is in bounds."""
+    """Return an array with a part replaced from start indices on, clamped so that the part is in bounds."""
     array, new, *starts = given
     largest_starts = [whole - size for whole, size in zip(array.shape, new.shape, strict=True)]
     indices = clamped_starts(code, array.shape, new.shape, starts)
@@ -180,7 +180,7 @@ def dynamic_update_slice(code: Code, _: Any, given: Sequence[Values]) -> Sequenc
 
 
 def _known(indices: Values) -> tuple[np.ndarray, int | None]:
-    """Return indices as numbers, zero where they are not known, and which of the columns has such ones, if one has."""
+    """Return indices as numbers, zero if not constant, and the column with indices that are not constant, if any."""
     known = np.vectorize(lambda value: 0 if value.constant is None else int(value.constant), otypes=[int])(indices)
     moving = [k for k in range(indices.shape[-1]) if any(value.constant is None for value in flat(indices[..., k]))]
     if len(moving) > 1:
@@ -205,7 +205,7 @@ def gather(code: Code, equation: Any, given: Sequence[Values]) -> Sequence[Value
         return [_taken(values, windows.positions(known, array.shape))]
     along = windows.named[axis]
     size, width = array.shape[along], windows.sizes[along]
-    # one beyond each end, too; or while all of a part is inside, so that numbers in memory need not be copied
+    # from one before to one beyond the ends; or only windows inside, so that numbers in memory need not be copied
     least, most = (-1, size) if windows.drop else (0, size - width)
     tables = [windows.positions(_with_column(known, axis, k), array.shape) for k in range(least, most + 1)]
     result = np.empty(tables[0].shape, object)
@@ -232,7 +232,7 @@ def filler(params: Mapping[str, Any], dtype: Any) -> Any:
 
 
 def scatter(code: Code, equation: Any, given: Sequence[Values]) -> Sequence[Values]:
-    """Put numbers at indices, or add them to what is there."""
+    """Return an array with numbers replaced at indices, or increased by the updates."""
     array, indices, updates = given
     known, moving = _known(indices)
     if not updates.size or not array.size:

@@ -1,4 +1,4 @@
-"""JAX's operations on arrays that stay in memory: views where numbers keep their places, and loops elsewhere."""
+"""Rules of JAX operations for arrays in memory: views if numbers keep their places, otherwise loops."""
 
 import math
 from collections.abc import Callable, Mapping, Sequence
@@ -43,11 +43,11 @@ from jounce.execution.llvm.text.views import (
 # -- number by number -------------------------------------------------------------------------------------------------
 
 
-MOST_READ = 16  # arrays, of which a number each is in registers at once
+MOST_READ = 16  # arrays that a loop body reads, one number each
 
 
 def _each(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Array]:
-    """Return the results of an operation on each number: its rule for single values, where they are used."""
+    """Return the result of an elementwise operation, computed where it is used by the rule for single values."""
     rule, aval = RULES[equation.primitive.name], equation.outvars[0].aval
     size = math.prod(aval.shape)  # an operand that is repeated is computed once
     operands = [x if isinstance(x, Deferred) and x.size == size else as_read(stored(code, x)) for x in given]
@@ -65,7 +65,7 @@ def _each(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Array]:
 
 
 def _index_among(arrays: list[Stored], array: Stored, shape: Sequence[int]) -> int:
-    """Return the place of an array, in a shape, among some, to which it is added if it is none of them."""
+    """Return the index of an array, broadcast to a shape, in a list of arrays; append it if it is not in the list."""
     array = spread(array, shape, range(array.ndim) if array.ndim else ())
     for index, other in enumerate(arrays):
         if other.is_same(array):
@@ -82,7 +82,7 @@ def _same(_: Code, __: Any, given: Sequence[Array]) -> Sequence[Array]:
 
 
 def _moved(rule: Rule) -> StoredRule:
-    """Return the rule for an operation that gives views of an array, as that for single values gives them."""
+    """Return the rule for an operation that returns views of an array, from its rule for single values."""
 
     def moved(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Array]:
         def views(array: Stored) -> list[Stored]:
@@ -109,14 +109,14 @@ def _dynamic_slice(code: Code, equation: Any, given: Sequence[Array]) -> Sequenc
 
 
 def _window(code: Code, array: Stored, sizes: Sequence[int], starts: Sequence[Array]) -> Stored:
-    """Return a part of an array, moved so that all of it is in bounds."""
+    """Return a part of an array, clamped so that it is in bounds."""
     indices = clamped_starts(code, array.shape, sizes, [values_of(code, start) for start in starts])
     for axis, (index, size) in enumerate(zip(indices, sizes, strict=True)):
         array = between(code, array, axis, index if index.constant is None else int(index.constant), size)
     return array
 
 
-# -- arrays made of others --------------------------------------------------------------------------------------------
+# -- arrays combined from others --------------------------------------------------------------------------------------
 
 
 def _concatenate(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Array]:
@@ -158,7 +158,7 @@ def _pad(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Array]:
 
 
 def _dynamic_update_slice(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Array]:
-    """Change a part of an array."""
+    """Return an array with a part replaced."""
     _, part, *starts = given
     result = _to_change(code, equation, given)
     target = _window(code, result, part.shape, starts)
@@ -167,7 +167,7 @@ def _dynamic_update_slice(code: Code, equation: Any, given: Sequence[Array]) -> 
 
 
 def _to_change(code: Code, equation: Any, given: Sequence[Array]) -> Stored:
-    """Return the first of some arrays, for the others to change it: in its place where nobody else reads it."""
+    """Return the first array for changes by the others: in place if nothing else reads it, otherwise a copy."""
     array, *others = given
     if isinstance(array, Stored) and is_own(code, array) and (array.lanes or not any_lanes(others)):
         return array
@@ -177,18 +177,18 @@ def _to_change(code: Code, equation: Any, given: Sequence[Array]) -> Stored:
 
 
 def _disjoint(code: Code, array: InMemory, changed: Stored) -> InMemory:
-    """Return an array that stays as it is while another one is changed: copied if it may be a part of that."""
+    """Return an array that stays unchanged while another one is changed: a copy if it may overlap that."""
     read = array.given if isinstance(array, Deferred) else [array]
     return copied(code, array) if any(x.region is changed.region for x in read) else array
 
 
-# -- at indices -------------------------------------------------------------------------------------------------------
+# -- at computed indices ----------------------------------------------------------------------------------------------
 
 
 def _window_at(
     code: Code, windows: Windows, array: Stored, indices: Stored, which: Sequence[int | Value]
 ) -> tuple[Stored, Value]:
-    """Return a window, moved into an array, and whether it was there already or need not be."""
+    """Return a window clamped into an array, and whether it was inside or is clamped by definition."""
     first, inside = array.first, code.constant(True)
     for k, axis in enumerate(windows.named):
         where = _at(code, indices, range(indices.ndim), (*which, k), indices.first)
@@ -202,7 +202,7 @@ def _window_at(
 
 
 def _part_of(code: Code, windows: Windows, whole: Stored, which: Sequence[int | Value]) -> Stored:
-    """Return where a window is in the array of all of them."""
+    """Return the part of the array of all windows that belongs to one window."""
     first = _at(code, whole, windows.batch, which, whole.first)
     shape, strides = (tuple(its[k] for k in windows.offsets) for its in (whole.shape, whole.strides))
     return Stored(whole.region, shape, strides, first)
@@ -211,7 +211,7 @@ def _part_of(code: Code, windows: Windows, whole: Stored, which: Sequence[int | 
 def _at(
     code: Code, array: Stored, axes: Sequence[int], which: Sequence[int | Value], first: int | Value
 ) -> int | Value:
-    """Return the place from `first` on to the indices of some axes of an array."""
+    """Return the position at indices along some axes of an array, from the position `first`."""
     for axis, index in zip(axes, which, strict=True):
         first = further(code, first, index, array.strides[axis])
     return first
@@ -220,7 +220,7 @@ def _at(
 def _each_window(
     code: Code, shape: Sequence[int], body: Callable[[list[int | Value]], None], before: Sequence[int | Value] = ()
 ) -> None:
-    """Write loops over the windows of an array."""
+    """Emit loops over the windows of an array."""
     if not shape:
         body(list(before))
         return
@@ -251,7 +251,7 @@ def _gather(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Array
 
 
 def _scatter(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Array]:
-    """Put numbers at indices, or add them to what is there."""
+    """Return an array with numbers replaced at indices, or increased by the updates."""
     result = _to_change(code, equation, given)
     indices, updates = (stored(code, _disjoint(code, stored(code, array), result)) for array in given[1:])
     windows, add = windows_of(equation), equation.primitive.name == "scatter-add"
@@ -289,10 +289,10 @@ STORED: Mapping[str, StoredRule] = {
     "dynamic_update_slice": _dynamic_update_slice,
     "gather": _gather,
 }
-"""Rules for operations of which an array is large; of others, the numbers are taken out of memory."""
+"""Rules for operations with large arrays; other operations load all numbers from memory."""
 
 DEFERRED = frozenset((*ELEMENTWISE, "broadcast_in_dim", "reshape", "squeeze", "expand_dims", "transpose"))
 """Operations whose numbers may be computed where they are used."""
 
 READING = frozenset(("concatenate", "stack", "dynamic_update_slice", *REDUCTIONS))
-"""Others that read a number of an array once."""
+"""Other operations that read each number of an array once."""

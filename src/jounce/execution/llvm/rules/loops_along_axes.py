@@ -1,4 +1,4 @@
-"""Loops along axes of arrays that stay in memory: sums, products, extremes, and products of matrices."""
+"""Loops along axes of arrays in memory: sums, products, extremes, and matrix products."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -10,7 +10,7 @@ from jounce.execution.llvm.text.stored import counted, fill, nest, new_storage, 
 from jounce.execution.llvm.text.values import Value
 from jounce.execution.llvm.text.views import Array, Deferred, Stored, as_read, between, part_at, spread, transposed
 
-ORDERLESS = ("max", "min", "and", "or")  # operations that give the same in any order
+ORDERLESS = ("max", "min", "and", "or")  # operations with the same result in any order
 StoredRule = Callable[[Code, Any, Sequence[Array]], Sequence[Array]]
 
 
@@ -35,7 +35,7 @@ def reduction(operation: str) -> StoredRule:
 
 
 def _gathered(code: Code, operation: str, total: Stored, array: Deferred) -> None:
-    """Write a loop that combines each number of an array with what there is of the total."""
+    """Emit a loop that combines each number of an array with the running total."""
     combine = combination(code, operation)
 
     def body(values: Sequence[Value]) -> Sequence[Value]:
@@ -45,9 +45,9 @@ def _gathered(code: Code, operation: str, total: Stored, array: Deferred) -> Non
 
 
 def _in_vectors(code: Code, operation: str, array: Deferred) -> list[Deferred]:
-    """Return a vector that combines the numbers of an array as far as whole vectors go, and what is left of it.
+    """Return a vector that combines the whole vectors of an array, and the remaining numbers.
 
-    Where the order does not matter, a vector at a time takes less time than a number at a time.
+    If the order does not matter, this is faster than to combine single numbers.
     """
     row = array.in_shape((array.size,))
     if row is None or row.size < 2 * code.width:
@@ -68,7 +68,7 @@ REDUCTIONS = {f"reduce_{name}": reduction(operation) for name, operation in REDU
 
 
 def extreme(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Array]:
-    """Return where the largest or smallest number along an axis is, the first of equals; NaN before all."""
+    """Return the index of the largest or smallest number along an axis, the first of equal ones; NaN before all."""
     array, result, word = stored(code, given[0]), result_storage(code, equation, given), equation.primitive.name
     (axis,) = map(int, equation.params["axes"])
     rows = transposed(array, [axis, *(k for k in range(array.ndim) if k != axis)])
@@ -91,7 +91,7 @@ def extreme(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Array
 
 
 def dot(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Array]:
-    """Return products of matrices: sums of products over some axes, for each place along those that are joined."""
+    """Return products of matrices: sums of products over contracted axes, for each index of batch axes."""
     (left_sum, right_sum), (left_batch, right_batch) = equation.params["dimension_numbers"]
     result = result_storage(code, equation, given)
     fill(code, result, code.constant(0, result.kind))

@@ -1,4 +1,4 @@
-"""What each of JAX's operations is in scalar operations: those of each element here, with a table of all."""
+"""Rules of JAX operations in terms of scalar operations: the elementwise ones, and the table of all."""
 
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
@@ -12,7 +12,7 @@ from jounce.execution.llvm.text.arrays import Rule, Values, each
 from jounce.execution.llvm.text.code import Code
 from jounce.execution.llvm.text.values import UnsupportedOperationError, Value, kind_of
 
-FUNCTIONS = {  # of C's library, by the names that JAX has for them, which are the same
+FUNCTIONS = {  # of the C library, which JAX calls by the same names
     "sin", "cos", "tan", "asin", "acos", "atan", "atan2", "sinh", "cosh", "tanh", "asinh", "acosh", "atanh",
     "exp", "exp2", "expm1", "log", "log1p", "cbrt", "erf", "erfc",
 }  # fmt: skip
@@ -29,7 +29,7 @@ def _compare_in_total_order(operation: str) -> Rule:
 
 
 def _position(code: Code, a: Value) -> Value:
-    """Return the position of a double in the total order of IEEE 754, by whole numbers; others as they are."""
+    """Return the position of a double in the total order of IEEE 754 as an integer; other numbers unchanged."""
     if a.kind != "f":
         return a
     digits = code.digits(a)
@@ -146,7 +146,7 @@ ELEMENTWISE: Mapping[str, Rule] = {
     "select_n": _select,
     "clamp": _clamp,
 }
-"""Of each number, or of the numbers at one place of some arrays."""
+"""Rules of elementwise operations."""
 
 RULES: Mapping[str, Rule] = {
     **ELEMENTWISE,

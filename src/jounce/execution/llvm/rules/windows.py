@@ -1,4 +1,4 @@
-"""The windows of an array that gathers read and scatters write, as JAX says where they are."""
+"""The windows of an array that gathers read and scatters write, from JAX's dimension numbers."""
 
 from collections.abc import Sequence
 from typing import Any, NamedTuple
@@ -8,23 +8,22 @@ from jax.lax import GatherScatterMode
 
 
 class Windows(NamedTuple):
-    """Windows of an array, one for each place along some axes of the array that they are taken to or put from.
+    """Windows of an array, one for each index along the batch axes of the array of all windows.
 
     Attributes
     ----------
     named : tuple of int
-        The axes of the array that the indices are of, in their order.
+        Axes of the array that the indices refer to, in their order.
     batching : dict of int to int
-        Axes of the array along which there is a window of length one for each element, and the axes of the windows that
-        count them.
+        Axes of the array with a window of length one for each element, and the axes of the windows that count them.
     sizes : tuple of int
-        Of a window, for each axis of the array.
+        Size of a window along each axis of the array.
     remaining : tuple of int
-        The axes of the array that a window has.
+        Axes of the array that a window keeps.
     offsets, batch : tuple of int
-        Where these are in the array of all windows, and its other axes.
+        Positions of these axes in the array of all windows, and its other axes.
     drop : bool
-        Whether windows that are not inside have no elements; otherwise they are moved.
+        Whether windows that are not inside are dropped; otherwise they are clamped.
     """
 
     named: tuple[int, ...]
@@ -36,9 +35,9 @@ class Windows(NamedTuple):
     drop: bool
 
     def positions(self, indices: np.ndarray, shape: Sequence[int]) -> np.ndarray:
-        """Return which elements of an array of a shape are in its windows, -1 for those of a window that is not inside.
+        """Return the flat indices of the elements in the windows of an array, -1 for a dropped window.
 
-        Where windows start is given by indices that are known, (windows..., index).
+        The starts of the windows are given by constant indices, (windows..., index).
         """
         batch = indices.shape[:-1]
         starts = np.zeros((*batch, len(shape)), int)

@@ -1,4 +1,4 @@
-"""Arrays of a program that is written for LLVM: NumPy arrays whose elements are values."""
+"""Arrays of a program for LLVM: NumPy arrays of values."""
 
 from collections.abc import Callable, Sequence
 from itertools import repeat
@@ -11,7 +11,7 @@ from jounce.execution.llvm.text.values import Region, UnsupportedOperationError,
 
 MOST_CONSTANTS = 2**20  # of an array
 Values = np.ndarray  # of objects, each a Value
-Rule = Callable[[Code, Any, Sequence[Values]], Sequence[Values]]  # of an equation and its arguments; its results
+Rule = Callable[[Code, Any, Sequence[Values]], Sequence[Values]]  # from an equation and its arguments to its results
 
 
 def filled(shape: Sequence[int], values: Sequence[Value]) -> Values:
@@ -37,7 +37,7 @@ def constants(array: Any) -> Values:
 
 
 def each(function: Callable[..., Value], *arrays: Values) -> Values:
-    """Return what a function gives for each element of arrays, which are spread to one shape."""
+    """Return the results of a function for each element of arrays, which are broadcast to one shape."""
     shape = max([array.shape for array in arrays], key=len)
     if all(array.shape == shape or not array.ndim for array in arrays):
         parts = [flat(array) if array.ndim or not shape else repeat(array.item()) for array in arrays]
@@ -48,7 +48,7 @@ def each(function: Callable[..., Value], *arrays: Values) -> Values:
 
 
 def in_memory(code: Code, values: Sequence[Value]) -> tuple[Region, int]:
-    """Return where some numbers are one after another in memory, and the first place: put there if they are not yet."""
+    """Return the memory of contiguous numbers and the index of the first; store them if they are not in memory."""
     if values[0].home is not None:
         region, first = values[0].home
         indices = range(first, first + len(values))

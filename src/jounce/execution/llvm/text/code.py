@@ -1,4 +1,4 @@
-"""A program as text for LLVM: operations on numbers, and the memory in which arrays are."""
+"""A program as text for LLVM: operations on numbers, and memory for arrays."""
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -15,32 +15,32 @@ MOST_ON_STACK = 4096  # bytes of an array
 
 @dataclass
 class Code(Scalars):
-    """A program that is written.
+    """A program that is being emitted.
 
     Attributes
     ----------
     entry : list of str
-        Text of what is run before the first vector of lanes.
+        Text of the entry block, which runs before the first vector of lanes.
     memory, heap : int
-        Bytes that are taken there, of the stack and elsewhere.
+        Bytes allocated on the stack and on the heap.
     large : int or None
-        Arrays of more numbers stay in memory, and operations on them are loops; None for none.
+        Size beyond which arrays stay in memory, with loops over them; None to unroll all.
     single : bool
-        Whether there is one instant only, so that vectors are numbers of an array that lie one after another.
+        Whether there is only one instant, so that vectors hold consecutive numbers of an array.
     constants : list of str
-        Text of arrays of constants in memory.
+        Text of constant arrays in memory.
     changeable : set of Region
-        Memory of one array alone, which may be changed where it is not read any more.
+        Memory of single arrays, which may be changed in place once it is not read any more.
     held : list of Region
-        Memory of what loops carry that are being written, which is not given back.
+        Memory carried by loops that are being emitted, which is not released.
     taken : list of Region
-        All memory that was taken, in that order.
+        All memory in the order of allocation.
     plans : dict
-        Of programs to how they are written, as `plans.plan_of` has it.
+        Plans of programs, from `plans.plan_of`.
     changes : list of Region
-        Memory of what the innermost loop changes, which a branch within it may change in its place.
+        Memory that the innermost loop changes, which a conditional within it may change in place.
     subroutines : dict
-        Those that were written, by the program and what is known of its arguments; see `subroutines`.
+        Emitted subroutines, by the program and its constant arguments; see `subroutines`.
     """
 
     entry: list[str] = field(default_factory=list)
@@ -55,10 +55,10 @@ class Code(Scalars):
     plans: dict[Any, Any] = field(default_factory=dict)
     changes: Sequence[Region] = ()
     subroutines: dict[Any, Any] = field(default_factory=dict)
-    _free: dict[tuple[int, str, bool], list[Region]] = field(default_factory=dict)  # that nobody uses any more
-    _taken: dict[Region, tuple[int, str, bool]] = field(default_factory=dict)  # that somebody may, by what they hold
+    _free: dict[tuple[int, str, bool], list[Region]] = field(default_factory=dict)  # released
+    _taken: dict[Region, tuple[int, str, bool]] = field(default_factory=dict)  # in use, with what they hold
     _tables: dict[tuple[str, bytes], Region] = field(default_factory=dict)
-    _users: list[Callable[[Region], bool]] = field(default_factory=list)  # tell whether memory is used further on
+    _users: list[Callable[[Region], bool]] = field(default_factory=list)  # whether memory is still used
 
     def room(self, size: int, kind: str, *, lanes: bool) -> Region:
         """Return memory for numbers of one kind."""
@@ -74,7 +74,7 @@ class Code(Scalars):
         return Region(name, kind, lanes)
 
     def taken_room(self, size: int, kind: str, *, lanes: bool) -> Region:
-        """Return memory that can be given back, some that was if there is any."""
+        """Return memory that can be released; reuse released memory if there is any."""
         key = max(1, size), kind, lanes
         free = self._free.get(key)
         region = free.pop() if free else self.room(size, kind, lanes=lanes)
@@ -84,13 +84,13 @@ class Code(Scalars):
         return region
 
     def release(self, region: Region) -> None:
-        """Let memory be used again, if it can be given back."""
+        """Release memory for reuse, if it is releasable."""
         if region not in self.held and (key := self._taken.pop(region, None)) is not None:
             self._free.setdefault(key, []).append(region)
 
     @contextmanager
     def changing(self, regions: Sequence[Region]) -> Iterator[None]:
-        """Write a turn of a loop that changes some memory."""
+        """Emit an iteration of a loop that changes some memory."""
         before, self.changes = self.changes, regions
         try:
             yield
@@ -99,7 +99,7 @@ class Code(Scalars):
 
     @contextmanager
     def used(self, wants: Callable[[Region], bool]) -> Iterator[None]:
-        """Keep memory meanwhile that a function says is used further on."""
+        """Keep the memory that a function declares as still used."""
         self._users.append(wants)
         try:
             yield
@@ -107,11 +107,11 @@ class Code(Scalars):
             self._users.pop()
 
     def is_unshared(self, region: Region) -> bool:
-        """Tell whether what is in memory is no longer used."""
+        """Return whether no declared use of memory remains."""
         return not any(wants(region) for wants in self._users)
 
     def constants_region(self, numbers: Sequence[Any], kind: str) -> Region:
-        """Return where constants are in memory."""
+        """Return the memory of constants."""
         table = np.array(numbers, DTYPES[kind])
         key = kind, table.tobytes()
         if (region := self._tables.get(key)) is None:
@@ -123,32 +123,32 @@ class Code(Scalars):
         return region
 
     def load_along(self, region: Region, index: int | Value) -> Value:
-        """Return a vector of numbers that lie one after another from a place of memory on."""
+        """Return a vector of consecutive numbers in memory from an index on."""
         of, position = f"<{self.width} x {IN_MEMORY[region.kind]}>", self._address(region, index)
         hint = ", !invariant.load !0" if region.given else ""
         text = f"load {of}, ptr {position}, align {DTYPES[region.kind].itemsize}{hint}"
         return self._read(text, of, region.kind, lanes=True)
 
     def store_along(self, region: Region, index: int | Value, value: Value) -> None:
-        """Put a vector of numbers one after another from a place of memory on."""
+        """Emit the store of a vector of consecutive numbers from an index of memory on."""
         of, position = f"<{self.width} x {IN_MEMORY[region.kind]}>", self._address(region, index)
         operand = self.stored_operand(value, of, lanes=True)
         self.lines.append(f"store {of} {operand}, ptr {position}, align {DTYPES[region.kind].itemsize}")
 
     def _read(self, text: str, of: str, kind: str, *, lanes: bool, home: tuple[Region, int] | None = None) -> Value:
-        """Return what an instruction reads from memory, of a type there."""
+        """Return the value that an instruction loads from memory with a given type."""
         name = self.fresh()
         self.lines.append(f"{name} = {text}")
         return Value(self.truths(name, of, lanes=lanes) if kind == "b" else name, kind, lanes, home=home)
 
     def truths(self, numbers: str, of: str, *, lanes: bool) -> str:
-        """Return truth values from what they are in memory, of a type there."""
+        """Return truth values from their representation in memory."""
         name = self.fresh()
         self.lines.append(f"{name} = trunc {of} {numbers} to {self.type_of('b', lanes=lanes)}")
         return name
 
     def stored_operand(self, value: Value, of: str, *, lanes: bool) -> str:
-        """Return a value as an operand of what puts it into memory, of a type there."""
+        """Return a value as the operand of a store, in the type of memory."""
         operand = self.operand(value, lanes=lanes)
         if value.kind != "b":
             return operand
@@ -160,7 +160,7 @@ class Code(Scalars):
         return self._emitted(address, "l", lanes=False).name
 
     def load(self, region: Region, index: int | Value) -> Value:
-        """Return the number at a place of memory, which must be one of its own."""
+        """Return the number at an index of memory."""
         if isinstance(index, Value) and index.lanes:
             return self._gathered(region, index)
         of, position = self._element(region, index)
@@ -168,7 +168,7 @@ class Code(Scalars):
         return self._read(f"load {of}, {position}{hint}", of, region.kind, lanes=region.lanes, home=home)
 
     def store(self, region: Region, index: int | Value, value: Value) -> None:
-        """Put a number at a place of memory, which must be one of its own."""
+        """Emit the store of a number at an index of memory."""
         if isinstance(index, Value) and index.lanes:
             self._scatter(region, index, value)
             return
@@ -176,7 +176,7 @@ class Code(Scalars):
         self.lines.append(f"store {of} {self.stored_operand(value, of, lanes=region.lanes)}, {position}")
 
     def _gathered(self, region: Region, index: Value) -> Value:
-        """Return numbers at a place of memory that differs from lane to lane."""
+        """Return numbers at indices of memory that differ from lane to lane."""
         indices, of, kinds = self._addresses(region, index)
         every = self.operand(self.constant(True), lanes=True)
         function = f"@llvm.masked.gather.{kinds}.v{self.width}p0"
@@ -186,7 +186,7 @@ class Code(Scalars):
         return self._read(f"call {of} {function}({given})", of, region.kind, lanes=True)
 
     def _scatter(self, region: Region, index: Value, value: Value) -> None:
-        """Put numbers at a place of memory that differs from lane to lane: each lane has places of its own."""
+        """Emit the store of numbers at indices that differ from lane to lane; each lane has its own memory."""
         indices, of, kinds = self._addresses(region, index)
         operand, every = self.stored_operand(value, of, lanes=True), self.operand(self.constant(True), lanes=True)
         function = f"@llvm.masked.scatter.{kinds}.v{self.width}p0"
@@ -196,7 +196,7 @@ class Code(Scalars):
         self.lines.append(f"call void {function}({given})")
 
     def _addresses(self, region: Region, index: Value) -> tuple[str, str, str]:
-        """Return the addresses of numbers at places that differ from lane to lane, their type, and its short name."""
+        """Return the addresses of numbers at indices that differ from lane to lane, their type, and its short name."""
         one = IN_MEMORY[region.kind]
         if region.lanes:
             read_first = Value("%total", "l", False) if region.given else self.constant(self.width, "l")
@@ -211,7 +211,7 @@ class Code(Scalars):
         return self._emitted(address, "l", lanes=True).name, f"<{self.width} x {one}>", short
 
     def _element(self, region: Region, index: int | Value) -> tuple[str, str]:
-        """Return the type of a number in memory, and its address with what that is a multiple of."""
+        """Return the type of a number in memory, and its address with the alignment."""
         one = IN_MEMORY[region.kind]
         of = f"<{self.width} x {one}>" if region.lanes else one
         position = str(index) if isinstance(index, int) else self.operand(index, lanes=False)
@@ -225,7 +225,7 @@ class Code(Scalars):
     # -- attempts -----------------------------------------------------------------------------------------------------
 
     def mark(self) -> tuple[Any, ...]:
-        """Return how far the text has come, for `back_to`."""
+        """Return the current state of the text, for `back_to`."""
         free_regions = {key: list(regions) for key, regions in self._free.items()}
         return (
             len(self.lines),
@@ -240,7 +240,7 @@ class Code(Scalars):
         )
 
     def back_to(self, mark: tuple[Any, ...]) -> None:
-        """Take back what was written since a mark in the same scope."""
+        """Undo what was emitted since a mark in the same scope."""
         lines, entry, known, self.memory, self.heap, free_regions, taken, count, subroutines = mark
         self._free, self._taken = {key: list(regions) for key, regions in free_regions.items()}, dict(taken)
         del self.lines[lines:], self.entry[entry:], self.taken[count:]

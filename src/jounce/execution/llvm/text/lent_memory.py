@@ -1,4 +1,4 @@
-"""Memory of arrays while a program is translated: what is live, and what is given back."""
+"""Lifetimes of the memory of arrays during translation."""
 
 from collections.abc import Callable, Sequence
 from typing import Any
@@ -9,25 +9,25 @@ from jounce.execution.llvm.text.views import Array, Deferred, InMemory, Stored
 
 
 def among(arrays: Sequence[Array]) -> Callable[[Region], bool]:
-    """Return what tells the memory of some arrays."""
+    """Return the predicate of the memory of some arrays."""
     return regions_of(arrays).__contains__
 
 
 def let_go(code: Code, known: dict[Any, Array], variables: Sequence[Any]) -> None:
-    """Forget variables that are not read any more, and give back what memory only they had."""
+    """Forget variables that are not read any more, and release memory that only they used."""
     gone = [known.pop(variable, None) for variable in variables]
     give_back(code, [array for array in gone if isinstance(array, InMemory)])
 
 
 def give_back(code: Code, arrays: Sequence[Array]) -> None:
-    """Give back the memory of arrays, unless others are in it, too."""
+    """Release the memory of arrays unless it is still used."""
     for region in regions_of(arrays) if arrays else ():
         if code.is_unshared(region):
             code.release(region)
 
 
 def give_back_but(code: Code, taken: Sequence[Region], arrays: Sequence[Array]) -> None:
-    """Give back memory that was taken, but that of arrays."""
+    """Release allocated memory except that of arrays."""
     live = regions_of(arrays) if taken else {}
     for region in dict.fromkeys(taken):
         if region not in live:
@@ -35,10 +35,10 @@ def give_back_but(code: Code, taken: Sequence[Region], arrays: Sequence[Array]) 
 
 
 def regions_of(arrays: Sequence[Array]) -> dict[Region, None]:
-    """Return the memory of arrays, and of what they are computed from: each once, in their order.
+    """Return the memory of arrays and of their operands, each once, in order.
 
-    A set has another order in each process, and memory that is given back in another order is taken so: then the same
-    program has another text, and another name in the store.
+    The order of a set differs between processes, and so would the order of reuse: the same program would have another
+    text, and another name in the store.
     """
     parts = [array.given if isinstance(array, Deferred) else [array] for array in arrays]
     return dict.fromkeys(part.region for some in parts for part in some if isinstance(part, Stored))

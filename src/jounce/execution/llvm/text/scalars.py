@@ -1,4 +1,4 @@
-"""Operations on numbers as text for LLVM, each on one number or side by side on a vector of lanes."""
+"""Scalar operations as text for LLVM, each on one number or on a vector of lanes."""
 
 import itertools
 import math
@@ -13,8 +13,8 @@ import numpy as np
 from jounce.execution.llvm.text import values
 from jounce.execution.llvm.text.values import DTYPES, SCALARS, UnsupportedOperationError, Value, kind_of, literal
 
-MOST_LINES = 500_000  # of text: LLVM makes some 5,000 to 20,000 of them into machine code in a second
-MOST_LINES_WITHOUT_LOOPS = 120_000  # where all numbers are single values, without loops: of more, LLVM takes minutes
+MOST_LINES = 500_000  # of text: LLVM compiles some 5,000 to 20,000 lines in a second
+MOST_LINES_WITHOUT_LOOPS = 120_000  # of fully unrolled code: LLVM takes minutes for more
 DOUBLES: dict[str, tuple[str, Any]] = {  # in LLVM, in Python
     "add": ("fadd contract", operator.add),
     "sub": ("fsub contract", operator.sub),
@@ -35,16 +35,16 @@ INTEGERS: dict[str, tuple[str, Any]] = {
 }
 UNSIGNED = {"sdiv": "udiv", "srem": "urem", "smax": "umax", "smin": "umin"}
 BOOLEANS = {"add": "or", "max": "or", "mul": "and", "min": "and"}
-CALLED = frozenset("maximum minimum smax smin umax umin".split())  # functions of LLVM, not instructions
+CALLED = frozenset("maximum minimum smax smin umax umin".split())  # LLVM intrinsics, not instructions
 COMMUTATIVE = frozenset("add mul max min".split())
-PLAIN: dict[tuple[type, str | None], tuple[str, Any]] = {  # numbers whose type says their kind
+PLAIN: dict[tuple[type, str | None], tuple[str, Any]] = {  # numbers whose type determines their kind
     **dict.fromkeys(itertools.product((float, np.float64), ("f", None)), ("f", np.float64)),
     **dict.fromkeys(itertools.product((bool, np.bool_), ("b", None)), ("b", np.bool_)),
     **dict.fromkeys(itertools.product((int, np.int64), ("l",)), ("l", np.int64)),
 }
 NEUTRAL = {"add": 0, "sub": 0, "mul": 1, "div": 1}
-TURNS = "sin", "cos"  # which of lanes are found together
-COMPARISONS: dict[str, tuple[str, str, str, Any]] = {  # of doubles, of whole numbers, without a sign, in Python
+TURNS = "sin", "cos"  # computed together for a vector of lanes
+COMPARISONS: dict[str, tuple[str, str, str, Any]] = {  # of doubles, of signed and of unsigned integers, in Python
     "eq": ("oeq", "eq", "eq", operator.eq),
     "ne": ("une", "ne", "ne", operator.ne),
     "lt": ("olt", "slt", "ult", operator.lt),
@@ -59,24 +59,24 @@ CONVERSIONS |= {"uf": "uitofp", "ul": "zext", "ui": "bitcast", "iu": "bitcast"}
 
 @dataclass
 class Scalars:
-    """Operations in the order in which they run, no two of them the same within a block and those around it.
+    """Operations in their order of execution; none is repeated within a block and the blocks around it.
 
     Attributes
     ----------
     width : int
         Lanes of a vector.
     most : int
-        Lines that there may be.
+        Largest number of lines.
     lines : list of str
-        Text of what is run for each vector of lanes.
+        Text that runs for each vector of lanes.
     functions : set
-        Names and numbers of arguments of the functions of C's library that are called.
+        Names and numbers of arguments of called C library functions.
     intrinsics : set of str
-        Declarations of the functions of LLVM that are called.
+        Declarations of called LLVM intrinsics.
     here : Value or None
-        In which lanes what is written now is asked for; None for all.
+        Mask of the active lanes; None for all.
     sparse : bool
-        Whether a constant zero is an entry that is not there, and no product with it is written.
+        Whether a constant zero is a structural zero, with which no product is emitted.
     """
 
     width: int
@@ -87,8 +87,8 @@ class Scalars:
     here: Value | None = None
     sparse: bool = False
     _count: int = 0
-    _known: dict[str, Value] = field(default_factory=dict)  # what instructions give that need not be written again
-    _scopes: list[list[str]] = field(default_factory=lambda: [[]])  # which of these were first written in each scope
+    _known: dict[str, Value] = field(default_factory=dict)  # results of emitted instructions
+    _scopes: list[list[str]] = field(default_factory=lambda: [[]])  # instructions first emitted in each scope
     _vectors: dict[tuple[str, str], str] = field(default_factory=dict)
 
     def __post_init__(self):
@@ -98,7 +98,7 @@ class Scalars:
     # -- text ---------------------------------------------------------------------------------------------------------
 
     def fresh(self, letter: str = "v") -> str:
-        """Return a name that nothing has."""
+        """Return a new name."""
         self._count += 1
         return f"%{letter}{self._count}"
 
@@ -107,7 +107,7 @@ class Scalars:
         return self._types[kind, lanes]
 
     def operand(self, value: Value, *, lanes: bool) -> str:
-        """Return a value as an operand, the same in all lanes where it is one number and a vector is needed."""
+        """Return a value as an operand; a single number is repeated in all lanes if a vector is needed."""
         if value.constant is not None:
             text = literal(value)
             return self._repeated(value.kind, text) if lanes else text
@@ -124,25 +124,25 @@ class Scalars:
         return vector
 
     def _emitted(self, instruction: str, kind: str, *, lanes: bool) -> Value:
-        """Return what an instruction without effects gives, written only if it has not been before."""
+        """Return the result of an instruction without side effects, emitted only if it is new."""
         if (known := self._known.get(instruction)) is not None:
             return known
         if len(self.lines) > self.most:
             raise UnsupportedOperationError(f"a program of more than {self.most:,} lines")
         self._count += 1
-        name = f"%v{self._count}"  # as `fresh` gives it
+        name = f"%v{self._count}"  # as from `fresh`
         self.lines.append(f"{name} = {instruction}")
         value = self._known[instruction] = Value(name, kind, lanes)
         self._scopes[-1].append(instruction)
         return value
 
     def _forget(self, instructions: Sequence[str]) -> None:
-        """Write instructions again where they are needed next."""
+        """Forget instructions, so that they are emitted again when needed."""
         for instruction in instructions:
             del self._known[instruction]
 
     def _called(self, name: str, result: str, kinds: str, given: Sequence[str], *, lanes: bool) -> Value:
-        """Return what a function of LLVM gives, whose name ends in the types of `kinds`."""
+        """Return the result of an LLVM intrinsic, whose name ends in the types of `kinds`."""
         sizes = "".join(f".{f'v{self.width}' if lanes else ''}{'f64' if k == 'f' else SCALARS[k]}" for k in kinds)
         of, written = self.type_of(kinds[-1], lanes=lanes), self.type_of(result, lanes=lanes)
         self.intrinsics.add(f"declare {written} @llvm.{name}{sizes}({', '.join([of] * len(given))})")
@@ -151,12 +151,12 @@ class Scalars:
 
     @contextmanager
     def scope(self, here: Value | None = None) -> Iterator[None]:
-        """Forget afterwards what was found meanwhile: it is not found on every way on.
+        """Begin a scope, whose results are forgotten at its end, since not every path passes it.
 
         Parameters
         ----------
         here : Value or None
-            In which lanes what is written meanwhile is asked for, if it differs from what is so around it.
+            Mask of the active lanes in the scope, if it differs from that around it.
         """
         around = self.here
         self.here = around if here is None else here
@@ -168,11 +168,11 @@ class Scalars:
             self.here = around
 
     def among_here(self, choice: Value) -> Value:
-        """Return a truth value that differs from lane to lane, false where what is written now is not asked for."""
+        """Return a truth value restricted to the active lanes, if it differs from lane to lane."""
         return choice if self.here is None or not choice.lanes else self.logic("and", choice, self.here)
 
     def constant(self, number: Any, kind: str | None = None) -> Value:
-        """Return a constant, of the kind of its type unless one is given."""
+        """Return a constant, by default of the kind of its type."""
         if (plain := PLAIN.get((type(number), kind))) is not None:
             return Value("", plain[0], False, plain[1](number))
         scalar = (np.asarray(number) if kind is None else np.asarray(number).astype(DTYPES[kind]))[()]
@@ -194,7 +194,7 @@ class Scalars:
             if (same := _neutral(operation, a, b)) is not None:
                 return same
             if self.sparse and a.kind == "f" and _is_nothing(operation, a, b):
-                return self.constant(0.0)  # of no sign
+                return self.constant(0.0)  # without a sign
         if operation in COMMUTATIVE and a.name > b.name:
             a, b = b, a
         if operation == "rem" and a.kind == "f":
@@ -212,9 +212,9 @@ class Scalars:
         return self._emitted(f"{word} {self._types[a.kind, lanes]} {left}, {right}", kind or a.kind, lanes=lanes)
 
     def _division(self, operation: str, word: str, a: Value, b: Value) -> Value:
-        """Return a quotient or remainder of whole numbers as XLA has it, by divisors that do not end the process."""
+        """Return a quotient or remainder of integers as XLA defines it, with divisors that do not trap."""
         one, least = self.constant(1, a.kind), self.constant(np.iinfo(DTYPES[a.kind]).min, a.kind)
-        if b.constant is None:  # of a lane that has not come here, it may be what LLVM takes for another one each time
+        if b.constant is None:  # in an inactive lane it may be undefined, with a different value at each use
             frozen = f"freeze {self.type_of(b.kind, lanes=b.lanes)} {b.name}"
             b = self._emitted(frozen, b.kind, lanes=b.lanes)
         opposite = self.compare("eq", b, self.constant(-1, a.kind)) if a.kind != "u" else self.constant(False)
@@ -232,7 +232,7 @@ class Scalars:
         return self._pair(word, a, b, "b")
 
     def logic(self, operation: str, a: Value, b: Value) -> Value:
-        """Return `and`, `or` or `xor` of two truth values, or of the digits of two whole numbers."""
+        """Return `and`, `or` or `xor` of two truth values, or of the bits of two integers."""
         if a.constant is not None and b.constant is not None:
             return self.constant(LOGIC[operation](a.constant, b.constant), a.kind)
         for one, other in ((a, b), (b, a)):
@@ -245,7 +245,7 @@ class Scalars:
         return self._pair(operation, a, b)
 
     def negated(self, a: Value) -> Value:
-        """Return a number with the other sign."""
+        """Return the negative of a number."""
         if a.kind != "f":
             return self.arithmetic("sub", self.constant(0, a.kind), a)
         if a.constant is not None:
@@ -253,20 +253,20 @@ class Scalars:
         return self._emitted(f"fneg {self.type_of('f', lanes=a.lanes)} {a.name}", "f", lanes=a.lanes)
 
     def inverted(self, a: Value) -> Value:
-        """Return the opposite of a truth value, or of each digit of a whole number."""
+        """Return the negation of a truth value, or of each bit of an integer."""
         if a.constant is not None:
             return self.constant(np.invert(a.constant))
         return self._pair("xor", a, self.constant(True if a.kind == "b" else -1, a.kind))
 
     def digits(self, a: Value) -> Value:
-        """Return the binary digits of a double, as a whole number."""
+        """Return the bits of a double as an integer."""
         if a.constant is not None:
             return self.constant(a.constant.view(np.int64))
         double, whole = self.type_of("f", lanes=a.lanes), self.type_of("l", lanes=a.lanes)
         return self._emitted(f"bitcast {double} {a.name} to {whole}", "l", lanes=a.lanes)
 
     def select(self, choice: Value, a: Value, b: Value) -> Value:
-        """Return the first of two numbers where a truth value holds, the second elsewhere."""
+        """Return the first of two numbers where a truth value holds, and the second elsewhere."""
         if choice.constant is not None:
             return a if choice.constant else b
         if a is b or (a.name and a.name == b.name) or is_same_constant(a, b):
@@ -281,11 +281,11 @@ class Scalars:
         return self._emitted(f"select {on} {which}, {kind} {left}, {kind} {right}", a.kind, lanes=lanes)
 
     def intrinsic(self, operation: str, a: Value) -> Value:
-        """Return a function of one double that LLVM knows to have an instruction for."""
+        """Return an LLVM intrinsic of one double that has an instruction."""
         return self._called(operation, "f", "f", (self.operand(a, lanes=a.lanes),), lanes=a.lanes)
 
     def call(self, function: str, *given: Value) -> Value:
-        """Return a function of doubles of C's library, but for sine and cosine one call for each lane."""
+        """Return a C library function of doubles, by one call for each lane except for sine and cosine."""
         lanes = any(value.lanes for value in given)
         if lanes and function in TURNS:
             self.functions |= {(name, 1) for name in TURNS}
@@ -300,7 +300,7 @@ class Scalars:
         return self._emitted(f"call {kind} {called}({listed})", "f", lanes=lanes)
 
     def converted(self, a: Value, to: str) -> Value:
-        """Return a number as one of another kind, the nearest whole number where a double is beyond all."""
+        """Return a number converted to another kind; a double out of range becomes the nearest integer."""
         if a.kind == to:
             return a
         if a.constant is not None:
@@ -308,15 +308,15 @@ class Scalars:
             return self.constant(a.constant.astype(DTYPES[to]) if exact else values.nearest(a.constant, DTYPES[to]), to)
         if to == "b":
             return self.compare("ne", a, self.constant(0, a.kind))
-        if a.kind == "f":  # `fptosi` gives poison where a number does not fit
+        if a.kind == "f":  # `fptosi` returns poison if a number does not fit
             return self._called("fptoui.sat" if to == "u" else "fptosi.sat", to, to + "f", (a.name,), lanes=a.lanes)
-        if to == "u" and a.kind != "i":  # by another kind, as no two instructions of different results are the same
+        if to == "u" and a.kind != "i":  # by another kind, since equal instructions must have equal results
             return self.converted(self.converted(a, "i"), "u")
         kind, expected = self.type_of(a.kind, lanes=a.lanes), self.type_of(to, lanes=a.lanes)
         return self._emitted(f"{CONVERSIONS[a.kind + to]} {kind} {a.name} to {expected}", to, lanes=a.lanes)
 
     def anywhere(self, a: Value) -> str:
-        """Return the name of a truth value that holds where one holds in some lane."""
+        """Return the name of the truth value whether a value holds in any lane."""
         if not a.lanes:
             return self.operand(a, lanes=False)
         of, called = self.type_of("b", lanes=True), f"@llvm.vector.reduce.or.v{self.width}i1"
@@ -334,11 +334,11 @@ class Scalars:
         self.lines.append(f"{label}:")
 
     def jump(self, label: str) -> None:
-        """End a block, and go on with another."""
+        """End a block with a jump to another."""
         self.lines.append(f"br label %{label}")
 
     def branch(self, choice: str, then: str, otherwise: str) -> None:
-        """End a block, and go on with one of two."""
+        """End a block with a branch to one of two others."""
         self.lines.append(f"br i1 {choice}, label %{then}, label %{otherwise}")
 
 
@@ -347,20 +347,20 @@ def _is_zero(a: Value) -> bool:
 
 
 def _is_nothing(operation: str, a: Value, b: Value) -> bool:
-    """Tell whether a product or a quotient is zero as its factor or its dividend is, whatever the other one is."""
+    """Return whether a product or quotient is zero because of a zero factor or dividend."""
     return (operation in ("mul", "div") and _is_zero(a)) or (operation == "mul" and _is_zero(b))
 
 
 def is_same_constant(a: Value, b: Value) -> bool:
-    """Tell whether two values are one constant, which zeros of different signs are not."""
+    """Return whether two values are the same constant; zeros of different signs are not."""
     x, y = a.constant, b.constant
     return x is not None and y is not None and bool(x == y) and math.copysign(1, x) == math.copysign(1, y)
 
 
 def _neutral(operation: str, a: Value, b: Value) -> Value | None:
-    """Return the operand that an operation leaves as it is, if the other says so: one as a factor, zero in a sum.
+    """Return the operand that an operation leaves unchanged because the other one is neutral; otherwise None.
 
-    The sign of -0 + 0 is not asked for, as XLA does not.
+    The sign of -0 + 0 is ignored, as by XLA.
     """
     if (nothing := NEUTRAL.get(operation)) is None:
         return None

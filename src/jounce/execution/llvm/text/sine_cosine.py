@@ -1,30 +1,30 @@
-"""Sines and cosines of a vector of angles at once, where C's library has them one after another."""
+"""Sines and cosines of a vector of angles at once, instead of by C library calls for each lane."""
 
 import math
 
 from jounce.execution.llvm.text.scalars import Scalars
 from jounce.execution.llvm.text.values import Value
 
-LARGEST = 1e5  # rad, beyond which C's library is asked
-SMALLEST = 2.0**-27  # rad, left of an angle, below which a sine is its angle
-SHIFT = 1.5 * 2.0**52  # added to a number, it leaves the nearest whole one in its last digits
+LARGEST = 1e5  # rad, beyond which the C library is called
+SMALLEST = 2.0**-27  # rad, of a reduced angle, below which the sine equals the angle
+SHIFT = 1.5 * 2.0**52  # added to a number, it leaves the nearest integer in the last bits
 QUARTER = 3373259426 * 2.0**-31, 2242054355 * 2.0**-65, 2.0222662487959506e-21
-"""Parts of pi / 2, the first two of 32 digits: products with a whole number below 2**21 are exact."""
+"""Parts of pi / 2, the first two of 32 bits: products with an integer below 2**21 are exact."""
 SINE = tuple((-1.0) ** (k // 2) / math.factorial(k) for k in range(17, 2, -2))
 COSINE = tuple((-1.0) ** (k // 2) / math.factorial(k) for k in range(18, 3, -2))
 
 
 def sine_and_cosine(around: Scalars) -> str:
-    """Return the text of a function of a vector of angles, rad, whose results are wrong by a last digit at most.
+    """Return the text of a function of a vector of angles, rad, with errors of at most one unit in the last place.
 
-    Whole quarter turns are taken off an angle (Cody and Waite 1980, Software Manual for the Elementary Functions,
-    chapter 8), and Taylor's series are summed for what is left, at most an eighth of a turn. Where little is left of
-    whole quarter turns, so that digits of pi would be missing, C's library is asked as well.
+    Angles are reduced by whole quarter turns (Cody and Waite 1980, Software Manual for the Elementary Functions,
+    chapter 8) to at most an eighth of a turn, for which Taylor series are summed. If a reduced angle is so small that
+    digits of pi are missing, the C library is called, too.
 
     Parameters
     ----------
     around : Scalars
-        The program that it belongs to.
+        The program of the function.
     """
     code = Scalars(around.width)
     x, vector, truths = Value("%x", "f", True), code.type_of("f", lanes=True), code.type_of("b", lanes=True)
@@ -58,7 +58,7 @@ def sine_and_cosine(around: Scalars) -> str:
     left = minus(first, second)
     third = minus(times(turns, number(QUARTER[2])), minus(minus(first, left), second))
     angle = minus(left, third)
-    rest = minus(minus(left, angle), third)  # of the angle, below its last digit
+    rest = minus(minus(left, angle), third)  # part of the angle below its last bit
     square = times(angle, angle)
     half = times(square, number(0.5))
     nearly = minus(number(1.0), half)

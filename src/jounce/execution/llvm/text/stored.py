@@ -1,6 +1,6 @@
-"""How numbers go to arrays in memory and come from there, and loops over such arrays.
+"""Loads and stores of arrays in memory, and loops over such arrays.
 
-A loop takes a number of each array, or as many as a vector has where they lie one after another.
+A loop handles one number of each array, or a vector of contiguous numbers.
 """
 
 import math
@@ -28,12 +28,12 @@ from jounce.execution.llvm.text.views import (
 
 
 def new_storage(code: Code, shape: Sequence[int], kind: str, *, lanes: bool) -> Stored:
-    """Return an array of which nothing is known yet."""
+    """Return a new uninitialized array in memory."""
     return contiguous(code.taken_room(math.prod(shape), kind, lanes=lanes), shape)
 
 
 def is_own(code: Code, array: Stored) -> bool:
-    """Tell whether an array may be changed in its place: it is all that is there, and nobody else reads it."""
+    """Return whether an array may be changed in place: it is the only array in its memory, and nothing reads it."""
     return (
         array.region in code.changeable
         and array.is_same(contiguous(array.region, array.shape))
@@ -42,22 +42,22 @@ def is_own(code: Code, array: Stored) -> bool:
 
 
 def is_large(code: Code, array: Any) -> bool:
-    """Tell whether an array belongs in memory."""
+    """Return whether an array is large enough to stay in memory."""
     return code.large is not None and math.prod(array.shape) > code.large
 
 
 def any_lanes(arrays: Sequence[Array]) -> bool:
-    """Tell whether numbers of some array differ from lane to lane."""
+    """Return whether the numbers of any array differ from lane to lane."""
     return any(x.lanes if isinstance(x, InMemory) else any(v.lanes for v in flat(x)) for x in arrays)
 
 
 def kind_in(array: Array) -> str:
-    """Return the kind of the numbers of an array that has some."""
+    """Return the kind of the numbers of a nonempty array."""
     return array.kind if isinstance(array, InMemory) else flat(array)[0].kind
 
 
 def result_storage(code: Code, equation: Any, given: Sequence[Array]) -> Stored:
-    """Return room for the result of an operation."""
+    """Return memory for the result of an operation."""
     aval = equation.outvars[0].aval
     return new_storage(code, aval.shape, kind_of(aval.dtype), lanes=any_lanes(given))
 
@@ -66,7 +66,7 @@ def result_storage(code: Code, equation: Any, given: Sequence[Array]) -> Stored:
 
 
 def row(code: Code, array: Array, index: int | Value) -> Array:
-    """Return the part of an array at an index of its first axis: an index that is not known wants a stored one."""
+    """Return the part of an array at an index of its first axis; a computed index needs an array in memory."""
     if isinstance(array, np.ndarray):
         assert isinstance(index, int)
         return array[index, ...]
@@ -74,7 +74,7 @@ def row(code: Code, array: Array, index: int | Value) -> Array:
 
 
 def reshaped(code: Code, array: Stored, shape: Sequence[int]) -> Stored:
-    """Return the same numbers in another shape, copied where no strides tell it."""
+    """Return the same numbers in another shape, copied if there are no strides for it."""
     result = in_shape(array, shape)
     return contiguous(copied(code, array).region, shape) if result is None else result
 
@@ -97,13 +97,13 @@ def values_of(code: Code, array: Array) -> Values:
 
 
 def without_home(value: Value) -> Value:
-    """Return a value that is not taken to be where it came from: that may change."""
+    """Return a value detached from its memory, which may change."""
     value.home = None
     return value
 
 
 def stored(code: Code, array: Array) -> Stored:
-    """Return an array in memory, put there if it is not yet; what is repeated is put there once."""
+    """Return an array in memory; store it if it is not there yet, with repeated parts stored once."""
     if isinstance(array, Stored):
         return array
     if isinstance(array, Deferred):
@@ -125,26 +125,26 @@ def stored(code: Code, array: Array) -> Stored:
 
 
 def settled(code: Code, array: Array) -> Array:
-    """Return an array as single values where it is small."""
+    """Return a small array as single values, and a large one unchanged."""
     return array if is_large(code, array) else values_of(code, array)
 
 
 def copied(code: Code, array: Array) -> Stored:
-    """Return an array with a place of its own, its numbers one after another."""
+    """Return a contiguous copy of an array in its own memory."""
     result = new_storage(code, array.shape, kind_in(array), lanes=any_lanes([array]))
     put(code, result, array)
     return result
 
 
 def put(code: Code, target: Stored, array: Array) -> None:
-    """Write an array where another one is: it reads nothing there but the number in whose place one is put."""
+    """Emit the store of an array into another one; it may read from that only the numbers that it replaces."""
     if not target.size:
         return
     if not isinstance(array, InMemory) and is_large(code, array):
         array = stored(code, array)
     if isinstance(array, InMemory):
         read = array if isinstance(array, Deferred) else as_read(array)
-        in_place = any(part.region == target.region for part in read.given)  # then each number once
+        in_place = any(part.region == target.region for part in read.given)  # then visit each number once
         nest(code, read.given, [target], lambda values: [read.body(values)], adds=in_place)
         return
     for index, value in zip(np.ndindex(*target.shape), flat(array), strict=True):
@@ -153,18 +153,18 @@ def put(code: Code, target: Stored, array: Array) -> None:
 
 
 def fill(code: Code, target: Stored, number: Value) -> None:
-    """Write a number wherever an array is."""
+    """Emit the store of one number into all elements of an array."""
     put(code, target, spread(stored(code, filled((), [number])), target.shape, ()))
 
 
 # -- loops ------------------------------------------------------------------------------------------------------------
 
 Body = Callable[[list[Value]], Sequence[Value]]
-Visit = Callable[[int | Value], None]  # of the number from which on something is done
+Visit = Callable[[int | Value], None]  # emits code from an index on
 
 
 def counted(code: Code, count: int, body: Callable[[int | Value], None]) -> None:
-    """Write a loop that runs so many times."""
+    """Emit a loop with `count` iterations."""
     if count <= 1:
         if count:
             body(0)
@@ -188,17 +188,17 @@ def counted(code: Code, count: int, body: Callable[[int | Value], None]) -> None
 
 
 def nest(code: Code, given: Sequence[Stored], result: Sequence[Stored], body: Body, *, adds: bool = False) -> None:
-    """Write loops over arrays of one shape.
+    """Emit loops over arrays of one shape.
 
     Parameters
     ----------
     code : Code
     given, result : sequence of Stored
-        What is read and written.
+        Arrays that are read and written.
     body : callable
-        Maps numbers of the arrays read to those written.
+        Function from the numbers read to those written.
     adds : bool, default False
-        Whether what is written depends on what was there, so that no place may be visited twice.
+        Whether written numbers depend on previous ones, so that no element may be visited twice.
     """
     arrays = [*given, *result]
     shape, strides = merged(arrays[0].shape, [array.strides for array in arrays])
@@ -233,7 +233,7 @@ def _visit(
     indices: Sequence[int | Value],
     along: Sequence[bool] | None = None,
 ) -> None:
-    """Write what is done at one place of each array, or for a vector of numbers from there on of some."""
+    """Emit the body at one index of each array, or for a vector of numbers from the index on in some arrays."""
     along = [False] * len(indices) if along is None else along
     read = [
         code.load_along(array.region, index) if vector else without_home(code.load(array.region, index))
@@ -245,18 +245,17 @@ def _visit(
 
 
 def _in_vectors(code: Code, size: int, vector: Visit, single: Visit | None) -> None:
-    """Write a loop of vectors over at least as many numbers as one has.
+    """Emit a loop of vectors over at least one vector of numbers.
 
     Parameters
     ----------
     code : Code
     size : int
-        Of the numbers.
+        Count of the numbers.
     vector : callable
-        Writes what is done for a vector of numbers, from one on.
+        Emits the code for a vector of numbers from an index on.
     single : callable or None
-        Writes what is done for each number that is left after whole vectors; None if the last vector may have some in
-        common with the one before.
+        Emits the code for each remaining number; None if the last vector may overlap the one before.
     """
     whole, left = divmod(size, code.width)
     if left and single is None:
@@ -276,12 +275,12 @@ def _in_vectors(code: Code, size: int, vector: Visit, single: Visit | None) -> N
 
 
 def _is_along(steps: Sequence[int], given: int) -> bool:
-    """Tell whether the numbers along an axis, or one of an array that is only read, make a vector."""
+    """Return whether the numbers along an axis are contiguous, or repeated in an array that is only read."""
     return set(steps) <= {0, 1} and 0 not in steps[given:]
 
 
 def _order(shape: Sequence[int], strides: Sequence[Sequence[int]], given: int) -> list[int]:
-    """Return the axes, the one of the innermost loop last: where numbers make vectors, and what is written moves on."""
+    """Return the axes with that of the innermost loop last: contiguous numbers, with writes to different elements."""
     if not shape:
         return []
 

@@ -1,4 +1,4 @@
-"""Numbers of a program that is written for LLVM: their kinds, their names, and where they are in memory."""
+"""Numbers of a program for LLVM: their kinds, names, and memory."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -13,28 +13,28 @@ DTYPES = {kind: dtype for dtype, kind in KINDS.items()}
 
 
 class UnsupportedOperationError(Exception):
-    """What this room has no code for, in the words of a warning: 'there is no machine code for ...'."""
+    """There is no machine code for an operation; the message completes 'there is no machine code for ...'."""
 
 
 @dataclass(frozen=True, eq=False)
 class Region:
-    """Numbers of one kind one after another in memory, each alone or as a vector of lanes."""
+    """Consecutive numbers of one kind in memory, each a single number or a vector of lanes."""
 
     pointer: str
     kind: str
     lanes: bool
-    given: bool = False  # by the caller: lanes of a number lie `%total` apart, and nothing is written there
+    given: bool = False  # by the caller: numbers are `%total` lanes apart, and arguments are read-only
 
 
-@dataclass(eq=False, slots=True)  # not frozen, which takes three times as long to make, and there are many
+@dataclass(eq=False, slots=True)  # not frozen, which takes three times as long to create
 class Value:
-    """A number of the program: a constant, or what an operation before has found, for each lane or for all."""
+    """A number of the program: a constant or the result of an operation, one for all lanes or one for each."""
 
     name: str
     kind: str
     lanes: bool
     constant: Any = None
-    home: tuple[Region, int] | None = None  # where it is in memory, as long as it can be used
+    home: tuple[Region, int] | None = None  # its memory and index, as long as that is valid
 
 
 def kind_of(dtype: Any) -> str:
@@ -43,7 +43,7 @@ def kind_of(dtype: Any) -> str:
     Raises
     ------
     UnsupportedOperationError
-        If there is none.
+        If there is no kind for the type.
     """
     if (kind := KINDS.get(dtype)) is None:
         raise UnsupportedOperationError(f"numbers of type {dtype}")
@@ -51,7 +51,7 @@ def kind_of(dtype: Any) -> str:
 
 
 def literal(value: Value) -> str:
-    """Return a constant as LLVM reads it."""
+    """Return the literal of a constant in LLVM."""
     if value.kind == "f":
         return f"0x{value.constant.view(np.uint64):016X}"
     number = value.constant.astype(np.int32) if value.kind == "u" else value.constant  # LLVM reads signed numbers
@@ -59,19 +59,19 @@ def literal(value: Value) -> str:
 
 
 def nearest(number: Any, dtype: Any) -> int:
-    """Return the whole number of a type that is nearest to a double toward zero, as XLA converts it."""
+    """Return a double truncated to an integer and clamped to the range of a type, as by XLA."""
     limits = np.iinfo(dtype)
     whole = 0 if np.isnan(number) else int(min(max(number, -(2.0**63)), 2.0**63))
     return min(max(whole, limits.min), limits.max)
 
 
 def quotient(a: Any, b: Any) -> Any:
-    """Return a quotient of whole numbers as XLA has it: rounded toward zero, -1 where the divisor is zero."""
+    """Return the quotient of integers as by XLA: rounded toward zero, -1 if the divisor is zero."""
     if b in (0, -1):
         return -1 if b == 0 else -a  # of the least number, itself
     return abs(int(a)) // abs(int(b)) * (1 if (a < 0) == (b < 0) else -1)
 
 
 def remainder(a: Any, b: Any) -> Any:
-    """Return what a quotient of whole numbers leaves, with the sign of the dividend; all of it if that is by zero."""
+    """Return the remainder of integers, with the sign of the dividend; the dividend if the divisor is zero."""
     return a if b == 0 else abs(int(a)) % abs(int(b)) * (1 if a > 0 else -1)

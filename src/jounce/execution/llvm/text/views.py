@@ -1,8 +1,7 @@
-"""Arrays that stay in memory, where they are too large to be single values, as places and strides.
+"""Arrays in memory, too large for single values, described by offsets and strides.
 
-Parts, transposes and repetitions of such an array are views, as in NumPy: where numbers begin, and how far apart they
-lie. None of them takes an operation on numbers. Numbers that are used once need not be in memory at all: they are
-computed where they are used, from those that are.
+Parts, transposes and repetitions of such an array are views, as in NumPy, and need no operations on numbers. Numbers
+that are used once need not be in memory: they are computed where they are used, from arrays in memory.
 """
 
 import math
@@ -18,11 +17,11 @@ from jounce.execution.llvm.text.arrays import Values
 from jounce.execution.llvm.text.code import Code
 from jounce.execution.llvm.text.values import Region, Value
 
-ORIGIN = np.zeros(1, np.int8)  # where arrays begin whose views are asked for, of numbers that nobody reads
+ORIGIN = np.zeros(1, np.int8)  # base of NumPy arrays that serve only to compute views
 
 
 class Shaped:
-    """What has a shape as an array of NumPy has."""
+    """An object with a shape, as a NumPy array."""
 
     shape: Any
 
@@ -33,7 +32,7 @@ class Shaped:
 
     @property
     def size(self) -> int:
-        """Number of numbers."""
+        """Number of elements."""
         return math.prod(self.shape)
 
 
@@ -44,11 +43,11 @@ class Stored(Shaped):
     Attributes
     ----------
     region : Region
-        Where its numbers are.
+        Memory of its numbers.
     shape, strides : tuple of int
-        As those of an array of NumPy; strides count numbers.
+        As for a NumPy array; strides count numbers.
     first : int or Value
-        Place of the first number, which may differ from lane to lane.
+        Index of the first number, which may differ from lane to lane.
     """
 
     region: Region
@@ -67,7 +66,7 @@ class Stored(Shaped):
         return self.region.lanes or (isinstance(self.first, Value) and self.first.lanes)
 
     def is_same(self, other: Any) -> bool:
-        """Tell whether another array is this one."""
+        """Return whether another array is the same view."""
         return (
             isinstance(other, Stored)
             and (other.region is self.region and other.shape == self.shape and other.strides == self.strides)
@@ -77,18 +76,18 @@ class Stored(Shaped):
 
 @dataclass(frozen=True, eq=False)
 class Deferred(Shaped):
-    """An array whose numbers are computed where they are used, which is once.
+    """An array whose numbers are computed where they are used, once.
 
     Attributes
     ----------
     given : tuple of Stored
-        Arrays of its shape, from which it is computed number by number.
+        Operands of its shape, from which it is computed number by number.
     kind : str
         Kind of the numbers.
     body : callable
-        Maps numbers of these arrays to one of its own.
+        Function from numbers of the operands to one of its own.
     parts : bool, default False
-        Whether it makes lanes differ by itself.
+        Whether the function itself makes lanes differ.
     """
 
     given: tuple[Stored, ...]
@@ -107,18 +106,18 @@ class Deferred(Shaped):
         return self.parts or any(array.lanes for array in self.given)
 
     def viewed(self, view: Callable[[Stored], Stored]) -> "Deferred":
-        """Return a view of it, as one of each array that it is computed from."""
+        """Return a view of the array, by views of its operands."""
         return replace(self, given=tuple(map(view, self.given)))
 
     def in_shape(self, shape: Sequence[int]) -> "Deferred | None":
-        """Return the same numbers in another shape, None where no strides tell it of some array."""
+        """Return the same numbers in another shape; None if an operand has no strides for it."""
         result = [in_shape(array, shape) for array in self.given]
         whole = tuple(array for array in result if array is not None)
         return replace(self, given=whole) if len(whole) == len(result) else None
 
 
 def as_read(array: Stored) -> Deferred:
-    """Return an array as one whose numbers are read where they are used."""
+    """Return a deferred array whose numbers are loaded where they are used."""
     return Deferred((array,), array.kind, lambda values: values[0])
 
 
@@ -127,13 +126,13 @@ Array = Values | InMemory
 
 
 def contiguous(region: Region, shape: Sequence[int], first: int | Value = 0) -> Stored:
-    """Return an array whose numbers lie one after another, the last axis fastest."""
+    """Return a contiguous array, the last axis fastest."""
     ends = np.cumprod([1, *shape[:0:-1]]) if len(shape) else []
     return Stored(region, tuple(shape), tuple(int(x) for x in ends[::-1]), first)
 
 
 def further(code: Code, first: int | Value, steps: int | Value, stride: int) -> int | Value:
-    """Return a place so many strides further."""
+    """Return an index advanced by a number of strides."""
     if not isinstance(steps, Value) and not isinstance(first, Value):
         return first + int(steps) * stride
     more = code.arithmetic("mul", _whole(code, steps), code.constant(stride, "l"))
@@ -149,7 +148,7 @@ def _plain(value: Value) -> int | Value:
 
 
 def views_of(code: Code, array: Stored, views: Callable[[np.ndarray], Sequence[np.ndarray]]) -> list[Stored]:
-    """Return what a function of an array of NumPy, one byte a number, gives that returns views of it."""
+    """Return the views that a function of a NumPy array, with one byte for each number, returns."""
     whole, begin = as_strided(ORIGIN, array.shape, array.strides), address_of(ORIGIN)
     return [
         Stored(array.region, view.shape, view.strides, further(code, array.first, address_of(view) - begin, 1))
@@ -164,7 +163,7 @@ def part_at(code: Code, array: Stored, index: int | Value) -> Stored:
 
 
 def between(code: Code, array: Stored, axis: int, start: int | Value, size: int, step: int = 1) -> Stored:
-    """Return so many numbers along an axis from an index on."""
+    """Return `size` numbers along an axis from an index on, with a step."""
     shape, strides = list(array.shape), list(array.strides)
     first = further(code, array.first, start, strides[axis])
     shape[axis], strides[axis] = size, strides[axis] * step
@@ -177,7 +176,7 @@ def transposed(array: Stored, axes: Sequence[int]) -> Stored:
 
 
 def spread(array: Stored, shape: Sequence[int], axes: Sequence[int]) -> Stored:
-    """Return an array repeated along new axes and those of length one; `axes` are where its own belong."""
+    """Return an array broadcast along new axes and those of length one; `axes` are the places of its own axes."""
     strides = [0] * len(shape)
     for axis, size, stride in zip(axes, array.shape, array.strides, strict=True):
         strides[axis] = stride if size == shape[axis] else 0
@@ -185,7 +184,7 @@ def spread(array: Stored, shape: Sequence[int], axes: Sequence[int]) -> Stored:
 
 
 def merged(shape: Sequence[int], strides: Sequence[Sequence[int]]) -> tuple[list[int], list[list[int]]]:
-    """Return axes without those of length one, neighbors as one where the numbers of all arrays go on."""
+    """Return axes without those of length one, with neighbors merged that are contiguous in all arrays."""
     sizes: list[int] = []
     steps: list[list[int]] = [[] for _ in strides]
     for k, size in enumerate(shape):
@@ -204,7 +203,7 @@ def merged(shape: Sequence[int], strides: Sequence[Sequence[int]]) -> tuple[list
 
 
 def divided(sizes: Sequence[int], strides: Sequence[Sequence[int]], shape: Sequence[int]) -> tuple[int, ...] | None:
-    """Return the strides of axes of other lengths, None where there are none: of axes as `merged` returns them."""
+    """Return the strides of merged axes split to another shape; None if there are none."""
     result, waiting, left, stride = [], list(zip(sizes, strides[0], strict=True)), 1, 0
     for size in reversed(shape):
         if size == 1:
@@ -220,6 +219,6 @@ def divided(sizes: Sequence[int], strides: Sequence[Sequence[int]], shape: Seque
 
 
 def in_shape(array: Stored, shape: Sequence[int]) -> Stored | None:
-    """Return the same numbers in another shape, None where no strides tell it."""
+    """Return the same numbers in another shape; None if there are no strides for it."""
     strides = divided(*merged(array.shape, [array.strides]), shape) if array.size else None
     return None if strides is None else replace(array, shape=tuple(shape), strides=strides)
