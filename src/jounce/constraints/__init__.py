@@ -1,4 +1,4 @@
-"""Joints and drivers: the catalogue of Sommer 2024, one residual each, and the base for one's own."""
+"""Joints and drivers: the catalogue of Sommer 2024, with one residual each, and the base of users' own."""
 
 from jounce.constraints import drivers as drivers, planar as planar, spatial as spatial
 from jounce.constraints.base import (

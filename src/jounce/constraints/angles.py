@@ -1,10 +1,9 @@
-"""Angles about an axis that do not depend on how the frames of the bodies were drawn. Sommer 2024, equations 101-103.
+"""Angles about an axis, independent of the choice of body frames. Sommer 2024, equations 101-103.
 
-Between bodies that turn about a common axis, fixed in both, there is one angle, up to where it is counted from. The
-Euler parameters of their frames give it as ``2 atan2(u.e, e0)``; but unless the axis has the same components in both
-frames, that function also changes as the axes tilt against each other, and a torque that works on it tilts the bearing.
-Here body j is therefore given a frame that differs from that of body i by a turn about the axis only, at a position
-where the mechanism is assembled, its `Datum`.
+Between bodies that turn about a common axis, fixed in both, there is one angle, up to its zero. The Euler parameters of
+their frames give it as ``2 atan2(u.e, e0)``. But unless the axis has the same components in both frames, that function
+also changes as the axes tilt against each other, and a torque that works on it tilts the bearing. Body j is therefore
+given a frame that differs from that of body i by a rotation about the axis only, at an assembled position: its `Datum`.
 """
 
 from typing import Any
@@ -24,11 +23,11 @@ from jounce.jet.algebra import total
 from jounce.jet.turns import principal, shifted_by_turns
 from jounce.rigid.spatial import SpatialPose, body_axes
 
-SMALLEST_COSINE = 1e-6  # of half the tilt of the axis: below it the tilt is half a turn, and the angle is undefined
+SMALLEST_COSINE = 1e-6  # of half the tilt of the axis: below, the tilt is half a turn, and the angle is undefined
 
 
 Vectors = Float[Numbers, "3 *#batch"]
-"""A vector of each instance, fixed in a body; the same in all lanes or one for each."""
+"""A body-fixed vector of each instance, common to all lanes or one per lane."""
 
 
 class Datum(Module):
@@ -39,12 +38,12 @@ class Datum(Module):
     attitude : array of shape (4, ...)
         Euler parameters of ``A_i^T A_j``.
     angle : array of shape (...)
-        rad, with its whole turns.
+        Angle at this attitude, rad, with whole turns.
     near : array of shape (...)
-        The angle at the positions that are looked at, to within half a turn, rad: it tells the turns made since. That
-        at the datum, unless a motion has been followed from there.
+        Expected angle, to within half a turn, rad, which determines the whole turns; the angle at the datum, unless a
+        motion has been followed from there.
     across : array of shape (3, ...), optional
-        Part of the second vector across the axis there, on body j, for what acts about the axis.
+        Component of the second vector perpendicular to the axis at the datum, on body j, for forces about the axis.
     """
 
     attitude: Float[Numbers, "4 *batch"]
@@ -54,7 +53,7 @@ class Datum(Module):
 
 
 def check_vectors(self: Any) -> None:
-    """Raise MechanismError unless an angle has a vector on each body or none: `__check_init__` of its class."""
+    """Raise MechanismError unless an angle has a vector on both bodies or on none: `__check_init__` of its class."""
     if (self.vector_i is None) != (self.vector_j is None):
         raise MechanismError(f"{self.type_name} takes two vectors, one on each body, or none", name="vectors")
 
@@ -78,14 +77,14 @@ def relative_angle(
     vector_j: Vectors | None = None,
     datum: Datum | None = None,
 ) -> Jet:
-    """Return the angle in rad by which body j is turned about an axis of body i.
+    """Return the rotation angle, rad, of body j about an axis of body i.
 
-    With vectors it is the signed angle from the first, on body i, to the second, on body j, or to the part of it that
-    the datum keeps. Without, it is the angle at the datum and the turn about the axis from there; where the axis does
-    not stay in its direction on body j, the turn left after the shortest tilt of the axis. Without a datum it is the
-    angle of ``A_i^T A_j``, by ``2 atan2(u.e, e0)`` of the relative Euler parameters, which keeps the sign that Sommer
-    2024, equation 101, loses, and within half a turn of zero. With a datum it has the turns of what the datum tells it
-    to be near to.
+    With vectors, it is the signed angle from the first, on body i, to the second, on body j, or to `across` of the
+    datum. Without vectors, it is the angle at the datum plus the rotation about the axis since then; if the axis
+    changes its direction on body j, the rotation that remains after the shortest tilt of the axis. Without a datum, it
+    is the angle of ``A_i^T A_j``, ``2 atan2(u.e, e0)`` of the relative Euler parameters, within half a turn of zero;
+    this keeps the sign that Sommer 2024, equation 101, loses. With a datum, it has the whole turns that bring it
+    nearest to `near`.
     """
     axis = axis_i / length_of(axis_i)[None]
     if vector_i is not None and vector_j is not None:
@@ -96,8 +95,8 @@ def relative_angle(
     return wrap(turn) if datum is None else shifted_by_turns(turn, datum.near - datum.angle) + datum.angle
 
 
-# The rate of the angle is the angular velocity along the axis, but for terms that vanish while the bodies turn about
-# the axis only: jets of the arctangent would subtract products that are larger by 2^k at order k.
+# The rate of the angle is the angular velocity along the axis, plus terms that vanish while the bodies turn about the
+# axis only. Jets of the arctangent would subtract products that are larger by 2^k at order k.
 
 
 @traced_once()
@@ -106,7 +105,7 @@ def _turn(body_i: SpatialPose, body_j: SpatialPose, axis: Vectors, datum: Datum 
     if body_i.angular_velocity is not None:
         turning = body_j.to_body(body_i.global_angular_velocity())
         w = -turning if w is None else w - turning
-    if datum is not None:  # what body j has turned by since, if its frame was that of body i then
+    if datum is not None:  # the rotation of body j since the datum, at which it has the frame of body i
         back = [part * sign for part, sign in zip(components(datum.attitude), (1.0, -1.0, -1.0, -1.0), strict=True)]
         quaternion = total(part * x for part, x in zip((quaternion, *body_j.spins), back, strict=True))
         w = None if w is None else stack([dot(side, w) for side in body_axes(jnp.concatenate(back))])
@@ -136,17 +135,17 @@ def _between(body_i: SpatialPose, body_j: SpatialPose, axis: Vectors, vector_i: 
 
 
 def coaxial(axis_i: Vectors, axis_j: Vectors) -> Datum:
-    """Return a datum for two bodies that turn about axes, one fixed in each, of shape (3, ...), that coincide.
+    """Return a datum for two bodies that turn about coinciding axes, one fixed in each, of shape (3, ...).
 
-    The angle there is that of ``A_i^T A_j``, as at every other such attitude.
+    Its angle is that of ``A_i^T A_j``, as at every attitude with coinciding axes.
     """
     u, v = (axis / length_of(axis)[None] for axis in (axis_i, axis_j))
     opposite = dot(u, v) < 0
     near = jnp.where(opposite[None], -u, u)
-    # the shortest turn that takes the axis of body j to that of body i, or to its opposite
+    # the shortest rotation that takes the axis of body j to that of body i, or to its opposite
     attitude = jnp.concatenate([1.0 + dot(v, near)[None], cross(v, near)])
     attitude = attitude / length_of(attitude)[None]
-    side, _ = perpendiculars(u)  # and half a turn about a perpendicular after it
+    side, _ = perpendiculars(u)  # axis of half a turn that follows
     e0, e = attitude[:1], attitude[1:]
     flipped = jnp.concatenate([-dot(side, e)[None], e0 * side + cross(side, e)])
     attitude = jnp.where(opposite[None], flipped, attitude)
@@ -158,9 +157,9 @@ def coaxial(axis_i: Vectors, axis_j: Vectors) -> Datum:
 def angle_of(
     attitude: Float[Numbers, "4 *#batch"], axis: Float[Numbers, "3 *#batch"]
 ) -> tuple[Float[Numbers, "*#batch"], Bool[Numbers, "*#batch"]]:
-    """Return the angle about a unit axis, in (-pi, pi], of Euler parameters, and where there is one.
+    """Return the angle of Euler parameters about a unit axis, in (-pi, pi], and whether it is defined.
 
-    There is none where the attitude turns the axis to its opposite.
+    It is undefined where the attitude reverses the axis.
     """
     along, e0 = (axis * attitude[1:]).sum(axis=0), attitude[0]
     namespace = jnp if isinstance(along, jax.Array) else np

@@ -1,4 +1,4 @@
-"""What a joint or a driver is: named values on two or three bodies, and one residual on jets."""
+"""The base of joints and drivers: named values on two or three bodies, and one residual on jets."""
 
 import abc
 import dataclasses
@@ -29,26 +29,26 @@ MotionLaw = Annotated[Any, "motion"]
 Wrenches = Annotated[Any, "wrenches"]
 Whole = Annotated[int, "whole"]
 Flag = Annotated[bool, "flag"]
-Points = Annotated[Any, "points"]  # one on each body
+Points = Annotated[Any, "points"]  # one point on each body
 Nested = Annotated[Any, "nested"]  # an element within another
 Curve = Annotated[Any, "curve"]
-Part = Annotated[Any, "part"]  # another joint or driver within one
+Part = Annotated[Any, "part"]  # another joint or driver as a part
 
 SPACES = ("planar", "spatial")
 ROLES = ("joint", "driver", "force")
-RESERVED_KEYS = ("bodies", "type")  # keys that every element of a file has
-_REGISTRY: dict[tuple[str, str], dict[str, tuple[type[Any], ...]]] = {}  # the last counts whose definition succeeded
+RESERVED_KEYS = ("bodies", "type")  # keys of every element in a file
+_REGISTRY: dict[tuple[str, str], dict[str, tuple[type[Any], ...]]] = {}  # the last class that was fully defined counts
 
 
 def register(kind: type[Any], type: str, space: str, role: str) -> None:  # noqa: A002
-    """Let files name a class by its type; one of no particular space is of both.
+    """Register a class under its type for mechanism files; a class without a space serves both.
 
     Raises
     ------
     MechanismError
-        If another class has this type: files would silently mean the new one. The same class defined again, as in a
-        cell of a notebook that is run again, takes its own place once it is whole; those of this package stay. If a
-        field has a name that files use otherwise.
+        If another class has this type, as files would silently get the new one; or if a field has a name that files
+        reserve. A class defined again, as in a notebook cell that is run again, replaces its former definition once it
+        is complete; classes of this package cannot be replaced.
     """
     check_choice("role", role, ROLES, MechanismError)
     if space:
@@ -78,53 +78,53 @@ class AbstractConstraint(Module):
 
     A subclass lists its values as fields and defines `residual`. Jacobian, right-hand sides of every order, forces and
     files follow. Fields are annotated `Scalar`, `Vector`, `MotionLaw` or ``str``; the fields ``point_i`` and
-    ``point_j`` are the key ``points`` of a mechanism file, and likewise vectors, axes and normals. Given a `type`, the
-    subclass can be used in files by that name. What else there is to know of the joint, the class states in class
-    variables, which subclasses inherit; `jounce.testing.check_joint` tells whether all of it is true.
+    ``point_j`` become the key ``points`` of a mechanism file, likewise vectors, axes and normals. With a `type`, the
+    subclass can be used in files by that name. The class states other facts of the joint in class variables, which
+    subclasses inherit; `jounce.testing.check_joint` checks them.
 
     Parameters
     ----------
     bodies : tuple of str
-        Names of the bodies i, j (and m), ``"ground"`` among them if one is fixed.
+        Names of the bodies i, j (and m), including ``"ground"`` if one is fixed.
 
     Attributes
     ----------
     dimensions : mapping of str to str
         Class variable: dimensions of fields, ``length``, ``angle``, ``ratio``, ``mass`` and so on; ``direction`` for a
-        vector of any unit; ``of coordinate`` or ``per angle`` where it depends on the field ``coordinate``; ``any``.
-        An entry ``axis`` is for ``axis_i`` and ``axis_j``. Points and fields named length, radius and lead are lengths,
-        vectors, axes and normals are directions, unless it says otherwise.
+        vector of any unit; ``of coordinate`` or ``per angle`` if it depends on the field ``coordinate``; ``any``. An
+        entry ``axis`` is for ``axis_i`` and ``axis_j``. By default, points and fields named length, radius and lead are
+        lengths; vectors, axes and normals are directions.
     signs : mapping of str to str
-        Class variable: ``positive``, ``not negative``, ``not zero`` (a vector of no zero length) or ``any``, by field.
-        Fields named length and radius must be positive, lead, vectors, axes and normals not zero, unless it says
-        otherwise.
+        Class variable: ``positive``, ``not negative``, ``not zero`` (for a vector, nonzero length) or ``any``, by
+        field. By default, fields named length and radius must be positive; lead, vectors, axes and normals must not be
+        zero.
     choices : mapping of str to tuple of str
-        Class variable: the words that fields annotated ``str`` may be.
+        Class variable: the permitted words of fields annotated ``str``.
     held_parallel : tuple of tuple of str
-        Class variable: pairs of fields, of the first and of the second body, whose directions the joint holds parallel.
-        Its residual then cannot tell a part from one that is turned over, which assembly avoids.
+        Class variable: pairs of fields, of the first and the second body, whose directions the joint holds parallel.
+        The residual of such a joint also vanishes with a part turned over, which assembly avoids.
     never_parallel : tuple of tuple of str
-        Class variable: pairs of fields of one body, of which the first must not be parallel to the second.
+        Class variable: pairs of fields of one body, the first of which must not be parallel to the second.
     squared_distance : str
-        Class variable: the field, a value or a law, whose square the residual subtracts from that of a distance.
+        Class variable: the field, a value or a law, whose square the residual subtracts from a squared distance.
     point_distance : str
-        Class variable: how far apart the joint holds ``point_i`` and ``point_j``: ``zero``, or the field of their
-        distance. Of a `pair` it is known.
+        Class variable: the distance at which the joint holds ``point_i`` and ``point_j``: ``zero``, or the field of the
+        distance. A `pair` implies it.
     rolls_along : tuple of str
-        Class variable, of a disc that rolls on the first body: fields of the direction of its line, and in space of the
-        axis of the disc, whose center ``point_j`` lies by ``radius`` on the right of the line through ``point_i``.
+        Class variable, for a disc that rolls on the first body: fields of the direction of its line, and in space of
+        the axis of the disc, whose center ``point_j`` lies ``radius`` to the right of the line through ``point_i``.
     symbol : str
-        Class variable: what plots and the viewer draw, one of `jounce.constraints.facts.symbols`, from the fields of
-        the joint of the library that has it; ``none`` for nothing, empty for a mark at each point.
+        Class variable: what plots and the viewer draw, one of `jounce.constraints.facts.symbols`, with the same fields
+        as the joint of the library with that symbol; ``none`` for nothing, empty for a mark at each point.
     pair : str
-        Class variable: ``revolute``, ``rod`` or ``prismatic`` if the planar joint is nothing else, with the fields of
-        that joint of the library. Linkages are recognized by it.
+        Class variable: ``revolute``, ``rod`` or ``prismatic`` if the planar joint is equivalent to it, with the fields
+        of that joint of the library. Linkages are recognized by it.
 
     Raises
     ------
     MechanismError
-        If the number of bodies is wrong or a body is joined with itself; if a field of text has a word that it may not
-        have; or if its class states a fact that cannot be.
+        If the number of bodies is wrong or a body is joined with itself; if a text field has a word that is not
+        permitted; or if its class states an impossible fact.
     """
 
     bodies: tuple[str, ...] = field(static=True, converter=tuple)
@@ -133,14 +133,14 @@ class AbstractConstraint(Module):
     role: ClassVar[str] = ""
     type_name: ClassVar[str] = ""
     body_count: ClassVar[int] = 2
-    body_counts: ClassVar[Sequence[int]] = ()  # where more than one number is right
+    body_counts: ClassVar[Sequence[int]] = ()  # permitted numbers of bodies, if several
     may_repeat: ClassVar[bool] = False  # whether a body may be named more than once
-    hidden: ClassVar[tuple[str, ...]] = ()  # coordinates besides those of bodies, which a carriage of its own has
-    periodic: ClassVar[bool] = False  # whether its residual forgets whole turns, which the law must not skip then
-    nonholonomic: ClassVar[bool] = False  # whether rows of it hold velocities, which no positions fulfill
-    parts: ClassVar[Mapping[str, Mapping[str, str]]] = MappingProxyType({})  # keys of files within a key, with fields
-    separable: ClassVar[bool] = False  # of the class that defines `residual`: a function of bodies less one of the law
-    has_friction_radius: ClassVar[bool] = False  # whether its surfaces turn on one another
+    hidden: ClassVar[tuple[str, ...]] = ()  # additional coordinates, which a carriage holds
+    periodic: ClassVar[bool] = False  # whether the residual is periodic in whole turns, which the law must not skip
+    nonholonomic: ClassVar[bool] = False  # whether some rows constrain velocities that follow from no positions
+    parts: ClassVar[Mapping[str, Mapping[str, str]]] = MappingProxyType({})  # nested keys in files, with their fields
+    separable: ClassVar[bool] = False  # whether `residual` is a function of bodies minus one of the law
+    has_friction_radius: ClassVar[bool] = False  # whether its surfaces rotate on each other
     dimensions: ClassVar[Mapping[str, str]] = USUAL_DIMENSIONS
     signs: ClassVar[Mapping[str, str]] = USUAL_SIGNS
     choices: ClassVar[Mapping[str, tuple[str, ...]]] = MappingProxyType({})
@@ -170,26 +170,27 @@ class AbstractConstraint(Module):
         check_words(self)
 
     @abc.abstractmethod
-    def residual(self, *bodies_and_time: Any, **_: Any) -> Jet:  # with both, type checkers let parameters be named
+    def residual(self, *bodies_and_time: Any, **_: Any) -> Jet:  # with both, type checkers accept named parameters
         """Return the jet that vanishes when the joint holds: ``residual(self, body_i, body_j, time)``.
 
         Bodies are poses (`PlanarPose` or `SpatialPose`), `time` is a jet in s. The result has the shape of one row,
-        (...), or of several, (rows, ...), as `rows` joins them.
+        (...), or of several, (rows, ...), joined by `rows`.
         """
 
     def variation(self, bodies: tuple[Any, ...], changes: tuple[Any, ...], time: Jet) -> Jet:
-        """Return how the residual varies as the bodies are displaced; linear in the displacements.
+        """Return the variation of the residual by displacements of the bodies, in which it is linear.
 
-        It follows from the residual, unless rows of it hold velocities: then it is these for the displacements instead.
+        It follows from the residual, unless some rows constrain velocities; it then has these rows, applied to the
+        displacements.
 
         Parameters
         ----------
         bodies : tuple of PlanarPose or SpatialPose
-            Where the bodies are.
+            Poses of the bodies.
         changes : tuple of PlanarPose or SpatialPose or None
-            What ``varied`` of them gives; None for a body that is not displaced.
+            Variations from ``varied``; None for a body that is not displaced.
         time : Jet
-            In s.
+            Time, s.
         """
         varied = [k for k, change in enumerate(changes) if change is not None]
 
@@ -202,7 +203,7 @@ class AbstractConstraint(Module):
         return jax.jvp(residual, tuple(bodies[k] for k in varied), tuple(changes[k] for k in varied))[1]
 
     def admissible(self, time: Jet) -> Bool[Numbers, "..."]:
-        """Tell at which instants the motion law, if there is one, has a permitted value: a finite one, unless more."""
+        """Return the instants at which the motion law, if any, has a permitted value; any finite value by default."""
         motion = getattr(self, "motion", None)
         if motion is None:
             return jnp.ones_like(time.coefficients[0], dtype=bool)
@@ -210,7 +211,7 @@ class AbstractConstraint(Module):
 
 
 def catalogue(space: str, role: str) -> dict[str, type[Any]]:
-    """Return the classes that files may name, by their type: `space` planar or spatial, `role` joint, driver or force.
+    """Return the classes that files may name by type: `space` planar or spatial, `role` joint, driver or force.
 
     Examples
     --------
@@ -223,9 +224,10 @@ def catalogue(space: str, role: str) -> dict[str, type[Any]]:
 
 
 def _last_whole(kinds: tuple[type[Any], ...]) -> type[Any] | None:
-    """Return the last of some classes that is whole: the definition of others failed, as their fields are in no order.
+    """Return the last completely defined class; the definition of others failed, as their fields are out of order.
 
-    A class is registered before it gets its fields; the last that a dataclass gets tells that it has them.
+    A class is registered before its fields are defined; `__match_args__`, the last attribute of a dataclass, marks it
+    as complete.
     """
     return next((kind for kind in reversed(kinds) if "__match_args__" in vars(kind)), None)
 
@@ -235,12 +237,12 @@ def _full_name(kind: type[Any]) -> tuple[str, str]:
 
 
 def _belongs_to_package(kind: type[Any]) -> bool:
-    """Tell whether a class is one of this package, for which another only passes itself off, by its module's name."""
+    """Return whether a class belongs to this package, by the name of its module."""
     return kind.__module__.partition(".")[0] == __name__.partition(".")[0]
 
 
 def is_bare_ratio(element: AbstractConstraint) -> bool:
-    """Tell whether a joint couples moving bodies by a ratio and nothing else: it does not say where its teeth touch."""
+    """Return whether a joint couples moving bodies by a ratio only, without the point of contact of its teeth."""
     fields = value_fields(type(element))
     given = "ratio" in fields and getattr(element, "ratio", None) is not None and element.role != "driver"
     placed = any(getattr(element, name) is not None for name in fields if name.startswith("point"))
@@ -248,7 +250,7 @@ def is_bare_ratio(element: AbstractConstraint) -> bool:
 
 
 def counted(counts: Sequence[int]) -> str:
-    """Word the numbers that are right.
+    """Return the permitted numbers in words.
 
     Examples
     --------
@@ -259,7 +261,7 @@ def counted(counts: Sequence[int]) -> str:
 
 
 def check_bodies(element: Any, counts: Sequence[int], does: str = "joins", must: str = "join") -> None:
-    """Raise MechanismError unless a joint, driver, force or output has as many bodies as it needs, all different."""
+    """Raise MechanismError unless a joint, driver, force or output has the required number of different bodies."""
     name = getattr(element, "type_name", "") or type(element).__name__
     if len(element.bodies) not in counts:
         message = f"{name} {does} {counted(counts)} {'body' if counts == (1,) else 'bodies'}"
@@ -272,7 +274,7 @@ def check_bodies(element: Any, counts: Sequence[int], does: str = "joins", must:
 
 
 def keep_words_static(kind: type[Any]) -> None:
-    """Have the fields of text of a class, before it is made a dataclass, be no values that JAX sees."""
+    """Make text fields of a class static for JAX, before it becomes a dataclass."""
     for name, annotation in vars(kind).get("__annotations__", {}).items():
         default = vars(kind).get(name, dataclasses.MISSING)
         if annotation in (str, "str") and not isinstance(default, dataclasses.Field):
@@ -280,7 +282,7 @@ def keep_words_static(kind: type[Any]) -> None:
 
 
 def check_words(element: Any) -> None:
-    """Raise MechanismError unless fields of text have words that they may have, and the facts of its class can be."""
+    """Raise MechanismError unless text fields have permitted words, and the facts of the class are possible."""
     for name, words in facts_of(type(element)).choices.items():
         check_choice(name, getattr(element, name), words, MechanismError)
 

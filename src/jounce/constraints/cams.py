@@ -1,4 +1,4 @@
-"""Cams: joints that hold a coordinate to a law of another one, and react on both."""
+"""Cams: joints that hold one coordinate to a law of another, with forces on both."""
 
 import dataclasses
 from collections.abc import Sequence
@@ -12,30 +12,30 @@ from jounce.constraints.facts import facts_of
 from jounce.errors import MechanismError
 from jounce.jet import Jet, wrap
 
-AT_REST = 0.0  # the law of a driver of which the coordinate alone is meant
+AT_REST = 0.0  # law of a driver that only provides its coordinate
 
 
 class Cam(AbstractConstraint):
-    """A coordinate is a law of another one: a cam, which presses its follower and is pressed by it.
+    """A cam: one coordinate follows a law of another.
 
-    The residual is the coordinate of the follower less the law of that of the leader. So the leader bears the force on
-    the follower times the slope of the law, whatever moves it. An angle in space is that of a body about an axis by
-    which it is hinged. Attitudes tell it up to whole turns: an angle that leads is therefore a coordinate of its own,
-    that of a carriage without mass, which counts them, and an angle that follows may have gone whole turns.
+    The residual is the coordinate of the follower minus the law of that of the leader. The leader thus bears the force
+    on the follower times the slope of the law, whatever moves it. An angle in space is that of a body about the axis of
+    its hinge. Attitudes determine it up to whole turns. A leading angle is therefore a separate coordinate, that of a
+    massless carriage, which counts turns; a following angle may differ by whole turns.
 
     Parameters
     ----------
     follower : AbstractConstraint
-        A driver, which says what follows, and by its law how: the coordinate of the leader takes the place of the time.
+        A driver that defines the following coordinate; its law has the coordinate of the leader in place of time.
     leader : AbstractConstraint
-        What is followed: a driver, of which the coordinate counts and not the law; or a joint that turns or slides.
+        The leading element: a driver, whose coordinate counts and not its law; or a joint that turns or slides.
     of : str, optional
-        The name of the leader in a file.
+        Name of the leader in a file.
 
     Raises
     ------
     MechanismError
-        If one of them has no coordinate, or is a class of a user's own.
+        If one of them has no coordinate, or is of a user's class.
 
     Examples
     --------
@@ -51,7 +51,7 @@ class Cam(AbstractConstraint):
     leader: Part
     of: str = field(static=True, default="")
     slots: tuple[tuple[int, ...], ...] = field(static=True, default=((), ()))
-    unit: Any = field(default=None, init=False)  # m, by which the carriage moves with a rad: the size of all
+    unit: Any = field(default=None, init=False)  # displacement of the carriage per rad, m: the size of the mechanism
 
     body_counts = (2, 3, 4)
     symbol = "none"
@@ -82,7 +82,7 @@ class Cam(AbstractConstraint):
 
     @property
     def hidden(self) -> tuple[str, ...]:  # pyright: ignore[reportIncompatibleVariableOverride]
-        """The angle of a leader that turns in space, with its whole turns."""
+        """The counted angle of a leader that turns in space."""
         return ("turn",) if turns_in_space(self.leader) else ()
 
     def evaluate(self, *bodies: Any) -> Jet:
@@ -104,24 +104,24 @@ class Cam(AbstractConstraint):
 
 
 def turns_in_space(part: Any) -> bool:
-    """Tell whether the follower or the leader of a cam is an angle about an axis, known up to whole turns."""
+    """Return whether a follower or leader is an angle about an axis in space, determined up to whole turns."""
     return hasattr(part, "datum")
 
 
 def coordinate_of_element(element: Any, name: str = "leader") -> Any:
-    """Return a driver without a law that has the coordinate of a driver, or of a joint that turns or slides.
+    """Return a driver, without a law, for the coordinate of a driver, or of a joint that turns or slides.
 
     Parameters
     ----------
     element : AbstractConstraint
-        Of this package.
+        An element of this package.
     name : str
-        What it is, for messages.
+        Name of the element, for messages.
 
     Raises
     ------
     MechanismError
-        If it has no coordinate, or one that a cam does not follow.
+        If it has no coordinate, or one that no cam can follow.
 
     Examples
     --------
@@ -152,5 +152,5 @@ def coordinate_of_element(element: Any, name: str = "leader") -> Any:
 
 
 def _between(element: Any, bodies: Sequence[str]) -> Any:
-    """Return an element between bodies of other names."""
+    """Return an element with renamed bodies."""
     return element if element.bodies == tuple(bodies) else dataclasses.replace(element, bodies=tuple(bodies))

@@ -1,4 +1,4 @@
-"""Couplings in space: of shafts, by constant velocity, tripod, Oldham and gears; of a pinion and its rack."""
+"""Couplings in space: of shafts (constant velocity, tripod, Oldham, gears), and of a pinion with its rack."""
 
 from typing import Any, NamedTuple
 
@@ -14,22 +14,22 @@ from jounce.errors import MechanismError
 from jounce.jet import Jet, cross, dot, wrap
 from jounce.rigid import SpatialPose
 
-ROLLING = 1e-6  # of the speed of a pitch point: less sliding is that of written numbers that are rounded
+ROLLING = 1e-6  # of the speed of a pitch point: slower sliding is rounding of the input
 
 
 class ConstantVelocity(AbstractConstraint, type="constant_velocity", space="spatial"):
-    """Homokinetic joint, such as a Rzeppa joint: the centers coincide, and both shafts turn about their axes alike.
+    """Homokinetic joint, such as a Rzeppa joint: the centers coincide, and both shafts rotate equally about their axes.
 
-    What is left of the relative attitude after the shortest tilt of the axis is no turn about it, but for the offset:
-    so the balls of such a joint lie in the plane that bisects the angle of the shafts. Hunt, Constant-velocity shaft
+    The relative attitude, after the shortest tilt of the axis, contains no rotation about it except for the offset: the
+    balls of such a joint lie in the plane that bisects the angle of the shafts. Hunt, Constant-velocity shaft
     couplings: a general theory, 1973.
     """
 
     point_i: Vector  # m, center, in the frame of body i
     point_j: Vector
-    axis_i: Vector  # of each shaft, in its frame, both from one end of the drive to the other
+    axis_i: Vector  # of each shaft in its frame, both in the same sense along the drive
     axis_j: Vector
-    offset: Scalar = None  # rad, by which shaft j is turned about its axis
+    offset: Scalar = None  # rad, rotation of shaft j about its axis
 
     dimensions = {"offset": "angle"}
     point_distance = "zero"
@@ -44,17 +44,17 @@ class ConstantVelocity(AbstractConstraint, type="constant_velocity", space="spat
 class Tripod(AbstractConstraint, type="tripod", space="spatial"):
     """Plunging joint: three rollers on the arms of spider j, each in the middle plane of a track of tulip i.
 
-    The tracks hold the axis of the tulip, 120 degrees from one another, and so do the arms at the spider: its center
-    may slide along the tulip, and goes round a small circle three times a turn where the shafts are at an angle.
+    The tracks contain the axis of the tulip, 120 degrees apart, and so are the arms of the spider. Its center may slide
+    along the tulip, and runs around a small circle three times per turn if the shafts are at an angle.
     """
 
     point_i: Vector  # m, on the axis of the tulip, in the frame of body i
     point_j: Vector  # m, center of the spider, in the frame of body j
-    axis_i: Vector  # of each shaft, in its frame, both from one end of the drive to the other
+    axis_i: Vector  # of each shaft in its frame, both in the same sense along the drive
     axis_j: Vector
-    normal_i: Vector  # across the axis, toward the first track
-    normal_j: Vector  # across the axis, along the first arm
-    radius: Scalar  # m, of the rollers' centers
+    normal_i: Vector  # normal to the axis, toward the first track
+    normal_j: Vector  # normal to the axis, along the first arm
+    radius: Scalar  # m, distance of the roller centers from the axis
 
     never_parallel = (("normal_i", "axis_i"), ("normal_j", "axis_j"))
     symbol = "spherical"
@@ -72,7 +72,8 @@ class Tripod(AbstractConstraint, type="tripod", space="spatial"):
 class Oldham(AbstractConstraint, type="oldham", space="spatial"):
     """Coupling of parallel shafts: a disc with two slots at right angles, in which a tongue of each hub slides.
 
-    The disc has no mass here. The hubs may move to each other in the plane across the axes, and neither turn nor tilt.
+    The disc has no mass. The hubs may move relative to each other in the plane normal to the axes, but neither rotate
+    nor tilt.
     """
 
     point_i: Vector  # m, in the plane of the disc, in the frame of body i
@@ -97,23 +98,24 @@ class Oldham(AbstractConstraint, type="oldham", space="spatial"):
 class Rolling(AbstractConstraint, type="rolling", space="spatial"):
     """Rack and pinion: a pinion j rolls along a line of body i, about an axis across the line.
 
-    A pinion that turns about the axis goes along the line: its center lies on the side of ``vector x axis``, seen from
-    the line. Other joints hold the axis on both bodies, and keep the distance of the center from the line. The force of
-    a tooth acts along the line at the pitch point, one radius from the center; a pressure angle presses both apart.
+    A pinion that turns about the axis moves along the line: its center lies on the side of ``vector x axis``, seen from
+    the line. Other joints hold the axis on both bodies, and the distance of the center from the line. The tooth force
+    acts along the line at the pitch point, one radius from the center; with a pressure angle, it also presses both
+    apart.
 
-    Travel is counted over turns, as that of a nut on its screw.
+    Travel is counted over turns, as with a nut on its screw.
     """
 
     point_i: Vector  # m, on the line, in the frame of body i
     point_j: Vector  # m, center of the pinion, in the frame of body j
     vector_i: Vector  # along the line
-    axis_i: Vector  # of the pinion, across the line
+    axis_i: Vector  # of the pinion, normal to the line
     axis_j: Vector
     radius: Scalar  # m, of the pitch circle
     offset: Scalar = None  # m
     pressure_angle: Scalar = None  # rad
     friction: Nested = None
-    flank: Any = field(default=None, init=False)  # 1 or -1, the sign of the multiplier; zero for neither
+    flank: Any = field(default=None, init=False)  # 1 or -1, the sign of the multiplier; zero if undecided
 
     dimensions = {"offset": "length", "pressure_angle": "angle"}
     signs = {"pressure_angle": "pressure angle"}
@@ -135,26 +137,26 @@ class Rolling(AbstractConstraint, type="rolling", space="spatial"):
         return rolled - self.flank * jnp.tan(self.pressure_angle) * clearance
 
     def slip(self, bodies: tuple[Any, ...], moving: Velocities) -> Jet:
-        """Return how fast the pinion turns about its axis relative to the rack, rad/s."""
+        """Return the angular velocity of the pinion about its axis relative to the rack, rad/s."""
         return rows(bodies[0].direction(self.axis_i).dot(relative_turn(moving)) / length_of(self.axis_i))
 
     def passed_on(self, multiplier: Jet) -> Jet:
-        """Return the torque that the pinion passes on to the rack, N m."""
+        """Return the torque that the pinion transmits to the rack, N m."""
         return multiplier * -self.radius
 
 
 class Gear(AbstractConstraint, type="gear", space="spatial"):
     """Shafts i and j turn in a ratio, each about its axis, relative to the frame m that carries them.
 
-    The axes may lie as they like, crossed as of a worm and its wheel, cut each other as of bevel gears, or be parallel
-    as of a belt, and the frame may move. Each is the axis of a joint, which holds its direction in the frame.
+    The axes may be skew, as with a worm and its wheel, intersect, as with bevel gears, or be parallel, as with a belt;
+    the frame may move. Each is the axis of a joint, which holds its direction in the frame.
 
-    Turns are read from the attitudes, and the remainder of the ratio after whole turns of both shafts must vanish: a
-    continuous motion never loses count if the ratio is one of whole numbers, as those of all teeth are.
+    Rotations are read from the attitudes, and the remainder of the ratio after whole turns of both shafts must vanish:
+    a continuous motion never loses count if the ratio is one of whole numbers, as with toothed gears.
 
-    With `points` and a pressure angle, bearings bear the force of a tooth. It acts at the pitch point, along the normal
-    of the flanks. On crossed axes these slide along the teeth, which shows how the teeth lie; on axes that are parallel
-    or cut each other the helix angle of gear i says so, positive for right-handed teeth.
+    With `points` and a pressure angle, the tooth force acts on the bearings, at the pitch point along the normal of the
+    flanks. On skew axes the flanks slide along the teeth, which determines the direction of the teeth; on parallel or
+    intersecting axes the helix angle of gear i does, positive for right-handed teeth.
     """
 
     axis_i: Vector  # in the frame of each body
@@ -165,13 +167,13 @@ class Gear(AbstractConstraint, type="gear", space="spatial"):
     point_i: Vector = None  # m, on the axis of each shaft, in its frame
     point_j: Vector = None
     point_m: Vector = None  # m, the pitch point, in the frame m
-    pressure_angle: Scalar = None  # rad, between the normal of a flank and the plane that both gears touch
-    helix_angle: Scalar = None  # rad, between the teeth of gear i and the axis, or the generator of the pitch cone
-    held_i: Datum | None = field(default=None, init=False)  # that lays each axis on the one that it is in the frame
+    pressure_angle: Scalar = None  # rad, between the normal of a flank and the common tangent plane of the gears
+    helix_angle: Scalar = None  # rad, between the teeth of gear i and its axis, or the generator of the pitch cone
+    held_i: Datum | None = field(default=None, init=False)  # aligns the axis with that in the frame
     held_j: Datum | None = field(default=None, init=False)
     whole: Any = field(default=None, init=False)  # the smallest whole number whose product with the ratio is whole
 
-    flank: Any = field(default=None, init=False)  # 1 or -1, the sign of the multiplier; zero for neither
+    flank: Any = field(default=None, init=False)  # 1 or -1, the sign of the multiplier; zero if undecided
 
     body_count = 3
     dimensions = {"ratio": "ratio", "offset": "angle", "pressure_angle": "angle", "helix_angle": "angle"}
@@ -198,7 +200,7 @@ class Gear(AbstractConstraint, type="gear", space="spatial"):
         return excess if self.whole is None else wrap(excess, 2 * jnp.pi / self.whole)
 
     def variation(self, bodies: tuple[Any, ...], changes: tuple[Any, ...], time: Jet) -> Jet:
-        """Return how the residual varies, and with a flank how far teeth part but by turning, which they never do."""
+        """Return the variation of the residual; with a flank, including the gap of the teeth, which stays zero."""
         turned = super().variation(bodies, changes, time)
         if self.flank is None or self.pressure_angle is None:
             return turned
@@ -210,7 +212,7 @@ class Gear(AbstractConstraint, type="gear", space="spatial"):
         return turned + along.dot(parted[1] - parted[0])
 
     def _mesh(self, bodies: tuple[Any, ...]) -> tuple[Jet, Jet, list[Jet], list[Jet]]:
-        """Return the pitch point, the tooth force of a multiplier, the axes, and how gears move by their turns."""
+        """Return the pitch point, the tooth force per multiplier, the axes, and the `arms` of the pitch point."""
         mesh = PitchPoint.of(self, bodies)
         normal = mesh.across_teeth(self.helix_angle)
         moved = normal.dot(mesh.arms[1])
@@ -218,32 +220,32 @@ class Gear(AbstractConstraint, type="gear", space="spatial"):
         return mesh.place, (normal + mesh.normal * slope) / moved, mesh.axes, mesh.arms
 
     def slip(self, bodies: tuple[Any, ...], moving: Velocities) -> Jet:
-        """Return how fast shaft i turns about its axis relative to the frame, rad/s."""
+        """Return the angular velocity of shaft i about its axis relative to the frame, rad/s."""
         turning = bodies[0].direction(self.axis_i).dot(moving[0][1] - moving[2][1])
         return rows(turning / length_of(self.axis_i))
 
     def passed_on(self, multiplier: Jet) -> Jet:
-        """Return the torque that shaft i passes on to shaft j, as seen at shaft i, N m."""
+        """Return the torque that shaft i transmits to shaft j, as seen at shaft i, N m."""
         return multiplier * -self.ratio
 
 
 class PitchPoint(NamedTuple):
-    """Where gears in space touch, in the ground frame.
+    """The contact of spatial gears, in the ground frame.
 
     Attributes
     ----------
     place : Jet
-        Of the pitch point.
+        Position of the pitch point.
     axes : list of Jet
-        Unit vectors along both.
+        Unit vectors along both axes.
     arms : list of Jet
-        How the points of the gears there move as each turns by one about its axis.
+        Velocities of the points of both gears at the pitch point, as each gear turns at unit rate.
     sliding : Jet
-        How fast the gears slide on each other there, as gear i turns by one.
+        Sliding velocity of the gears at the pitch point, as gear i turns at unit rate.
     rolls : array of bool
-        Whether they do not, as on axes that are parallel or cut each other.
+        Whether the gears roll without sliding, as on parallel or intersecting axes.
     normal : Jet
-        Normal of the plane that both touch, from gear i to gear j.
+        Normal of the common tangent plane, from gear i to gear j.
     """
 
     place: Jet
@@ -255,7 +257,7 @@ class PitchPoint(NamedTuple):
 
     @classmethod
     def of(cls, gear: Gear, bodies: tuple[Any, ...]) -> "PitchPoint":
-        """Return that of gears whose bodies are at some poses."""
+        """Return the pitch point of gears at the poses of their bodies."""
         place = bodies[2].point(gear.point_m)
         axes = [unit(b.direction(axis)) for b, axis in zip(bodies[:2], (gear.axis_i, gear.axis_j), strict=True)]
         points = [b.point(point) for b, point in zip(bodies[:2], (gear.point_i, gear.point_j), strict=True)]
@@ -263,16 +265,16 @@ class PitchPoint(NamedTuple):
         sliding = arms[0] - arms[1] * gear.ratio
         square, least = (x.dot(x).coefficients[0] for x in (sliding, arms[0]))
         rolls = square <= ROLLING**2 * least
-        # the plane has the line on which gears roll, or the speeds of both gears where they slide
+        # the plane contains the line on which gears roll, or, if they slide, the velocities of both gears
         other = where(rolls, axes[0] - axes[1] * gear.ratio, arms[1])
         normal = unit(cross(arms[0], other))
         radial = [cross(arm, axis) for arm, axis in zip(arms, axes, strict=True)]
         curvatures = [normal.dot(r).coefficients[0] / r.dot(r).coefficients[0] for r in radial]
-        # of gear i more convex than gear j, also where one of them is a ring
+        # gear i is the more convex one, even if one of them is a ring
         return cls(place, axes, arms, sliding, rolls, normal * jnp.where(curvatures[0] > curvatures[1], 1.0, -1.0))
 
     def across_teeth(self, helix_angle: Any) -> Jet:
-        """Return a vector in the plane that both gears touch, across their teeth."""
+        """Return a vector in the common tangent plane, perpendicular to the teeth."""
         around = unit(self.arms[0])
         along = cross(self.normal, around)
         along = along * jnp.where(along.dot(self.axes[0]).coefficients[0] < 0, -1.0, 1.0)
@@ -282,7 +284,7 @@ class PitchPoint(NamedTuple):
 
 
 def _frame_of(axis: Vectors, normal: Vectors) -> tuple[Any, Any]:
-    """Return the unit vector across a constant axis toward another one, and the vector a quarter turn on."""
+    """Return the unit vector normal to a constant axis toward another vector, and the vector a quarter turn on."""
     along = axis / length_of(axis)[None]
     across = normal - dot(along, normal)[None] * along
     across = across / length_of(across)[None]

@@ -1,6 +1,6 @@
 """Drivers: constraints with a motion law ``f(t)``. Sommer 2024, equations 39-40, 44-49, 53-55 and 101-111.
 
-Each can be evaluated as an output is: its value is the coordinate that it prescribes, whatever its law.
+Each can be evaluated like an output: its value is the coordinate that it prescribes, whatever its law.
 """
 
 import jax.numpy as jnp
@@ -19,7 +19,7 @@ from jounce.rigid.pose import Pose
 class CoordinateDriver(AbstractConstraint, type="coordinate", space="planar", role="driver"):
     """Prescribed angle, x or y of body j: ``c_j = K phi_i + C + f(t)``. Sommer 2024, equations 39-40.
 
-    K is 1 unless given (the motion is relative to body i), which from ground makes no difference.
+    K is 1 unless given; the motion is then relative to body i. From ground, K makes no difference.
     """
 
     coordinate: str = field(static=True)  # angle, x or y of body j
@@ -95,16 +95,16 @@ class SpatialDistanceDriver(DistanceDriver, type="distance", space="spatial", ro
 class RotationDriver(AbstractConstraint, type="rotation", space="spatial", role="driver"):
     """Prescribed angle of body j about an axis of body i. Sommer 2024, equations 101-103, continuous over turns.
 
-    Without vectors the angle is that of ``A_i^T A_j`` where the mechanism is assembled, and the turn from there;
-    with them, the signed angle from `vector_i` to `vector_j`.
-    What is left of angle minus motion after whole turns must vanish, so that the motion may go on for many turns.
+    Without vectors, the angle is that of ``A_i^T A_j`` at the assembled position, plus the rotation since then; with
+    vectors, the signed angle from `vector_i` to `vector_j`. The remainder of angle minus motion after whole turns must
+    vanish, so that the motion may span many turns.
     """
 
     axis_i: Vector
     motion: MotionLaw  # rad
     vector_i: Vector = None
     vector_j: Vector = None
-    datum: Datum | None = field(default=None, init=False)  # found when the mechanism is assembled
+    datum: Datum | None = field(default=None, init=False)  # set when the mechanism is assembled
 
     periodic = True
     separable = True

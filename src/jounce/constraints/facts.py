@@ -1,8 +1,8 @@
-"""Facts that the class of a joint, driver, force or output states, and its fields, for all who read them.
+"""Facts that the class of a joint, driver, force or output states about itself and its fields.
 
-A class states a fact as a class variable; subclasses inherit it, and may state another. Facts of single fields are
-mappings from the name of a field, or from its name without the body, ``axis`` for ``axis_i`` and ``axis_j``; each entry
-is inherited by itself. The base classes state those of usual names.
+A class states a fact as a class variable, which subclasses inherit or override. Facts of single fields are mappings
+from the name of a field, or from its name without the body, ``axis`` for ``axis_i`` and ``axis_j``; each entry is
+inherited separately. The base classes state the facts of fields with usual names.
 """
 
 import dataclasses
@@ -27,8 +27,8 @@ WORDS = (
     "Nested",
     "Curve",
     "Part",
-)  # annotations that say what kind of value a field has
-BODY_ENDINGS = ("_i", "_j", "_m")  # of fields, by the body that they are fixed in
+)  # annotations of fields by kind of value
+BODY_ENDINGS = ("_i", "_j", "_m")  # of fields, by the body to which they belong
 
 USUAL_DIMENSIONS: Mapping[str, str] = MappingProxyType(
     {
@@ -36,7 +36,7 @@ USUAL_DIMENSIONS: Mapping[str, str] = MappingProxyType(
         **dict.fromkeys(("vector", "axis", "normal"), "direction"),
     }
 )
-"""Dimensions of fields of usual names, unless a class states others."""
+"""Dimensions of fields with usual names, unless a class states others."""
 
 USUAL_SIGNS: Mapping[str, str] = MappingProxyType(
     {
@@ -44,7 +44,7 @@ USUAL_SIGNS: Mapping[str, str] = MappingProxyType(
         **dict.fromkeys(("lead", "vector", "axis", "normal"), "not zero"),
     }
 )
-"""Signs of fields of usual names, unless a class states others."""
+"""Signs of fields with usual names, unless a class states others."""
 
 BY_COORDINATE: Mapping[str, Mapping[bool, str]] = MappingProxyType(
     {
@@ -52,7 +52,7 @@ BY_COORDINATE: Mapping[str, Mapping[bool, str]] = MappingProxyType(
         "per angle": {True: "ratio", False: "length per angle"},
     }
 )
-"""Dimensions that depend on whether the field ``coordinate`` beside is ``angle``."""
+"""Dimensions that depend on whether the field ``coordinate`` is ``angle``."""
 
 SIGNS: Mapping[str, str] = MappingProxyType(
     {
@@ -67,7 +67,7 @@ SIGNS: Mapping[str, str] = MappingProxyType(
         "any": "",
     }
 )
-"""Signs that values may have to have, and what is said of a value that has another."""
+"""Signs that may be required of values, and the message about a value without that sign."""
 
 _MACHINES = {
     "planar": ("revolute", "rod", "slot", "prismatic", "coordinate", "gear", "rolling", "curve", "belt", "rope"),
@@ -96,38 +96,39 @@ PAIRS = {
     "rod": ("point_i", "point_j", "length"),
     "prismatic": ("point_i", "point_j", "vector_i"),
 }
-"""Pairs by which planar linkages are recognized, and the fields that a joint has as one of them."""
-_DISTANCES = {"revolute": "zero", "rod": "length"}  # of the points of such pairs
+"""Pairs by which planar linkages are recognized, and the fields that they require."""
+_DISTANCES = {"revolute": "zero", "rod": "length"}  # between the points of such pairs
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Facts:
-    """What a class of joints, drivers, forces or outputs states, its own and what it inherits.
+    """The facts that a class of joints, drivers, forces or outputs states or inherits.
 
     Parameters
     ----------
     dimensions : mapping of str to str
-        Of each field: a word of `jounce.units.dimensions.KINDS`; ``direction`` for a vector of any unit;
-        ``of coordinate`` or ``per angle`` where it depends on the field ``coordinate``; ``any``.
+        Dimension of each field: a word of `jounce.units.dimensions.KINDS`; ``direction`` for a vector of any unit; ``of
+        coordinate`` or ``per angle`` if it depends on the field ``coordinate``; ``any``.
     signs : mapping of str to str
-        Of each field: ``positive``, ``not negative``, ``not zero`` (of a vector: of no zero length), ``any``.
+        Sign of each field: ``positive``, ``not negative``, ``not zero`` (for a vector, nonzero length), ``any``.
     choices : mapping of str to tuple of str
-        Words that a field of text may be.
+        Permitted words of text fields.
     held_parallel : tuple of tuple of str
-        Pairs of fields whose directions, on the first and the second body, the joint holds parallel.
+        Pairs of fields, on the first and the second body, whose directions the joint holds parallel.
     never_parallel : tuple of tuple of str
-        Pairs of fields: the first must not be parallel to the second, on the same body.
+        Pairs of fields on one body, the first of which must not be parallel to the second.
     squared_distance : str
-        Field of the distance, a value or a law, where the residual is the square of a distance less the square of it.
+        Field of a distance, a value or a law, if the residual is a squared distance minus its square.
     point_distance : str
-        How far apart the joint holds ``point_i`` and ``point_j``: ``zero``, or the field of their distance; else empty.
+        Distance at which the joint holds ``point_i`` and ``point_j``: ``zero``, or the field of the distance; else
+        empty.
     rolls_along : tuple of str
-        Of a disc that rolls on the first body: fields of the direction of its line, and in space of the axis of the
-        disc. Its center ``point_j`` lies by ``radius`` on the right of the line through ``point_i``.
+        For a disc that rolls on the first body: fields of the direction of its line, and in space of the axis of the
+        disc. Its center ``point_j`` lies ``radius`` to the right of the line through ``point_i``.
     symbol : str
-        What is drawn for it, see `symbols`; ``none`` for nothing, empty for a mark of what is not known.
+        Symbol to draw, see `symbols`; ``none`` for nothing, empty for a mark of an unknown element.
     pair : str
-        One of `PAIRS` where the joint is nothing else, else empty.
+        One of `PAIRS` to which the joint is equivalent, else empty.
     """
 
     dimensions: Mapping[str, str]
@@ -152,8 +153,8 @@ def facts_of(kind: type[Any]) -> Facts:
     Raises
     ------
     MechanismError
-        If the class states what cannot be: of a field that it has not, or in words that nobody knows; or if a field
-        has the name of a fact.
+        If the class states an impossible fact, such as one of a missing field or in an unknown word; or if a field has
+        the name of a fact.
 
     Examples
     --------
@@ -187,7 +188,7 @@ def facts_of(kind: type[Any]) -> Facts:
 
 
 def _of_field(kind: type[Any], fact: str, field: str, otherwise: Any) -> Any:
-    """Return what the first class in the order of inheritance says of a field."""
+    """Return the fact of a field from the first class that states it, in method resolution order."""
     for base in kind.__mro__:
         stated = vars(base).get(fact, {})
         if not isinstance(stated, Mapping):
@@ -200,7 +201,7 @@ def _of_field(kind: type[Any], fact: str, field: str, otherwise: Any) -> Any:
 
 
 def _pairs(kind: type[Any], fact: str) -> tuple[tuple[str, str], ...]:
-    """Return the pairs of fields that a class states."""
+    """Return the pairs of fields that a class states, checked."""
     pairs = getattr(kind, fact, ())
     for both in pairs:
         if isinstance(both, str) or len(both) != 2:
@@ -210,7 +211,7 @@ def _pairs(kind: type[Any], fact: str) -> tuple[tuple[str, str], ...]:
 
 
 def _of_residual(kind: type[Any], fact: str) -> str:
-    """Return what is stated by the class that a user's residual is of, or by one derived from it; else it is empty."""
+    """Return a fact stated by the class that defines the residual, or by a class derived from it; else empty."""
     for base in kind.__mro__:
         if fact in vars(base):
             return vars(base)[fact]
@@ -220,7 +221,7 @@ def _of_residual(kind: type[Any], fact: str) -> str:
 
 
 def _check(kind: type[Any], facts: Facts, fields: tuple[str, ...]) -> None:
-    """Raise MechanismError if a class states what cannot be."""
+    """Raise MechanismError if a class states an impossible fact."""
 
     def must_be(fact: str, word: str, known: Any, noun: str) -> None:
         if word not in known:
@@ -248,7 +249,7 @@ def _check(kind: type[Any], facts: Facts, fields: tuple[str, ...]) -> None:
 
 
 def _named_fields(facts: Facts) -> Iterator[tuple[str, str]]:
-    """Give the names of fields in facts of a class, after those of the facts."""
+    """Yield the names of facts of a class, each with a field that it names."""
     for fact in ("held_parallel", "never_parallel"):
         yield from ((fact, name) for both in getattr(facts, fact) for name in both)
     if facts.squared_distance:
@@ -260,9 +261,9 @@ def _named_fields(facts: Facts) -> Iterator[tuple[str, str]]:
 
 
 def _stated_fields(kind: type[Any]) -> Iterator[tuple[str, str]]:
-    """Give the names of fields of which a class or one of its bases states facts, after those of the facts.
+    """Yield the names of facts that a class or its bases state by field, each with a field.
 
-    The usual names are left out.
+    The facts of usual names are left out.
     """
     for base in kind.__mro__:
         for fact in ("dimensions", "signs", "choices"):
@@ -272,7 +273,7 @@ def _stated_fields(kind: type[Any]) -> Iterator[tuple[str, str]]:
 
 
 def symbols(kind: type[Any]) -> tuple[str, ...]:
-    """Return the symbols that a class may state, as plots know them.
+    """Return the symbols that a class may state.
 
     Examples
     --------
@@ -287,12 +288,12 @@ def symbols(kind: type[Any]) -> tuple[str, ...]:
 
 
 def stem_of(field: str) -> str:
-    """Return the name of a field without the body that it is fixed in."""
+    """Return the name of a field without the ending of its body."""
     return field[:-2] if field[-2:] in BODY_ENDINGS else field
 
 
 def has_other_sign(sign: str, least: Any, largest: Any) -> Any:
-    """Tell whether values do not have the sign that they must have, by their least entries and largest magnitudes.
+    """Return whether values lack the required sign, given their least entries and largest magnitudes.
 
     Examples
     --------
@@ -320,7 +321,7 @@ def has_other_sign(sign: str, least: Any, largest: Any) -> Any:
 
 
 def at_coordinate(dimension: str, coordinate: object) -> str:
-    """Return the dimension of a field where that depends on the field ``coordinate``, else as it is.
+    """Return the dimension of a field, resolved by the field ``coordinate`` if it depends on it.
 
     Examples
     --------
@@ -331,7 +332,7 @@ def at_coordinate(dimension: str, coordinate: object) -> str:
 
 
 def dimension_of_field(element: Any, field: str) -> str:
-    """Return the dimension of a field of an element, of its own coordinate where it depends on that.
+    """Return the dimension of a field of an element, resolved by its coordinate.
 
     Examples
     --------
@@ -345,13 +346,13 @@ def dimension_of_field(element: Any, field: str) -> str:
 
 @lru_cache(maxsize=1000)
 def value_fields(kind: type[Any]) -> Mapping[str, dataclasses.Field]:
-    """Return the fields of a joint, driver or force that a user gives, by name; `bodies` is not among them."""
+    """Return the fields of a joint, driver or force that users give, by name, without `bodies`."""
     return {field.name: field for field in dataclasses.fields(kind) if field.name != "bodies" and field.init}
 
 
 @lru_cache(maxsize=1000)
 def field_kinds(kind: type[Any]) -> Mapping[str, str]:
-    """Return the kinds of the fields that a user gives, by name; see `field_kind`."""
+    """Return the kinds of the fields that users give, by name; see `field_kind`."""
     return {name: field_kind(field) for name, field in value_fields(kind).items()}
 
 

@@ -1,8 +1,9 @@
-"""Dry friction of joints: how surfaces in contact slide on each other, and how much they resist it.
+"""Dry friction of joints: sliding of surfaces in contact, and its resistance.
 
-What a joint exerts presses its surfaces together, and friction is in proportion to that. A joint that can have it says
-in `slip` how its surfaces slide, linear in the velocities of its bodies; what presses them is its reaction force. The
-teeth of gears take a share of the power that they pass on: a gear says in `passed_on` by which torque.
+The reaction of a joint presses its surfaces together, and friction is proportional to it. A joint that may have
+friction defines `slip`, the sliding of its surfaces, linear in the velocities of its bodies; its reaction force is the
+normal force. Gear teeth take a share of the power that they transmit: a gear defines the transmitted torque in
+`passed_on`.
 """
 
 import operator
@@ -22,27 +23,27 @@ from jounce.rigid import PlanarPose
 from jounce.rigid.pose import Pose
 
 Velocities = Sequence[tuple[Jet, Jet]]
-"""Of each body: velocity of the origin, and angular velocity, both global; or a displacement and a turn."""
+"""Velocity of the origin, and angular velocity, of each body, both global; or displacement and rotation."""
 
-NEAR = 0.09  # of the square of slip over speed: below, tanh(x) / x is taken by its series
+NEAR = 0.09  # squared ratio of slip to speed below which tanh(x) / x is computed by its series
 TERMS = 13  # of that series
 
 
 class Friction(Module):
-    """Dry friction of a joint, Coulomb's law: in proportion to what presses its surfaces together, and against slip.
+    """Dry friction of a joint by Coulomb's law: proportional to the normal force, and opposite to slip.
 
     It is ``mu |R| tanh(v / speed)`` along the slip v of a guide, and a moment ``mu r |R| tanh(omega r / speed)`` about
-    a pin of radius r, R being the reaction force of the joint. Within some multiples of the speed it is less than
-    Coulomb's, and at rest there is none: nothing sticks, but creeps. It is on both bodies, with opposite signs.
+    a pin of radius r, with R the reaction force of the joint. Up to a few multiples of the speed it is less than
+    Coulomb's friction, and at rest it is zero: nothing sticks, but creeps. It acts on both bodies, with opposite signs.
 
     Parameters
     ----------
     coefficient : float or expression
         Coefficient of friction mu, not negative.
     speed : float or expression
-        Speed of slip at which it is 76 percent of Coulomb's, m/s; far below those of the motion.
+        Speed of slip at which friction is 76 percent of Coulomb's, m/s; choose it far below the speeds of the motion.
     radius : float or expression, optional
-        Of the surface that slides where the bodies turn, m: of the pin, the ball or the thread; guides have none.
+        Radius of the sliding surface where the bodies turn, m: of the pin, the ball or the thread; guides have none.
 
     Examples
     --------
@@ -68,7 +69,7 @@ class Friction(Module):
     signs = {"coefficient": "not negative", "speed": "positive", "radius": "positive"}
 
     def resisting(self, slip: Float[Jet, "direction *batch"]) -> Float[Jet, "direction *batch"]:
-        """Return the part of what presses that resists slip, in each direction of it."""
+        """Return the ratio of friction to the normal force, opposite to slip, in each direction of slip."""
         relative = slip / self.speed
         if slip.shape[0] == 1:
             return _tanh(relative) * self.coefficient
@@ -76,30 +77,30 @@ class Friction(Module):
 
 
 class GearFriction(Module):
-    """Friction of the teeth of gears: a torque against the turning of gear i, in proportion to the torque passed on.
+    """Friction of gear teeth: a torque opposite to the rotation of gear i, proportional to the transmitted torque.
 
-    The power that leaves the gears is that which enters them times the efficiency: `efficiency` where gear i drives
-    gear j, and `backward` where gear j drives gear i. Both count in the frame that carries the gears. A worm has a
-    coefficient and its lead angle instead, from which both follow as of a screw: ``tan(lead) / tan(lead + rho)`` where
-    the worm, gear i, drives, and ``tan(lead - rho) / tan(lead)`` where its wheel does, with ``tan(rho) = coefficient /
-    cos(pressure_angle)``. What is zero or less backward locks itself: gear j moves gear i no way, and where gear i is
-    driven under a load that pushes it, it must be driven all the same. Within some multiples of the speed friction is
-    less, and at rest there is none: nothing sticks, but creeps. Niemann and Winter, Maschinenelemente 3.
+    The output power is the input power times the efficiency: `efficiency` if gear i drives gear j, and `backward` if
+    gear j drives gear i, both relative to the frame that carries the gears. A worm has a coefficient and a lead angle
+    instead, from which both follow as for a screw: ``tan(lead) / tan(lead + rho)`` if the worm, gear i, drives, and
+    ``tan(lead - rho) / tan(lead)`` if its wheel does, with ``tan(rho) = coefficient / cos(pressure_angle)``. With zero
+    or less backward, the gears are self-locking: gear j cannot move gear i, and even under a load that pushes it, gear
+    i must be driven. Up to a few multiples of the speed friction is less, and at rest it is zero: nothing sticks, but
+    creeps. Niemann and Winter, Maschinenelemente 3.
 
     Parameters
     ----------
     speed : float or expression
-        Of gear i relative to the frame, rad/s, at which friction is about 76 percent of what it is above; far below
-        those of the motion.
+        Angular velocity of gear i relative to the frame, rad/s, at which friction is about 76 percent of its full
+        value; choose it far below those of the motion.
     efficiency : float or expression, optional
-        Of power from gear i to gear j: above 0, at most 1.
+        Efficiency of power from gear i to gear j: above 0, at most 1.
     backward : float or expression, optional
-        Of power from gear j to gear i, at most 1; as forward unless given.
+        Efficiency of power from gear j to gear i, at most 1; by default as forward.
     coefficient, lead_angle : float or expression, optional
-        In the place of efficiencies: coefficient of friction of the flanks of worm i, and its lead angle at the pitch
+        In place of efficiencies: coefficient of friction of the flanks of worm i, and its lead angle at the pitch
         radius, rad.
     pressure_angle : float or expression, optional
-        Of the normal section of its thread, rad; none unless given.
+        Pressure angle of the normal section of its thread, rad; zero by default.
 
     Raises
     ------
@@ -154,9 +155,9 @@ class GearFriction(Module):
 
     @property
     def losses(self) -> tuple[Any, Any]:
-        """Shares of the torque passed on that gear i loses fast: the mean of forward and backward, half the difference.
+        """Shares of the transmitted torque lost at full speed: mean of forward and backward, and half the difference.
 
-        At rest it loses any torque within the mean to both sides of half the difference.
+        At rest, the loss may be any torque within the mean on both sides of half the difference.
         """
         forward, backward = self.efficiencies
         onward, back = 1.0 / forward - 1.0, 1.0 - backward
@@ -164,7 +165,7 @@ class GearFriction(Module):
 
     @property
     def efficiencies(self) -> tuple[Any, Any]:
-        """Efficiency where gear i drives gear j, and where gear j drives gear i."""
+        """Efficiencies if gear i drives gear j, and if gear j drives gear i."""
         if self.coefficient is None:
             return self.efficiency, self.efficiency if self.backward is None else self.backward
         of = jnp if is_traced((self.coefficient, self.pressure_angle, self.lead_angle)) else np
@@ -173,25 +174,25 @@ class GearFriction(Module):
         return rise * (1.0 - slope * rise) / (rise + slope), (rise - slope) / (rise * (1.0 + slope * rise))
 
     def resisting(self, slip: Float[Jet, "direction *batch"]) -> Float[Jet, "direction *batch"]:
-        """Return the part of the torque lost that is against the turning of gear i."""
+        """Return the share of the lost torque that opposes the rotation of gear i."""
         return _tanh(slip / self.speed)
 
     def lost(self, passed: Float[Jet, "*batch"], resisting: Float[Jet, "*batch"]) -> Float[Jet, "*batch"]:
-        """Return the torque lost at a gear i that turns fast, N m, from what it passes on and what `resisting` says.
+        """Return the torque lost at gear i at full speed, N m, from the transmitted torque and `resisting`.
 
-        Where no torque is passed on, its rates are not determined, and those of zero are returned.
+        Without transmitted torque, the rates of the loss are not determined; those of zero are returned.
         """
         mean, difference = self.losses
         return passed * (resisting * difference + mean * jnp.sign(passed.coefficients[0]))
 
 
 def friction_class(kind: type[Any]) -> type[Any]:
-    """Return the class of the friction that a class of joints can have."""
+    """Return the friction class of a class of joints."""
     return GearFriction if hasattr(kind, "passed_on") else Friction
 
 
 def _tanh_of_root(square: Jet) -> Jet:
-    """Return ``tanh(x) / x`` from the square of x, smooth at zero, where the root is not."""
+    """Return ``tanh(x) / x`` from the square of x; smooth at zero, unlike the root."""
     near = square.coefficients[0] < NEAR
     small, large = (where(condition, square, 1e-2) for condition in (near, ~near))
     series = small * 0.0
@@ -204,7 +205,7 @@ def _tanh_of_root(square: Jet) -> Jet:
 def _tanh(x: Jet) -> Jet:
     """Return the hyperbolic tangent by exponentials, whose coefficients keep their digits where it saturates.
 
-    The recurrence of series by ``1 - tanh^2`` loses them, and has steps of simulations short far above the speed.
+    The recurrence by ``1 - tanh^2`` loses them, and makes steps of simulations short far above the speed.
     """
     side = jnp.where(x.coefficients[0] < 0, -1.0, 1.0)
     left = exp(x * (-2.0 * side))
@@ -212,7 +213,7 @@ def _tanh(x: Jet) -> Jet:
 
 
 def _terms() -> list[float]:
-    """Return the coefficients of ``tanh(x) / x`` by powers of the square of x, as ``tanh' = 1 - tanh^2`` has them."""
+    """Return the coefficients of ``tanh(x) / x`` in powers of the square of x, from ``tanh' = 1 - tanh^2``."""
     coefficients = [1.0]
     for k in range(1, TERMS):
         coefficients.append(-sum(map(operator.mul, coefficients, coefficients[::-1])) / (2 * k + 1))
@@ -220,14 +221,14 @@ def _terms() -> list[float]:
 
 
 def where(condition: Any, jet: Jet, other: Any) -> Jet:
-    """Return one jet where a condition holds, and elsewhere another one or a constant."""
+    """Return a jet where a condition holds, and another jet or a constant elsewhere."""
     others = other if isinstance(other, Jet) else Jet.constant(jnp.full_like(jet.coefficients[0], other), jet.order)
     pairs = zip(jet.dense().coefficients, others.dense().coefficients, strict=True)
     return Jet(tuple(jnp.where(condition, a, b) for a, b in pairs))
 
 
 def check_friction(joint: Any) -> None:
-    """Raise MechanismError unless what a joint has as friction is one, with a radius where surfaces turn."""
+    """Raise MechanismError unless the friction of a joint is of the right class, with a radius if surfaces rotate."""
     friction = joint.friction
     if friction is None:
         return
@@ -247,9 +248,9 @@ def check_friction(joint: Any) -> None:
 
 
 def check_no_own_code(joint: Any) -> None:
-    """Raise UnsupportedError where a user wrote how surfaces slip, what presses them, or the law of their friction.
+    """Raise UnsupportedError for users' methods of slip, normal force or friction law.
 
-    What such methods compute is not read off when a model is built, so that numbers that they capture would be kept.
+    Such methods are not traced when a model is built, so that changes of captured numbers would go unnoticed.
     """
     friction = getattr(joint, "friction", None)
     if friction is None or not (hasattr(joint, "slip") or hasattr(joint, "passed_on")):
@@ -264,7 +265,7 @@ def check_no_own_code(joint: Any) -> None:
 
 
 def velocities(bodies: Sequence[Pose]) -> Velocities:
-    """Return how bodies move, one order shorter than their poses."""
+    """Return the velocities of bodies, one order shorter than their poses."""
     return [
         (
             b.position.differentiate(),
@@ -275,7 +276,7 @@ def velocities(bodies: Sequence[Pose]) -> Velocities:
 
 
 def displacements(bodies: Sequence[Pose], changes: Sequence[Any]) -> Velocities:
-    """Return by how much bodies are displaced and turned by changes that `varied` gave; None is no change."""
+    """Return displacements and rotations of bodies by variations from `varied`; None is no variation."""
     velocities = []
     for body, change in zip(bodies, changes, strict=True):
         if change is None:
@@ -289,7 +290,7 @@ def displacements(bodies: Sequence[Pose], changes: Sequence[Any]) -> Velocities:
 
 
 def slip_velocity(joint: Any, bodies: Sequence[Pose]) -> Float[Jet, "direction *batch"]:
-    """Return how fast the surfaces of a joint slide on each other, m/s, one order shorter than the poses."""
+    """Return the slip velocity of the surfaces of a joint, m/s, one order shorter than the poses."""
     return joint.slip(tuple(b.truncate(b.order - 1) for b in bodies), velocities(bodies))
 
 
@@ -299,7 +300,7 @@ def relative_turn(moving: Velocities) -> Jet:
 
 
 def relative_velocity(bodies: Sequence[Pose], moving: Velocities, point_j: Any) -> Jet:
-    """Return the velocity of a point of the second body relative to the first, global."""
+    """Return the velocity of a point of the second body relative to the first, in global components."""
     place = bodies[1].point(point_j)
     return velocity_at(bodies[1], moving[1], place) - velocity_at(bodies[0], moving[0], place)
 
@@ -313,7 +314,7 @@ def line_turn(bodies: Sequence[Pose], moving: Velocities, point_i: Any, point_j:
 
 
 def velocity_at(body: Pose, moving: tuple[Jet, Jet], place: Jet) -> Jet:
-    """Return the velocity of the point of a body that is at a place, global."""
+    """Return the global velocity of the body-fixed point at a given place."""
     velocity, turning = moving
     lever = place - body.position
     if isinstance(body, PlanarPose):
@@ -322,21 +323,21 @@ def velocity_at(body: Pose, moving: tuple[Jet, Jet], place: Jet) -> Jet:
 
 
 class UnitFriction(Module):
-    """Friction of one along a direction of slip, whatever slips: what any friction at rest is made of.
+    """Unit friction along one direction of slip, of which any friction at rest is composed.
 
     Parameters
     ----------
     radius : float, optional
-        As of `Friction`.
+        Radius, as in `Friction`.
     direction : int
-        Of slip.
+        Index of the direction of slip.
     """
 
     radius: Any
     direction: int = field(static=True)
 
     def resisting(self, slip: Float[Jet, "direction *batch"]) -> Float[Jet, "direction *batch"]:
-        """Return one in that direction, and nothing in the others."""
+        """Return one in that direction, and zero in the others."""
         none = jnp.zeros_like(slip.coefficients[0])
         return Jet.constant(none.at[self.direction].set(1.0), slip.order)
 
@@ -344,18 +345,17 @@ class UnitFriction(Module):
 def pressing_force(
     joint: Any, bodies: Sequence[Pose], force: Float[Jet, "component *batch"]
 ) -> Float[Jet, "direction *batch"]:
-    """Return what presses the surfaces of a joint, N, as a vector, from what it exerts on its second body, global.
+    """Return the force that presses the surfaces of a joint, N, from its global reaction on the second body.
 
-    It is that force, unless the class has a `pressing` of its own.
+    It is that reaction, unless the class defines `pressing`.
     """
     return force if not hasattr(joint, "pressing") else joint.pressing(bodies, force)
 
 
 def normal_force(joint: Any, bodies: Sequence[Pose], force: Float[Jet, "component *batch"]) -> Float[Jet, "*batch"]:
-    """Return what presses the surfaces of a joint together, N, from what it exerts on its second body, global.
+    """Return the normal force of the surfaces of a joint, N, from its global reaction on the second body.
 
-    It is the size of `pressing_force`. Where there is none, its rates are not determined, and those of zero are
-    returned.
+    It is the norm of `pressing_force`. If that is zero, its rates are not determined; those of zero are returned.
     """
     pressing = pressing_force(joint, bodies, force)
     square = pressing.dot(pressing)

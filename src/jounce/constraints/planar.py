@@ -1,7 +1,7 @@
 """Planar joints: a residual of a few lines each. Sommer 2024, section 3.
 
-In each, ``d = r_j^P - r_i^P`` leads from the joint's point on body i to that on body j, and ``a`` is a vector fixed in
-a body, seen in the global frame. ``cross(a, b)`` is the paper's ``a^T R^T b``.
+In each, ``d = r_j^P - r_i^P`` is the vector from the joint's point on body i to that on body j, and ``a`` is a
+body-fixed vector in global components. ``cross(a, b)`` is the paper's ``a^T R^T b``.
 """
 
 from typing import Any
@@ -21,7 +21,7 @@ from jounce.rigid import PlanarPose
 from jounce.rigid.pose import Pose
 
 COORDINATES = ("angle", "x", "y")
-FAR = 1e300  # a period that is never gone through
+FAR = 1e300  # a period that is never completed
 Vectors = Float[Numbers, "components *batch"]
 
 
@@ -31,13 +31,13 @@ def length_of(vector: Float[Numbers, "components *batch"]) -> Float[Numbers, "*b
 
 
 def slide(body_i: Pose, body_j: Pose, point_i: Vectors, point_j: Vectors, vector_i: Vectors) -> Jet:
-    """Return the distance, in m, from the point on body i to that on body j, along a direction fixed in body i."""
+    """Return the distance, m, from the point on body i to that on body j, along a direction fixed in body i."""
     d = body_j.point(point_j) - body_i.point(point_i)
     return body_i.direction(vector_i).dot(d) / length_of(vector_i)
 
 
 def _sliding(bodies: tuple[Any, ...], moving: Velocities, point_j: Vectors, vector_i: Vectors) -> Jet:
-    """Return the velocity, in m/s, of a point of body j relative to body i, along a direction fixed in that."""
+    """Return the velocity, m/s, of a point of body j relative to body i, along a direction fixed in body i."""
     velocity = relative_velocity(bodies, moving, point_j)
     return bodies[0].direction(vector_i).dot(velocity) / length_of(vector_i)
 
@@ -65,7 +65,7 @@ class Revolute(AbstractConstraint, type="revolute", space="planar"):
         return body_j.point(self.point_j) - body_i.point(self.point_i)
 
     def slip(self, bodies: tuple[Any, ...], moving: Velocities) -> Jet:
-        """Return how the pin slips in its bore, m/s."""
+        """Return the slip of the pin in its bore, m/s."""
         return rows(relative_turn(moving) * self.friction.radius)
 
 
@@ -116,7 +116,7 @@ class Parallel2(AbstractConstraint, type="parallel2", space="planar"):
         return cross(body_i.direction(self.vector_i), d)
 
     def slip(self, bodies: tuple[Any, ...], moving: Velocities) -> Jet:
-        """Return how fast the point slides along the slot, m/s; that the pin turns in it does not count."""
+        """Return the sliding velocity of the point along the slot, m/s; rotation of the pin in it does not count."""
         return rows(_sliding(bodies, moving, self.point_j, self.vector_i))
 
 
@@ -142,16 +142,16 @@ class Prismatic(AbstractConstraint, type="prismatic", space="planar"):
         check_friction(self)
 
     def slip(self, bodies: tuple[Any, ...], moving: Velocities) -> Jet:
-        """Return how fast body j slides in its guide, m/s."""
+        """Return the sliding velocity of body j in its guide, m/s."""
         return rows(_sliding(bodies, moving, self.point_j, self.vector_i))
 
 
 class Fixed(AbstractConstraint, type="fixed", space="planar"):
-    """Weld: a point of each body coincides, and body j keeps its angle to body i, that of the guess unless given."""
+    """Weld: a point of each body coincides, and body j keeps its angle to body i, by default that of the guess."""
 
     point_i: Vector  # m, in the frame of body i
     point_j: Vector
-    offset: Scalar = None  # rad, the angle of body j less that of body i
+    offset: Scalar = None  # rad, the angle of body j minus that of body i
 
     dimensions = {"offset": "angle"}
     point_distance = "zero"
@@ -164,13 +164,13 @@ class Fixed(AbstractConstraint, type="fixed", space="planar"):
 class PlanarCurve(AbstractConstraint, type="curve", space="planar"):
     """Point on a curve: a point of body j stays on a curve of body i, as a pin in a track, or a roller in a cam groove.
 
-    The parameter of the curve is a coordinate of its own, that of an additional carriage without mass; the force of
-    the curve is along its normal.
+    The parameter of the curve is a separate coordinate, that of an additional massless carriage; the force of the curve
+    is along its normal.
     """
 
     curve: Curve  # of s, m, in the frame of body i
     point_j: Vector  # m, in the frame of body j
-    start: Scalar = None  # of the parameter, as a guess; where the curve is nearest to the guess of the bodies else
+    start: Scalar = None  # of the parameter, as a guess; by default the point of the curve nearest to the guess
 
     hidden = ("s",)
     dimensions = {"curve": "length", "start": "any"}
@@ -205,24 +205,24 @@ class Coordinate(AbstractConstraint, type="coordinate", space="planar"):
 class Gear(AbstractConstraint, type="gear", space="planar"):
     """Gears i and j by their pitch circles, or by a ratio on a frame m that turns. Sommer 2024, equations 41-43.
 
-    Toothed gears have two bodies, the points on them where the gears are centered, and pitch radii, of which that of a
-    ring is negative. They turn relative to the line of centers as rolling circles do, and what they exert on each other
-    is the force of a tooth, which bearings bear: along the common tangent of the pitch circles, and with a pressure
-    angle as much off it as presses the gears apart, whichever way the load is.
+    Toothed gears have two bodies, the points on them at their centers, and pitch radii, negative for a ring gear. They
+    turn relative to the line of centers as rolling circles do. The tooth force acts on the bearings: along the common
+    tangent of the pitch circles, and, with a pressure angle, inclined to it so as to press the gears apart, for either
+    direction of load.
 
-    By a ratio, gears turn relative to a third body, and no bearing bears anything.
+    Gears with a ratio turn relative to a third body, and exert no force on bearings.
     """
 
     ratio: Scalar = None  # -rho_i / rho_j external, rho_i / rho_j internal
     offset: Scalar = None  # rad
     point_i: Vector = None  # m, center of each gear in its frame
     point_j: Vector = None
-    radius_i: Scalar = None  # m, of the pitch circle; of a ring below zero
+    radius_i: Scalar = None  # m, of the pitch circle; negative for a ring gear
     radius_j: Scalar = None
     pressure_angle: Scalar = None  # rad
     friction: Nested = None
-    arm: Any = field(default=None, init=False)  # rad, of the line of centers in the frame of a body that has both
-    flank: Any = field(default=None, init=False)  # 1 or -1, the sign of the multiplier; zero for neither
+    arm: Any = field(default=None, init=False)  # rad, direction of the line of centers in the frame of their carrier
+    flank: Any = field(default=None, init=False)  # 1 or -1, the sign of the multiplier; zero if undecided
 
     body_counts = (2, 3)
     dimensions = {"ratio": "ratio", "offset": "angle", "pressure_angle": "angle"}
@@ -251,10 +251,10 @@ class Gear(AbstractConstraint, type="gear", space="planar"):
         check_friction(self)
 
     def residual(self, body_i: PlanarPose, body_j: PlanarPose, *others: Any) -> Jet:
-        """Return what body j lacks of turning as body i says.
+        """Return the difference between the rotation of body j and that required by body i.
 
-        Others are the body m and the time. Of gears with teeth there is a body m only where it is known which one
-        carries them: it counts the turns of the line of centers.
+        `others` are the body m and the time. Toothed gears have a body m only if their carrier is known: it counts the
+        turns of the line of centers.
         """
         if self.ratio is not None:
             return _turned(self, body_i, body_j, others[0].angle, self.ratio)
@@ -264,30 +264,30 @@ class Gear(AbstractConstraint, type="gear", space="planar"):
         excess = _turned_on_line(self, body_i, body_j, others, d, ratio)
         if self.flank is None or self.pressure_angle is None:
             return excess
-        # how far the centers may part, which they never do: across it, the tooth force is along the line of action
+        # with the separation of the centers, which is always zero, the tooth force is along the line of action
         parted = sqrt(d.dot(d)) - jnp.abs(center_distance)
         side = -self.flank * jnp.sign(center_distance) / jnp.abs(self.radius_j)
         return excess + side * jnp.tan(self.pressure_angle) * parted
 
     def slip(self, bodies: tuple[Any, ...], moving: Velocities) -> Jet:
-        """Return how fast gear i turns relative to what carries the gears, rad/s."""
+        """Return the angular velocity of gear i relative to the carrier of the gears, rad/s."""
         toothed = self.ratio is None
         carrier = line_turn(bodies, moving, self.point_i, self.point_j) if toothed else moving[2][1]
         return rows(moving[0][1] - carrier)
 
     def passed_on(self, multiplier: Jet) -> Jet:
-        """Return the torque that gear i passes on to gear j, as seen at gear i, N m."""
+        """Return the torque that gear i transmits to gear j, as seen at gear i, N m."""
         return multiplier * (-self.ratio if self.ratio is not None else self.radius_i / self.radius_j)
 
 
 def _turned_on_line(
     joint: Any, body_i: PlanarPose, body_j: PlanarPose, others: tuple[Any, ...], d: Jet, ratio: Any
 ) -> Jet:
-    """Return what body j lacks of turning by a ratio relative to the line of centers, whose turns the arm counts."""
+    """Return the residual of rotation in a ratio relative to the line of centers, whose turns the arm counts."""
     line = atan2(d[1], d[0])
     if joint.arm is None:
         period = 2 * jnp.pi * (1.0 - ratio)
-        period = jnp.where(period == 0, FAR, period)  # then the line does not count
+        period = jnp.where(period == 0, FAR, period)  # the line then does not matter
         return wrap(_turned(joint, body_i, body_j, line, ratio), period)
     line = shifted_by_turns(line, others[0].angle.coefficients[0] + joint.arm)
     return _turned(joint, body_i, body_j, line, ratio)
@@ -298,7 +298,7 @@ def _turned(joint: Any, body_i: PlanarPose, body_j: PlanarPose, line: Jet, ratio
 
 
 def _center_offset(d: Jet, distance: Any) -> Any:
-    """Return an offset of centers of gears that coincide in a guess, where the line of centers is undefined."""
+    """Return an offset for gear centers that coincide in a guess, where the line of centers is undefined."""
     value = d.coefficients[0]
     together = (value == 0).all(axis=0)
     return jnp.where(together, jnp.abs(distance), 0.0)[None] * np.array([1.0, 0.0]).reshape(2, *[1] * together.ndim)
@@ -307,10 +307,10 @@ def _center_offset(d: Jet, distance: Any) -> Any:
 class Belt(AbstractConstraint, type="belt", space="planar"):
     """Belt or chain around two pulleys, open or crossed, that neither slips nor stretches.
 
-    Pulleys turn relative to the line of centers in the ratio of their radii: where the centers move round each other,
-    the belt wraps on one and off the other. Both strands give by as much where the centers part, as under a tensioner.
-    What the belt exerts is the difference of the pulls of its strands, along these; their mean, which presses the
-    pulleys together, is that of the tension with which the belt was put on, and no matter of motion.
+    Pulleys turn relative to the line of centers in the ratio of their radii: as the centers move around each other, the
+    belt winds onto one pulley and off the other. Both strands lengthen equally as the centers separate, as under a
+    tensioner. The force of the belt is the difference of the tensions of its strands, along these. Their mean, which
+    pulls the pulleys together, is the pretension, which does not depend on the motion.
     """
 
     point_i: Vector  # m, center of each pulley in its frame
@@ -320,7 +320,7 @@ class Belt(AbstractConstraint, type="belt", space="planar"):
     crossed: Flag = field(static=True, default=False)
     offset: Scalar = None  # rad
     friction: Nested = None
-    arm: Any = field(default=None, init=False)  # rad, of the line of centers in the frame of a body that has both
+    arm: Any = field(default=None, init=False)  # rad, direction of the line of centers in the frame of their carrier
 
     dimensions = {"offset": "angle"}
     symbol = "belt"
@@ -330,27 +330,27 @@ class Belt(AbstractConstraint, type="belt", space="planar"):
 
     @property
     def ratio(self) -> Any:
-        """Turns of pulley j to those of pulley i, relative to the line of centers."""
+        """Turns of pulley j per turn of pulley i, relative to the line of centers."""
         return (-1.0 if self.crossed else 1.0) * self.radius_i / self.radius_j
 
     def residual(self, body_i: PlanarPose, body_j: PlanarPose, *others: Any) -> Jet:
-        """Return what body j lacks of turning as body i says; others are as those of a gear with teeth."""
+        """Return the difference between the rotation of body j and that required by body i; `others` as in `Gear`."""
         d = body_j.point(self.point_j) - body_i.point(self.point_i)
         d = d + _center_offset(d, self.radius_i + self.radius_j)
         return _turned_on_line(self, body_i, body_j, others, d, self.ratio)
 
     def slip(self, bodies: tuple[Any, ...], moving: Velocities) -> Jet:
-        """Return how fast pulley i turns relative to the line of centers, rad/s."""
+        """Return the angular velocity of pulley i relative to the line of centers, rad/s."""
         return rows(moving[0][1] - line_turn(bodies, moving, self.point_i, self.point_j))
 
     def passed_on(self, multiplier: Jet) -> Jet:
-        """Return the torque that pulley i passes on to pulley j, as seen at pulley i, N m."""
+        """Return the torque that pulley i transmits to pulley j, as seen at pulley i, N m."""
         return multiplier * -self.ratio
 
     def line_force(self) -> Any:
-        """Return the pull of the strand on the left of the line of centers less that of the other, N, for a multiplier.
+        """Return the tension of the strand left of the line of centers minus that of the other, N, per multiplier.
 
-        Left is seen from pulley i to pulley j, where the strand leaves pulley i.
+        Left is as seen from pulley i toward pulley j, where the strand leaves pulley i.
         """
         return (1.0 if self.crossed else -1.0) / self.radius_j
 
@@ -358,8 +358,8 @@ class Belt(AbstractConstraint, type="belt", space="planar"):
 class Rolling(AbstractConstraint, type="rolling", space="planar"):
     """A disc j rolls along a line of body i. Sommer 2024, equations 50-52 (51 as corrected in the errata).
 
-    A disc that turns anticlockwise, as angles count, goes along the line: its center lies on the right of it. A pinion
-    on a rack has a pressure angle, by which the force of a tooth presses both apart.
+    A disc that turns counterclockwise, in the positive sense of angles, moves along the line: its center lies to the
+    right of it. A pinion on a rack has a pressure angle, by which the tooth force presses both apart.
     """
 
     point_i: Vector  # m, on the line; in the frame of body i
@@ -369,7 +369,7 @@ class Rolling(AbstractConstraint, type="rolling", space="planar"):
     offset: Scalar = None  # m
     pressure_angle: Scalar = None  # rad
     friction: Nested = None
-    flank: Any = field(default=None, init=False)  # 1 or -1, the sign of the multiplier; zero for neither
+    flank: Any = field(default=None, init=False)  # 1 or -1, the sign of the multiplier; zero if undecided
 
     dimensions = {"offset": "length", "pressure_angle": "angle"}
     signs = {"pressure_angle": "pressure angle"}
@@ -389,9 +389,9 @@ class Rolling(AbstractConstraint, type="rolling", space="planar"):
         return rolled + self.flank * jnp.tan(self.pressure_angle) * (aside + self.radius)
 
     def slip(self, bodies: tuple[Any, ...], moving: Velocities) -> Jet:
-        """Return how fast the disc turns relative to the line, rad/s."""
+        """Return the angular velocity of the disc relative to the line, rad/s."""
         return rows(relative_turn(moving))
 
     def passed_on(self, multiplier: Jet) -> Jet:
-        """Return the torque that the disc passes on to the line, N m."""
+        """Return the torque that the disc transmits to the line, N m."""
         return multiplier * -self.radius

@@ -1,4 +1,4 @@
-"""Ropes: lines of one length through points of bodies, in the plane and in space."""
+"""Ropes: lines of constant length through points of bodies, in the plane and in space."""
 
 from itertools import pairwise
 from typing import Any
@@ -12,25 +12,25 @@ from jounce.jet.algebra import total
 
 
 class Rope(AbstractConstraint, type="rope"):
-    """Rope, cable or string of one length that runs without friction through points of bodies in their order.
+    """Rope, cable or string of constant length that runs without friction through points of bodies in the given order.
 
-    Its distances from point to point add up to the length. A block and tackle is a rope through a point of the moving
-    block and one of the ground in turn. The multiplier is the tension, the same all along: positive where the rope
-    pulls, negative where it would have to push, and is slack.
+    The distances between successive points add up to the length. A block and tackle is a rope through a point of the
+    moving block and one of the ground in turn. The multiplier is the tension, the same all along: positive where the
+    rope pulls, negative where it would have to push and is therefore slack.
 
     Parameters
     ----------
     bodies : tuple of str
-        Names of the bodies in the order of the points; one may be there several times.
+        Names of the bodies in the order of the points; a body may occur several times.
     points : sequence of sequence of float
-        One on each of them, in its frame, m.
+        One point on each of these bodies, in its frame, m.
     length : float
-        Of the whole rope between its ends, m.
+        Length of the whole rope between its ends, m.
 
     Raises
     ------
     MechanismError
-        If a rope has less than two bodies, or all points are on one.
+        If a rope has fewer than two bodies, or all points are on one body.
 
     Examples
     --------
@@ -42,7 +42,7 @@ class Rope(AbstractConstraint, type="rope"):
 
     points: Points  # m, one on each body in its frame
     length: Scalar  # m
-    slots: tuple[int, ...] = field(static=True, default=(), init=False)  # of the body of each point, where some repeat
+    slots: tuple[int, ...] = field(static=True, default=(), init=False)  # slot of each point, if bodies repeat
 
     body_counts = range(2, 101)
     may_repeat = True
@@ -54,23 +54,23 @@ class Rope(AbstractConstraint, type="rope"):
             raise MechanismError(message, name="bodies", value=list(self.bodies))
 
     def residual(self, *bodies_and_time: Any) -> Jet:
-        """Return by how much the distances from point to point exceed the length, m."""
+        """Return the excess of the sum of distances over the length, m."""
         *bodies, _ = bodies_and_time
         points = [bodies[slot].point(self.points[k]) for k, slot in enumerate(self.slots or range(len(bodies)))]
         segments = [after - before for before, after in pairwise(points)]
         return total(sqrt(segment.dot(segment)) for segment in segments) - self.length
 
     def line_force(self) -> float:
-        """Return the tension, N, for a multiplier."""
+        """Return the tension, N, per multiplier."""
         return 1.0
 
     def first_on(self, slot: int) -> Numbers:
-        """Return the first point on the body of a slot, in its frame, m."""
+        """Return the first point on the body in a slot, in its frame, m."""
         return self.points[(self.slots or tuple(range(len(self.points)))).index(slot)]
 
 
 def distinct(bodies: tuple[str, ...]) -> tuple[tuple[str, ...], tuple[int, ...]]:
-    """Return bodies each once, and the slot of each among them.
+    """Return the bodies without repetition, and the slot of each among them.
 
     Examples
     --------
@@ -82,5 +82,5 @@ def distinct(bodies: tuple[str, ...]) -> tuple[tuple[str, ...], tuple[int, ...]]
 
 
 def shares_points(element: Any) -> bool:
-    """Tell whether an element has several points on one body."""
+    """Return whether an element has several points on one body."""
     return isinstance(element, Rope) and len(set(element.bodies)) < len(element.bodies)

@@ -1,6 +1,6 @@
 """Spatial joints: the four basic residuals of Sommer 2024, section 5, joints composed of them, and couplings of shafts.
 
-In each, ``d = r_j^P - r_i^P`` leads from the joint's point on body i to that on body j.
+In each, ``d = r_j^P - r_i^P`` is the vector from the joint's point on body i to that on body j.
 """
 
 from typing import Any
@@ -48,7 +48,7 @@ class Spherical(AbstractConstraint, type="spherical", space="spatial"):
         return body_j.point(self.point_j) - body_i.point(self.point_i)
 
     def slip(self, bodies: tuple[Any, ...], moving: Velocities) -> Jet:
-        """Return how the ball slips in its socket, m/s, across the axis about which it turns, global."""
+        """Return the slip of the ball in its socket, m/s, as relative angular velocity times the radius, global."""
         return relative_turn(moving) * self.friction.radius
 
 
@@ -133,7 +133,7 @@ class Revolute(AbstractConstraint, type="revolute", space="spatial"):
         return rows(d, *parallel_rows(body_i, body_j, self.axis_i, self.axis_j))
 
     def slip(self, bodies: tuple[Any, ...], moving: Velocities) -> Jet:
-        """Return how the pin slips in its bore, m/s."""
+        """Return the slip of the pin in its bore, m/s."""
         return rows(_turning(bodies, moving, self.axis_i) * self.friction.radius)
 
 
@@ -158,7 +158,7 @@ class Cylindrical(AbstractConstraint, type="cylindrical", space="spatial"):
         return rows(*_collinear(self, body_i, body_j))
 
     def slip(self, bodies: tuple[Any, ...], moving: Velocities) -> Jet:
-        """Return how the shaft slips in its bore along the axis and around it, m/s."""
+        """Return the slip of the shaft in its bore along the axis and around it, m/s."""
         around = _turning(bodies, moving, self.axis_i) * self.friction.radius
         return rows(_sliding(bodies, moving, self), around)
 
@@ -186,7 +186,7 @@ class Prismatic(AbstractConstraint, type="prismatic", space="spatial"):
         return rows(*_collinear(self, body_i, body_j), side.dot(body_j.direction(self.normal_j)))
 
     def slip(self, bodies: tuple[Any, ...], moving: Velocities) -> Jet:
-        """Return how fast body j slides in its guide, m/s."""
+        """Return the sliding velocity of body j in its guide, m/s."""
         return rows(_sliding(bodies, moving, self))
 
 
@@ -210,7 +210,7 @@ class PlaneOnPlane(AbstractConstraint, type="planar", space="spatial"):
         return rows(distance, *parallel_rows(body_i, body_j, self.axis_i, self.axis_j))
 
     def slip(self, bodies: tuple[Any, ...], moving: Velocities) -> Jet:
-        """Return how the point of body j slides on the plane, m/s, along two directions of it; turns do not count."""
+        """Return the slip of the point of body j on the plane, m/s, in two directions of it, without rotation."""
         velocity = relative_velocity(bodies, moving, self.point_j)
         return rows(*[bodies[0].direction(side).dot(velocity) for side in perpendiculars(self.axis_i)])
 
@@ -239,13 +239,13 @@ class Fixed(AbstractConstraint, type="fixed", space="spatial"):
 class SpatialCurve(AbstractConstraint, type="curve", space="spatial"):
     """Point on a curve: a point of body j stays on a curve of body i, as a roller in the groove of a barrel cam.
 
-    The parameter of the curve is a coordinate of its own, that of an additional carriage without mass; the force of
-    the curve is perpendicular to its tangent.
+    The parameter of the curve is a separate coordinate, that of an additional massless carriage; the force of the curve
+    is perpendicular to its tangent.
     """
 
     curve: Curve  # of s, m, in the frame of body i
     point_j: Vector  # m, in the frame of body j
-    start: Scalar = None  # of the parameter, as a guess; where the curve is nearest to the guess of the bodies else
+    start: Scalar = None  # of the parameter, as a guess; by default the point of the curve nearest to the guess
 
     hidden = ("s",)
     dimensions = {"curve": "length", "start": "any"}
@@ -260,8 +260,8 @@ class SpatialCurve(AbstractConstraint, type="curve", space="spatial"):
 class Surface(AbstractConstraint, type="surface", space="spatial"):
     """Point on a surface: a point of body j stays on a surface of body i.
 
-    The parameters of the surface are coordinates of their own, those of an additional carriage without mass; the force
-    of the surface is along its normal.
+    The parameters of the surface are separate coordinates, those of an additional massless carriage; the force of the
+    surface is along its normal.
     """
 
     surface: Curve  # of u and v, m, in the frame of body i
@@ -283,8 +283,8 @@ class Surface(AbstractConstraint, type="surface", space="spatial"):
 class Screw(AbstractConstraint, type="screw", space="spatial"):
     """Nut j on a screw i: cylindrical, and an advance of one lead per turn. Sommer 2024, section 5.
 
-    The advance is counted over turns: what is left of it after whole leads must vanish, so that a continuous motion
-    never loses count.
+    The advance is counted over turns: its remainder after whole leads must vanish, so that a continuous motion never
+    loses count.
     """
 
     point_i: Vector  # m, on the axis, in the frame of body i
@@ -311,7 +311,7 @@ class Screw(AbstractConstraint, type="screw", space="spatial"):
         return rows(*_collinear(self, body_i, body_j), wrap(excess, self.lead))
 
     def slip(self, bodies: tuple[Any, ...], moving: Velocities) -> Jet:
-        """Return how the nut slips along the thread at its mean radius, m/s."""
+        """Return the slip of the nut along the thread at its mean radius, m/s."""
         cosine, sine = self._helix()
         around = _turning(bodies, moving, self.axis_i) * self.friction.radius
         return rows(around * cosine + _sliding(bodies, moving, self) * sine)
@@ -329,18 +329,18 @@ class Screw(AbstractConstraint, type="screw", space="spatial"):
 
 
 def _turning(bodies: tuple[Any, ...], moving: Velocities, axis_i: Vectors) -> Jet:
-    """Return how fast body j turns about an axis of body i, relative to that, rad/s."""
+    """Return the angular velocity of body j about an axis of body i, relative to body i, rad/s."""
     return bodies[0].direction(axis_i).dot(relative_turn(moving)) / length_of(axis_i)
 
 
 def _sliding(bodies: tuple[Any, ...], moving: Velocities, joint: Any) -> Jet:
-    """Return how fast the point of a joint on body j slides along the axis of body i, m/s."""
+    """Return the sliding velocity of the point of a joint on body j along the axis of body i, m/s."""
     velocity = relative_velocity(bodies, moving, joint.point_j)
     return bodies[0].direction(joint.axis_i).dot(velocity) / length_of(joint.axis_i)
 
 
 def _collinear(joint: Any, body_i: SpatialPose, body_j: SpatialPose) -> list[Jet]:
-    """Return the four rows that keep the axes of a joint on one line."""
+    """Return the four rows that keep the axes of a joint collinear."""
     d = body_j.point(joint.point_j) - body_i.point(joint.point_i)
     on_line = [body_i.direction(side).dot(d) for side in perpendiculars(joint.axis_i)]
     return [*parallel_rows(body_i, body_j, joint.axis_i, joint.axis_j), *on_line]

@@ -1,4 +1,4 @@
-"""What holds a body that nothing else keeps from spinning about an axis of itself."""
+"""The constraint that holds an idle body, which nothing else keeps from spinning about its own axis."""
 
 import jax.numpy as jnp
 
@@ -9,11 +9,11 @@ from jounce.rigid import SpatialPose
 
 
 class SpinHold(AbstractConstraint):
-    """The angular velocity of a body about an axis of itself: zero, the least motion, or a constant.
+    """The angular velocity of a body about its own axis: zero, for the least motion, or a constant.
 
-    A condition on velocities (a gauge): the residual is the angle by which the body has spun since the instant, zero
-    there, so that its coefficient of order k is affine in the angular velocity of order k - 1, as that of any joint.
-    It says nothing of the position, which corrections leave as it is.
+    This is a condition on velocities (a gauge). The residual is the angle by which the body has spun since the instant,
+    zero at the instant itself, so that its coefficient of order k is affine in the angular velocity of order k - 1, as
+    for any joint. It does not constrain the position, which corrections leave unchanged.
     """
 
     axis: Vector

@@ -1,4 +1,4 @@
-"""Wheels that roll on a plane without slip: rows of velocities, which no positions fulfill (nonholonomic)."""
+"""Wheels that roll on a plane without slip: nonholonomic rows, which constrain velocities but not positions."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -16,11 +16,11 @@ class Wheel(AbstractConstraint, type="wheel", space="spatial"):
     """A thin wheel of body j that rolls without slip on a plane of body i: a disc, or a tire of no width.
 
     Its lowest point touches the plane, and the material point of the wheel there has the velocity of the plane, both
-    along the wheel and across it. These two rows hold velocities: they restrict how the wheel moves and not where it
-    is, so that there are simulations of wheels alone. Neimark and Fufaev, Dynamics of nonholonomic systems, 1972.
+    along and across the wheel. These two rows constrain velocities: they restrict how the wheel moves, but not where it
+    is. Wheels can therefore only be simulated. Neimark and Fufaev, Dynamics of nonholonomic systems, 1972.
 
-    The residual has the distance that the wheel has slipped since the instant, zero there, whose coefficient of order k
-    is affine in the velocities of order k - 1 as that of any joint.
+    The residual contains the distance that the wheel has slipped since the instant, zero at the instant itself; its
+    coefficient of order k is affine in the velocities of order k - 1, as for any joint.
     """
 
     point_j: Vector  # m, center of the wheel, in the frame of body j
@@ -43,7 +43,7 @@ class Wheel(AbstractConstraint, type="wheel", space="spatial"):
         return rows(height, *(part.integrate(nothing) for part in slip))
 
     def variation(self, bodies: tuple[Any, ...], changes: tuple[Any, ...], time: Jet) -> Jet:
-        """Return the varied height, and by how much the touching points slip on each other by displacements."""
+        """Return the variation of the height, and the slip of the touching points by displacements."""
         varied = [k for k, change in enumerate(changes) if change is not None]
 
         def height(*poses: Any) -> Jet:
@@ -73,14 +73,14 @@ class Wheel(AbstractConstraint, type="wheel", space="spatial"):
         return body_j.point(self.point_j) + unit(down) * self.radius, normal, axis
 
     def _slip(self, body_i: SpatialPose, body_j: SpatialPose, moving: Sequence[tuple[Jet, Jet]]) -> tuple[Jet, Jet]:
-        """Return how fast the wheel slips along itself, and across.
+        """Return the slip velocity of the wheel along its direction of rolling, and across it.
 
         Parameters
         ----------
         body_i, body_j : SpatialPose
-            Where the bodies are.
+            Poses of the bodies.
         moving : sequence of tuple of Jet
-            Velocity of the origin, and angular velocity, global, of both.
+            Velocity of the origin and angular velocity, both global, of each body.
         """
         touching, normal, axis = self._contact(body_i, body_j)
         plane, wheel = (
@@ -93,5 +93,5 @@ class Wheel(AbstractConstraint, type="wheel", space="spatial"):
 
 
 def unit(vector: Jet) -> Jet:
-    """Return the unit vector along a vector."""
+    """Return the unit vector in the direction of a vector."""
     return vector / sqrt(vector.dot(vector))

@@ -1,4 +1,4 @@
-"""Applied forces: springs, actuators and loads, each a displacement and a law on jets, and the base for one's own."""
+"""Applied forces: springs, actuators and loads, each a displacement and a law on jets, and the base of users' own."""
 
 from jounce.forces.actuators import (
     DistanceForce as DistanceForce,

@@ -12,7 +12,7 @@ from jounce.rigid.pose import Pose
 
 
 def distance(body_i: Pose, body_j: Pose, point_i: Numbers, point_j: Numbers) -> Jet:
-    """Return the distance of two points, m."""
+    """Return the distance between two points, m."""
     d = body_j.point(point_j) - body_i.point(point_i)
     return sqrt(d.dot(d))
 
@@ -34,7 +34,7 @@ class DistanceForce(AbstractForce, type="distance_force"):
 
 
 class SlideForce(AbstractForce, type="slide_force"):
-    """Force on body j along a direction of body i, by a law of the slide x, its rate v and t; body i takes the counter.
+    """Force on body j along a direction of body i, by a law of the slide x, its rate v and t, with reaction on body i.
 
     The slide is that of a slide driver: from the point on body i to that on body j, along the direction.
     """
@@ -71,14 +71,14 @@ class Torque(AbstractForce, type="torque", space="planar"):
 class SpatialTorque(AbstractForce, type="torque", space="spatial"):
     """Torque on body j from body i about an axis of body i, by a law of the angle x, its rate v and t.
 
-    The angle is that of a rotation driver: with vectors, from `vector_i` to `vector_j`. Its turns count.
+    The angle is that of a rotation driver: with vectors, from `vector_i` to `vector_j`. Its turns are counted.
     """
 
     axis_i: Vector
     law: Law  # N m
     vector_i: Vector = None
     vector_j: Vector = None
-    datum: Datum | None = field(default=None, init=False)  # found when the mechanism is assembled
+    datum: Datum | None = field(default=None, init=False)  # set when the mechanism is assembled
 
     unit = "N*m"
     dimensions = {"law": "torque"}

@@ -1,4 +1,4 @@
-"""What an applied force is: named values on one or more bodies, where it acts, and how large it is, on jets."""
+"""The base of applied forces: named values on one or more bodies, a displacement, and a force, on jets."""
 
 import abc
 from collections.abc import Mapping
@@ -19,23 +19,23 @@ Laws = Annotated[Any, "laws"]
 
 
 class AbstractForce(Module):
-    """An applied force or torque: a displacement on which it does work, and its size.
+    """An applied force or torque: a displacement on which it does work, and its magnitude.
 
-    A subclass lists its values as fields and defines `displacement` and `force`. What it does to its bodies follows
-    from how the displacement changes as they move, and the rates of that, to any order, follow too. Fields are
-    annotated `Scalar`, `Vector`, `Law`, `Laws` or ``str``. Given a `type`, the subclass can be used in mechanism files
-    by that name; the keys are those of joints: ``point_i`` and ``point_j`` are the key ``points``. What else there is
-    to know, the class states as joints do: `dimensions`, `signs`, `choices`, `never_parallel` and `symbol`.
+    A subclass lists its values as fields and defines `displacement` and `force`. Its effect on the bodies follows from
+    the change of the displacement as they move; its rates follow, too, to any order. Fields are annotated `Scalar`,
+    `Vector`, `Law`, `Laws` or ``str``. With a `type`, the subclass can be used in mechanism files by that name; the
+    keys are those of joints: ``point_i`` and ``point_j`` become the key ``points``. The class states other facts as
+    joints do: `dimensions`, `signs`, `choices`, `never_parallel` and `symbol`.
 
     Parameters
     ----------
     bodies : tuple of str
-        Names of the bodies, ``"ground"`` among them if one is fixed; one name alone is enough for a force on one body.
+        Names of the bodies, including ``"ground"`` if one is fixed; for a force on one body, its name alone is enough.
 
     Raises
     ------
     MechanismError
-        If the number of bodies is wrong or one is named twice.
+        If the number of bodies is wrong, or a body is named twice.
 
     Examples
     --------
@@ -55,12 +55,12 @@ class AbstractForce(Module):
 
     bodies: tuple[str, ...] = field(static=True, converter=lambda b: (b,) if isinstance(b, str) else tuple(b))
 
-    space: ClassVar[str] = ""  # planar or spatial where only one makes sense
+    space: ClassVar[str] = ""  # planar or spatial, if only one makes sense
     role: ClassVar[str] = "force"
     type_name: ClassVar[str] = ""
     body_count: ClassVar[int] = 2
     unit: ClassVar[str] = "N"
-    displacement_names: ClassVar[tuple[str, ...]] = ("x",)  # what expressions of the law call the displacement
+    displacement_names: ClassVar[tuple[str, ...]] = ("x",)  # names of the displacement in expressions of the law
     velocity_names: ClassVar[tuple[str, ...]] = ("v",)
     dimensions: ClassVar[Mapping[str, str]] = USUAL_DIMENSIONS  # these facts are those of `AbstractConstraint`
     signs: ClassVar[Mapping[str, str]] = USUAL_SIGNS
@@ -92,45 +92,45 @@ class AbstractForce(Module):
     def force(self, displacement: Jet, velocity: Jet, time: Jet) -> Jet:
         """Return the jet of the force, of the shape of the displacement.
 
-        Its product with the velocity is the power that goes into the mechanism: a positive force drives a growing
+        Its product with the velocity is the power supplied to the mechanism: a positive force drives a growing
         displacement. It may be as short as the velocity, which has one order less than the displacement.
         """
 
     def velocity(self, *bodies_and_time: Any, **_: Any) -> Jet:
-        """Return the jet of the velocity on which the force works: the rate of the displacement by default."""
+        """Return the jet of the velocity on which the force does work: by default, the rate of the displacement."""
         return self.displacement(*bodies_and_time).differentiate()
 
     def variation(self, bodies: tuple[Pose, ...], changes: tuple[Pose, ...], time: Jet) -> Jet:
-        """Return how far the force acts along as the bodies move by changes; linear in them.
+        """Return the variation of the displacement of the force by variations of the bodies, in which it is linear.
 
-        It follows from the displacement, unless the force works on what is no change of any displacement, as a moment
-        in space does; `velocity` is then overridden, too.
+        It follows from the displacement, unless the force works on a velocity that is not the rate of any displacement,
+        as a moment in space does; `velocity` is then overridden, too.
 
         Parameters
         ----------
         bodies : tuple of PlanarPose or SpatialPose
-            Where the bodies are.
+            Poses of the bodies.
         changes : tuple of PlanarPose or SpatialPose
-            What ``varied`` of them gives.
+            Variations from ``varied``.
         time : Jet
-            In s.
+            Time, s.
         """
         return jax.jvp(lambda *poses: self.displacement(*poses, time), tuple(bodies), tuple(changes))[1]
 
     def energy(self, displacement: Jet) -> Jet:
-        """Return the energy that the force has stored and gives back, in J; none by default."""
+        """Return the recoverable energy that the force stores, J; zero by default."""
         first = displacement.coefficients[0]
-        zero = jnp.zeros_like(first if jnp.ndim(first) < 3 else first[0])  # instances and batch stand last
+        zero = jnp.zeros_like(first if jnp.ndim(first) < 3 else first[0])  # instances and batch are last
         return Jet.constant(zero, displacement.order)
 
 
 def by_law(self: Any, displacement: Jet, velocity: Jet, time: Jet) -> Jet:
-    """Return the jet of a force that is given by a law: the method `force` of its class."""
+    """Return the jet of a force that is given by a law; serves as the method `force` of its class."""
     return self.law(displacement, velocity, time)
 
 
 def force_catalogue(space: str) -> dict[str, type[AbstractForce]]:
-    """Return the classes of forces that files may name, by their type, for planar or spatial mechanisms.
+    """Return the classes of forces that files may name, by type, for planar or spatial mechanisms.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Laws of forces: what a force depends on, as functions that act on jets."""
+"""Laws of forces, as functions on jets."""
 
 import abc
 from collections.abc import Callable, Mapping, Sequence
@@ -20,7 +20,7 @@ class AbstractLaw(Module):
 
     @abc.abstractmethod
     def value(self, displacement: Jet, velocity: Jet, time: Jet) -> Quantity:
-        """Return the force: a jet, or what does not change in time; its axes need not be all there."""
+        """Return the force: a jet or a constant, possibly with missing axes."""
 
     def __call__(self, displacement: Jet, velocity: Jet, time: Jet) -> Jet:
         """Return the jet of the force, of the shape of the displacement."""
@@ -37,8 +37,8 @@ class ExpressionLaw(AbstractLaw):
     parameters : dict of str to float or array
         Values of the other names in the expression.
     displacements, velocities : tuple of str
-        What the expression calls the displacement and the velocity, or their components where there are several names.
-        The time is always ``t``.
+        Names of the displacement and the velocity in the expression, or of their components if there are several. The
+        time is always ``t``.
 
     Raises
     ------
@@ -72,7 +72,7 @@ class ExpressionLaw(AbstractLaw):
         self.expression.check({*self.parameters, "t", *self.displacements, *self.velocities})
 
     def value(self, displacement: Jet, velocity: Jet, time: Jet) -> Quantity:
-        """Return what the expression evaluates to."""
+        """Return the value of the expression."""
         moving = _named(self.displacements, displacement) | _named(self.velocities, velocity)
         return self.expression.evaluate({**self.parameters, "t": time, **moving})
 
@@ -117,7 +117,7 @@ class FunctionLaw(AbstractLaw):
     function: Callable[[Jet, Jet, Jet], Any] = field(static=True)
 
     def value(self, displacement: Jet, velocity: Jet, time: Jet) -> Quantity:
-        """Return what the function returns."""
+        """Return the result of the function."""
         return self.function(displacement, velocity, time)
 
 
@@ -143,37 +143,37 @@ class VectorLaw(AbstractLaw):
 
 
 class ReadLaw(AbstractLaw):
-    """A law in which there is code of a user, as what it computed when it was read off.
+    """A law that contains users' code, with the program that it had when it was traced.
 
     Parameters
     ----------
     computes : ReadObject
-        Of displacement, velocity and time.
+        Traced function of displacement, velocity and time.
     """
 
     computes: ReadObject
 
     def value(self, displacement: Jet, velocity: Jet, time: Jet) -> Jet:
-        """Return what the law computes."""
+        """Return the value of the traced law."""
         return self.computes(displacement, velocity, time)
 
 
 def read_law(law: AbstractLaw, shape: tuple[int, ...]) -> AbstractLaw:
-    """Return a law as what it computes now, where it is a user's own or has such parts.
+    """Return the current reading of a law that is a user's own or has such parts; other laws unchanged.
 
     Parameters
     ----------
     law : AbstractLaw
-        Of a force.
+        Law of a force.
     shape : tuple of int
-        Of the displacement: empty, or its number of components.
+        Shape of the displacement: empty, or its number of components.
     """
     parts = jax.tree.leaves(law, is_leaf=is_users_law)
     return ReadLaw(ReadObject.of(law, (ORDER, ORDER - 1, ORDER), shape)) if any(map(is_users_law, parts)) else law
 
 
 def is_users_law(law: Any) -> bool:
-    """Tell whether a law of a force, or a motion law, is a user's own."""
+    """Return whether a law of a force, or a motion law, is a user's own."""
     if not isinstance(law, AbstractLaw):
         return is_users(law)
     kind = type(law)
@@ -187,7 +187,7 @@ def _named(names: tuple[str, ...], jet: Jet) -> dict[str, Jet]:
 
 
 def _broadcast_to_jet(value: Quantity, like: Jet, time: Jet) -> Jet:
-    """Return a value as a jet of the shape of another: a law of time alone is the same for all instances."""
+    """Return a value as a jet of the shape of another; a law of time alone is the same for all instances."""
     shape = jnp.shape(like.coefficients[0])
     if not isinstance(value, Jet):
         return Jet.constant(jnp.broadcast_to(jnp.asarray(value, float), shape), time.order)

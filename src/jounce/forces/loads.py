@@ -1,4 +1,4 @@
-"""Loads on one body: a force at a point and a moment, by laws of place, velocity and time, global or in the body."""
+"""Loads on one body: a force at a point and a moment, by laws of position, velocity and time, global or in the body."""
 
 import jax.numpy as jnp
 
@@ -14,7 +14,7 @@ from jounce.rigid.pose import Pose
 class PointForce(AbstractForce, type="point_force", space="planar"):
     """Force at a point of a body: one law for each component, of t, x, y, vx and vy.
 
-    x and y are where the point is, in the global frame. The components, and those of the velocity, are global, or along
+    x and y are the position of the point in the global frame. The components of force and velocity are global, or along
     the axes of the body (`frame`), as for a thruster.
     """
 
@@ -47,7 +47,7 @@ class PointForce(AbstractForce, type="point_force", space="planar"):
 class SpatialPointForce(PointForce, type="point_force", space="spatial"):
     """Force at a point of a body: one law for each component, of t, x, y, z, vx, vy and vz.
 
-    x, y and z are where the point is, in the global frame. The components, and those of the velocity, are global, or
+    x, y and z are the position of the point in the global frame. The components of force and velocity are global, or
     along the axes of the body (`frame`), as for a thruster.
     """
 
@@ -89,7 +89,7 @@ class SpatialMoment(AbstractForce, type="moment", space="spatial"):
     velocity_names = ("wx", "wy", "wz")
 
     def displacement(self, body: SpatialPose, time: Jet) -> Jet:
-        # no vector changes at the rate of the angular velocity: the rates below are those on which the moment works
+        # no vector has the angular velocity as its rate: `velocity` and `variation` below define the work of the moment
         return Jet.constant(jnp.zeros_like(body.position.coefficients[0]), body.order)
 
     def velocity(self, body: SpatialPose, time: Jet) -> Jet:

@@ -1,4 +1,4 @@
-"""Linear springs with damping: along the line of two points, along a direction, about an axis."""
+"""Linear springs with damping: along the line between two points, along a direction, about an axis."""
 
 from typing import Any
 
@@ -14,12 +14,12 @@ from jounce.rigid.pose import Pose
 
 
 def linear_force(self: Any, displacement: Jet, velocity: Jet, time: Jet) -> Jet:  # noqa: ARG001
-    """Return the jet of the force of a linear spring with a damper: the method `force` of its class."""
+    """Return the jet of the force of a linear spring with a damper; serves as the method `force` of its class."""
     return -_elongation(self, displacement) * self.stiffness - velocity * self.damping
 
 
 def stored_energy(self: Any, displacement: Jet) -> Jet:
-    """Return the energy that a linear spring has stored, J: the method `energy` of its class."""
+    """Return the energy stored in a linear spring, J; serves as the method `energy` of its class."""
     return _elongation(self, displacement).square() * (0.5 * self.stiffness)
 
 
@@ -36,7 +36,7 @@ class Spring(AbstractForce, type="spring"):
     point_i: Vector  # m, in the frame of body i
     point_j: Vector
     stiffness: Scalar  # N/m
-    length: Scalar  # m, at which the spring is free
+    length: Scalar  # m, free length
     damping: Scalar = 0.0  # N s/m
 
     dimensions = {"stiffness": "stiffness", "damping": "damping"}
@@ -56,7 +56,7 @@ class SlideSpring(AbstractForce, type="slide_spring"):
     point_j: Vector
     vector_i: Vector  # direction in which s grows
     stiffness: Scalar  # N/m
-    length: Scalar = 0.0  # m, the s at which the spring is free
+    length: Scalar = 0.0  # m, the s of the free spring
     damping: Scalar = 0.0  # N s/m
 
     dimensions = {"stiffness": "stiffness", "damping": "damping"}
@@ -73,7 +73,7 @@ class TorsionalSpring(AbstractForce, type="torsional_spring", space="planar"):
     """Spring and damper on the angle of body j relative to body i: ``T = -k (s - angle) - c s'``; turns count."""
 
     stiffness: Scalar  # N m/rad
-    angle: Scalar = 0.0  # rad, at which the spring is free
+    angle: Scalar = 0.0  # rad, angle of the free spring
     damping: Scalar = 0.0  # N m s/rad
 
     unit = "N*m"
@@ -94,11 +94,11 @@ class SpatialTorsionalSpring(AbstractForce, type="torsional_spring", space="spat
 
     axis_i: Vector
     stiffness: Scalar  # N m/rad
-    angle: Scalar = 0.0  # rad, at which the spring is free
+    angle: Scalar = 0.0  # rad, angle of the free spring
     damping: Scalar = 0.0  # N m s/rad
     vector_i: Vector = None
     vector_j: Vector = None
-    datum: Datum | None = field(default=None, init=False)  # found when the mechanism is assembled
+    datum: Datum | None = field(default=None, init=False)  # set when the mechanism is assembled
 
     unit = "N*m"
     dimensions = {"stiffness": "torsional stiffness", "damping": "torsional damping", "angle": "angle"}

@@ -1,11 +1,11 @@
-"""Clusters of what is joined pair by pair."""
+"""Connected components of a pairwise relation."""
 
 import numpy as np
 from jaxtyping import Bool
 
 
 def clusters(joined: Bool[np.ndarray, "member member"]) -> list[list[int]]:
-    """Return the members that are joined with each other, over others or at once, by the least of each cluster.
+    """Return the connected components of a symmetric relation, in the order of their least members.
 
     Examples
     --------

@@ -1,26 +1,26 @@
-"""In which order bodies are eliminated from a small dense matrix so that few of its certain zeros are filled.
+"""Elimination order of the bodies in a small dense matrix, chosen for little fill-in.
 
-Only which bodies each row touches decides, so that the order is the same for all values, and in each process.
+It depends only on the bodies that each row touches, so that it is the same for all values and in all processes.
 """
 
 from collections.abc import Sequence
 from functools import lru_cache
 
-Order = tuple[tuple[int, ...], tuple[int, ...]]  # of the rows and of the columns
+Order = tuple[tuple[int, ...], tuple[int, ...]]  # orders of the rows and of the columns
 
 
 @lru_cache
 def elimination_order(touched: tuple[frozenset[int], ...], body_count: int, width: int) -> Order:
-    """Return the order of rows and columns that takes the fewest operations, as far as moving single bodies finds it.
+    """Return the order of rows and columns with the fewest operations that local search by moving single bodies finds.
 
     Parameters
     ----------
     touched : tuple of frozenset of int
         Bodies that each row touches.
     body_count, width : int
-        Number of bodies, and of columns of each.
+        Number of bodies, and of columns per body.
     """
-    best = list(reversed(range(body_count)))  # what is driven comes late: its rows touch few bodies
+    best = list(reversed(range(body_count)))  # driven bodies late: their rows touch few bodies
     least, improved = _operations(best, touched, width), True
     while improved:
         improved = False
@@ -36,18 +36,18 @@ def elimination_order(touched: tuple[frozenset[int], ...], body_count: int, widt
 
 
 def _masks(bodies: Sequence[int], touched: Sequence[frozenset[int]]) -> list[int]:
-    """Return the bodies that rows touch, as bits in the order of their elimination."""
+    """Return the bodies that rows touch as bit masks, in the order of their elimination."""
     bits = {body: 1 << k for k, body in enumerate(bodies)}
     return [sum(bits[body] for body in some) for some in touched]
 
 
 def _ends(mask: int) -> tuple[int, int]:
-    """Return the first and the last body of a row."""
+    """Return the positions of the first and the last body of a row."""
     return (mask & -mask).bit_length(), mask.bit_length()
 
 
 def _operations(bodies: Sequence[int], touched: Sequence[frozenset[int]], width: int) -> int:
-    """Return how many operations elimination by reflections takes: rows that meet times columns that they have."""
+    """Return the number of operations of elimination by reflections: rows of each front times their columns."""
     rows, result = sorted(_masks(bodies, touched), key=_ends), 0
     for k in range(len(bodies)):
         meeting = [row for row, mask in enumerate(rows) if mask >> k & 1 or row < width]

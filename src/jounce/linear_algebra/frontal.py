@@ -1,4 +1,4 @@
-"""Orthogonal elimination of large sparse matrices, front by front: a multifrontal QR factorization, the batch last."""
+"""Multifrontal QR factorization of large sparse matrices, a batch side by side; the batch is the last axis."""
 
 from typing import Any
 
@@ -15,23 +15,23 @@ from jounce.linear_algebra.reflections import reflection
 
 
 class FrontalFactor(Module):
-    """A batch of matrices, factored front by front into reflections and triangles.
+    """A batch of matrices, factored front by front into Householder reflections and triangles.
 
-    Solutions are as good as substitution makes them, without refinement: reflections keep lengths. Where rows are more
-    than columns the solution is that of least squares.
+    Reflections preserve lengths, so that solutions need no refinement. If there are more rows than columns, they are
+    least-squares solutions.
     """
 
     fronts: Fronts
-    vectors: Float[Numbers, "front width row batch"]  # the reflections of each front
-    factors: Float[Numbers, "front width batch"]  # two over their squares
+    vectors: Float[Numbers, "front width row batch"]  # reflection vectors of each front
+    factors: Float[Numbers, "front width batch"]  # two over the squared lengths of the vectors
     triangle: Float[Numbers, "front width column batch"]  # finished rows
-    inverted: Float[Numbers, "front width batch"]  # of the diagonal, infinite where singular
+    inverted: Float[Numbers, "front width batch"]  # inverse diagonal, infinite where singular
 
     @classmethod
     def of(
         cls, fronts: Fronts, entries: Float[Numbers, "entry batch"], scale: Float[Numbers, "row 1"]
     ) -> "FrontalFactor":
-        """Factor the matrices with these entries, shape (entries, batch), in rows multiplied by a scale, (rows, 1)."""
+        """Factor matrices with given entries, (entries, batch), rows multiplied by a scale, (rows, 1)."""
         count, height, columns = fronts.shape
         width, lanes = fronts.width, entries.shape[-1]
         entries = jnp.concatenate([entries, jnp.zeros((1, lanes))])
@@ -50,19 +50,19 @@ class FrontalFactor(Module):
 
     @classmethod
     def blank(cls, fronts: Fronts, lanes: int) -> "FrontalFactor":
-        """Return a placeholder for the factors of a batch, to start a loop with."""
+        """Return placeholder factors of a batch, to start a loop."""
         (count, height, columns), width = fronts.shape, fronts.width
         sizes = ((count, width, height, lanes), (count, width, lanes), (count, width, columns, lanes))
         return cls(fronts, *map(np.zeros, (*sizes, sizes[1])))
 
     @property
     def arrays(self) -> tuple[Numbers, Numbers, Numbers, Numbers]:
-        """Reflections, their factors, triangle and inverted diagonal; the batch is the last axis of all of them."""
+        """Reflections, their factors, triangle and inverse diagonal; the batch is the last axis of each."""
         return self.vectors, self.factors, self.triangle, self.inverted
 
     def solve(self, right: Columns, *, refined: bool = True) -> Float[Numbers, "column batch"]:
         """Return the solutions, shape (columns, batch), for right-hand sides of shape (rows, batch)."""
-        del refined  # they are as good as can be
+        del refined  # refinement would not improve them
         _, height, columns = self.fronts.shape
         width, lanes, plan = self.fronts.width, right.shape[-1], self.fronts
         right = jnp.concatenate([right, jnp.zeros((1, lanes))])
@@ -90,12 +90,12 @@ class FrontalFactor(Module):
         return known[plan.of_body].reshape(-1, lanes)
 
     def solve_transposed(self, right: Float[Numbers, "column batch"]) -> Columns:
-        """Return the solutions with the transposed matrices, shape (rows, batch), of least norm where they are many."""
+        """Return the solutions of the transposed systems, shape (rows, batch), of least norm if underdetermined."""
         height, width = self.fronts.shape[1], self.fronts.width
         lanes, plan = right.shape[-1], self.fronts
         count = np.arange(len(plan.entries))
         blocks = jnp.asarray(right).reshape(len(count), width, lanes)
-        order = jnp.zeros_like(plan.of_body).at[plan.of_body].set(count.astype(np.int32))  # the body of each front
+        order = jnp.zeros_like(plan.of_body).at[plan.of_body].set(count.astype(np.int32))  # body of each front
 
         def forward(owed: Any, level: Any) -> Any:
             front, neighbors, body, triangle, inverted = level
@@ -127,14 +127,14 @@ class FrontalFactor(Module):
         return FrontalFactor(self.fronts, *(x[..., :1] for x in self.arrays)).solve(matrix)
 
     def pivot_ratio(self) -> Float[Numbers, " batch"]:
-        """Return the smallest pivot over the largest, shape (batch,): near zero at a singular position."""
+        """Return the ratio of smallest to largest pivot, shape (batch,): near zero at a singular position."""
         sizes = 1 / jnp.abs(self.inverted.reshape(-1, self.inverted.shape[-1]))
         return jnp.min(sizes, axis=0) / jnp.max(sizes, axis=0)
 
     def sign(self) -> Float[Numbers, " batch"]:
-        """Return the signs of the determinants, or all of them turned round, shape (batch,): 0 where singular.
+        """Return the signs of the determinants up to a common sign, shape (batch,): 0 where singular.
 
-        The order of rows and columns, which is the same for all matrices of a pattern, is not counted.
+        The common sign is that of the order of rows and columns, which all matrices of a pattern share.
         """
         return jnp.prod(jnp.sign(jnp.where(jnp.isinf(self.inverted), 0.0, self.inverted)), axis=(0, 1))
 
@@ -146,14 +146,14 @@ def _put(whole: Any, part: Any, index: Any) -> Any:
 def _reflected(y: Any, reflections: Any) -> Any:
     for vector, factor in reflections:
         y = y - vector * (factor[None] * jnp.sum(vector * y, axis=0, keepdims=True))
-        y = jax.lax.optimization_barrier(y)  # or XLA computes the chain again for each use
+        y = jax.lax.optimization_barrier(y)  # otherwise XLA recomputes the chain for each use
     return y
 
 
 def _eliminated(front: Any, width: int) -> tuple[Any, Any, Any, Any, Any]:
-    """Return the reflections that clear the first columns, the finished rows, and what is left.
+    """Return the reflections that clear the first columns, the finished rows, and the remaining front.
 
-    As in `FrontalFactor`: vectors, factors, triangle and inverted.
+    The first four are vectors, factors, triangle and inverted, as in `FrontalFactor`.
     """
     vectors, factors, rows, inverted = [], [], [], []
     for k in range(width):

@@ -1,8 +1,8 @@
-"""Inverses of large sparse matrices, as one product with a small matrix for each front and each way through them.
+"""Inverses of large sparse matrices, as one product with a small matrix per front and direction.
 
-`FrontalFactor.solve` goes through reflections one after the other; where right sides come one by one, such as those of
-the orders of a Taylor series, what a front makes of them is assembled once. Time and memory grow with the number of
-fronts, where a dense inverse takes its square.
+`FrontalFactor.solve` applies reflections one after another. If right-hand sides come one by one, as with the orders of
+a Taylor series, the map of each front is assembled once instead. Time and memory grow with the number of fronts, while
+those of a dense inverse grow with its square.
 """
 
 from typing import Any
@@ -21,19 +21,20 @@ from jounce.linear_algebra.linear import Columns
 
 
 class InversePlan(Module):
-    """Where fronts find what they need for products with the inverse.
+    """Index arrays of the fronts for products with the inverse.
 
     Attributes
     ----------
     fronts : Fronts
-        Of square matrices.
+        Fronts of square matrices.
     sources : array of int, shape (fronts, rows)
-        Where a row of a front is among the right sides, a zero, and what fronts leave over, one after the other.
+        Index of each row of a front in the concatenation of the right-hand sides, a zero, and the rows left over by all
+        fronts.
     responses : array of int, shape (fronts, columns, left rows)
-        Of the columns of neighbors and what the front leaves over: which entry of all blocks of the inverse, by front,
-        column and row, tells how the column responds; one beyond the last where there is none.
+        For the columns of neighbors and the left-over rows of a front: index of the response of the column among the
+        entries of all blocks of the inverse, by front, column and row; one beyond the last if there is none.
     diagonal : array of int, shape (rows of the matrix,)
-        The entry of these blocks in which a row meets its own column.
+        Index, among these entries, of each diagonal entry of the inverse.
     """
 
     fronts: Fronts
@@ -43,12 +44,12 @@ class InversePlan(Module):
 
     @classmethod
     def of(cls, fronts: Fronts) -> "InversePlan":
-        """Plan products from fronts that hold arrays of NumPy; row and column of a number belong together."""
+        """Plan products from fronts with NumPy arrays; row and column of equal number belong together."""
         (count, height, columns), width, size = fronts.shape, fronts.width, fronts.row_count
         left_height, nothing = height - width, count * height * columns
         inherited = fronts.left_rows < count * left_height
         sources = np.where(inherited, size + 1 + fronts.left_rows, fronts.rights).astype(np.int32)
-        needed = np.concatenate([np.arange(count)[:, None], fronts.neighbors], axis=1)  # of a block, its bodies
+        needed = np.concatenate([np.arange(count)[:, None], fronts.neighbors], axis=1)  # bodies of each block
         responses = np.full((count, columns - width, left_height), nothing, np.int32)
         for front, at in np.argwhere(inherited).tolist():
             child, row = divmod(int(fronts.left_rows[front, at]), left_height)
@@ -71,11 +72,11 @@ class FrontalInverse(Module):
     Attributes
     ----------
     plan : InversePlan
-        Of their pattern.
+        Plan of their pattern.
     inward : array of shape (fronts, rows, rows, batch)
-        What a right side adds, first, to the columns of the front, and then to what is left over.
+        Contribution of a right-hand side to the columns of the front, followed by that to the left-over rows.
     outward : array of shape (fronts, columns of neighbors, width, batch)
-        What each unknown of a neighbor takes off the columns of the front.
+        Coefficients by which unknowns of neighbors are subtracted from the columns of the front.
     """
 
     plan: InversePlan
@@ -84,7 +85,7 @@ class FrontalInverse(Module):
 
     @classmethod
     def of(cls, plan: InversePlan, factor: FrontalFactor) -> "FrontalInverse":
-        """Put together the products of factored matrices, all fronts side by side."""
+        """Assemble the maps of factored matrices, all fronts side by side."""
         (count, height, _), width = plan.fronts.shape, plan.fronts.width
         lanes = factor.inverted.shape[-1]
         turned = jnp.broadcast_to(np.eye(height)[None, :, :, None], (count, height, height, lanes))
@@ -132,14 +133,14 @@ class FrontalInverse(Module):
         return known[plan.fronts.of_body].reshape(-1, lanes)
 
     def diagonal(self) -> Float[Numbers, "row batch"]:
-        """Return the diagonals of the inverses, of which no more is computed than the blocks of the fronts."""
+        """Return the diagonals of the inverses, computed from the blocks of the fronts only."""
         plan, width, lanes = self.plan, self.plan.fronts.width, self.inward.shape[-1]
         count, height, columns = plan.fronts.shape
         size = height * columns
 
         def step(known: Any, level: Any) -> tuple[Any, None]:
             front, responses, inward, outward = level
-            at_neighbors = known.at[responses].get(mode="promise_in_bounds")  # of what is left over
+            at_neighbors = known.at[responses].get(mode="promise_in_bounds")  # responses to left-over rows
             given = inward[:, width:]
             others = total(at_neighbors[:, k, None] * given[None, :, k] for k in range(height - width))
             own = jnp.swapaxes(inward[:, :width], 0, 1)

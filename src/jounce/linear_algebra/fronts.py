@@ -1,12 +1,11 @@
-"""Which rows and columns of a Jacobian meet when it is eliminated body by body: known before any number.
+"""Symbolic analysis of a Jacobian for elimination body by body, independent of its numbers.
 
-The rows of a Jacobian touch two bodies, seldom three, so that most of it is zero, and where is known before any number.
-Bodies are eliminated one by one, those with the fewest neighbors first (George and Liu 1989, the evolution of the
-minimum degree ordering algorithm). The front of a body holds the rows that touch it: its own, and those left over by
-the fronts before; Householder reflections clear its columns, and the rows that are left touch its neighbors only
-(Duff and Reid 1983; Davis 2011, algorithm 915). Nothing is chosen by the numbers, so that all lanes of a batch, and all
-instants of a motion, go through one program, and all fronts through one scan of it: neither the program nor the time to
-compile it grows with the number of bodies.
+Rows of a Jacobian touch two bodies, seldom three, so most of it is known to be zero. Bodies are eliminated one by one,
+those with the fewest neighbors first (George and Liu 1989, the evolution of the minimum degree ordering algorithm). The
+front of a body holds the rows that touch it: its own, and those left over by earlier fronts. Householder reflections
+clear its columns, and the remaining rows touch its neighbors only (Duff and Reid 1983; Davis 2011, algorithm 915). No
+choice depends on the numbers, so that all lanes of a batch, and all instants of a motion, go through one program, and
+all fronts through one scan of it. Neither the program nor its compile time grows with the number of bodies.
 """
 
 import heapq
@@ -18,32 +17,33 @@ from jounce.base.modules import Module, field
 from jounce.base.shapes import Numbers
 from jounce.linear_algebra.pattern import Pattern
 
-MOST_DENSE = 100  # columns of a matrix with more rows: a dense elimination is dearer, but knows its orientation
-FRONT_COST = 4.0  # of an operation in fronts, by that of one in dense elimination, as measured
-Row = tuple[int, int]  # the front that left it over, and its place there; -1 and its number if it is one of the matrix
+MOST_DENSE = 100  # columns of a matrix with more rows, for which the slower dense elimination gives the orientation
+FRONT_COST = 4.0  # measured cost of an operation in fronts, relative to one in dense elimination
+Row = tuple[int, int]  # the front that left the row over, and its index there; -1 and its number for a matrix row
 
 
 class Fronts(Module):
-    """Which rows and columns meet in which front; index arrays, that a program takes as input.
+    """Rows and columns of each front, as index arrays that a program takes as input.
 
     Attributes
     ----------
     entries : array of int, shape (fronts, rows, columns)
-        Which entry of the matrix is there before the elimination; one beyond the last where there is none.
+        Index of the matrix entry at each place before the elimination; one beyond the last if there is none.
     rights : array of int, shape (fronts, rows)
-        Which row of the matrix that is; one beyond the last where it is none.
+        Index of the matrix row in each row of a front; one beyond the last if there is none.
     left_rows : array of int, shape (fronts, rows)
-        Which row of all those that fronts leave over is taken in there; one beyond the last where there is none.
+        Index, among the left-over rows of all fronts, of the one taken into each row; one beyond the last if there is
+        none.
     left_columns : array of int, shape (fronts, rows, columns)
-        Which column of that row is there; one beyond the last where there is none.
+        Index of the column of that left-over row at each place; one beyond the last if there is none.
     neighbors : array of int, shape (fronts, neighbors)
-        Fronts of the bodies that the rest of the columns belong to; one beyond the last where there are fewer.
+        Fronts of the bodies to which the other columns belong; one beyond the last if there are fewer.
     of_body : array of int, shape (bodies,)
-        The front of each body.
+        Front of each body.
     row_count : int
-        Rows of the matrix.
+        Number of rows of the matrix.
     width : int
-        Columns of a body.
+        Number of columns per body.
     """
 
     entries: Int[Numbers, "front row column"]
@@ -57,18 +57,18 @@ class Fronts(Module):
 
     @property
     def shape(self) -> tuple[int, int, int]:
-        """Number of fronts, and of rows and columns of each."""
+        """Number of fronts, and of rows and columns of each front."""
         count, rows, columns = self.entries.shape
         return count, rows, columns
 
     @classmethod
     def of(cls, pattern: Pattern) -> "Fronts":
-        """Plan the elimination of matrices of a pattern, which holds arrays of NumPy."""
+        """Plan the elimination of matrices of a pattern with NumPy arrays."""
         bodies, indices, count, width = pattern.bodies, pattern.entry_indices, pattern.body_count, pattern.width
         entry_count = pattern.entry_count
         order, separators, held = _ordered(pattern)
         position = np.argsort(order)
-        height = max(width + 1, *map(len, held))  # no empty arrays
+        height = max(width + 1, *map(len, held))  # avoids empty arrays
         most_neighbors = max(1, *map(len, separators))
         columns, left_height = width * (1 + most_neighbors), height - width
         entries = np.full((count, height, columns), entry_count, np.int32)
@@ -96,9 +96,9 @@ class Fronts(Module):
 
 
 def _ordered(pattern: Pattern) -> tuple[Int[np.ndarray, " body"], list[set[int]], list[list[Row]]]:
-    """Return the bodies in the order of their elimination, and the neighbors and rows that each has then.
+    """Return the bodies in the order of their elimination, with the neighbors and rows of each at that time.
 
-    Of bodies with as many neighbors, one with the fewest rows is the first.
+    Among bodies with equally many neighbors, one with the fewest rows is first.
     """
     count, width = pattern.body_count, pattern.width
     adjacent: list[set[int]] = [set() for _ in range(count)]
@@ -115,7 +115,7 @@ def _ordered(pattern: Pattern) -> tuple[Int[np.ndarray, " body"], list[set[int]]
     while waiting:
         *key, body = heapq.heappop(waiting)
         if done[body] or key != [len(adjacent[body]), len(rows[body])]:
-            continue  # it was put in again since, with what it has now
+            continue  # an outdated entry; the body was queued again
         done[body] = True
         around, mine = adjacent[body], sorted(rows[body])
         left = {(len(order), k) for k in range(len(mine) - width)}
@@ -132,7 +132,7 @@ def _ordered(pattern: Pattern) -> tuple[Int[np.ndarray, " body"], list[set[int]]
 
 
 def elimination(pattern: Pattern) -> Fronts | None:
-    """Return how matrices of a pattern are eliminated body by body, where that is less work than as dense ones."""
+    """Return the fronts of matrices of a pattern if their elimination is less work than a dense one, or None."""
     rows, columns = pattern.shape
     if rows < columns or not rows or (rows > columns and columns <= MOST_DENSE):
         return None

@@ -1,7 +1,7 @@
-"""The Jacobian at one position on the host: what it closes, its rank, and the vectors that it takes to zero.
+"""The Jacobian at one position on the host: Newton steps, rank, and null vectors.
 
-A small one is decomposed into singular values. Of a large one only what is not zero is kept: its equations go through
-SuperLU, and its null vectors are found by subspace iteration with a shifted inverse, as many as there are.
+A small Jacobian is decomposed into singular values. A large one is sparse: its equations are solved by SuperLU, and all
+its null vectors are found by subspace iteration with a shifted inverse.
 """
 
 import dataclasses
@@ -15,28 +15,28 @@ from jounce.base.shapes import Numbers
 from jounce.linear_algebra.pattern import Pattern
 
 RANK_TOLERANCE = 1e-9
-SMALL = 1e-6  # of the largest singular value: how small one is next to a singular position
+SMALL = 1e-6  # of the largest singular value: bound of small singular values, next to a singular position
 STEP_TOLERANCE = 1e-10
-MOST_DENSE = 100  # rows and columns; from there on an elimination of what is not zero is quicker
+MOST_DENSE = 100  # rows or columns, beyond which sparse elimination is faster
 DAMPING = 1e-6  # of the largest singular value
-PROBES = 8  # random vectors, of which at least one has its part of every vector that an inverse makes long
-MOST_VECTORS = 1024  # of a null space; of a larger one, so many at random
+PROBES = 8  # random vectors, at least one of which has a component along any vector that an inverse amplifies
+MOST_VECTORS = 1024  # of a null space; of a larger one, this many random vectors
 
 
 @dataclasses.dataclass(frozen=True)
 class HostJacobian:
-    """A Jacobian by the bodies that each row touches.
+    """A Jacobian in blocks of the bodies that each row touches.
 
     Attributes
     ----------
     bodies : array of int, shape (rows, slots)
-        The number of bodies where a row touches fewer.
+        Bodies that each row touches; the number of bodies fills unused slots.
     blocks : array of shape (rows, slots, width)
-        Entries in the columns of those bodies.
+        Entries in the columns of these bodies.
     body_count : int
         Number of bodies.
     tolerance : float
-        Of the largest singular value: those at or below count as zero.
+        Bound relative to the largest singular value, at or below which singular values count as zero.
     """
 
     bodies: Int[np.ndarray, "row slot"]
@@ -46,49 +46,49 @@ class HostJacobian:
 
     @classmethod
     def of(cls, pattern: Pattern, entries: Float[Numbers, " entry"]) -> "HostJacobian":
-        """Return the Jacobian with these entries in places of a pattern."""
+        """Return the Jacobian with given entries at the places of a pattern."""
         padded = np.zeros(pattern.entry_count + 1)
         padded[:-1] = entries
         return cls(np.asarray(pattern.bodies), padded.take(pattern.entry_indices), pattern.body_count)
 
     @property
     def shape(self) -> tuple[int, int]:
-        """Number of rows and columns."""
+        """Number of rows, and of columns."""
         return len(self.blocks), self.body_count * self.blocks.shape[-1]
 
     @property
     def is_large(self) -> bool:
-        """Whether only what is not zero is kept."""
+        """Whether the matrix is treated as sparse."""
         return max(self.shape) > MOST_DENSE
 
     def finite(self) -> Bool[np.ndarray, " row"]:
-        """Tell which rows are finite."""
+        """Return which rows are finite."""
         return np.asarray(np.isfinite(self.blocks).all(axis=(1, 2)))
 
     @cached_property
     def row_scale(self) -> Float[np.ndarray, " row"]:
-        """Return what makes the largest entry of each row one."""
+        """Factors that scale the largest entry of each row to one."""
         largest = np.abs(self.blocks).max(axis=(1, 2), initial=0.0)
         return 1 / np.where((largest > 0) & np.isfinite(largest), largest, 1.0)
 
     def scaled(self, scale: Float[np.ndarray, " row"]) -> "HostJacobian":
-        """Return the Jacobian with its rows multiplied by a scale."""
+        """Return the Jacobian with its rows multiplied by factors."""
         return HostJacobian(self.bodies, scale[:, None, None] * self.blocks, self.body_count, self.tolerance)
 
     def take(self, rows: Bool[np.ndarray, " row"]) -> "HostJacobian":
-        """Return the Jacobian of some rows."""
+        """Return the Jacobian of selected rows."""
         return dataclasses.replace(self, bodies=self.bodies[rows], blocks=self.blocks[rows])
 
     def dense(self) -> Float[np.ndarray, "row column"]:
-        """Return the matrix."""
+        """Return the dense matrix."""
         rows, _, width = self.blocks.shape
         matrix = np.zeros((rows, self.body_count + 1, width))
         matrix[np.arange(rows)[:, None], self.bodies] = self.blocks
         return matrix[:, :-1].reshape(self.shape)
 
     def sparse(self) -> Any:
-        """Return the matrix as one of SciPy that keeps what is not zero."""
-        from scipy.sparse import coo_array  # here, since importing SciPy takes half a second
+        """Return the matrix in SciPy's sparse format, nonzero entries only."""
+        from scipy.sparse import coo_array  # imported late, as importing SciPy takes half a second
 
         width = self.blocks.shape[-1]
         columns = self.bodies[:, :, None] * width + np.arange(width)
@@ -97,9 +97,9 @@ class HostJacobian:
         return coo_array((self.blocks[row, slot, column], where), shape=self.shape).tocsr()
 
     def step(self, residual: Float[np.ndarray, " row"]) -> Float[np.ndarray, " column"] | None:
-        """Return the shortest step that closes the residual to first order, by rows of one size; None if not finite."""
+        """Return the shortest step that closes the residual to first order, rows scaled; None if it is not finite."""
         if not (np.isfinite(residual).all() and np.isfinite(self.blocks).all()):
-            return None  # what factors a matrix may never end on one that is not finite
+            return None  # factorizations may not terminate on non-finite matrices
         scale = self.row_scale
         matrix, right = self.scaled(scale), -scale * residual
         if self.is_large:
@@ -110,7 +110,7 @@ class HostJacobian:
 
     @cached_property
     def rank(self) -> int:
-        """Number of rows that depend on no others."""
+        """Number of independent rows."""
         if self._is_regular:
             return len(self.blocks)
         if self.is_large:
@@ -119,16 +119,16 @@ class HostJacobian:
 
     @cached_property
     def largest(self) -> float:
-        """The largest singular value, or a bound near it."""
+        """The largest singular value, or a bound close to it."""
         return _largest_size(self.sparse()) if self.is_large else float(self._sizes.max(initial=0.0))
 
     def times(self, vectors: Float[np.ndarray, "column k"]) -> Float[np.ndarray, "row k"]:
-        """Return the products with some vectors."""
+        """Return the products with vectors."""
         return (self.sparse() if self.is_large else self.dense()) @ vectors
 
     @cached_property
     def smallest(self) -> tuple[Any, Any, Any]:
-        """Singular values at most `SMALL` times the largest: vectors of rows in columns, values, vectors of columns."""
+        """Singular values up to `SMALL` times the largest: left vectors, values, right vectors, as columns."""
         rows, columns = self.shape
         if self._is_regular:
             return np.zeros((rows, 0)), np.zeros(0), np.zeros((columns, 0))
@@ -148,7 +148,7 @@ class HostJacobian:
 
     @cached_property
     def dependences(self) -> Float[np.ndarray, "row combination"]:
-        """Combinations of rows that vanish, orthonormal."""
+        """Orthonormal combinations of rows that vanish."""
         if not self.is_large:
             return self._singular[0][:, self.rank :]
         rows, _columns = self.shape
@@ -156,7 +156,7 @@ class HostJacobian:
 
     @cached_property
     def free_directions(self) -> Float[np.ndarray, "direction column"]:
-        """Directions that no row sees, orthonormal; of hundreds in a large mechanism, some at random."""
+        """Orthonormal basis of the null space; of a very large one, random vectors."""
         if not self.is_large:
             return self._singular[2][self.rank :]
         _rows, columns = self.shape
@@ -164,14 +164,14 @@ class HostJacobian:
 
     @cached_property
     def _is_regular(self) -> bool:
-        """Whether a small square one has no small singular values by far; an inverse takes a tenth of their time."""
+        """Whether a small square matrix is clearly regular, by its inverse, in a tenth of the time of an SVD."""
         if self.is_large or self.shape[0] != self.shape[1]:
             return False
         return _has_short_inverse(self.dense(), max(SMALL, self.tolerance))
 
     @cached_property
     def _sizes(self) -> Float[np.ndarray, " k"]:
-        return np.linalg.svd(self.dense(), compute_uv=False)  # in half the time that the vectors take besides
+        return np.linalg.svd(self.dense(), compute_uv=False)  # half the time of a decomposition with vectors
 
     @cached_property
     def _singular(self) -> tuple[Float[np.ndarray, "row row"], Float[np.ndarray, " k"], Float[np.ndarray, "c c"]]:
@@ -179,7 +179,7 @@ class HostJacobian:
 
 
 def _largest_size(matrix: Any) -> float:
-    """Return a bound of the largest singular value, near it where rows have few entries: by its rows and columns."""
+    """Return a bound of the largest singular value from row and column sums, close if rows have few entries."""
     sizes, begun = np.abs(matrix.data), matrix.indptr[:-1][np.diff(matrix.indptr) > 0]
     sums = np.add.reduceat(sizes, begun), np.bincount(matrix.indices, sizes)
     return float(np.sqrt(np.prod([part.max(initial=0.0) for part in sums])))
@@ -190,12 +190,12 @@ def _probes(rows: int, count: int) -> Float[np.ndarray, "row probe"]:
 
 
 def _factored(matrix: Any) -> Any:
-    """Return the factors of a square matrix, None where it is singular."""
+    """Return the factors of a square matrix, or None if it is singular."""
     from scipy.sparse.linalg import splu
 
     try:
         return splu(matrix.tocsc())
-    except RuntimeError:  # that is how SuperLU tells
+    except RuntimeError:  # SuperLU's report of a singular matrix
         return None
 
 
@@ -212,7 +212,7 @@ def _augmented(matrix: Any, damping: float) -> Any:
 
 
 def _shortest(matrix: Any, right: Float[np.ndarray, " row"]) -> Float[np.ndarray, " column"]:
-    """Return the shortest solution; of least squares, damped, where rows depend on one another."""
+    """Return the shortest solution; a damped least-squares solution if rows are dependent."""
     columns = matrix.shape[1]
     shortest, smallest = _solved(matrix, right[:, None])
     if smallest > STEP_TOLERANCE * _largest_size(matrix):
@@ -222,9 +222,9 @@ def _shortest(matrix: Any, right: Float[np.ndarray, " row"]) -> Float[np.ndarray
 
 
 def _solved(matrix: Any, right: Float[np.ndarray, "row k"]) -> tuple[Float[np.ndarray, "column k"], float]:
-    """Return the shortest solutions, and nearly the smallest singular value; zero where these are not to be had.
+    """Return the shortest solutions and an estimate of the smallest singular value; zeros if the matrix is singular.
 
-    The inverse makes a random vector longer by about the inverse of that value.
+    The inverse amplifies random vectors by about the inverse of that value.
     """
     (rows, columns), count = matrix.shape, right.shape[1]
     square = rows == columns
@@ -241,9 +241,9 @@ def _solved(matrix: Any, right: Float[np.ndarray, "row k"]) -> tuple[Float[np.nd
 
 
 def is_clearly_regular(matrix: Float[np.ndarray, "size size"], tolerance: float) -> bool:
-    """Tell whether a square matrix, a large one with many zeros, has no small singular value by far.
+    """Return whether a square matrix, if large with many zeros, is far from singular.
 
-    A value counts as small if it is at most the tolerance times the largest.
+    All its singular values then exceed the tolerance times the largest by a wide margin.
     """
     if len(matrix) <= MOST_DENSE:
         return _has_short_inverse(matrix, tolerance)
@@ -251,26 +251,26 @@ def is_clearly_regular(matrix: Float[np.ndarray, "size size"], tolerance: float)
 
     if not np.isfinite(matrix).all():
         return False
-    nonzero = np.flatnonzero(matrix != 0.0)  # ten times as fast as SciPy looks for them
+    nonzero = np.flatnonzero(matrix != 0.0)  # ten times as fast as SciPy's search
     where = np.divmod(nonzero.astype(np.int32), np.int32(len(matrix)))
     whole = csr_array((matrix.ravel()[nonzero], where), shape=matrix.shape)
     return _solved(whole, np.zeros((len(matrix), 0)))[1] > 10 * tolerance * _largest_size(whole)
 
 
 def _has_short_inverse(matrix: Float[np.ndarray, "size size"], tolerance: float) -> bool:
-    """Tell whether a small matrix is regular by its inverse, in a fourth of the time that singular values take."""
+    """Return whether a small matrix is regular by its inverse, in a fourth of the time of an SVD."""
     try:
         inverse = np.linalg.inv(matrix)
     except np.linalg.LinAlgError:
         return False
-    squares = np.vdot(matrix, matrix) * np.vdot(inverse, inverse)  # of the condition, or of more
+    squares = np.vdot(matrix, matrix) * np.vdot(inverse, inverse)  # squared bound of the condition number
     return bool((10 * tolerance) ** 2 * squares < 1)
 
 
 def _clearly_independent(matrix: Any, tolerance: float) -> bool:
-    """Tell whether no combination of rows vanishes by far."""
+    """Return whether no combination of rows vanishes, by a wide margin."""
     smallest = _solved(matrix, np.zeros((matrix.shape[0], 0)))[1]
-    # in the larger matrix rounding hides what is smaller
+    # in the augmented matrix, rounding hides smaller values
     least = 10 * tolerance if matrix.shape[0] == matrix.shape[1] else max(10 * tolerance, 1e-7)
     return smallest > least * _largest_size(matrix)
 
@@ -278,11 +278,11 @@ def _clearly_independent(matrix: Any, tolerance: float) -> bool:
 def _null_space(
     matrix: Any, count: int | None = None, tolerance: float = RANK_TOLERANCE
 ) -> Float[np.ndarray, "column vector"]:
-    """Return an orthonormal basis of what a matrix takes to zero; if its dimension is given and large, a part of it.
+    """Return an orthonormal basis of the null space of a matrix; if its dimension is given and large, a part of it.
 
-    The inverse of ``A^T A + d I`` shortens every vector by d over the square of its singular value, but those of the
-    null space: two products leave of a random block that space and the vectors nearest to it. The block is large enough
-    as soon as one vector of it is no null vector by far.
+    The inverse of ``A^T A + d I`` shortens vectors by d over the square of their singular value, except those of the
+    null space: two products with a random block leave that space and the vectors closest to it. The block is large
+    enough when one of its vectors is clearly not a null vector.
     """
     rows, columns = matrix.shape
     if not rows or not columns:

@@ -1,7 +1,7 @@
-"""Least squares for batches of small matrices with dependent rows, the batch last: orthonormal bases and triangles.
+"""Least squares for batches of small matrices with dependent rows, batch last: orthonormal bases and triangles.
 
-Where constraints are redundant but agree, the equations of every order have more rows than unknowns and one solution
-all the same: that of least squares. The multipliers of the rows are many then; those of least norm are returned.
+Where constraints are redundant but agree, the equations of each order have more rows than unknowns, but a unique
+solution by least squares. The multipliers of the rows are not unique; those of least norm are returned.
 """
 
 from typing import Any
@@ -22,9 +22,9 @@ Triangle = Float[Numbers, "column column batch"]
 class LeastSquaresFactor(Module):
     """A batch of matrices with independent columns, factored into orthonormal columns and a triangle.
 
-    Columns are made orthogonal one after another, twice, which is enough (Giraud, Langou, Rozloznik and van den Eshof
-    2005, Rounding error analysis of the classical Gram-Schmidt orthogonalization process); no operation is LAPACK's,
-    as in `DenseFactor`.
+    Columns are orthogonalized one after another, twice, which is enough (Giraud, Langou, Rozloznik and van den Eshof
+    2005, Rounding error analysis of the classical Gram-Schmidt orthogonalization process). No operation is LAPACK's, as
+    in `DenseFactor`.
     """
 
     basis: Basis
@@ -52,17 +52,17 @@ class LeastSquaresFactor(Module):
 
     @classmethod
     def blank(cls, shape: tuple[int, ...], lanes: int) -> "LeastSquaresFactor":
-        """Return a placeholder for the factors of a batch, to start a loop with."""
+        """Return placeholder factors of a batch, to start a loop."""
         rows, columns = shape[:2]
         return cls(np.zeros((rows, columns, lanes)), np.zeros((columns, columns, lanes)))
 
     def solve(self, right: Float[Numbers, "row batch"], *, refined: bool = True) -> Float[Numbers, "column batch"]:
-        """Return the solutions of least squares, shape (columns, batch); not finite where columns are dependent."""
-        del refined  # they are as good as can be
+        """Return the least-squares solutions, shape (columns, batch); not finite where columns are dependent."""
+        del refined  # refinement would not improve them
         return self._substituted(jnp.sum(self.basis * right[:, None], axis=0), 0)
 
     def solve_transposed(self, right: Float[Numbers, "column batch"]) -> Float[Numbers, "row batch"]:
-        """Return the solutions of least norm with the transposed matrices, shape (rows, batch)."""
+        """Return the least-norm solutions of the transposed systems, shape (rows, batch)."""
         return jnp.sum(self.basis * self._substituted(right, 1)[None], axis=1)
 
     def applied_inverse(self, matrix: Float[Numbers, "row k"]) -> Float[Numbers, "column k"]:
@@ -72,20 +72,20 @@ class LeastSquaresFactor(Module):
         return LeastSquaresFactor(*many).solve(matrix)
 
     def pivot_ratio(self) -> Float[Numbers, " batch"]:
-        """Return the smallest pivot over the largest, shape (batch,): near zero at a singular position."""
+        """Return the ratio of smallest to largest pivot, shape (batch,): near zero at a singular position."""
         sizes = jnp.diagonal(self.triangle)
         return jnp.min(sizes, axis=-1) / jnp.max(sizes, axis=-1)
 
     def orientation(self, before: Any) -> Float[Numbers, " batch"]:
-        """Return the signs of the determinants that the columns have as seen from those of other factors, (batch,).
+        """Return the orientations of the column spaces relative to those of other factors, as signs, shape (batch,).
 
-        It takes the place of the sign of the determinant, that a matrix with more rows than columns does not have.
+        They replace the sign of the determinant, which a matrix with more rows than columns does not have.
         """
         seen = jnp.sum(before.basis[:, :, None] * self.basis[:, None], axis=0)
         return DenseFactor.of(seen).sign()
 
     def _substituted(self, right: Float[Numbers, "column batch"], axis: int) -> Float[Numbers, "column batch"]:
-        """Return the solutions with the triangle, row after row from the last, or with its columns, from the first."""
+        """Return the solutions of the triangular systems (`axis` 0), or of the transposed ones (`axis` 1)."""
         at, put, columns = jax.lax.dynamic_index_in_dim, jax.lax.dynamic_update_index_in_dim, len(self.triangle)
 
         def substitute(i: Any, solved: Any) -> Any:
@@ -98,9 +98,9 @@ class LeastSquaresFactor(Module):
 
 
 def range_basis(matrix: Basis, rank: int) -> Float[Numbers, "row rank batch"]:
-    """Return orthonormal bases of what matrices of a rank map to, shape (rows, rank, batch).
+    """Return orthonormal bases of the ranges of matrices of known rank, shape (rows, rank, batch).
 
-    The longest column that is left is the next to be made orthogonal to all before.
+    The longest remaining column is orthogonalized next.
     """
     put = jax.lax.dynamic_update_index_in_dim
     rows, _, lanes = matrix.shape

@@ -1,4 +1,4 @@
-"""Linear algebra of batches of small matrices, the batch last: factor once, solve often; singular values."""
+"""Linear algebra of batches of small matrices, batch last: factor once, solve often; singular values."""
 
 from typing import Any
 
@@ -15,15 +15,15 @@ Columns = Float[Numbers, "row batch"]
 
 
 class DenseFactor(Module):
-    """A batch of small dense matrices, factored by Gauss-Jordan elimination with partial pivoting; the batch is last.
+    """A batch of small dense matrices, factored by Gauss-Jordan elimination with partial pivoting; batch last.
 
-    Each operation is one on the whole batch, and none is LAPACK's, so that programs with it may run in several threads:
-    JAX 0.10 shares the batches of LAPACK among XLA's threads and waits for them in such a thread, and two programs on
-    two cores wait for each other forever.
+    Each operation acts on the whole batch, and none is LAPACK's, so that programs may run in several threads: JAX 0.10
+    distributes LAPACK batches over XLA's threads and waits for them in such a thread, so that two programs on two cores
+    deadlock.
 
-    Rows stay where they are: the pivot of column k is that of row ``order[k]``. One step of refinement brings the
-    residual of a solution to rounding, as substitution would, which a product with the inverse alone does not (Higham
-    2002, Accuracy and Stability of Numerical Algorithms, sections 12.1 and 14.1).
+    Rows stay in place: the pivot of column k is in row ``order[k]``. One step of refinement brings the residual of a
+    solution to rounding, as substitution would; a product with the inverse alone does not (Higham 2002, Accuracy and
+    Stability of Numerical Algorithms, sections 12.1 and 14.1).
     """
 
     matrix: Matrices
@@ -44,7 +44,7 @@ class DenseFactor(Module):
             largest = _largest(jnp.where(free, jnp.abs(column), -1.0), rows)
             row = _rows(matrix, largest[None])[0]
             pivot, here, chosen = at(row, k, 0), rows == k, rows == largest
-            # column k makes room for that of the identity; a pivot of zero leaves the others finite
+            # column k is replaced by that of the identity; a zero pivot leaves the other entries finite
             row = jnp.where(here, 1.0, row) * (1.0 / jnp.where(pivot == 0, 1.0, pivot))
             others = jnp.where(chosen[:, None] | here[None], 0.0, matrix)
             matrix = others - jnp.where(chosen, -1.0, column)[:, None] * row[None]
@@ -57,31 +57,31 @@ class DenseFactor(Module):
 
     @classmethod
     def blank(cls, shape: tuple[int, ...], lanes: int) -> "DenseFactor":
-        """Return a placeholder for the factors of a batch, to start a loop with."""
+        """Return placeholder factors of a batch, to start a loop."""
         matrix, column = np.zeros((*shape, lanes)), np.zeros((shape[0], lanes))
         return cls(matrix, matrix, column.astype(np.int32), column)
 
     def refining(self, matrix: Matrices) -> "DenseFactor":
-        """Return these factors for matrices near to those that were factored, by which solutions are refined."""
+        """Return these factors for nearby matrices, whose solutions they find by refinement."""
         return DenseFactor(matrix, self.eliminated, self.order, self.pivots)
 
     def renewed(self) -> "DenseFactor":
-        """Return the factors of these matrices, where they have been near to those that were factored."""
+        """Return new factors of the present matrices."""
         return self.of(self.matrix)
 
     def defect(self) -> Float[Numbers, " batch"]:
-        """Return by which part solutions are off that are not refined, as one of known solution tells, shape (batch,).
+        """Return the relative error of unrefined solutions, measured on one known solution, shape (batch,).
 
-        Refined, they are off by its square. It is NaN where a matrix is singular.
+        Refined solutions have the square of this error. It is NaN where a matrix is singular.
         """
         known = np.where(np.arange(len(self.order)) % 3 == 1, -1.0, 1.0)
         right = jnp.sum(self.matrix * known[None, :, None], axis=1)
         return jnp.max(jnp.abs(self.solve(right, refined=False) - known[:, None]), axis=0)
 
     def solve(self, right: Columns, *, refined: bool = True) -> Columns:
-        """Return the solution for right-hand sides of shape (rows, batch); it is NaN where a matrix is singular.
+        """Return the solutions for right-hand sides of shape (rows, batch); NaN where a matrix is singular.
 
-        A correction that is followed by another need not be refined.
+        A correction that is followed by another one need not be refined.
         """
 
         def product(right: Any) -> Any:
@@ -95,7 +95,7 @@ class DenseFactor(Module):
         return (solution + product(rest)) * self._regular()
 
     def solve_transposed(self, right: Columns) -> Columns:
-        """Return the solution with the transposed matrices, for right-hand sides of shape (rows, batch)."""
+        """Return the solutions of the transposed systems, for right-hand sides of shape (rows, batch)."""
         rank = self._rank()
 
         def product(right: Any) -> Any:
@@ -107,7 +107,7 @@ class DenseFactor(Module):
         return (solution + product(rest)) * self._regular()
 
     def inverse(self) -> Matrices:
-        """Return the inverse matrices, shape (rows, rows, batch), for many right-hand sides that come one by one."""
+        """Return the inverse matrices, shape (rows, rows, batch), for many successive right-hand sides."""
         rows = _rows(self.eliminated, self.order[:, None])
         return jnp.take_along_axis(rows, self._rank()[None], axis=1, mode="promise_in_bounds") * self._regular()[None]
 
@@ -117,7 +117,7 @@ class DenseFactor(Module):
         return first.inverse()[..., 0] @ matrix
 
     def pivot_ratio(self) -> Float[Numbers, " batch"]:
-        """Return the smallest pivot over the largest, shape (batch,): near zero at a singular position."""
+        """Return the ratio of smallest to largest pivot, shape (batch,): near zero at a singular position."""
         sizes = jnp.abs(self.pivots)
         return jnp.min(sizes, axis=0) / jnp.max(sizes, axis=0)
 
@@ -130,7 +130,7 @@ class DenseFactor(Module):
         return jnp.prod(jnp.sign(self.pivots), axis=0) * jnp.where(odd, -1.0, 1.0)
 
     def _rank(self) -> Int[Numbers, "row batch"]:
-        """Return which pivot is that of each row; `argsort` would call a library of XLA's."""
+        """Return the index of the pivot in each row; `argsort` would call an XLA library."""
         positions = np.arange(len(self.order), dtype=np.int32)
         matches = self.order[None] == positions[:, None, None]
         return jnp.sum(jnp.where(matches, positions[None, :, None], 0), axis=1)
@@ -140,20 +140,20 @@ class DenseFactor(Module):
 
 
 def _rows(matrix: Any, rows: Any) -> Any:
-    """Return rows by the indices that `order` holds, of which none is out of bounds."""
+    """Return rows by index; no index may be out of bounds."""
     return jnp.take_along_axis(matrix, rows, axis=0, mode="promise_in_bounds")
 
 
 def _largest(sizes: Columns, rows: Int[Numbers, "row 1"]) -> Int[Numbers, "1 batch"]:
-    """Return the row of the largest entry of each lane, the first of equals, shape (1, batch); NaN is the largest.
+    """Return the row of the largest entry in each lane, the first among equals, shape (1, batch); NaN is the largest.
 
-    XLA's argmax goes from entry to entry; two reductions go over all lanes at once.
+    XLA's argmax goes entry by entry; two reductions process all lanes at once.
     """
     sizes = jnp.where(jnp.isnan(sizes), jnp.inf, sizes)
     return jnp.min(jnp.where(sizes == jnp.max(sizes, axis=0, keepdims=True), rows, len(rows)), axis=0, keepdims=True)
 
 
-SWEEPS = 10  # a third of them is enough for tasks of robots: convergence is quadratic
+SWEEPS = 10  # a third is enough for robot tasks, as convergence is quadratic
 
 
 def singular_values(
@@ -161,18 +161,18 @@ def singular_values(
 ) -> tuple[Float[Numbers, "row k batch"], Float[Numbers, "k batch"], Float[Numbers, "column k batch"]]:
     """Return the singular value decomposition of a batch of small matrices, the batch last, without LAPACK.
 
-    One-sided Jacobi rotations make the rows orthogonal (Demmel and Veselic 1992, Jacobi's method is more accurate than
-    QR), pair after pair.
+    One-sided Jacobi rotations orthogonalize the rows pair by pair (Demmel and Veselic 1992, Jacobi's method is more
+    accurate than QR).
 
     Parameters
     ----------
     matrix : array of shape (rows, columns, batch)
-        To be decomposed as ``sum_k u[:, k] s[k] v[:, k]^T``.
+        Matrices to be decomposed as ``sum_k u[:, k] s[k] v[:, k]^T``.
 
     Returns
     -------
     u, s, v : arrays of shape (rows, k, batch), (k, batch) and (columns, k, batch)
-        k is the lesser of rows and columns; the largest singular value is first, and v is zero where it is zero.
+        k is the lesser of rows and columns. Singular values are in descending order; v is zero for zero ones.
     """
     rows, columns, lanes = matrix.shape
     if rows > columns:

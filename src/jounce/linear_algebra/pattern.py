@@ -1,4 +1,4 @@
-"""Where the entries of a Jacobian stand: a row touches two bodies, seldom three, however many there are."""
+"""Sparsity pattern of a Jacobian: a row touches two bodies, seldom three, however many there are."""
 
 import math
 from collections.abc import Sequence
@@ -13,18 +13,18 @@ from jounce.base.shapes import Numbers
 
 
 class Pattern(Module):
-    """The bodies that each row of a matrix touches, and where its entries stand in a list of them.
+    """The bodies that each row of a matrix touches, and the indices of its entries in a list.
 
     Attributes
     ----------
     bodies : array of int, shape (rows, slots)
-        The number of bodies where a row touches fewer.
+        Bodies that each row touches; the number of bodies fills unused slots.
     entry_indices : array of int, shape (rows, slots, width)
-        Of the entries in the columns of that body; the number of entries where there are none.
+        Indices of the entries in the columns of these bodies; the number of entries where there are none.
     body_count, entry_count : int
         Number of bodies, and of entries.
     row_counts : tuple of int
-        Rows of an instance of each group.
+        Number of rows per instance of each group.
     """
 
     bodies: Int[Numbers, "row slot"]
@@ -40,11 +40,11 @@ class Pattern(Module):
         Parameters
         ----------
         groups : sequence of Group
-            Each with the bodies of its instances, the ground as 0.
+            Groups with the bodies of their instances, the ground as 0.
         row_counts : sequence of int
-            Rows of an instance of each.
+            Number of rows per instance of each group.
         width : int
-            Columns of a body.
+            Number of columns per body.
         body_count : int
             Number of bodies, without the ground.
         """
@@ -67,16 +67,16 @@ class Pattern(Module):
 
     @property
     def width(self) -> int:
-        """Columns of a body."""
+        """Number of columns per body."""
         return self.entry_indices.shape[-1]
 
     @property
     def shape(self) -> tuple[int, int]:
-        """Number of rows and of columns."""
+        """Number of rows, and of columns."""
         return len(self.bodies), self.body_count * self.width
 
     def dense(self, entries: Float[Numbers, "entry batch"]) -> Float[Numbers, "row column batch"]:
-        """Return the matrices with these entries."""
+        """Return the dense matrices with given entries."""
         bodies = np.arange(self.body_count, dtype=np.int32)[None, None, :, None]
         entry_indices = jnp.where(
             self.bodies[:, :, None, None] == bodies, self.entry_indices[:, :, None], self.entry_count
@@ -86,25 +86,25 @@ class Pattern(Module):
     def product(
         self, entries: Float[Numbers, "entry #batch"], columns: Float[Numbers, "column batch"]
     ) -> Float[Numbers, "row batch"]:
-        """Return the products of the matrices with these entries and columns."""
+        """Return the products of matrices with given entries and columns."""
         return jnp.sum(self.by_row(entries) * self.touched(columns), axis=(1, 2))
 
     def by_row(self, entries: Float[Numbers, "entry batch"]) -> Float[Numbers, "row slot width batch"]:
-        """Return the entries of each row, in the columns of each body that it touches."""
+        """Return the entries of each row in the columns of each body that it touches."""
         return _with_zero(entries)[self.entry_indices]
 
     def touched(self, columns: Float[Numbers, "column batch"]) -> Float[Numbers, "row slot width batch"]:
-        """Return the components that belong to the bodies that each row touches."""
+        """Return the components of the bodies that each row touches."""
         by_body = jnp.reshape(columns, (self.body_count, self.width, -1))
         return by_body.at[self.bodies].get(mode="fill", fill_value=0.0)
 
     def summed(self, shares: Float[Numbers, "row slot width batch"]) -> Float[Numbers, "column batch"]:
-        """Return the sums of the shares of all rows in each component: the transpose of `touched`."""
+        """Return the sums over all rows of the shares of each component: the transpose of `touched`."""
         sums = jnp.zeros((self.body_count, self.width, shares.shape[-1])).at[self.bodies].add(shares, mode="drop")
         return sums.reshape(self.shape[1], -1)
 
     def row_scale(self, entries: Float[Numbers, "entry batch"]) -> Float[Numbers, "row batch"]:
-        """Return factors by which the largest entry of each row becomes one; one where that is zero or not finite."""
+        """Return factors that scale the largest entry of each row to one; one if that entry is zero or not finite."""
         largest = jnp.max(jnp.abs(self.by_row(entries)), axis=(1, 2))
         return 1 / jnp.where((largest > 0) & jnp.isfinite(largest), largest, 1.0)
 

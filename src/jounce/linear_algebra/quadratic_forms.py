@@ -1,4 +1,4 @@
-"""Quadratic forms from their values in some directions, and where several of them vanish."""
+"""Quadratic forms from their values in given directions, and their common zeros."""
 
 from collections.abc import Callable
 
@@ -14,9 +14,9 @@ def polarized(
     Parameters
     ----------
     values : callable
-        Values of the forms in directions: the unit vectors, and the sums of two of them.
+        Returns values of the forms in directions: the unit vectors, and sums of two of them.
     count : int
-        How many variables the forms have.
+        Number of variables of the forms.
     """
     first, second = np.triu_indices(count)
     unit = np.eye(count)
@@ -36,20 +36,20 @@ def common_zeros(
     steps: int,
     longest: float = np.inf,
 ) -> Float[np.ndarray, "zero k"]:
-    """Return unit vectors on which all forms vanish, to a tolerance, by Gauss-Newton on the sphere from many starts.
+    """Return unit vectors on which all forms vanish to a tolerance, by Gauss-Newton on the sphere from many starts.
 
     Parameters
     ----------
     forms : array of shape (forms, k, k)
         Symmetric matrices.
     starts : array of shape (starts, k)
-        Each leads to the nearest one, or to none.
+        Start vectors; each leads to a zero nearby or to none.
     tolerance : float
         Largest value of a form.
     steps : int
-        How many are made. Where a zero is double each halves the error, and the value goes with its square.
+        Number of steps. At a double zero, each halves the error and quarters the value.
     longest : float, optional
-        Length of a step at most.
+        Largest length of a step.
     """
     x = starts / np.linalg.norm(starts, axis=1, keepdims=True)
     for _ in range(steps):

@@ -1,7 +1,7 @@
-"""Small dense matrices eliminated by Householder reflections, without pivoting: nothing depends on the numbers.
+"""Elimination of small dense matrices by Householder reflections, without pivoting: no choice depends on the numbers.
 
-Each entry is an operation of its own here, which suits code for one instant at a time (`jounce.execution.llvm`), where
-a choice of pivots would cost more than the arithmetic; on arrays `DenseFactor` takes less time.
+Each entry is an operation of its own, which suits code for one instant at a time (`jounce.execution.llvm`), where
+pivoting would cost more than the arithmetic; on arrays, `DenseFactor` is faster.
 """
 
 import jax
@@ -18,22 +18,22 @@ Columns = Float[Numbers, "row batch"]
 
 
 class ReflectedFactor(Module):
-    """A batch of small square matrices, factored into reflections and a triangle; the batch is last.
+    """A batch of small square matrices, factored into reflections and a triangle; batch last.
 
-    The solution of a triangle after reflections is backward stable (Higham 2002, Accuracy and Stability of Numerical
-    Algorithms, section 19.3). The step of refinement is for factors that serve a matrix nearby.
+    Triangular solution after reflections is backward stable (Higham 2002, Accuracy and Stability of Numerical
+    Algorithms, section 19.3). The refinement step serves factors of nearby matrices.
     """
 
     matrix: Float[Numbers, "row row batch"]
-    reduced: Float[Numbers, "row row batch"]  # above its diagonal the triangle, below and on it the reflections
+    reduced: Float[Numbers, "row row batch"]  # triangle above the diagonal, reflections on and below it
     pivots: Columns  # diagonal of the triangle
-    shares: Columns  # two over the squared length of each reflection; 0 where nothing is reflected
-    order: Order = field(static=True)  # of the rows and columns in all of these
+    shares: Columns  # two over the squared length of each reflection; 0 without reflection
+    order: Order = field(static=True)  # of the rows and columns in all of these arrays
 
     @classmethod
     @by_certain_entries()
     def of(cls, matrix: Float[Numbers, "row row batch"], order: Order) -> "ReflectedFactor":
-        """Factor matrices of shape (rows, rows, batch), their rows and columns in an order."""
+        """Factor matrices of shape (rows, rows, batch) with rows and columns in a given order."""
         return cls._of_ordered(_ordered(matrix, order), order)
 
     @classmethod
@@ -58,24 +58,24 @@ class ReflectedFactor(Module):
 
     @classmethod
     def blank(cls, order: Order, lanes: int) -> "ReflectedFactor":
-        """Return a placeholder for the factors of a batch, to start a loop with."""
+        """Return placeholder factors of a batch, to start a loop."""
         size = len(order[0])
         matrix, column = np.zeros((size, size, lanes)), np.zeros((size, lanes))
         return cls(matrix, matrix, column, column, order)
 
     def refining(self, matrix: Float[Numbers, "row row batch"]) -> "ReflectedFactor":
-        """Return these factors for matrices near to those that were factored, by which solutions are refined."""
+        """Return these factors for nearby matrices, whose solutions they find by refinement."""
         return with_fields(self, matrix=_ordered(matrix, self.order))
 
     def renewed(self) -> "ReflectedFactor":
-        """Return the factors of these matrices, where they have been near to those that were factored."""
+        """Return new factors of the present matrices."""
         return self._of_ordered(self.matrix, self.order)
 
     @by_certain_entries()
     def defect(self) -> Float[Numbers, " batch"]:
-        """Return by which part solutions are off that are not refined, as one of known solution tells, shape (batch,).
+        """Return the relative error of unrefined solutions, measured on one known solution, shape (batch,).
 
-        Refined, they are off by its square. It is not finite where a matrix is singular.
+        Refined solutions have the square of this error. It is not finite where a matrix is singular.
         """
         known = np.where(np.arange(len(self.pivots)) % 3 == 1, -1.0, 1.0)
         right = jnp.sum(self.matrix * known[None, :, None], axis=1)
@@ -83,9 +83,9 @@ class ReflectedFactor(Module):
 
     @by_certain_entries()
     def solve(self, right: Columns, *, refined: bool = True) -> Columns:
-        """Return the solution for right-hand sides of shape (rows, batch); it is not finite where one is singular.
+        """Return the solutions for right-hand sides of shape (rows, batch); not finite where a matrix is singular.
 
-        A correction that is followed by another need not be refined.
+        A correction that is followed by another one need not be refined.
         """
         rows, columns = self.order
         right = right[np.asarray(rows)]
@@ -100,7 +100,7 @@ class ReflectedFactor(Module):
         return jax.lax.map(lambda column: first.solve(column[:, None], refined=False)[:, 0], matrix.T).T
 
     def pivot_ratio(self) -> Float[Numbers, " batch"]:
-        """Return the smallest pivot over the largest, shape (batch,): near zero at a singular position."""
+        """Return the ratio of smallest to largest pivot, shape (batch,): near zero at a singular position."""
         sizes = jnp.abs(self.pivots)
         return jnp.min(sizes, axis=0) / jnp.max(sizes, axis=0)
 
@@ -112,7 +112,7 @@ class ReflectedFactor(Module):
 
 
 def reflection(first: Columns) -> tuple[Columns, Float[Numbers, " batch"], Float[Numbers, " batch"]]:
-    """Return the reflection that clears a column but for its first entry, that entry, and 2 over its square, or 0."""
+    """Return the reflection that clears a column below its first entry, that entry, and 2 over its square or 0."""
     length = jnp.sqrt(jnp.sum(first * first, axis=0))
     pivot = jnp.where(first[0] > 0, -length, length)
     head = first[0] - pivot
