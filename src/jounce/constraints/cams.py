@@ -75,8 +75,8 @@ class Cam(AbstractConstraint):
         self.slots = tuple(tuple(names.index(body) for body in part.bodies) for part in (follower, leader))
         self.bodies = names if bodies is None else tuple(bodies)
         self.follower, self.leader = (
-            _between(part, [self.bodies[k] for k in its])
-            for part, its in zip((follower, leader), self.slots, strict=True)
+            _between(part, [self.bodies[k] for k in indices])
+            for part, indices in zip((follower, leader), self.slots, strict=True)
         )
         self.of = of
 

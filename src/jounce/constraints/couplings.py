@@ -206,8 +206,8 @@ class Gear(AbstractConstraint, type="gear", space="spatial"):
             return turned
         moving, (place, along, axes, arms) = displacements(bodies, changes), self._mesh(bodies)
         parted = [
-            velocity_at(body, its, place) - arm * axis.dot(its[1] - moving[2][1])
-            for body, its, axis, arm in zip(bodies[:2], moving, axes, arms, strict=False)
+            velocity_at(body, twist, place) - arm * axis.dot(twist[1] - moving[2][1])
+            for body, twist, axis, arm in zip(bodies[:2], moving, axes, arms, strict=False)
         ]
         return turned + along.dot(parted[1] - parted[0])
 

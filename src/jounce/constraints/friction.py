@@ -308,7 +308,9 @@ def relative_velocity(bodies: Sequence[Pose], moving: Velocities, point_j: Any) 
 def line_turn(bodies: Sequence[Pose], moving: Velocities, point_i: Any, point_j: Any) -> Jet:
     """Return the angular velocity of the line from a point of the first planar body to one of the second."""
     points = [body.point(point) for body, point in zip(bodies, (point_i, point_j), strict=False)]
-    first, second = (velocity_at(body, its, place) for body, its, place in zip(bodies, moving, points, strict=False))
+    first, second = (
+        velocity_at(body, twist, place) for body, twist, place in zip(bodies, moving, points, strict=False)
+    )
     line = points[1] - points[0]
     return cross(line, second - first) / line.dot(line)
 

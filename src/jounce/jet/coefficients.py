@@ -193,7 +193,7 @@ def with_rank(a: Real, rank: int) -> Any:
     return jnp.reshape(a, (1,) * missing + jnp.shape(a)) if missing and jnp.ndim(a) else a
 
 
-def begun_series(coefficients: list[Any], levels: int) -> Any:
+def padded_series(coefficients: list[Any], levels: int) -> Any:
     """Return the first coefficients of a series as an array with room for the others."""
     first = jnp.stack(coefficients)
     return jnp.pad(first, ((0, levels - len(first)), *((0, 0),) * (first.ndim - 1)))

@@ -54,13 +54,13 @@ def nan_where_rounding(
     return Jet(coefficients)
 
 
-def nan_where_rounding_in_plane(angle: Jet, seen: Jet, line: Jet, normal: Jet | None = None) -> Jet:
+def nan_where_rounding_in_plane(angle: Jet, projection: Jet, line: Jet, normal: Jet | None = None) -> Jet:
     """Return the angle of a line projected on a plane, NaN where the line is normal to it; vectors (components, ...).
 
     A moving plane has a unit normal, in the axes of the line; the projection then moves with both.
     """
     batch = jnp.ndim(angle.coefficients[0])
-    flat, whole = sizes(seen, batch), sizes(line, batch)
+    flat, whole = sizes(projection, batch), sizes(line, batch)
     rate = growth(whole[1:], whole[0])
     if normal is not None:
         rate = jnp.maximum(rate, growth(sizes(normal, batch)[1:], jnp.ones_like(rate)))

@@ -119,7 +119,7 @@ class FrontalInverse(Module):
             ]
 
         known = jnp.concatenate([right, jnp.zeros((1 + count * left, lanes))])
-        _, begun = jax.lax.scan(inwards, known, (numbers, plan.sources, self.inward))
+        _, partial = jax.lax.scan(inwards, known, (numbers, plan.sources, self.inward))
 
         def outwards(known: Any, level: Any) -> tuple[Any, None]:
             front, neighbors, outward, own = level
@@ -128,7 +128,7 @@ class FrontalInverse(Module):
             return jax.lax.dynamic_update_index_in_dim(known, own, front, 0), None
 
         known = jnp.zeros((count + 1, width, lanes))
-        levels = (numbers, plan.fronts.neighbors, self.outward, begun)
+        levels = (numbers, plan.fronts.neighbors, self.outward, partial)
         known, _ = jax.lax.scan(outwards, known, levels, reverse=True)
         return known[plan.fronts.of_body].reshape(-1, lanes)
 

@@ -180,8 +180,8 @@ class HostJacobian:
 
 def _largest_size(matrix: Any) -> float:
     """Return a bound of the largest singular value from row and column sums, close if rows have few entries."""
-    sizes, begun = np.abs(matrix.data), matrix.indptr[:-1][np.diff(matrix.indptr) > 0]
-    sums = np.add.reduceat(sizes, begun), np.bincount(matrix.indices, sizes)
+    sizes, starts = np.abs(matrix.data), matrix.indptr[:-1][np.diff(matrix.indptr) > 0]
+    sums = np.add.reduceat(sizes, starts), np.bincount(matrix.indices, sizes)
     return float(np.sqrt(np.prod([part.max(initial=0.0) for part in sums])))
 
 

@@ -81,8 +81,8 @@ class LeastSquaresFactor(Module):
 
         They replace the sign of the determinant, which a matrix with more rows than columns does not have.
         """
-        seen = jnp.sum(before.basis[:, :, None] * self.basis[:, None], axis=0)
-        return DenseFactor.of(seen).sign()
+        relative = jnp.sum(before.basis[:, :, None] * self.basis[:, None], axis=0)
+        return DenseFactor.of(relative).sign()
 
     def _substituted(self, right: Float[Numbers, "column batch"], axis: int) -> Float[Numbers, "column batch"]:
         """Return the solutions of the triangular systems (`axis` 0), or of the transposed ones (`axis` 1)."""

@@ -43,10 +43,10 @@ class DenseFactor(Module):
             column = at(matrix, k, 1, False)
             largest = _largest(jnp.where(free, jnp.abs(column), -1.0), rows)
             row = _rows(matrix, largest[None])[0]
-            pivot, here, chosen = at(row, k, 0), rows == k, rows == largest
+            pivot, diagonal, chosen = at(row, k, 0), rows == k, rows == largest
             # column k is replaced by that of the identity; a zero pivot leaves the other entries finite
-            row = jnp.where(here, 1.0, row) * (1.0 / jnp.where(pivot == 0, 1.0, pivot))
-            others = jnp.where(chosen[:, None] | here[None], 0.0, matrix)
+            row = jnp.where(diagonal, 1.0, row) * (1.0 / jnp.where(pivot == 0, 1.0, pivot))
+            others = jnp.where(chosen[:, None] | diagonal[None], 0.0, matrix)
             matrix = others - jnp.where(chosen, -1.0, column)[:, None] * row[None]
             return matrix, free & ~chosen, put(order, largest, k, 0), put(pivots, pivot, k, 0)
 

@@ -55,12 +55,12 @@ class Pattern(Module):
         entry_indices = np.full((*bodies.shape, width), entry_count)
         row = first = 0
         for block, count, group in zip(blocks, row_counts, groups, strict=True):
-            its = slice(row, row + block)
+            block_rows = slice(row, row + block)
             for k, slot in enumerate(group.moving_slots):
                 touched = np.tile(group.bodies[slot], count) - 1
-                bodies[its, k] = np.where(touched < 0, body_count, touched)
-                there = first + np.arange(width * block).reshape(width, block).T
-                entry_indices[its, k] = np.where(touched[:, None] < 0, entry_count, there)
+                bodies[block_rows, k] = np.where(touched < 0, body_count, touched)
+                indices = first + np.arange(width * block).reshape(width, block).T
+                entry_indices[block_rows, k] = np.where(touched[:, None] < 0, entry_count, indices)
                 first += width * block
             row += block
         return cls(bodies.astype(np.int32), entry_indices.astype(np.int32), body_count, entry_count, tuple(row_counts))

@@ -37,7 +37,7 @@ from jounce.dynamics.friction.coupling import has_friction
 from jounce.dynamics.friction.free_motion import FreeFriction, with_friction
 from jounce.dynamics.masses import Gravity, Masses
 from jounce.jet import Jet
-from jounce.jet.coefficients import begun_series
+from jounce.jet.coefficients import padded_series
 from jounce.jet.programs.series import Recursion
 from jounce.linear_algebra.least_squares import range_basis
 from jounce.linear_algebra.linear import DenseFactor
@@ -381,8 +381,8 @@ def expand(
         return history, now, series, put(rates, multipliers, k, 0)
 
     now = raised(state, acceleration, recursion.outputs[2], 1)
-    series = State(*(begun_series([c, d], order + 1) for c, d in zip(state, now, strict=True)))
-    rates = begun_series([multipliers], order)
+    series = State(*(padded_series([c, d], order + 1) for c, d in zip(state, now, strict=True)))
+    rates = padded_series([multipliers], order)
     _, _, series, rates = jax.lax.fori_loop(1, order, level, (recursion.history, now, series, rates))
     numbers = jnp.arange(1.0, order + 1)[:, None, None, None]
     accelerations = numbers * jnp.concatenate([series.velocity[1:], series.spin[1:]], axis=1)

@@ -148,19 +148,21 @@ def over_instances(
     if not any(several):
         flat = x.map(lambda c: jnp.reshape(jnp.asarray(c, float), -1))
         return jax.vmap(lambda x: function(captured, x))(flat).map(lambda c: jnp.reshape(c, x.shape))
-    axes = tuple(-1 if its and np.shape(v)[-1] > 1 else None for v, its in zip(captured, several, strict=True))
+    axes = tuple(-1 if is_many and np.shape(v)[-1] > 1 else None for v, is_many in zip(captured, several, strict=True))
 
     def of_instance(captured: Any, x: Jet) -> Jet:
-        given = tuple(v[..., 0] if its and a is None else v for v, its, a in zip(captured, several, axes, strict=True))
+        given = tuple(
+            v[..., 0] if is_many and a is None else v for v, is_many, a in zip(captured, several, axes, strict=True)
+        )
         return jax.vmap(function, in_axes=(axes, -1), out_axes=-1)(given, x)
 
-    each = tuple(-2 if its else None for its in several)
+    each = tuple(-2 if is_many else None for is_many in several)
     wide = x.map(lambda c: jnp.broadcast_to(c, jnp.broadcast_shapes(x.shape, *_ends(captured, several))))
     return jax.vmap(of_instance, in_axes=(each, -2), out_axes=-2)(tuple(captured), wide)
 
 
 def _ends(captured: Sequence[Any], several: Sequence[bool]) -> list[tuple[int, ...]]:
-    return [np.shape(v)[-2:] for v, its in zip(captured, several, strict=True) if its]
+    return [np.shape(v)[-2:] for v, is_many in zip(captured, several, strict=True) if is_many]
 
 
 def on_jets(program: Program, captured: Sequence[Any], arguments: Sequence[Any]) -> list[Any]:

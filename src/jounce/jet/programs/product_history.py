@@ -32,7 +32,7 @@ class ProductHistory:
 
     Attributes
     ----------
-    begun
+    initial
         History before the first order, a pytree of arrays.
     """
 
@@ -56,7 +56,7 @@ class ProductHistory:
         if self._in_parts:
             self._width = max(LEAST_ROW, -(-self._width // BLOCK) * BLOCK)
         sizes = [order + BLOCK, order + 2 * BLOCK]
-        self.begun: Any = ((), ()) if unrolled else tuple(jnp.zeros((size, self._width)) for size in sizes)
+        self.initial: Any = ((), ()) if unrolled else tuple(jnp.zeros((size, self._width)) for size in sizes)
 
     def noted(self, history: Any, k: Any, newest: Sequence[Any]) -> Any:
         """Return the history with the coefficients of order k of all factors.

@@ -117,7 +117,7 @@ class ReadObject(Module):
         held = [np.shape(x) for x in leaves]
         jets = [Jet([jax.ShapeDtypeStruct((*shape, 1, 1), float)] * (order + 1)) for order in orders]
         jets[-1] = Jet([jax.ShapeDtypeStruct((1, 1), float)] * (orders[-1] + 1))  # time
-        fields = [jax.ShapeDtypeStruct((*its, 1, 1), float) for its in held]
+        fields = [jax.ShapeDtypeStruct((*field_shape, 1, 1), float) for field_shape in held]
 
         def on_jets(given: Sequence[Any], _: Any) -> Any:
             return jax.tree.unflatten(tree, given[len(jets) :])(*given[: len(jets)])

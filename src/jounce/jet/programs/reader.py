@@ -89,8 +89,8 @@ class ProgramReader(abc.ABC):
         sequences, collected = operands[constants + state :], []
         steps = range(parameters["length"])
         for i in reversed(steps) if parameters["reverse"] else steps:
-            here = [self.composed(lambda x, i=i: x[i], [x]) for x in sequences]
-            results = self.read(inner.jaxpr, inner.consts, [*fixed, *carry, *here])
+            step_inputs = [self.composed(lambda x, i=i: x[i], [x]) for x in sequences]
+            results = self.read(inner.jaxpr, inner.consts, [*fixed, *carry, *step_inputs])
             carry = results[:state]
             collected.append(results[state:])
         if parameters["reverse"]:

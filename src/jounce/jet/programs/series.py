@@ -124,7 +124,7 @@ class Recursion(ProgramReader):
         self._still = still if still is not None and still.form == self.form else None
         factors = None if self._still is None else self._still.factors
         self._rows = ProductHistory(shapes, pairs, order, factors, reversible=reversible, unrolled=unrolled)
-        self.history = self._rows.begun
+        self.history = self._rows.initial
 
     @property
     def uses_still(self) -> bool:

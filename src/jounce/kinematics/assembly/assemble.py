@@ -138,27 +138,27 @@ def _assemble_near_guess(model: Model, instant: float, tolerance: float) -> tupl
     it takes another iteration to reach the angles that the drivers prescribe.
     """
     displace, prescribed = Displacements(model, instant), model.prescribed
-    residual, attempt, known = displace.closed(model.guess, tolerance)
+    residual, attempt, position = displace.closed(model.guess, tolerance)
     laws = law_values(model.system.groups, instant)
     lag = driver_lag(model, laws, residual)
     model, start = _start_after_turns(model, instant, tolerance, lag)
     if start is not None:
         attempt = assemble_from_guess(model, instant, tolerance, start)
     elif attempt is None:
-        attempt = assemble_from_guess(model, instant, tolerance, known=known or displace.at(model.guess))
+        attempt = assemble_from_guess(model, instant, tolerance, start_position=position or displace.at(model.guess))
     if not attempt.closed and any(map(measures_angle, model.system.groups)):
         # angles counted from a tilted guess may be far off: first close the joints, with the drivers as in the guess
-        begin = attempt if lag is None else assemble_from_guess(model, instant, tolerance, lag=lag)
-        if begin.closed:
-            model, _ = with_reference(model, begin.coordinates, instant, prescribed, laws=laws)
-            attempt = assemble_from_guess(model, instant, tolerance, begin.coordinates)
+        lagging = attempt if lag is None else assemble_from_guess(model, instant, tolerance, lag=lag)
+        if lagging.closed:
+            model, _ = with_reference(model, lagging.coordinates, instant, prescribed, laws=laws)
+            attempt = assemble_from_guess(model, instant, tolerance, lagging.coordinates)
     if "angle" in attempt.coordinates and start is None and attempt.closed:
         attempt = nearest_to_guess(model, attempt, instant)
     for _ in range(MAX_DATUMS):
         if not attempt.closed:
             return model, attempt
-        model, away = with_reference(model, attempt.coordinates, instant, prescribed, laws=laws)
-        if away <= SETTLED:
+        model, change = with_reference(model, attempt.coordinates, instant, prescribed, laws=laws)
+        if change <= SETTLED:
             return model, attempt
         attempt = assemble_from_guess(model, instant, tolerance, attempt.coordinates)
     return with_reference(model, attempt.coordinates, instant, prescribed, keep=True)[0], attempt
@@ -173,8 +173,8 @@ def warn_of_parts_turned_over(model: Model, attempt: AssemblyAttempt) -> None:
             "along the line (in the plane the center belongs on its right, in space on the side of vector x axis)"
         )
         warnings.warn(AssemblyWarning(message), stacklevel=3)
-    there = signs_of(model, attempt)
-    if there.all() or not (odd := there != drawn_axis_signs(model)).any():
+    signs = signs_of(model, attempt)
+    if signs.all() or not (odd := signs != drawn_axis_signs(model)).any():
         return
     names = dict.fromkeys(itertools.compress(pair_names(model), odd))
     message = (
@@ -195,10 +195,10 @@ def _start_after_turns(
     """
     if lag is None or not np.pi < lag.angle < np.inf:
         return model, None
-    begin = assemble_from_guess(model, instant, tolerance, lag=lag)
-    if not begin.closed:
+    lagging = assemble_from_guess(model, instant, tolerance, lag=lag)
+    if not lagging.closed:
         return model, None
-    turned = turned_to_laws(model, lag, begin.coordinates, Displacements(model, instant))
+    turned = turned_to_laws(model, lag, lagging.coordinates, Displacements(model, instant))
     if turned is None:
         return model, None
     coordinates, history = turned
@@ -292,8 +292,8 @@ def _widths(model: Model, attempt: AssemblyAttempt, instant: float) -> dict[str,
         unit = "mm" if lengthy[row] else "deg"
         sizes[name][unit] = max(sizes[name][unit], open_by[row])
     return {
-        name: " and ".join(f"{size:.3g} {unit}" for unit, size in its.items() if size > 1e-6)
-        for name, its in sizes.items()
+        name: " and ".join(f"{size:.3g} {unit}" for unit, size in by_unit.items() if size > 1e-6)
+        for name, by_unit in sizes.items()
     }
 
 
@@ -326,7 +326,7 @@ def check_mobility(model: Model, redundant: Redundancy, *, free: bool = False) -
 
     Redundant constraints raise no error, since they agree. With `free`, degrees of freedom may be left.
     """
-    (rows, columns), rank = redundant.here.shape, redundant.rank
+    (rows, columns), rank = redundant.at_assembly.shape, redundant.rank
     left_over = columns - rank
     if (free or not left_over) and not redundant.is_singular:
         return
@@ -345,11 +345,11 @@ def check_mobility(model: Model, redundant: Redundancy, *, free: bool = False) -
     if redundant.count:
         parts.append(f"{redundant}, which is no fault as they agree")
     if redundant.is_singular:
-        moving = freely_moving(model, redundant.here.free_directions)
+        moving = freely_moving(model, redundant.at_assembly.free_directions)
         parts.append(
             "the start is a singular position (a dead point or a change point), where only "
-            f"{redundant.here.rank} equations are independent and {moving} can move: start at another instant, or with "
-            "another position"
+            f"{redundant.at_assembly.rank} equations are independent and {moving} can move: start at another "
+            "instant, or with another position"
         )
     raise MobilityError("; ".join(parts), status=Status.SINGULAR if redundant.is_singular else None)
 

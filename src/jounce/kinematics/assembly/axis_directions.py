@@ -88,13 +88,13 @@ def axis_signs_to_try(model: Model, attempt: AssemblyAttempt) -> list[AxisSigns]
     Another assembly is needed if parts are turned over, or if the first one failed and directions in its guess are far
     from parallel. Signs as drawn may be impossible; all pairs pointing the same way come second.
     """
-    there = signs_of(model, attempt) if attempt.closed else None
-    if there is not None and there.all():
+    signs = signs_of(model, attempt) if attempt.closed else None
+    if signs is not None and signs.all():
         return []
     drawn = _cosines(model.system, model.guess)
     meant = drawn > DRAWN_OPPOSITE
-    if there is not None:
-        as_meant = np.array_equal(there, meant)
+    if signs is not None:
+        as_meant = np.array_equal(signs, meant)
     else:  # where a law has no finite value, no other start helps
         as_meant = bool(np.all(np.abs(drawn) > DRAWN_NEARLY)) or not np.isfinite(attempt.gaps).all()
     if as_meant:
@@ -134,15 +134,15 @@ def _directed(model: Model, signs: AxisSigns, *, only_directions: bool = False, 
     groups = [] if only_directions else [group for group in model.system.groups if driven or not group.is_driver]
     leads, first = list(range(model.system.body_count + 1)), 0
     for group, names in _pairs(model.system):
-        its = np.arange(group.instances)
-        factors = np.where(signs[first + its], 1.0, -1.0)
+        chosen = np.arange(group.instances)
+        factors = np.where(signs[first + chosen], 1.0, -1.0)
         first += group.instances
         if only_directions:
-            its = np.array([k for k in its if _joins(leads, group.bodies[0][k], group.bodies[1][k])], int)
-        if len(its):
-            vector_i, vector_j = (_unit(group, name)[:, its, None] for name in names)
-            slots = tuple(tuple(slot[k] for k in its) for slot in group.bodies[:2])
-            groups.append(Group(SameDirection(vector_i, vector_j * factors[its, None]), slots))
+            chosen = np.array([k for k in chosen if _joins(leads, group.bodies[0][k], group.bodies[1][k])], int)
+        if len(chosen):
+            vector_i, vector_j = (_unit(group, name)[:, chosen, None] for name in names)
+            slots = tuple(tuple(slot[k] for k in chosen) for slot in group.bodies[:2])
+            groups.append(Group(SameDirection(vector_i, vector_j * factors[chosen, None]), slots))
     unnamed = tuple(("",) * group.instances for group in groups)
     parts = ((tuple(groups), unnamed), ((), ()), ((), ()))
     return model_of(model.bodies, parts, model.guess, model.length, None)

@@ -31,7 +31,7 @@ class _NewtonState(NamedTuple):
 
     coordinates: dict[str, Numbers]
     increment: Float[Numbers, " column"]  # of the next step
-    begun: Float[Numbers, " row"]  # residual at the first position
+    first_residual: Float[Numbers, " row"]  # residual at the first position
     residual: Float[Numbers, " row"]
     entries: Float[Numbers, " entry"]
     row_scale: Float[Numbers, " row"]
@@ -58,14 +58,14 @@ def _moved(
     """
     time = Jet([instant[None, None]])
 
-    def there(coordinates: dict[str, Numbers], increment: Float[Numbers, " column"]) -> Any:
+    def evaluated(coordinates: dict[str, Numbers], increment: Float[Numbers, " column"]) -> Any:
         pose = pose_at(coordinates, pose_type)
         pose = pose.displaced(*system.coordinates(increment[:, None], pose.shifts))
         moved = {name: jet.coefficients[0] for name, jet in pose.coordinates().items()}
         return moved, system.residual(pose, time).coefficients[0][:, 0], system.entries(pose, time)[:, 0]
 
     def newton_step(state: _NewtonState) -> _NewtonState:
-        moved, residual, entries = there(state.coordinates, state.increment)
+        moved, residual, entries = evaluated(state.coordinates, state.increment)
         before, now = (jnp.sqrt(jnp.sum((state.row_scale * x) ** 2)) for x in (state.residual, residual))
         first, small = state.left == steps, state.size <= tolerance
         falls = first | small | (now < before)
@@ -77,17 +77,17 @@ def _moved(
         size = jnp.max(jnp.abs(step))
         goes_on = falls & (size <= LONGEST_STEP) & (factor.pivot_ratio()[0] >= REGULAR)
         left = jnp.where(goes_on, state.left - 1, -1)
-        begun = jnp.where(first, residual, state.begun)
-        return _NewtonState(moved, step, begun, residual, entries, row_scale, size, closed, left)
+        first_residual = jnp.where(first, residual, state.first_residual)
+        return _NewtonState(moved, step, first_residual, residual, entries, row_scale, size, closed, left)
 
     if system.pattern is None:
-        return there(coordinates, increment)
+        return evaluated(coordinates, increment)
     rows, entries = np.zeros(system.shape[0]), np.zeros(system.pattern.entry_count)
     start = _NewtonState(coordinates, increment, rows, rows, entries, rows, np.zeros(()), np.zeros((), bool), steps)
     end = jax.lax.while_loop(
         lambda state: ~state.closed & (state.left >= 0), newton_step, jax.tree.map(jnp.asarray, start)
     )
-    return end.coordinates, end.residual, end.entries, end.begun, end.closed
+    return end.coordinates, end.residual, end.entries, end.first_residual, end.closed
 
 
 class AssemblyAttempt(NamedTuple):
@@ -139,9 +139,9 @@ class Displacements:
 
         The position at the coordinates comes third, if no step was tried from it; the damped iteration starts there.
         """
-        there, begun, closed = self._moved(start, self._still, MAX_STEPS if self._dense else 0, tolerance)
-        attempt = _attempt(there, tolerance) if closed else None
-        return begun, attempt, None if self._dense else there
+        position, residual, closed = self._moved(start, self._still, MAX_STEPS if self._dense else 0, tolerance)
+        attempt = _attempt(position, tolerance) if closed else None
+        return residual, attempt, None if self._dense else position
 
     def at(self, coordinates: Coordinates) -> Displaced:
         """Return the position with given coordinates."""
@@ -154,10 +154,10 @@ class Displacements:
         result = _moved(self._system, coordinates, increment, *settings, self._model.pose_type)
         to = {name: np.asarray(x) for name, x in result[0].items()}
         residual, entries, *ending = map(np.asarray, result[1:])
-        begun, closed = ending or (residual, False)
+        first_residual, closed = ending or (residual, False)
         system = self._model.system
         jacobian = HostJacobian.of(system.pattern, entries).scaled(np.asarray(system.row_scale)[:, 0])
-        return Displaced(to, residual, jacobian), begun, bool(closed)
+        return Displaced(to, residual, jacobian), first_residual, bool(closed)
 
     @cached_property
     def _system(self) -> System:
@@ -173,7 +173,7 @@ def assemble_from_guess(
     start: Coordinates | None = None,
     *,
     lag: DriverLag | None = None,
-    known: Displaced | None = None,
+    start_position: Displaced | None = None,
 ) -> AssemblyAttempt:
     """Assemble the bodies at one instant by damped Gauss-Newton; the result may have open gaps.
 
@@ -189,7 +189,7 @@ def assemble_from_guess(
         Start coordinates in place of the guess.
     lag : DriverLag, optional
         Lag that the drivers keep.
-    known : Displaced, optional
+    start_position : Displaced, optional
         Start position in place of coordinates, with residual and Jacobian.
     """
     displace = Displacements(model, instant)
@@ -197,37 +197,37 @@ def assemble_from_guess(
     def opened(displaced: Displaced) -> Displaced:
         return displaced if lag is None else displaced._replace(residual=lag.open(displaced.residual, 1.0))
 
-    if known is None:
-        begin = model.guess if start is None else start
+    if start_position is None:
+        start_coordinates = model.guess if start is None else start
         if lag is None:
-            _, attempt, known = displace.closed(begin, tolerance)
+            _, attempt, start_position = displace.closed(start_coordinates, tolerance)
             if attempt is not None:
                 return attempt
-        known = displace.at(begin) if known is None else known
-    there = opened(known)
+        start_position = displace.at(start_coordinates) if start_position is None else start_position
+    position = opened(start_position)
     for _ in range(MAX_STEPS):
-        step, scale = there.jacobian.step(there.residual), there.jacobian.row_scale
+        step, scale = position.jacobian.step(position.residual), position.jacobian.row_scale
         if step is None:
             break  # the error names the rows
         size = np.max(np.abs(step), initial=0.0)
         step *= min(1.0, LONGEST_STEP / max(size, 1e-300))
-        now = np.linalg.norm(scale * there.residual)
+        now = np.linalg.norm(scale * position.residual)
         for _halving in range(12):
-            trial = opened(displace(there.coordinates, step))
+            trial = opened(displace(position.coordinates, step))
             left = np.linalg.norm(scale * trial.residual)
             if left < now or size <= tolerance:
                 break
             step *= 0.5
         else:
             break
-        there = trial
+        position = trial
         if size <= tolerance or size * left <= NEXT_STEP * tolerance * now:
             break
-    return _attempt(there, tolerance)
+    return _attempt(position, tolerance)
 
 
-def _attempt(there: Displaced, tolerance: float) -> AssemblyAttempt:
-    jacobian, scale = there.jacobian, there.jacobian.row_scale
-    gaps = np.where(jacobian.finite(), scale * there.residual, np.nan)
+def _attempt(position: Displaced, tolerance: float) -> AssemblyAttempt:
+    jacobian, scale = position.jacobian, position.jacobian.row_scale
+    gaps = np.where(jacobian.finite(), scale * position.residual, np.nan)
     closed = bool(np.all(np.abs(gaps) <= max(1e3 * tolerance, 1e-9)))
-    return AssemblyAttempt(there.coordinates, scale, gaps, jacobian.scaled(scale), closed)
+    return AssemblyAttempt(position.coordinates, scale, gaps, jacobian.scaled(scale), closed)

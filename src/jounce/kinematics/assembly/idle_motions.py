@@ -42,7 +42,7 @@ def idle_motions(model: Model, redundant: Redundancy, coordinates: Coordinates, 
     driven = any(name.startswith("drivers.") for name in model.rows)
     if redundant.is_singular or not driven or "quaternion" not in coordinates:
         return {}
-    directions = redundant.here.free_directions
+    directions = redundant.at_assembly.free_directions
     parts = directions.reshape(len(directions), len(model.bodies), -1)
     idle: IdleMotions = {}
     for members in _moved_together(parts):

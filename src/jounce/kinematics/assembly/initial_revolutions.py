@@ -82,13 +82,13 @@ def driver_lag(model: Model, laws: Sequence[np.ndarray], residual: Float[np.ndar
     angles = iter(laws)
     first = 0
     for group in groups:
-        its = rows[first : first + group.instances]
+        driver_rows = rows[first : first + group.instances]
         first += group.instances
-        size[its] = -residual[its]
-        turning[its] = dimension_of_field(group.element, "motion") == "angle"
+        size[driver_rows] = -residual[driver_rows]
+        turning[driver_rows] = dimension_of_field(group.element, "motion") == "angle"
         if measures_angle(group):
-            turning[its] = periodic[its] = True
-            size[its] = (next(angles) - np.asarray(group.element.datum.angle))[:, 0]
+            turning[driver_rows] = periodic[driver_rows] = True
+            size[driver_rows] = (next(angles) - np.asarray(group.element.datum.angle))[:, 0]
     return DriverLag(size, turning, periodic)
 
 
@@ -165,12 +165,12 @@ def _repeated(states: list[Coordinates], turns: int) -> Coordinates | None:
     if len(states) > 2 * STEPS_A_TURN:  # an advance per turn, as of a nut on a screw or the turn counter of a cam
         advance = before["position"] - states[-1 - 2 * STEPS_A_TURN]["position"]
     for name, value in after.items():
-        away = value - before[name]
+        difference = value - before[name]
         if name == "position":
-            away = away - advance
+            difference = difference - advance
         if name == "quaternion":
-            away = np.minimum(np.abs(away).max(axis=0), np.abs(value + before[name]).max(axis=0))
-        if np.max(np.abs(principal(away) if name == "angle" else away), initial=0.0) > 1e-6:
+            difference = np.minimum(np.abs(difference).max(axis=0), np.abs(value + before[name]).max(axis=0))
+        if np.max(np.abs(principal(difference) if name == "angle" else difference), initial=0.0) > 1e-6:
             return None
     after = {**after, "position": after["position"] + turns * advance}
     if "angle" not in after:
@@ -192,38 +192,40 @@ def nearest_turns(
     residual_at : callable
         Returns the scaled residual for given angles, shape (rows,).
     """
-    away = ((np.asarray(guess["angle"]) - coordinates["angle"]) / WHOLE_TURN)[1:, 0]
-    if not np.round(away).any():
+    missing_turns = ((np.asarray(guess["angle"]) - coordinates["angle"]) / WHOLE_TURN)[1:, 0]
+    if not np.round(missing_turns).any():
         return coordinates
     still = residual_at(coordinates["angle"])
 
     def shifted(turns: np.ndarray) -> np.ndarray:
         return coordinates["angle"] + WHOLE_TURN * np.concatenate([[0.0], turns])[:, None]
 
-    bodies = np.arange(len(away))
+    bodies = np.arange(len(missing_turns))
     changes = np.stack([residual_at(shifted((bodies == k) * 1.0)) - still for k in bodies])
     counted = np.abs(changes) > 1e-6
-    turns = np.round(away)
+    turns = np.round(missing_turns)
     for members in clusters(counted @ counted.T):  # bodies that share a row that counts turns
         if counted[members].any():
-            turns[members] = _together(changes[members], away[members])
+            turns[members] = _together(changes[members], missing_turns[members])
     if not turns.any() or np.max(np.abs(residual_at(shifted(turns)) - still)) > 1e-6:
         return coordinates
     return {**coordinates, "angle": shifted(turns)}
 
 
-def _together(changes: Float[np.ndarray, "body row"], away: Float[np.ndarray, " body"]) -> Float[np.ndarray, " body"]:
-    """Return the whole turns nearest to `away` that change no row; `changes` are those by one turn of each body."""
-    if np.max(np.abs(np.round(away) @ changes)) < 1e-6:
-        return np.round(away)
+def _together(
+    changes: Float[np.ndarray, "body row"], missing_turns: Float[np.ndarray, " body"]
+) -> Float[np.ndarray, " body"]:
+    """Return the whole turns nearest to `missing_turns` that change no row; `changes` are by one turn of each."""
+    if np.max(np.abs(np.round(missing_turns) @ changes)) < 1e-6:
+        return np.round(missing_turns)
     left, sizes, _ = np.linalg.svd(changes)
     rank = int(np.sum(sizes > 1e-9 * sizes[0]))
-    if len(away) - rank != 1:
-        return np.zeros(len(away))
+    if len(missing_turns) - rank != 1:
+        return np.zeros(len(missing_turns))
     direction = left[:, -1]
     direction = direction / np.min(np.abs(direction[np.abs(direction) > 1e-9]))
     for count in range(SMALLEST_PERIOD, LARGEST_PERIOD + 1):
         whole = np.round(count * direction)
         if np.max(np.abs(whole - count * direction)) < 1e-7 * count:
-            return np.round(away @ whole / (whole @ whole)) * whole
-    return np.zeros(len(away))
+            return np.round(missing_turns @ whole / (whole @ whole)) * whole
+    return np.zeros(len(missing_turns))

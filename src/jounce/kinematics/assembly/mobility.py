@@ -248,17 +248,17 @@ def _branches(constraints: ReducedConstraints, going: Sequence[LocalCurve], disp
         nearby = closed_nearby(constraints.coordinates, constraints.placed(coefficients, step), everything, displace)
         velocity = constraints.free @ curve.tangent
         space = velocity[None] if nearby is None else nearby.free_directions
-        for known, its in members:
-            if len(known) == len(space) and np.linalg.svd(known @ space.T, compute_uv=False)[-1] > np.cos(SAME_BRANCH):
-                its.append(curve)
+        for basis, branch_curves in members:
+            if len(basis) == len(space) and np.linalg.svd(basis @ space.T, compute_uv=False)[-1] > np.cos(SAME_BRANCH):
+                branch_curves.append(curve)
                 break
         else:
             members.append((space, [curve]))
     branches = []
-    for space, its in members:
-        velocities = np.stack([constraints.free @ curve.tangent for curve in its])
-        tangents = np.linalg.svd(velocities)[2][: len(space)] if len(its) > 1 else velocities
-        cusp = all(curve.multiplicity > 1 for curve in its)
+    for space, branch_curves in members:
+        velocities = np.stack([constraints.free @ curve.tangent for curve in branch_curves])
+        tangents = np.linalg.svd(velocities)[2][: len(space)] if len(branch_curves) > 1 else velocities
+        cusp = all(curve.multiplicity > 1 for curve in branch_curves)
         branches.append(Branch(len(space), _by_body(constraints, tangents), cusp))
     return tuple(sorted(branches, key=lambda branch: branch.freedom))
 

@@ -64,7 +64,7 @@ class Redundancy:
         Joint or driver of each row, as in a model.
     rank : int
         Rank of the Jacobian at general positions.
-    here : HostJacobian
+    at_assembly : HostJacobian
         Scaled Jacobian at the assembled position.
     jacobian : HostJacobian
         Scaled Jacobian at a position with the general rank.
@@ -72,7 +72,7 @@ class Redundancy:
 
     rows: tuple[str, ...]
     rank: int
-    here: HostJacobian
+    at_assembly: HostJacobian
     jacobian: HostJacobian
 
     @property
@@ -83,7 +83,7 @@ class Redundancy:
     @property
     def is_singular(self) -> bool:
         """Whether the assembled position is singular: its rank is below the general rank."""
-        return self.here.rank < self.rank
+        return self.at_assembly.rank < self.rank
 
     @cached_property
     def repetitions(self) -> tuple[Repetition, ...]:
@@ -116,13 +116,13 @@ def redundancy(model: Model, coordinates: Coordinates, jacobian: HostJacobian, d
     displace : callable
         Maps coordinates and an increment to coordinates, residual and Jacobian, rows scaled alike.
     """
-    here = _next_to_singular(coordinates, jacobian, displace)
+    at_assembly = _next_to_singular(coordinates, jacobian, displace)
     best, rank = jacobian, jacobian.rank
-    if here.rank < min(here.shape) or here.shape[0] > here.shape[1]:
-        for nearby in _nearby(model, coordinates, here, displace):
+    if at_assembly.rank < min(at_assembly.shape) or at_assembly.shape[0] > at_assembly.shape[1]:
+        for nearby in _nearby(model, coordinates, at_assembly, displace):
             if nearby.rank >= rank:
                 best, rank = nearby, nearby.rank
-    return Redundancy(model.rows, rank, here, best)
+    return Redundancy(model.rows, rank, at_assembly, best)
 
 
 def _next_to_singular(coordinates: Coordinates, jacobian: HostJacobian, displace: Displace) -> HostJacobian:
@@ -138,8 +138,8 @@ def _next_to_singular(coordinates: Coordinates, jacobian: HostJacobian, displace
     zero = 0.0
     for k in np.flatnonzero(sizes > jacobian.tolerance * jacobian.largest):
         size, velocity = sizes[k], columns[:, k]
-        there, back = (displace(coordinates, sign * STEP * velocity).jacobian for sign in (1.0, -1.0))
-        change = rows.T @ (there.times(columns) - back.times(columns)) / (2 * STEP)
+        ahead, behind = (displace(coordinates, sign * STEP * velocity).jacobian for sign in (1.0, -1.0))
+        change = rows.T @ (ahead.times(columns) - behind.times(columns)) / (2 * STEP)
         if size**2 <= 2 * ROUNDING * np.linalg.norm(change):
             zero = max(zero, float(size))
     return dataclasses.replace(jacobian, tolerance=1.01 * zero / jacobian.largest) if zero else jacobian
@@ -155,9 +155,9 @@ def _nearby(model: Model, coordinates: Coordinates, jacobian: HostJacobian, disp
     for _ in range(POSITIONS):
         sway = random.normal(size=len(directions)) @ directions
         for size in SWAYS:
-            there = closed_nearby(coordinates, size * sway / np.abs(sway).max(), joints, displace)
-            if there is not None:
-                jacobians.append(there)
+            nearby = closed_nearby(coordinates, size * sway / np.abs(sway).max(), joints, displace)
+            if nearby is not None:
+                jacobians.append(nearby)
                 break
     return jacobians or _along_curves(model, coordinates, jacobian, joints, displace)
 
@@ -174,8 +174,8 @@ def _along_curves(
     for curve in going:
         coefficients = constraints.along(curve.series[None])[2][0]
         sway = constraints.placed(coefficients, SWAYS[-1] ** (1.0 / curve.multiplicity))
-        there = closed_nearby(coordinates, sway, joints, displace)
-        jacobians += [] if there is None else [there]
+        nearby = closed_nearby(coordinates, sway, joints, displace)
+        jacobians += [] if nearby is None else [nearby]
     return jacobians
 
 
@@ -203,9 +203,9 @@ def closed_nearby(
         displaced, total = displace(displaced.coordinates, correction), total + correction
         if np.abs(correction).max(initial=0.0) < 1e-12:
             break
-    away = np.abs(total).max(initial=0.0)
+    displacement = np.abs(total).max(initial=0.0)
     open_ = np.abs(displaced.residual[joints]).max(initial=0.0)
-    return displaced.jacobian if open_ <= CLOSED and away > 0.1 * np.abs(sway).max() else None
+    return displaced.jacobian if open_ <= CLOSED and displacement > 0.1 * np.abs(sway).max() else None
 
 
 def repetitions(rows: tuple[str, ...], combinations: Float[np.ndarray, "row combination"]) -> tuple[Repetition, ...]:
@@ -227,8 +227,8 @@ def repetitions(rows: tuple[str, ...], combinations: Float[np.ndarray, "row comb
         # among joints that repeat equally many, the last one; a driver comes after all joints
         name = [name for name in names if ranks[name] == most][-1]
         _, _, turned = np.linalg.svd(parts[name])
-        its, rest = turned[:most].T, turned[most:].T
-        others = [other for other in names if other != name and np.linalg.norm(parts[other] @ its) > OPEN]
+        own, rest = turned[:most].T, turned[most:].T
+        others = [other for other in names if other != name and np.linalg.norm(parts[other] @ own) > OPEN]
         kind, _, plain = name.partition(".")
         repeated.append(Repetition(KINDS.get(kind, kind), plain, most, tuple(x.partition(".")[2] for x in others)))
         combinations = combinations @ rest

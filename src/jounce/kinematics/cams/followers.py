@@ -224,15 +224,15 @@ class OscillatingFollower(AbstractFollower):
     def touching(self, points: Plane) -> Float[np.ndarray, " points"]:
         """Return the angle of the arm, or of the face, at which it comes down on points."""
         x, y = self.center_distance - points[0], points[1]
-        away, above = np.hypot(x, y), np.arctan2(y, x)
+        distance, above = np.hypot(x, y), np.arctan2(y, x)
         with np.errstate(invalid="ignore", divide="ignore"):
             if self.is_flat:
-                sine = self.face_offset / away
+                sine = self.face_offset / distance
                 coordinate = above + np.arcsin(sine)
                 return np.where(np.abs(sine) <= 1, coordinate, -np.inf)
-            cosine = (self.arm**2 + away**2 - self.radius**2) / (2 * self.arm * away)
+            cosine = (self.arm**2 + distance**2 - self.radius**2) / (2 * self.arm * distance)
             if not self.radius:
-                return np.where(np.abs(away - self.arm) <= 1e-9 * self.arm, above, -np.inf)
+                return np.where(np.abs(distance - self.arm) <= 1e-9 * self.arm, above, -np.inf)
             return np.where(np.abs(cosine) <= 1, above + np.arccos(np.clip(cosine, -1, 1)), -np.inf)
 
 

@@ -274,9 +274,9 @@ def _check(cam: PlateCam) -> None:
     if not np.isfinite(lift).all():
         where = float(cam.angle[int(np.argmin(np.isfinite(lift)))])
         raise TrajectoryError("has no finite value at this cam angle, rad", name="law", value=where)
-    away = float(lift[-1] - lift[0])
-    if abs(away) > CLOSED * max(float(np.ptp(lift)), 1e-3 * cam.base_radius):
-        message = f"does not close: after a turn of the cam the lift is {away:.6g} from where it began"
+    gap = float(lift[-1] - lift[0])
+    if abs(gap) > CLOSED * max(float(np.ptp(lift)), 1e-3 * cam.base_radius):
+        message = f"does not close: after a turn of the cam the lift is {gap:.6g} from where it began"
         raise TrajectoryError(message, name="law", value=float(lift[-1]))
     coordinate = start + lift
     low, high = (0.0, np.pi / 2 if follower.is_flat else np.pi) if follower.turning else (0.0, np.inf)

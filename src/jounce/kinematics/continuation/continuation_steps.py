@@ -44,7 +44,7 @@ class StepState(NamedTuple):
 
     known: SolvedState  # data of the last anchor from which all lanes are predicted
     control: StepControl  # of the step tried next
-    away: Float[Numbers, " batch"]  # time from the last anchor to the instant of each lane, s
+    step: Float[Numbers, " batch"]  # time from the last anchor to the instant of each lane, s
     instant: Float[Numbers, " batch"]  # of each lane, s
     planned: Bool[Numbers, ""]  # whether step and instants are decided
     next_up: Int[Numbers, ""]  # index of the next grid instant
@@ -133,14 +133,14 @@ def take_steps(
     def arrived_at(run: StepState, search: Any) -> Any:
         if native is not None:
             first = np.arange(len(run.instant)) == 0
-            lanes = run.known, run.away, run.instant, None, search & first
+            lanes = run.known, run.step, run.instant, None, search & first
             arrival = called(native, (system, settings), lanes)
             arrival = arrival._replace(safe_step=arrival.safe_step[:1], radius=arrival.radius[:1])
             if finds_det_rate(system):
                 return arrival._replace(det_rate=arrival.det_rate[:1])
-            there = partial(det_rate_at, system, pose_type, arrival.coordinates, run.instant)
-            return arrival._replace(det_rate=jax.lax.cond(search, there, lambda: jnp.zeros(1)))
-        return _batch(system, settings, run.known, run.away, run.instant, search, pose_type=pose_type, order=order)
+            find_det_rate = partial(det_rate_at, system, pose_type, arrival.coordinates, run.instant)
+            return arrival._replace(det_rate=jax.lax.cond(search, find_det_rate, lambda: jnp.zeros(1)))
+        return _batch(system, settings, run.known, run.step, run.instant, search, pose_type=pose_type, order=order)
 
     def going(state: TakenSteps) -> Any:
         return (state.run.control.ending == int(StopReason.UNFINISHED)) & (state.count < most)
@@ -189,8 +189,8 @@ def _planned(run: StepState, grid: Float[Numbers, " time"], limits: StepLimits) 
 def _aimed(run: StepState, control: StepControl, grid: Float[Numbers, " time"]) -> StepState:
     """Return the run with a step to try, and the next grid instants within it in the other lanes."""
     instant = jnp.concatenate([control.target[None], jnp.minimum(_next_up(run, grid), control.target)])
-    away = instant - control.expansion_point.instant
-    return run._replace(control=control, instant=instant, away=away, planned=jnp.ones((), bool))
+    step = instant - control.expansion_point.instant
+    return run._replace(control=control, instant=instant, step=step, planned=jnp.ones((), bool))
 
 
 def _next_up(run: StepState, grid: Float[Numbers, " time"]) -> Float[Numbers, " lane"]:

@@ -257,8 +257,8 @@ def advance(
         hidden = hidden_by_laws(system, first, instant[:searched], step[:searched], order)
         det_rates = det_rate_of if searched == 1 else det_rates_of
         det_rate = det_rates(system, pose, factor, instant) if with_det_rate else np.zeros(1)
-        here = {name: jet.map(lambda c: c[..., :searched]) for name, jet in pose.coordinates().items()}
-        return hidden, det_rate, *safe_step_and_radius(system, here, pose_type.predictor)
+        first_lanes = {name: jet.map(lambda c: c[..., :searched]) for name, jet in pose.coordinates().items()}
+        return hidden, det_rate, *safe_step_and_radius(system, first_lanes, pose_type.predictor)
 
     first, det_rate, safe_step, radius = jax.lax.cond(search, search_result, lambda: (first, *[np.zeros(searched)] * 3))
     status = jnp.concatenate([first, arrival.status[searched:]])

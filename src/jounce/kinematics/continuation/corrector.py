@@ -49,7 +49,7 @@ class _Iteration(NamedTuple):
     factor: Factor
     correction: Correction
     rate: Lanes  # expected ratio of the next correction to the last one
-    away: Lanes  # distance of the pose from that of the factored Jacobian, rad or sizes of the mechanism
+    distance: Lanes  # distance of the pose from that of the factored Jacobian, rad or sizes of the mechanism
     count: Int[Numbers, ""]
 
 
@@ -68,8 +68,8 @@ def newton_raphson(
 
     def sized(pose: Any, step: Any) -> Any:
         shift, turn = system.coordinates(step, pose.shifts)
-        away = jnp.max(jnp.abs(pose.position.coefficients[0]), axis=(0, 1), keepdims=True)
-        shift = shift / jnp.maximum(system.column_scale[0], away)  # rounding of a position grows with its distance
+        distance = jnp.max(jnp.abs(pose.position.coefficients[0]), axis=(0, 1), keepdims=True)
+        shift = shift / jnp.maximum(system.column_scale[0], distance)  # rounding of a position grows with its distance
         return jnp.maximum(jnp.max(jnp.abs(shift), axis=(0, 1)), jnp.max(jnp.abs(turn), axis=(0, 1)))
 
     def going(state: _Iteration) -> Any:
@@ -80,10 +80,10 @@ def newton_raphson(
         return ~jnp.where(refine, rounded, accepted) & hopeful
 
     def unfinished(state: _Iteration) -> Any:
-        return jnp.any(going(state) | (state.away > ROUNDING)) & (state.count < MAX_ITERATIONS)
+        return jnp.any(going(state) | (state.distance > ROUNDING)) & (state.count < MAX_ITERATIONS)
 
     def iterate(state: _Iteration) -> _Iteration:
-        pose, before, correction, rate, away, count = state
+        pose, before, correction, rate, distance, count = state
         residual = system.residual(pose, time).coefficients[0]
         on, slow = going(state), ~(rate <= SLOWEST)
         anew = (count == 0) | (count > 1) & jnp.any(on & slow)  # the second correction measures the contraction
@@ -106,8 +106,8 @@ def newton_raphson(
         simplified = jnp.where(compared, again, correction.simplified)
         rate = jnp.where(anew, size, size / jnp.maximum(correction.last, 1e-300))
         counts = made & (on | ~moved)  # corrections of converged lanes are rounding, which may exceed `ROUNDING`
-        away = jnp.where(moved, 0.0, away) + jnp.where(counts, size, 0.0)
-        return _Iteration(pose, factor, Correction(size, first, simplified), rate, away, count + 1)
+        distance = jnp.where(moved, 0.0, distance) + jnp.where(counts, size, 0.0)
+        return _Iteration(pose, factor, Correction(size, first, simplified), rate, distance, count + 1)
 
     lanes = time.coefficients[0].shape[-1]
     unknown, nothing = np.full(lanes, np.inf), np.zeros(lanes)

@@ -139,9 +139,9 @@ class FollowedPath:
 
     def anchors_around(self, first: float, last: float) -> list[Anchor]:
         """Return the anchors between two instants, with the one before and the one after, where they exist."""
-        begin = bisect.bisect_right(self.anchors, first, key=INSTANT) - 1
+        start = bisect.bisect_right(self.anchors, first, key=INSTANT) - 1
         end = bisect.bisect_left(self.anchors, last, key=INSTANT)
-        return self.anchors[max(min(begin, len(self.anchors) - 1), 0) : end + 1]
+        return self.anchors[max(min(start, len(self.anchors) - 1), 0) : end + 1]
 
     def ended(self, status: Status, instant: float, fault: str) -> "FollowedPath":
         """End the path with a status, instant and fault."""
@@ -238,12 +238,12 @@ def follow(
         if not path.anchors:
             arrival = jax.tree.map(np.asarray, done.last)
             return path.ended(Status(int(arrival.status[0])), float(run.instant[0]), solver.fault(arrival, 0))
-        here = path.anchors[-1]
+        last = path.anchors[-1]
         control = run.control
         ending = int(control.ending)
         first += int(run.next_up)
         if ending == StopReason.PASSAGE:
-            passed = _passed(solver, here, stop)
+            passed = _passed(solver, last, stop)
             if passed is None:
                 no = np.zeros((), bool)
                 control = control._replace(may_pass=no, ending=np.asarray(int(StopReason.UNFINISHED)))
@@ -257,7 +257,7 @@ def follow(
             )
             first = int(np.searchsorted(grid, far_side.instant, side="right"))
         elif ending == StopReason.COLLAPSED:
-            beyond = float(np.nextafter(here.instant, np.inf))
+            beyond = float(np.nextafter(last.instant, np.inf))
             return path.ended(Status.COLLAPSED, beyond, ", ".join(solver.model.drivers))
         elif ending == StopReason.REFUSED:
             return _ended(solver, path, done, span)
@@ -266,40 +266,40 @@ def follow(
 
 def _ended(solver: Solver, path: FollowedPath, done: TakenSteps, span: float) -> FollowedPath:
     """End a path that cannot be continued, at the instant where a law was first refused, if any."""
-    here, refused = path.anchors[-1], float(done.run.control.refused)
+    last, refused = path.anchors[-1], float(done.run.control.refused)
     if np.isnan(refused):
         target, arrival = float(done.run.instant[0]), jax.tree.map(np.asarray, done.last)
     else:
         target, instant = refused, np.array([refused])
-        arrival = solver(solver.needed(here.state), instant - here.instant, instant, search=True)
+        arrival = solver(solver.needed(last.state), instant - last.instant, instant, search=True)
     status = Status(int(arrival.status[0]))
-    if status != Status.INADMISSIBLE and here.reach < NEARLY_SINGULAR * span:
+    if status != Status.INADMISSIBLE and last.reach < NEARLY_SINGULAR * span:
         status = Status.SINGULAR  # the motion ends at a dead point
     return path.ended(status, target, solver.fault(arrival, 0))
 
 
-def _passed(solver: Solver, here: Anchor, stop: float) -> tuple[Anchor, ChangePoint] | None:
+def _passed(solver: Solver, near_side: Anchor, stop: float) -> tuple[Anchor, ChangePoint] | None:
     """Return the anchor beyond a change point just ahead, and the change point; None if there is none to pass.
 
     The far anchor is as distant from the change point as this one. It must lie on the series to rounding, and the
     Jacobian must leave the singular position as fast as it approached it. Neither holds at a dead point, or where two
     branches only come close.
     """
-    middle = here.instant + here.reach
-    target = min(middle + here.reach, stop)
-    if target - middle < LEAST_PASSAGE * here.reach:
+    middle = near_side.instant + near_side.reach
+    target = min(middle + near_side.reach, stop)
+    if target - middle < LEAST_PASSAGE * near_side.reach:
         return None  # the motion stops before
-    coordinates, outputs, sign = here.state
+    coordinates, outputs, sign = near_side.state
     shortened = jax.tree.map(_shortened, (coordinates, outputs))
     known = (*shortened, np.zeros_like(sign))  # the sign may change
-    arrival = solver(solver.needed(known), np.array([target - here.instant]), np.array([target]), search=True)
+    arrival = solver(solver.needed(known), np.array([target - near_side.instant]), np.array([target]), search=True)
     beyond = Anchor.of(arrival, target)
     if arrival.status[0] not in PASSABLE or not arrival.deviation[0] <= PASSAGE_DEVIATION:
         return None
     if not (beyond.det_rate > 0 and abs(beyond.reach - (target - middle)) <= 0.5 * (target - middle)):
         return None
     located = 0.5 * (middle + target - beyond.reach)  # first-order errors of the two sides cancel
-    return beyond, ChangePoint(located, min(here.radius, beyond.radius))
+    return beyond, ChangePoint(located, min(near_side.radius, beyond.radius))
 
 
 def within_steps(times: Float[np.ndarray, " anchor"], count: int) -> Float[np.ndarray, " time"]:

@@ -37,9 +37,9 @@ def laws_predictable(system: System, instant: Lanes, step: Lanes, order: int) ->
     start, end = Jet.variable((instant - step)[None], order), Jet([instant[None]])
     result = np.ones(step.shape, bool)
     for before, after in zip(system.laws(start, periodic=True), system.laws(end, periodic=True), strict=True):
-        away = jnp.abs(after.coefficients[0] - before.evaluate(step[None]))
+        departure = jnp.abs(after.coefficients[0] - before.evaluate(step[None]))
         travel = travel_of([jnp.abs(c) for c in before.dense().coefficients[1:]], step[None])
-        result &= jnp.all(near_prediction(away, travel), axis=0)
+        result &= jnp.all(near_prediction(departure, travel), axis=0)
     return result
 
 
@@ -59,8 +59,8 @@ def hidden_by_laws(system: System, status: Numbers, instant: Lanes, step: Lanes,
 
     for before, value in zip(system.laws(Jet.variable(start[None], order)), jax.vmap(values)(shares), strict=True):
         terms = [jnp.where(jnp.isfinite(c), c, 0.0)[None] for c in before.dense().coefficients]
-        away = jnp.abs(value - Jet(tuple(terms)).evaluate(ahead))
+        departure = jnp.abs(value - Jet(tuple(terms)).evaluate(ahead))
         allowed = jnp.maximum(0.2 * travel_of([jnp.abs(c) for c in terms[1:]], ahead), size)
-        near &= jnp.all(away <= allowed, axis=(0, 1))
+        near &= jnp.all(departure <= allowed, axis=(0, 1))
     hidden = ~near & (step > FINEST * jnp.abs(instant))  # instants closer than that differ by rounding only
     return jnp.where((status == int(Status.OK)) & hidden, int(Status.BRANCH_JUMP), status)

@@ -66,7 +66,7 @@ class Solver:
         lanes = len(instant)
         if lanes <= SMALL_BATCH:
             known, step, instant = jax.tree.map(lambda x: padded(x, SMALL_BATCH), (needed, step, instant))
-            run = _run_from(known, (0.0,) * 4, away=step, instant=instant)
+            run = _run_from(known, (0.0,) * 4, step=step, instant=instant)
             arrival = self._take_steps(run, NO_GRID, 1, search=search).last
         else:
             arrival = self.program((needed, step, instant, None, np.zeros(step.shape, bool)))
@@ -247,15 +247,15 @@ def _run_from(
     known: SolvedState,
     expansion_point: Sequence[float],
     *,
-    away: Any = None,
+    step: Any = None,
     instant: Any = None,
     largest: float = np.inf,
     crawled: int = 0,
 ) -> StepState:
     """Return a run at its beginning, with its first step, if given."""
     nothing = np.zeros(SMALL_BATCH)
-    here = nothing if instant is None else instant
-    control = initial_control(ExpansionPoint(*map(np.asarray, expansion_point)), np.asarray(here[0]))
+    instants = nothing if instant is None else instant
+    control = initial_control(ExpansionPoint(*map(np.asarray, expansion_point)), np.asarray(instants[0]))
     control = control._replace(largest=np.asarray(largest), crawled=np.asarray(crawled))
     decided, first = np.asarray(instant is not None), np.zeros((), int)
-    return StepState(known, control, nothing if away is None else away, here, decided, first, NOWHERE)
+    return StepState(known, control, nothing if step is None else step, instants, decided, first, NOWHERE)

@@ -107,16 +107,16 @@ def plan_next_step(control: StepControl, limits: StepLimits) -> StepControl:
     return control._replace(step=step, target=target, ending=ending, crawled=crawled, refused=refused)
 
 
-def is_accepted(control: StepControl, status: Int[Numbers, "*batch"], there: ExpansionPoint) -> Truths:
+def is_accepted(control: StepControl, status: Int[Numbers, "*batch"], end_point: ExpansionPoint) -> Truths:
     """Return whether a step is accepted, by its status and the expansion point at its end."""
     passable = (status == int(Status.OK)) | (status == int(Status.UNDEFINED))
-    return passable & ((control.step == 0) | (control.step * jnp.abs(there.det_rate) <= LARGEST_DET_RATE))
+    return passable & ((control.step == 0) | (control.step * jnp.abs(end_point.det_rate) <= LARGEST_DET_RATE))
 
 
 def next_control(
     control: StepControl,
     status: Int[Numbers, "*batch"],
-    there: ExpansionPoint,
+    end_point: ExpansionPoint,
     limits: StepLimits,
     good: Truths,
     taken: Truths,
@@ -132,7 +132,7 @@ def next_control(
         refused=jnp.where(inadmissible, control.target, control.refused),
     )
     largest = jnp.where(control.step == 0, control.largest, GROWTH * control.step)
-    arrived = control._replace(expansion_point=there, may_pass=jnp.ones_like(taken), largest=largest)
+    arrived = control._replace(expansion_point=end_point, may_pass=jnp.ones_like(taken), largest=largest)
     halved = ~good & ~stuck
     step = jnp.where(halved, 0.5 * control.step, control.step)
     again = control._replace(
@@ -154,6 +154,6 @@ def next_controls(
     lanes : tuple
         For each design, the step made, its status, and the expansion point at its end.
     """
-    control, status, there = lanes
-    good = is_accepted(control, status, there)
-    return next_control(control, status, there, limits, good, good), good
+    control, status, end_point = lanes
+    good = is_accepted(control, status, end_point)
+    return next_control(control, status, end_point, limits, good, good), good

@@ -278,8 +278,8 @@ class _Search:
 
     def add(self, coordinates: dict[str, np.ndarray], hits: int = 1) -> bool:
         """Add an assembly, and return whether it is new; reject it if a part is turned over in its joint."""
-        there = {name: x[..., None] for name, x in coordinates.items()}
-        if not np.array_equal(axis_signs(self.system, there), self.axis_signs):
+        batch = {name: x[..., None] for name, x in coordinates.items()}
+        if not np.array_equal(axis_signs(self.system, batch), self.axis_signs):
             return False
         for known in self.configurations:
             same = SAME if known.smallest > NEARLY_SINGULAR else SAME_IF_SINGULAR
@@ -294,8 +294,8 @@ class _Search:
 
     def _polished(self, coordinates: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
         """Return an assembly corrected to rounding, with planar angles in the whole turn nearest to the guess."""
-        begun = {name: x[..., None] for name, x in coordinates.items()}
-        attempt = assemble_from_guess(self.first, self.instant, TOLERANCE, begun)
+        start = {name: x[..., None] for name, x in coordinates.items()}
+        attempt = assemble_from_guess(self.first, self.instant, TOLERANCE, start)
         if not attempt.closed:
             return coordinates  # near a singular position: no better accuracy is possible
         attempt = nearest_to_guess(self.first, attempt, self.instant) if "angle" in coordinates else attempt
@@ -307,8 +307,8 @@ class _Search:
         number = 0
         while number < len(self.configurations):
             if self.configurations[number].circuit is None:
-                begun = posed(self.mechanism, self.configurations[number].coordinates)
-                curves = curve_through(begun, self.instant, driver).connected()
+                start = posed(self.mechanism, self.configurations[number].coordinates)
+                curves = curve_through(start, self.instant, driver).connected()
                 circuits.append(curves[0])
                 self.configurations[number].circuit, self.configurations[number].branch = len(circuits), 1
                 before = 0  # number of branches on the curves before, through the same change points
@@ -328,20 +328,20 @@ class _Search:
                 known.circuit, known.branch = circuit, before + curve.branch_at(arc_length)
 
     def _nearest(self, coordinates: dict[str, np.ndarray]) -> _Configuration:
-        away = [np.max(np.abs(self.tracker.difference(coordinates, x.coordinates))) for x in self.configurations]
-        return self.configurations[int(np.argmin(away))]
+        distances = [np.max(np.abs(self.tracker.difference(coordinates, x.coordinates))) for x in self.configurations]
+        return self.configurations[int(np.argmin(distances))]
 
     def result(self, circuits: tuple[Curve, ...]) -> Assemblies:
         """Return the assemblies in the order of their distance from the starting guess."""
         guess = {name: np.asarray(x)[..., 0] for name, x in self.model.guess.items()}
-        away = [float(np.linalg.norm(self.tracker.difference(x.coordinates, guess))) for x in self.configurations]
-        order = np.argsort(away, kind="stable").tolist()
+        distances = [float(np.linalg.norm(self.tracker.difference(x.coordinates, guess))) for x in self.configurations]
+        order = np.argsort(distances, kind="stable").tolist()
         ranked = [k for k in dict.fromkeys(self.configurations[k].circuit for k in order) if k is not None]
         members = []
         for number, k in enumerate(order, start=1):
             x = self.configurations[k]
             circuit = None if x.circuit is None else ranked.index(x.circuit) + 1
             mechanism = posed(self.mechanism, x.coordinates)
-            members.append(Assembly(number, mechanism, circuit, x.branch, x.hits, away[k], x.smallest))
+            members.append(Assembly(number, mechanism, circuit, x.branch, x.hits, distances[k], x.smallest))
         ranked_circuits = tuple(circuits[k - 1] for k in ranked)
         return Assemblies(members, self.starts, self.since_last_new, ranked_circuits, self.movable)

@@ -38,8 +38,10 @@ def chosen(mechanism: Mechanism, instant: float) -> Mechanism:
 
 def _guesses(mechanism: Mechanism, picked: Assembly) -> dict:
     return {
-        name: dataclasses.replace(body, position=there.position, angle=there.angle, orientation=there.orientation)
-        for (name, body), there in zip(mechanism.bodies.items(), picked.mechanism.bodies.values(), strict=True)
+        name: dataclasses.replace(
+            body, position=assembled.position, angle=assembled.angle, orientation=assembled.orientation
+        )
+        for (name, body), assembled in zip(mechanism.bodies.items(), picked.mechanism.bodies.values(), strict=True)
     }
 
 
@@ -72,5 +74,5 @@ def _middle(mechanism: Mechanism, body: str) -> np.ndarray:
         if holder == number
     ]
     local = np.mean(points, axis=0) if points else np.zeros(2 if model.pose_type is PlanarPose else 3)
-    there = np.asarray(model.guess["position"])[:, number, 0]
-    return there + in_global_axes(local[:, None], model.guess, np.array([number]))[:, 0]
+    origin = np.asarray(model.guess["position"])[:, number, 0]
+    return origin + in_global_axes(local[:, None], model.guess, np.array([number]))[:, 0]

@@ -68,27 +68,27 @@ class ChangePoint:
         return dataclasses.replace(self, center=self.center.reversed(), tangents=tangents)
 
 
-def crossing(tracker: PathTracker, here: CurvePoint, ahead: complex) -> tuple[ChangePoint, CurvePoint] | None:
+def crossing(tracker: PathTracker, before: CurvePoint, ahead: complex) -> tuple[ChangePoint, CurvePoint] | None:
     """Return the change point just ahead, and the point as far beyond it, or None if there is none.
 
     Parameters
     ----------
     tracker : PathTracker
-    here : CurvePoint
-        Point before the change point.
+    before : CurvePoint
+        Point just before the change point.
     ahead : complex
         Signed arc length to the nearest singular point, to first order.
     """
-    near = NEAR * tracker.radius(here, PASSAGE_ORDER - 2)
+    near = NEAR * tracker.radius(before, PASSAGE_ORDER - 2)
     if not (0 < ahead.real < near and abs(ahead.imag) <= REAL * ahead.real):
         return None
-    short = here.shortened(PASSAGE_ORDER)
+    short = before.shortened(PASSAGE_ORDER)
     point = _located(tracker, short, ahead.real)
     if point is None:
         return None
-    step = point.arc_length - here.arc_length
+    step = point.arc_length - before.arc_length
     points = tracker.points(short, np.array([2 * step]))
-    beyond = tracker.point_at_lane(points, 0, here.arc_length + 2 * step, here.rows)
+    beyond = tracker.point_at_lane(points, 0, before.arc_length + 2 * step, before.rows)
     arrived = {name: c[0] for name, c in beyond.coordinates.items()}
     departure = tracker.difference(arrived, short.at(2 * step))
     if not all_finite(points)[0] or np.max(np.abs(departure)) > LARGEST_DEPARTURE:

@@ -289,8 +289,8 @@ class Curve(Displayed):
         special = [x.arc_length for x in (*self.limits, *self.change_points)]
         even = np.linspace(self.start, self.stop, self._settings.count)
         spacing = self.length / max(1, self._settings.count - 1)
-        there = np.array([s for s in special if np.min(np.abs(even - s)) > 1e-9 * spacing])
-        return np.sort(np.concatenate([even, there]))
+        extra = np.array([s for s in special if np.min(np.abs(even - s)) > 1e-9 * spacing])
+        return np.sort(np.concatenate([even, extra]))
 
     @cached_property
     def _points(self) -> tuple[dict[str, np.ndarray], np.ndarray]:
@@ -384,6 +384,6 @@ def curve_through(
 def _one_of(items: Any, number: Any, name: str, what: str) -> Any:
     """Return an item by index, or raise MechanismError."""
     if not isinstance(number, int) or isinstance(number, bool) or not 0 <= number < len(items):
-        there = f"there are {len(items)}, counted from 0" if len(items) else "there are none"
-        raise MechanismError(f"no such one among the {what}: {there}", name=name, value=number)
+        range_words = f"there are {len(items)}, counted from 0" if len(items) else "there are none"
+        raise MechanismError(f"no such one among the {what}: {range_words}", name=name, value=number)
     return items[number]

@@ -76,8 +76,8 @@ def limits_between(point: CurvePoint, stop: float, unit: float) -> list[LimitPos
     for part in roots(slopes):
         if not 0 < part <= 1:
             continue
-        here = point.recentered(part * step)
-        limits.append(LimitPosition(here.arc_length, float(here.value[0]), _kind(slopes, part, size)))
+        limit = point.recentered(part * step)
+        limits.append(LimitPosition(limit.arc_length, float(limit.value[0]), _kind(slopes, part, size)))
     return limits
 
 
@@ -108,7 +108,7 @@ def roots(coefficients: Float[np.ndarray, " order"]) -> list[float]:
 
 
 def _kind(slopes: Float[np.ndarray, " order"], part: float, size: float) -> Kind:
-    before, after = (float(polyval(part + away, slopes)) for away in (-1e-3, 1e-3))
+    before, after = (float(polyval(part + offset, slopes)) for offset in (-1e-3, 1e-3))
     if min(abs(before), abs(after)) <= FLAT * 1e-6 * size or before * after > 0:
         return "stationary"
     return "maximum" if before > 0 else "minimum"

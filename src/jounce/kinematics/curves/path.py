@@ -134,8 +134,8 @@ def step_to_configuration(
     step = 0.0
     for _ in range(MOST_CORRECTIONS):
         next_point = point.recentered(step)
-        away = tracker.difference({name: c[0] for name, c in next_point.coordinates.items()}, target)
-        change = float(tracker.tangent(next_point)[: tracker.columns] @ away)
+        difference = tracker.difference({name: c[0] for name, c in next_point.coordinates.items()}, target)
+        change = float(tracker.tangent(next_point)[: tracker.columns] @ difference)
         step -= change
         if not -length <= step <= 2 * length:
             return None

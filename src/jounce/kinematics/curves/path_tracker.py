@@ -59,8 +59,8 @@ class CurvePoint:
     def recentered(self, step: float, order: int = ORDER) -> "CurvePoint":
         """Return the point at a step along the series, with terms up to an order."""
         power = np.arange(order + 1)
-        away = power[None] - power[:, None]
-        shift = BINOMIALS[: order + 1, : order + 1] * step ** np.maximum(away, 0)
+        exponent = power[None] - power[:, None]
+        shift = BINOMIALS[: order + 1, : order + 1] * step ** np.maximum(exponent, 0)
 
         def shifted(c: np.ndarray) -> np.ndarray:
             return np.concatenate([np.tensordot(shift, c[: order + 1], 1), np.zeros_like(c[order + 1 :])])
@@ -242,14 +242,14 @@ class PathTracker:
         second = {name: np.stack([c[0], 2 * c[2]]) for name, c in point.coordinates.items()}
         return self.rates(second, np.stack([point.value[0], 2 * point.value[2]]))
 
-    def difference(self, there: dict[str, np.ndarray], here: dict[str, np.ndarray]) -> Float[np.ndarray, " column"]:
+    def difference(self, target: dict[str, np.ndarray], origin: dict[str, np.ndarray]) -> Float[np.ndarray, " column"]:
         """Return scaled shifts and rotations from one configuration to another; whole turns do not count."""
         if self.is_planar:
-            turns = principal(there["angle"] - here["angle"])[None]
+            turns = principal(target["angle"] - origin["angle"])[None]
         else:
-            turns = spin(here["quaternion"], there["quaternion"])
-            turns = turns * np.where(np.sum(here["quaternion"] * there["quaternion"], axis=0) < 0, -1.0, 1.0)
-        return self.column(there["position"] - here["position"], turns)
+            turns = spin(origin["quaternion"], target["quaternion"])
+            turns = turns * np.where(np.sum(origin["quaternion"] * target["quaternion"], axis=0) < 0, -1.0, 1.0)
+        return self.column(target["position"] - origin["position"], turns)
 
     def terms(self, point: CurvePoint) -> Float[np.ndarray, " order"]:
         """Return the size of each coefficient from order one on, rad or sizes of the mechanism."""

@@ -15,7 +15,7 @@ from jaxtyping import Bool, Float, Int
 from jounce.base.shapes import Numbers
 from jounce.execution.compilation import compiled
 from jounce.jet import Jet
-from jounce.jet.coefficients import begun_series
+from jounce.jet.coefficients import padded_series
 from jounce.jet.programs.series import Recursion
 from jounce.linear_algebra.linear import DenseFactor
 from jounce.mechanism.building.starting_guess import pose_at
@@ -188,8 +188,8 @@ def _differentiated(curve: _Curve, pose: Any, value: Any, factor: DenseFactor, o
     recursion = Recursion(program, (point, attitude, value), order)
     _, newest = recursion.advanced(recursion.history, 1, (shift, spun(turn), rate))
     history = recursion.noted(recursion.history, 1, newest)
-    series = tuple(begun_series([x, y], order + 1) for x, y in ((point, shift), (attitude, spun(turn)), (value, rate)))
-    turns, rates = begun_series([turn], order), begun_series([tangent], order)
+    series = tuple(padded_series([x, y], order + 1) for x, y in ((point, shift), (attitude, spun(turn)), (value, rate)))
+    turns, rates = padded_series([turn], order), padded_series([tangent], order)
 
     def level(k: Any, carry: Any) -> Any:
         history, series, turns, rates = carry
@@ -199,8 +199,8 @@ def _differentiated(curve: _Curve, pose: Any, value: Any, factor: DenseFactor, o
         solution = factor.solve(right)
         # x'[j] = (j + 1) x[j + 1], and the coefficient of order k - 1 of x'.x' vanishes
         known = jnp.sum(_convolved(rates, rates, k - 1, lambda a, b: jnp.sum(a * b, axis=1)), axis=0)
-        lacking = -known / (2 * k) - jnp.sum(tangent * solution[:count], axis=0)
-        solution = solution + null * lacking[None]
+        deficit = -known / (2 * k) - jnp.sum(tangent * solution[:count], axis=0)
+        solution = solution + null * deficit[None]
         shift, turn, rate = parts(solution)
         change = spun(turn)
         history = recursion.noted(history, k, recursion.corrected(newest, (shift, change, rate)))
@@ -223,8 +223,8 @@ def _convolved(left: Any, right: Any, order: Any, product: Any) -> Any:
     """Return the terms of the Cauchy product at an order; unknown coefficients count as zero."""
     counterparts = order - np.arange(len(right))
     left = left[: len(right)]
-    there = (counterparts >= 0).reshape(-1, *[1] * (right.ndim - 1))
-    return product(left, jnp.where(there, jnp.take(right, jnp.clip(counterparts, 0, len(right) - 1), axis=0), 0.0))
+    valid = (counterparts >= 0).reshape(-1, *[1] * (right.ndim - 1))
+    return product(left, jnp.where(valid, jnp.take(right, jnp.clip(counterparts, 0, len(right) - 1), axis=0), 0.0))
 
 
 def _slope(curve: _Curve, pose: Any, value: Any, rates: dict[str, Any], value_rate: Any) -> Any:
@@ -232,8 +232,8 @@ def _slope(curve: _Curve, pose: Any, value: Any, rates: dict[str, Any], value_ra
     now = {name: jet.coefficients[0] for name, jet in pose.coordinates().items()}
 
     def at(step: Any) -> Any:
-        there = {name: x + step * rates[name] for name, x in now.items()}
-        return curve.jacobian(pose_at(there, type(pose)), value + step * value_rate)
+        moved = {name: x + step * rates[name] for name, x in now.items()}
+        return curve.jacobian(pose_at(moved, type(pose)), value + step * value_rate)
 
     return jax.jvp(at, (np.zeros(()),), (np.ones(()),))[1]
 

@@ -61,10 +61,10 @@ def assemble_side_by_side(
         size = jnp.max(jnp.abs(step), axis=0, keepdims=True)
         step = step * jnp.minimum(1.0, LONGEST_STEP / jnp.maximum(size, 1e-300))
         moved = pose.displaced(*system.coordinates(step, pose.shifts))
-        there = {name: jet.coefficients[0] for name, jet in moved.coordinates().items()}
+        trial_coordinates = {name: jet.coefficients[0] for name, jet in moved.coordinates().items()}
         trial = residual(moved)
         better = jnp.sum(trial**2, axis=0) < jnp.sum(gaps**2, axis=0)
-        now = {name: jnp.where(better, there[name], x) for name, x in now.items()}
+        now = {name: jnp.where(better, trial_coordinates[name], x) for name, x in now.items()}
         eased = jnp.maximum(damping * EASED, SMALLEST_DAMPING)
         damping = jnp.where(better, eased, jnp.minimum(damping * STIFFENED, LARGEST_DAMPING))
         return now, jnp.where(better[None], trial, gaps), damping, count + 1

@@ -142,17 +142,17 @@ class DesignPaths:
         for _ in range(MOST_STEPS):
             if not lanes.size:
                 break
-            away = control.target - control.expansion_point.instant
-            arrival = solver.program((known, away, control.target, own, np.ones(len(lanes), bool)))
+            step = control.target - control.expansion_point.instant
+            arrival = solver.program((known, step, control.target, own, np.ones(len(lanes), bool)))
             self._arrival = arrival
-            there: Any = ExpansionPoint(control.target, arrival.safe_step, arrival.radius, arrival.det_rate)
+            end_point: Any = ExpansionPoint(control.target, arrival.safe_step, arrival.radius, arrival.det_rate)
             begins: Any = control.step == 0
-            control, taken = decide((control, arrival.status, there))
-            unlike = taken & ((arrival.status != Status.OK) | is_spoiled_outside(there, begins, last))
+            control, taken = decide((control, arrival.status, end_point))
+            unlike = taken & ((arrival.status != Status.OK) | is_spoiled_outside(end_point, begins, last))
             ended = control.ending != StopReason.UNFINISHED
             self.individual[lanes[unlike | ended & (control.ending != StopReason.ARRIVED)]] = True
             reached = solver.needed(arrival.state(slice(None) if taken.all() else taken))
-            steps.append((lanes[taken], there.instant[taken], reached))
+            steps.append((lanes[taken], end_point.instant[taken], reached))
             known = reached if taken.all() else _replaced(known, taken, reached)
             if (left := ~(ended | unlike)).all():
                 continue
@@ -203,7 +203,7 @@ class DesignPaths:
                 whole[..., lanes, :] = self._as_given(values, block.designs)
 
         with Threads(threads, compiled=self.solver.is_compiled) as pool:
-            for _ in solve_in_buffers(new, blocks, self._begin, put, pool.map):
+            for _ in solve_in_buffers(new, blocks, self._load, put, pool.map):
                 pass
         outputs = [[np.transpose(x, (2, 3, 0, 1)) for x in np.moveaxis(whole, 2, 0)] for whole in wholes]
         for group in self._groups:
@@ -219,7 +219,7 @@ class DesignPaths:
         rank = self._rank[block]
         return np.take_along_axis(values, rank.reshape(*[1] * (values.ndim - 2), *rank.shape), axis=-1)
 
-    def _begin(self, buffer: SolveBuffer, block: Anchors) -> int:
+    def _load(self, buffer: SolveBuffer, block: Anchors) -> int:
         """Load all instants of designs; each starts from the instant before, or from the nearest anchor."""
         instants = self._instants[block.designs]
         count, times = instants.shape
@@ -244,8 +244,8 @@ class DesignPaths:
         system = self.systems.at(designs[owner])
         measuring = [(g, output) for g, output in zip(system.outputs, outputs, strict=True) if measures_angle(g)]
         series = np.nan_to_num(anchors.known[0]["quaternion"][..., anchors.order], nan=0.0, posinf=0.0, neginf=0.0)
-        here = np.arange(len(owner))
-        following = np.where(np.append(owner[1:] != owner[:-1], True), here, here + 1)  # the last anchor: itself
+        index = np.arange(len(owner))
+        following = np.where(np.append(owner[1:] != owner[:-1], True), index, index + 1)  # the last anchor: itself
 
         def instants(anchor: Indices, share: Lanes) -> Lanes:
             return at[anchor] + share * (at[following[anchor]] - at[anchor])
@@ -258,8 +258,8 @@ class DesignPaths:
                 own = jax.tree.map(lambda leaf: leaf if np.shape(leaf)[-1] == 1 else leaf[..., anchor], group)
                 return raw_angles([own], {"quaternion": attitudes})[0]
 
-            begun = np.broadcast_to(counted.element.datum.near, (counted.instances, len(owner)))
-            samples = counted_along(measured, owner, begun, SAMPLES_A_STEP)
+            first_angles = np.broadcast_to(counted.element.datum.near, (counted.instances, len(owner)))
+            samples = counted_along(measured, owner, first_angles, SAMPLES_A_STEP)
             known = owner[samples.path], instants(samples.path, samples.share)
             nearest = _nearest(*known, self._instants[designs], self._ends)
             for values, angle in zip(output, samples.angle, strict=True):

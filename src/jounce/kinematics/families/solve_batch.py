@@ -113,8 +113,8 @@ def solve_batch(
     >>> int(family["status"].max())
     0
     """
-    with Count("solving", "designs", progress) as tell:
-        family = _Family(mechanism, parameters, time, order, tolerance, tell)
+    with Count("solving", "designs", progress) as report:
+        family = _Family(mechanism, parameters, time, order, tolerance, report)
         family.solve(thread_count(threads), individually=alone)
     return family.dataset
 

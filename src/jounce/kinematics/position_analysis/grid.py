@@ -203,8 +203,10 @@ class GridSolver:
     def _disagreement(self, coordinates: dict[str, np.ndarray], lanes: Indices) -> float:
         """Return the largest difference of coordinates from the positions already solved, rad or m."""
         solved, names = self.status[lanes] == OK, self.solver.model.pose_type.predictor
-        away = [np.abs(coordinates[name][0] - self._store[0][name][0][..., lanes])[..., solved] for name in names]
-        return max(np.max(x, initial=0.0) for x in away)
+        differences = [
+            np.abs(coordinates[name][0] - self._store[0][name][0][..., lanes])[..., solved] for name in names
+        ]
+        return max(np.max(x, initial=0.0) for x in differences)
 
     def _refuse(self, points: Sequence[ChangePoint]) -> None:
         """Mark instants next to singular positions as SINGULAR, where rounding dominates the results."""

@@ -146,21 +146,21 @@ def solve_blocks(
     around = {block: path.anchors_around(time[block.first], time[block.first + block.count - 1]) for block in blocks}
     most = max(map(len, around.values()), default=0)
 
-    def begin(buffer: SolveBuffer, block: Block) -> int:
-        here, anchors = time[block.indices], around[block]
+    def load(buffer: SolveBuffer, block: Block) -> int:
+        block_time, anchors = time[block.indices], around[block]
         buffer.put_anchors(zip(*(anchor.leaves for anchor in anchors), strict=True))
         neighbor, known = _neighbors(block.count, block.stride)
         instants = np.array([anchor.instant for anchor in anchors])
-        nearest = nearest_instants(instants, here)
-        to_neighbor, to_anchor = here - here[neighbor], here - instants[nearest]
+        nearest = nearest_instants(instants, block_time)
+        to_neighbor, to_anchor = block_time - block_time[neighbor], block_time - instants[nearest]
         near = known & (np.abs(to_neighbor) <= np.abs(to_anchor))
         sources = np.where(near, neighbor, buffer.first_anchor + nearest), np.where(near, to_neighbor, to_anchor)
-        buffer.load(here, sources, rounds(block.count, block.stride, buffer.width))
+        buffer.load(block_time, sources, rounds(block.count, block.stride, buffer.width))
         return block.count
 
     def put_block(block: Block, state: Any, status: Indices) -> None:
         put(block.indices, state, status)
 
     return solve_in_buffers(
-        lambda: SolveBuffer(solver, path.anchors[0].state, size, most), blocks, begin, put_block, each
+        lambda: SolveBuffer(solver, path.anchors[0].state, size, most), blocks, load, put_block, each
     )

@@ -119,11 +119,11 @@ def _solved_at_once(
     points = [(point, half_width(point, solver.order)) for point in path.change_points]
     points += [(point, spoiled_width(point, solver.order)) for point in path.singular_positions_outside()]
     for first in range(0, len(time), CHUNK):
-        here = time[first : first + CHUNK]
-        begin, end, count = here[0], here[-1], len(here)
-        near = any(begin - width < point.instant < end + width for point, width in points)
+        chunk = time[first : first + CHUNK]
+        start, end, count = chunk[0], chunk[-1], len(chunk)
+        near = any(start - width < point.instant < end + width for point, width in points)
         if count > LONG_GRID and end < path.ended_at and not near:
-            stride = stride_of(solver, count, count, len(path.anchors_around(begin, end)))
+            stride = stride_of(solver, count, count, len(path.anchors_around(start, end)))
             blocks[first] = blocks_for(solver, first, count, stride)
     done, queue = 0, [*itertools.chain(*blocks.values())]
 

@@ -150,8 +150,8 @@ def check_independent(
     for name in checked:
         one, other = (np.asarray(motion.outputs[name])[solved] for motion in (still, spun))
         size = np.maximum(np.abs(one), np.abs(other)).reshape(len(one), ORDER + 1, -1).max(axis=(0, 2), initial=0.0)
-        away = np.abs(one - other).reshape(len(one), ORDER + 1, -1).max(axis=(0, 2), initial=0.0)
-        if not (away <= DEPENDS * np.maximum(size, scale)).all():
+        difference = np.abs(one - other).reshape(len(one), ORDER + 1, -1).max(axis=(0, 2), initial=0.0)
+        if not (difference <= DEPENDS * np.maximum(size, scale)).all():
             bodies = idle_words(idle)
             message = (
                 f"depends on a motion that nothing prescribes: {bodies} may spin about an axis of itself, which moves "

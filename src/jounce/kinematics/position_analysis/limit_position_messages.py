@@ -27,12 +27,12 @@ def dead_end_words(motion: Motion, index: int) -> str:
     drivers = mechanism.drivers
     if not drivers or index == 0 or motion.status[index] not in ENDS or motion.status[index - 1] != Status.OK:
         return ""
-    before, here = float(motion.time[index - 1]), float(motion.time[index])
+    before, instant = float(motion.time[index - 1]), float(motion.time[index])
     _, coordinates = motion.poses
     last = posed(mechanism, {name: np.asarray(c)[0, ..., index - 1] for name, c in coordinates.items()})
     name = next(iter(drivers)) if len(drivers) == 1 else TIME
     try:
-        target = here if name == TIME else law_values(mechanism, here)[name]
+        target = instant if name == TIME else law_values(mechanism, instant)[name]
         curve = trace(last, before, driver=name, order=0, count=2, length=LENGTH)
     except JounceError:
         return ""  # the message already names the failure

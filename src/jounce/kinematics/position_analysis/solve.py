@@ -132,9 +132,9 @@ def solve(
     order = checked_settings(mechanism, order, tolerance)
     count = thread_count(threads)
     instants = time_grid(mechanism.time if time is None else time, mechanism.parameter_values)
-    with Count("solving", report=progress) as tell:
+    with Count("solving", report=progress) as report:
         solver, path = _followed(mechanism, instants, order, tolerance, refine=refine)
-        solution = solve_grid(solver, path, instants, tell, count, keep=keep)
+        solution = solve_grid(solver, path, instants, report, count, keep=keep)
     state = solution.coordinates, solution.outputs
     outcome = solution.status, solution.faults, path.change_points
     backend = _backend(solver, path, instants)

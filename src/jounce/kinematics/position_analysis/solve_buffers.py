@@ -107,7 +107,7 @@ class SolveBuffer:
 def solve_in_buffers(
     new: Callable[[], SolveBuffer],
     items: Sequence[Item],
-    begin: Callable[[SolveBuffer, Item], int],
+    load: Callable[[SolveBuffer, Item], int],
     put: Callable[[Item, Any, Indices], None],
     each: Callable[[Callable[[Item], int], Iterable[Item]], Iterator[int]],
 ) -> Iterator[int]:
@@ -119,7 +119,7 @@ def solve_in_buffers(
         Makes a buffer for a thread.
     items : sequence
         Items to solve.
-    begin : callable
+    load : callable
         Loads an item into a buffer, and returns its number of instants.
     put : callable
         Stores the states and outcomes of the instants of an item. Several threads may call it at once; the arrays are
@@ -133,7 +133,7 @@ def solve_in_buffers(
     def solve(item: Item) -> int:
         with lock:
             buffer = idle_buffers.pop() if idle_buffers else new()
-            count = begin(buffer, item)
+            count = load(buffer, item)
         buffer.solve()
         put(item, *buffer.results(count))
         idle_buffers.append(buffer)

@@ -335,8 +335,8 @@ def _linear(
         indices.append(which)
         return made
 
-    here, slope = jax.jvp(numbers, (values, first), (changes, moved))
-    system = built.model(here, indices[0], known[1] is not None).system
+    primal, slope = jax.jvp(numbers, (values, first), (changes, moved))
+    system = built.model(primal, indices[0], known[1] is not None).system
     leaves, structure = jax.tree.flatten(system)
     numbered = jax.tree.unflatten(structure, range(len(leaves)))
     numbers_used = jax.tree.leaves(with_fields(numbered, forces=(), outputs=()))  # leaves that residuals need
