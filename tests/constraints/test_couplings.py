@@ -26,7 +26,7 @@ def law(order=4):
 
 
 def shafts(coupling, drawn=(1.0, 0.0, 0.0, 0.0), **extra):
-    """Two shafts whose axes meet in the origin, the second loaded; its frame is drawn at will."""
+    """Two shafts whose axes meet in the origin, the second loaded, with an arbitrary body frame."""
     back = np.array([drawn[0], *(-np.array(drawn[1:]))])
     local = turned(back, AXIS).tolist()
     joints = {"one": spatial.Revolute(("ground", "first"), ORIGIN, ORIGIN, Z, Z), "coupling": coupling(local)}
@@ -68,7 +68,7 @@ def test_shafts_of_a_constant_velocity_joint_turn_alike(drawn):
 
 
 def tripod_in_mpmath(instant, tilt, radius):
-    """Turn of the second shaft, its slide and the rest of a shaft that a tripod joint drives, all from matrices."""
+    """Rotation, slide and remaining tilt of a shaft driven by a tripod joint, all from matrices."""
 
     def about(axis, angle):
         c, s = mp.cos(angle), mp.sin(angle)

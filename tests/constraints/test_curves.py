@@ -48,7 +48,7 @@ def agree(found, expected, tolerance=1e-10):
 
 @pytest.mark.slow
 def test_a_bead_driven_along_an_ellipse_has_the_closed_form_of_place_parameter_and_forces():
-    """Laps of the curve count on; the reaction is along the normal, and balances weight and inertia."""
+    """Laps of the curve are counted; the reaction is along the normal, and balances weight and inertia."""
     made = bead(
         ["2*cos(s)", "sin(s)"], [2 * np.cos(0.6), np.sin(0.6)], start=0.6,
         force=JointForceOutput("track"), ground=GroundForceOutput(),
@@ -173,7 +173,7 @@ def test_a_barrel_cam_by_the_flank_of_its_groove_has_the_torque_of_its_lift():
 
 @pytest.mark.slow
 def test_a_bead_on_a_helix_of_a_turning_body_goes_by_matrices():
-    """A curve in space that turns: the place is that of the turned helix, with its rates."""
+    """A rotating curve in space: the position is that on the rotated helix, with its rates."""
     helix = ["0.3*cos(s)", "0.3*sin(s)", "0.1*s"]
     x, y, z = np.eye(3).tolist()
     made = jn.Mechanism(
@@ -207,7 +207,7 @@ def test_a_bead_on_a_helix_of_a_turning_body_goes_by_matrices():
 
 @pytest.mark.slow
 class TestEnds:
-    """A motion ends at an end of its curve; nothing is said of what would be beyond."""
+    """A motion stops at the end of its curve; nothing is computed beyond."""
 
     def test_a_driven_motion_ends_there_and_at_the_end_itself_it_is_solved(self):
         made = bead(HILL, [0.5, 0.02], law="0.5 + 0.5*t", start=0.5)
@@ -317,7 +317,7 @@ def test_a_curve_that_crosses_itself_is_followed_through_the_crossing():
 
 @pytest.mark.slow
 def test_many_laps_of_a_curve_through_points():
-    """A bead on a ring by samples, weightless, keeps its speed over the knots; laps count on."""
+    """A weightless bead on a ring given by samples keeps its speed over the knots; laps are counted."""
     ellipse = jn.joints.SampledCurve(ring(80), closed=True)
     made = dataclasses.replace(bead(ellipse, [1.0, 0.0], speed="1 + 0*t"), gravity=[0.0, 0.0])
     made = dataclasses.replace(made, initial={"y": drivers.CoordinateDriver(("ground", "bead"), "y", "4*t")})

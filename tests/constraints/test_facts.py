@@ -19,7 +19,7 @@ BOTH = ("one", "two")
 
 
 class Rail(jn.joints.AbstractConstraint, space="planar"):
-    """A guide whose fields have names of their own."""
+    """A guide with field names different from the usual ones."""
 
     point_i: jn.joints.Vector
     point_j: jn.joints.Vector
@@ -40,7 +40,7 @@ class Rail(jn.joints.AbstractConstraint, space="planar"):
 
 
 class Pin(planar.Revolute):
-    """The hinge of the library by another name."""
+    """The hinge of the library under another name."""
 
 
 class OffsetPin(planar.Revolute):

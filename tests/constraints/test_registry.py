@@ -1,4 +1,4 @@
-"""A type of joints, drivers and forces is one class: none takes the place of another without a word."""
+"""A type of joints, drivers or forces is one class: no class replaces another silently."""
 
 import pytest
 
@@ -9,7 +9,7 @@ from jounce.io.mechanisms.user_classes import import_file
 
 
 def own(kind="mine", name="Own", body=None, **keywords):
-    """Define a class as if in a module, with more in its body."""
+    """Define a class as if in a module, with additional lines in its body."""
     body = {"residual": lambda self, *_: None, "__qualname__": name, "__module__": "notebook"} | (body or {})
     return jn.joints.AbstractConstraint.__class__(name, (jn.joints.AbstractConstraint,), body, type=kind, **keywords)
 

@@ -88,7 +88,7 @@ def robot(left, right):
 
 @pytest.mark.slow
 def test_a_robot_goes_where_its_wheels_drive_it():
-    """Speed and rate of turn follow from the wheels; the place is their integral, with Fresnel's integrals here."""
+    """Speed and yaw rate follow from the wheels; the position is their integral, here with Fresnel integrals."""
     found = jn.simulate(robot("5*t - 0.4*t**2", "5*t + 0.4*t**2"), np.linspace(0, 3, 7))
     rate = 0.1 / 0.5 * 1.6  # of the rate of turn: radius over track times the rate of the difference of the wheels
 
@@ -123,7 +123,7 @@ def riding(speed):
 
 @pytest.mark.slow
 def test_the_benchmark_bicycle_has_the_published_equations_and_eigenvalues():
-    """Steer is about the axis upward here, and downward there."""
+    """Steering is about the upward axis here, and about the downward axis in the benchmark."""
     small, sign = riding(5.0), np.array([[1, -1], [-1, 1]])
     printed = {name: np.array(matrix) for name, matrix in PRINTED.items()}
     stiffness = 9.81 * printed["weight"] + 25 * printed["turning"]
@@ -143,7 +143,7 @@ def test_the_benchmark_bicycle_has_the_published_equations_and_eigenvalues():
 @pytest.mark.slow
 @pytest.mark.parametrize("speed, swings", [(4.292382536341, True), (6.024262015388, False)])
 def test_weave_and_capsize_begin_at_the_published_speeds(speed, swings):
-    """The real part passes zero there; its slope by the speed is of the order of one."""
+    """The real part crosses zero at that speed, with a slope of order one."""
     parts = sorted(abs(x.real) for x in riding(speed).modes.eigenvalues if (abs(x.imag) > 1e-9) == swings)
     assert parts[0 if swings else 1] < 1e-11  # one of those that do not swing is the speed, which nothing changes
 

@@ -65,7 +65,7 @@ def system_of(forces, components, parameters=()):
 
 
 def applied(system, pose):
-    """Return the plain derivatives of what forces do, shape (order, coordinates, bodies)."""
+    """Return the plain derivatives of the generalized forces, shape (order, coordinates, bodies)."""
     time = jn.Jet.variable(jnp.full((1, 1), INSTANT), pose.order)
     return np.asarray(quickly(lambda p: system.applied_forces(p, time).derivatives())(pose))[..., 0]
 

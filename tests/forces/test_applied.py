@@ -1,4 +1,4 @@
-"""What every force does to its bodies, with rates, against the mechanics of points and moments in forty digits."""
+"""Effect of every force on its bodies, with rates, against the mechanics of points and moments in forty digits."""
 
 import dataclasses
 
@@ -117,7 +117,7 @@ def test_torque_of_the_plane(name):
 @pytest.mark.parametrize("frame", ["global", "body"])
 @pytest.mark.parametrize("components", [2, 3], ids=["planar", "spatial"])
 def test_point_force(components, frame):
-    """The force follows the place, the velocity and the time; along the axes of the body it turns with it."""
+    """The force depends on position, velocity and time; along the axes of the body it turns with the body."""
     kind = forces.PointForce if components == 2 else forces.SpatialPointForce
     law = ["-c*vx + x", "2*t*vy", "y*t - vz"][:components]
     other, body = moving_bodies(7, components)

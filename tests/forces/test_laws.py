@@ -1,4 +1,4 @@
-"""Laws of forces: numbers, expressions, functions and splines on jets, and what is refused, with the place named."""
+"""Laws of forces: numbers, expressions, functions and splines on jets; refusals name the location."""
 
 import math
 
@@ -146,7 +146,7 @@ def test_what_no_law_or_value_is(wrong, message):
 
 
 def test_values_that_are_allowed():
-    """A stiffness may be negative, a free length zero, that of a slide of any sign; a vector of laws an array."""
+    """A stiffness may be negative, a free length zero, or of any sign for a slide; a vector of laws may be an array."""
     spring = built(forces.Spring(BOTH, *LINE, stiffness=-3.0, length=0.0, damping=-1.0))
     assert [float(x.item()) for x in (spring.stiffness, spring.length, spring.damping)] == [-3.0, 0.0, -1.0]
     slide = built(forces.SlideSpring(BOTH, *LINE, [1, 0], stiffness=0.0, length=-2.0))

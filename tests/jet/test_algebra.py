@@ -17,7 +17,7 @@ NUMBERS = st.floats(-2, 2).map(lambda x: 0.0 if abs(x) < 1e-6 else x)
 
 
 def jets(first=NUMBERS, order=ORDER):
-    """Jets of a scalar, some of whose coefficients are absent, which stands for zero."""
+    """Jets of a scalar with some coefficients absent, which stand for zero."""
     rest = st.lists(st.one_of(st.none(), NUMBERS), min_size=order, max_size=order)
     return st.tuples(first, rest).map(
         lambda c: jn.Jet([jnp.asarray(c[0]), *(None if x is None else jnp.asarray(x) for x in c[1])])
@@ -29,7 +29,7 @@ POSITIVE = st.floats(0.8, 3)
 
 
 def magnitude(*operands):
-    """Coefficients of the product of the operands, all taken by magnitude: what rounding scales with."""
+    """Coefficients of the product of the magnitudes of the operands, to which rounding is proportional."""
     size = np.eye(1, ORDER + 1)[0]
     for x in operands:
         size = np.convolve(size, np.abs(np.array(x.dense().coefficients)))[: ORDER + 1]
@@ -37,7 +37,7 @@ def magnitude(*operands):
 
 
 def inverse_magnitude(x):
-    """The same of 1 / x, whose magnitudes solve the recurrence of division with all signs alike."""
+    """The same for 1 / x, whose magnitudes solve the recurrence of division with equal signs."""
     c, out = np.abs(np.array(x.dense().coefficients)), []
     for k in range(ORDER + 1):
         out.append(((k == 0) + sum(c[j] * out[k - j] for j in range(1, k + 1))) / c[0])
@@ -104,7 +104,7 @@ def test_sine_and_cosine(x):
 
 
 def exponential_magnitude(x):
-    """Majorant of exp(i x): the exponential of the magnitudes of all but the value."""
+    """Majorant of exp(i x): the exponential of the magnitudes of all coefficients but the first."""
     c, out = np.abs(np.array(x.dense().coefficients)), [1.0]
     for k in range(1, ORDER + 1):
         out.append(sum(j * c[j] * out[k - j] for j in range(1, k + 1)) / k)

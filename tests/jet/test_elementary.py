@@ -182,7 +182,7 @@ def test_functions_take_numbers_and_arrays(name):
 
 @pytest.mark.parametrize("name", UNARY)
 def test_lower_orders_are_the_same(name):
-    """The coefficients that a jet has do not depend on its order."""
+    """The coefficients of a jet do not depend on its order."""
     function, x = getattr(jet, name), jet_of([0.3, 0.5, -0.2, 0.7])
     for order in range(3):
         shorter, longer = function(x.truncate(order)), function(x).truncate(order)

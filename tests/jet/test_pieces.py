@@ -1,4 +1,4 @@
-"""Which piece has begun, against NumPy's search in sorted numbers."""
+"""The piece of a law at an instant, against NumPy's search in sorted numbers."""
 
 import jax
 import jax.numpy as jnp

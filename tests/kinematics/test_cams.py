@@ -1,4 +1,4 @@
-"""Plate cams from laws: against eccentric discs, whose laws are known, and by following the profile back."""
+"""Plate cams from laws, against eccentric discs with known laws, and by following the profile."""
 
 import math
 import warnings
@@ -12,7 +12,7 @@ DISC, OFF, ROLLER, COUNT = 0.03, 0.01, 0.008, 181
 
 
 def disc_law(follower, sense=1.0):
-    """The law of a follower on a disc of 30 mm, whose center is 10 mm off the axis, toward y at the angle zero."""
+    """The law of a follower on a disc of 30 mm with its center 10 mm off the axis, toward y at angle zero."""
 
     def center(t):
         return -OFF * np.sin(sense * t), OFF * np.cos(sense * t)

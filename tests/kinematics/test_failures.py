@@ -1,4 +1,4 @@
-"""What cannot be solved: said by name and time, never silently wrong."""
+"""Motions that cannot be solved: reported by name and time, never silently wrong."""
 
 import dataclasses
 import re
@@ -90,7 +90,7 @@ def test_crank_that_leaves_the_region_of_assembly():
 
 @pytest.mark.slow
 def test_dead_center_passed_smoothly_keeps_to_the_motion():
-    """The law touches the dead center and returns; the crank goes on through it, in one smooth motion."""
+    """The law touches the dead center and returns; the crank continues through it in a smooth motion."""
     time = np.linspace(0, 3, 31)
     angle = jn.solve(slider_crank("4 - 0.5*cos(t)**2"), time, order=0).outputs["angle"][:, 0]
     assert (np.diff(angle) < 0).all()
@@ -107,7 +107,7 @@ def test_change_point_of_a_parallelogram_is_passed_on_the_same_branch():
 @pytest.mark.slow
 @pytest.mark.parametrize("beyond", [-1e-11, 0.0, 1e-9, 1e-8])
 def test_a_motion_that_ends_at_a_change_point_has_no_derivatives_there(beyond):
-    """Stretched out: whether it goes on as a parallelogram cannot be seen, and rounding decides all rates."""
+    """In the stretched position, the branch cannot be determined, and rounding decides all rates."""
     time = np.array([0.5, 2.0, np.pi + beyond])
     mechanism = four_bar("0.5", "0.5", "t", AB=0.1, CD=0.1, AD=0.2, BC=0.2)
     error = failure(mechanism, time, order=1)
@@ -194,7 +194,7 @@ def test_degrees_of_freedom_are_explained(bodies, joints, drivers, message):
 
 
 def wiper(**joints):
-    """A four-bar with a second arm on a tie; `joints` replaces or adds some, None takes one out."""
+    """A four-bar with a second arm on a tie; `joints` replaces or adds joints, and None removes one."""
     pin = jn.planar.Revolute
     found = {
         "O": PIN,
@@ -262,7 +262,7 @@ def test_constraints_that_contradict_each_other_are_reported_in_one_sentence():
     ],
 )
 def test_a_law_that_ends_or_grows_beyond_all_bounds(law, stop, count, end, status):
-    """It is told, at once and where, though nothing but the steps may tell that there is a pole."""
+    """A pole is reported at once with its instant, although only the steps can reveal it."""
     time = np.linspace(0, stop, count)
     motion = jn.solve(crank(law), time, order=2, strict=False)
     before = time < end
@@ -313,7 +313,7 @@ def test_gaps_of_what_cannot_be_assembled_are_lengths_and_angles():
 
 
 def test_the_gap_of_two_points_in_one_place_is_a_length():
-    """The square of a distance has no slope where the distance is zero: nothing but its kind tells its unit."""
+    """A squared distance has no slope where it is zero; only its class determines its unit."""
     reach = jn.drivers.DistanceDriver(("ground", "crank"), [1, 0], [1, 0], motion="0.5 + t")
     pin = jn.planar.Revolute(("ground", "crank"), [0, 0], [0, 0])
     crank = jn.Mechanism(space="planar", bodies={"crank": jn.Body([0, 0])}, joints={"O": pin}, drivers={"reach": reach})

@@ -1,4 +1,4 @@
-"""Derivatives of motions by the design, against differences in fifty digits of an independent solver."""
+"""Derivatives of motions with respect to the design, against differences of an independent solver in fifty digits."""
 
 import dataclasses
 
@@ -89,7 +89,7 @@ def test_high_orders_in_fifty_digits(name, parameters, order):
 
 @pytest.mark.slow
 def test_the_travel_of_a_nut_by_the_lead_of_its_screw():
-    """It is the lead by turn, so that its derivative by the lead is the turns, and their rate."""
+    """The advance is the lead times the turns, so that its derivative by the lead is the turns, and their rates."""
     time = np.array([0.0, 0.3, 0.8])
 
     def travel(lead):

@@ -1,4 +1,4 @@
-"""Struts and rods that may spin about themselves: held by the least motion, told, and nothing may depend on it."""
+"""Struts and rods that may spin about their own axes: held at rest with a warning, and no output may depend on it."""
 
 import dataclasses
 import warnings
@@ -52,7 +52,7 @@ def held():
 
 
 def test_what_does_not_depend_on_a_spin_is_as_with_joints_that_hold_it(held):
-    """Universal joints in the place of balls, and a rod without a body, leave no spin."""
+    """Universal joints in place of ball joints, and a massless rod, leave no spin."""
     cross = jn.spatial.Universal(("ground", "strut"), TOP, TOP, [0.4225, 0, 0.026], [0, 0.4225, 0.13])
     direction = np.array(OUTER) - [0.05, 0.2, 0.25]
     side = np.cross(direction, [0, 0, 1.0])
@@ -100,7 +100,7 @@ def test_gradients_are_refused():
 
 
 def test_a_strut_that_is_off_its_axis_is_not_idle():
-    """It swings as it spins, so that its spin is a degree of freedom like any other."""
+    """The body swings as it spins, so that its spin is a degree of freedom like any other."""
     top = [TOP[0], TOP[1] + 1e-3, TOP[2]]
     with pytest.raises(jn.errors.MobilityError, match="add 2 drivers"):
         jn.solve(strut(joints={"top": BALL(("ground", "strut"), top, top)}), [0.4])

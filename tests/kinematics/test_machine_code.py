@@ -1,4 +1,4 @@
-"""Machine code for many instants beside XLA's programs: the same motions, and XLA's where there is none."""
+"""Machine code for many instants: the same motions as XLA, and XLA as the fallback."""
 
 import numpy as np
 import pytest
@@ -56,7 +56,7 @@ def test_motions_are_those_of_xla(mechanism, count, monkeypatch):
 @pytest.mark.slow
 @pytest.mark.parametrize("samples", [25, 301])
 def test_motions_by_laws_through_samples_are_those_of_xla(samples, monkeypatch):
-    """Of many samples, too: their table stays in memory, where single values would be too much code."""
+    """A law of many samples keeps its table in memory, as scalar code for it would be too long."""
     made, program = [], Mapped.program
     monkeypatch.setattr(
         Mapped, "program", lambda *a, **k: made.append(isinstance(program(*a, **k), OnLlvm)) or program(*a, **k)

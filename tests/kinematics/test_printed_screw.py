@@ -1,4 +1,4 @@
-"""The screw as Sommer 2024 composes it (section 5), beside the screw of the library."""
+"""The screw as composed by Sommer 2024 (section 5), compared with the screw of the library."""
 
 import numpy as np
 import pytest

@@ -16,7 +16,7 @@ KITE = (50e-3, 50e-3, 200e-3, 200e-3)  # flat where the crank points away from t
 
 
 def four_bar(lengths, angle=0.0, guess=(0.0, 0.0), law=None):
-    """A four-bar of crank, coupler, rocker and base, whose crank begins at an angle; coupler and rocker as guessed."""
+    """A four-bar of crank, coupler, rocker and base, with a first crank angle, and guesses of coupler and rocker."""
     crank, coupler, rocker, base = lengths
     pin = jn.planar.Revolute
     along = (crank * np.cos(angle), crank * np.sin(angle))

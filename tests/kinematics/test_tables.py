@@ -1,4 +1,4 @@
-"""Results as datasets with a variable for each derivative, and as tables of pandas, with units that pint reads."""
+"""Results as datasets with a variable for each derivative, and as pandas tables, with units that pint reads."""
 
 import numpy as np
 import pint

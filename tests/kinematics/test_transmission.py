@@ -45,7 +45,7 @@ def test_extremes_are_those_along_the_curve(family, point):
 
 
 def _angles(linkage, curve, point):
-    """Return the transmission angle from the places of the points."""
+    """Return the transmission angle from the positions of the points."""
     values, theta = linkage.values, curve.values[:, 0]
     tip = values["a"] * np.stack([np.cos(theta), np.sin(theta)], axis=1)
     rod = curve.outputs[point][:, 0] - tip
@@ -58,7 +58,7 @@ def _angles(linkage, curve, point):
 
 
 def test_a_four_bar_of_hinges_turned_in_its_frames():
-    """The driver's angle is that of a frame that does not lie along the crank, on a slanted ground."""
+    """The driver angle belongs to a frame not aligned with the crank, on a slanted ground."""
     crank = FourBar(1.0, 3.0, 2.5, 3.2, 0.0)
     turn = 0.7
     ground = 3.2 * np.array([np.cos(0.3), np.sin(0.3)])

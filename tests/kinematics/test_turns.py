@@ -1,4 +1,4 @@
-"""Whole turns: the guess and the laws of the drivers say them, not the path of assembly, nor the grid."""
+"""Whole turns follow from the guess and the laws of the drivers, not from the path of assembly or the grid."""
 
 import dataclasses
 
@@ -16,7 +16,7 @@ X, Z, ORIGIN = [1, 0, 0], [0, 0, 1], [0, 0, 0]
 
 
 def shafts(law):
-    """Two shafts in line by way of two Hooke joints, as fast as each other after each turn."""
+    """Two collinear shafts with two Hooke joints between them, which agree after each turn."""
     slope = 0.3
     return jn.Mechanism(
         space="spatial",
@@ -68,7 +68,7 @@ def test_half_a_turn_is_pi_whatever_its_last_digit_says():
 
 
 def assembled_angles(mechanism, instant=0.0):
-    """Return the angles of the moving bodies of a planar mechanism where it is assembled."""
+    """Return the angles of the moving bodies of a planar mechanism at its assembled position."""
     return assemble(build(mechanism), instant, 1e-12)[1]["angle"][1:, 0]
 
 
@@ -103,7 +103,7 @@ def test_a_torsional_spring_sees_the_angle_that_the_guess_says():
 
 
 def drag_link(law, gear=False):
-    """Two cranks that both turn about, the second with the first, a coupler, and a wheel geared to the second crank."""
+    """Two cranks that make full turns together, a coupler, and a wheel geared to the second crank."""
     joints = {
         "A": planar.Revolute(("ground", "first"), [0, 0], [0, 0]),
         "D": planar.Revolute(("ground", "second"), [0.5, 0], [0, 0]),
@@ -137,7 +137,7 @@ def test_planar_bodies_turn_with_the_driver(law, start):
 
 
 def test_bodies_that_a_gear_couples_go_back_by_whole_turns_together():
-    """The shortest way to close the loop turns the crank beyond half a turn; the wheel goes with it, both back."""
+    """The shortest way to close the loop turns the crank by more than half a turn; crank and wheel are shifted together."""
     mechanism = drag_link("0.5 + t", gear=True)
     wheel = dataclasses.replace(mechanism.joints["pair"], offset=3.8)
     mechanism = dataclasses.replace(mechanism, joints=mechanism.joints | {"pair": wheel})
@@ -157,7 +157,7 @@ SPRING = {"stiffness": 2.0, "angle": 0.3, "damping": 0.1}
 
 
 def wound(start, rate, space="spatial"):
-    """A driven rotor on a torsional spring, in space or in the plane, and one that turns back twice as fast."""
+    """A driven rotor on a torsional spring, in space or in the plane, and one that turns twice as fast backward."""
     motions = {"first": law(start, rate, wave=0.4), "second": law(0.2, -2 * rate, wave=0.1)}
     pairs = {"first": ("ground", "first"), "second": ("ground", "second"), "between": ("first", "second")}
     inertia = {"mass": 1.0, "inertia": 0.7 if space == "planar" else [0.7, 0.7, 0.7]}

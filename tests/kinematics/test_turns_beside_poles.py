@@ -1,4 +1,4 @@
-"""Angles that turn by half a turn at once, where a vector passes near the axis, or Euler angles near gimbal lock."""
+"""Angles that change by half a turn at once: of a vector passing near the axis, and Euler angles near gimbal lock."""
 
 import itertools
 
@@ -33,7 +33,7 @@ def gimbals():
 
 
 def swept(turn, miss):
-    """Angle of (cos turn, sin(miss) sin turn), which is within a quarter of a turn of the turn."""
+    """Angle of (cos turn, sin(miss) sin turn), which is within a quarter turn of `turn`."""
     angle = np.arctan2(np.sin(miss) * np.sin(turn), np.cos(turn))
     return angle + 2 * np.pi * np.round((turn - angle) / (2 * np.pi))
 

@@ -54,7 +54,7 @@ def square(request):
 
 @functools.cache
 def drawn(count, width, redundant):
-    """A random matrix, right-hand sides, and for both what comes of its factors, in one program."""
+    """A random matrix, right-hand sides, and the solutions of both systems by its factors, in one program."""
     random = np.random.default_rng(count + width)
     bodies = random_pattern(random, count, width, redundant)
     places = random.permutation(bodies.size * width).reshape(*bodies.shape, width)

@@ -1,4 +1,4 @@
-"""The Jacobian on the host: of a large one only what is not zero; against the singular values of the whole."""
+"""The Jacobian on the host, sparse if large, against the singular values of the dense matrix."""
 
 import itertools
 
@@ -14,7 +14,7 @@ BODIES, WIDTH = 20, 3
 
 
 def drawn(rows, redundant=0, loose=0, seed=0):
-    """Rows on two bodies each, some of them twice, and some bodies that no row sees turn."""
+    """Rows on two bodies each, some repeated, and some bodies whose rotation affects no row."""
     random = np.random.default_rng(seed)
     first = np.arange(rows) % BODIES
     bodies = np.stack([first, (first + 1 + random.integers(0, 3, rows)) % BODIES], axis=1)

@@ -56,7 +56,7 @@ def test_inverses_determinants_and_solutions_where_rows_must_change_places(size)
 @pytest.mark.parametrize("transposed", [False, True])
 @pytest.mark.parametrize("condition", [1e1, 1e8])
 def test_residuals_are_rounding_however_ill_conditioned(condition, transposed):
-    """As Gaussian elimination with substitution leaves them; a product with the inverse would leave 1e-10."""
+    """Residuals are as small as with substitution; a product with the inverse would leave 1e-10."""
     generator = np.random.default_rng(3)
     turns = [np.linalg.qr(generator.normal(size=(12, 12)))[0] for _ in range(2)]
     matrix = (turns[0] * np.logspace(0, -np.log10(condition), 12)) @ turns[1]
@@ -104,7 +104,7 @@ def test_singular_value_decompositions(shape):
 
 
 def test_no_operation_is_left_to_lapack():
-    """Batches of LAPACK wait for threads of XLA in a thread of XLA: two such programs may wait forever."""
+    """Batches of LAPACK wait for XLA threads within an XLA thread: two such programs may deadlock."""
 
     def everything(matrices):
         factor = DenseFactor.of(matrices)

@@ -1,4 +1,4 @@
-"""Elimination by reflections against NumPy, and its sign, for matrices of all kinds."""
+"""Elimination by reflections against NumPy, with the sign of the determinant, for many kinds of matrices."""
 
 from functools import partial
 

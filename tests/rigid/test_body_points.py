@@ -63,7 +63,7 @@ def close(found, expected, tolerance=1e-13):
 
 
 def off(found, right):
-    """Largest difference over the largest entry of what is right."""
+    """Largest difference over the largest entry of the reference."""
     return np.abs(np.asarray(found) - right).max() / np.abs(np.asarray(right)).max()
 
 
@@ -159,7 +159,7 @@ def test_equations_044_and_045_exponential_of_the_product_is_not_the_rotation(se
 
 @SEEDS
 def test_equation_042_with_turned_axes_inside_the_exponentials_is_wrong(seed):
-    """The axes inside are those of the initial state; with the turned ones the exponentials stand in another order."""
+    """The exponents have the axes of the initial state; with rotated axes the exponentials are in another order."""
     case = body(seed)
     (a, b, _), (da, db, dc) = (np.asarray(x) for x in case.angles.derivatives()[:2])
     z, x, _ = axes = [np.eye(3)[2], np.eye(3)[0], np.eye(3)[2]]

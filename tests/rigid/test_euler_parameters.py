@@ -17,7 +17,7 @@ angles = st.floats(-7, 7, allow_nan=False)
 
 
 def agree(ours, rotation):
-    """Quaternions are equal up to their sign, which stands for no difference in attitude."""
+    """Quaternions are equal up to their sign, which does not affect the attitude."""
     theirs = rotation.as_quat(scalar_first=True)
     np.testing.assert_allclose(np.outer(ours, ours), np.outer(theirs, theirs), atol=3e-15)
 

@@ -68,7 +68,7 @@ def close(found, expected):
 
 
 def off(found, right):
-    """Largest difference over the largest entry of what is right."""
+    """Largest difference over the largest entry of the reference."""
     return np.abs(np.asarray(found) - right).max() / np.abs(np.asarray(right)).max()
 
 
@@ -167,7 +167,7 @@ def test_equations_057_and_058_accelerations_by_slopes_of_any_order(seed):
 
 @pytest.mark.slow
 def test_equation_058_derivative_of_the_sum():
-    """The rate of equation 58's right side, along the motion, is that of the angular acceleration."""
+    """The rate of the right side of equation 58 along the motion equals that of the angular acceleration."""
     m, order = 1, 2
     q = np.random.default_rng(3).normal(size=(order + 2, 6))
 

@@ -8,7 +8,7 @@ import jounce as jn
 
 
 def cloud(seed, count=6):
-    """Return masses and places of point masses."""
+    """Return masses and positions of point masses."""
     generator = np.random.default_rng(seed)
     return generator.uniform(0.1, 2.0, count), generator.normal(size=(count, 3))
 

@@ -144,7 +144,7 @@ def test_equations_003_to_010_axes_and_direction_cosines():
 
 @functools.cache
 def everything(sequence):
-    """What the identities need, compiled once for all drawn motions."""
+    """Quantities for the identities, compiled once for all random motions."""
 
     def computed(motion):
         R = rigid.rotation_matrix(sequence, motion)

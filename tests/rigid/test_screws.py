@@ -79,7 +79,7 @@ def test_equations_031_to_034_products_to_order_6(seed):
 
 
 def test_equation_033_position_of_the_frame_and_of_a_point():
-    """Delta_p: the same product takes along the origin of the frame, or any point of the body."""
+    """Delta_p: the same product moves the origin of the frame, or any point of the body."""
     screws, _ = chain(3)
     q = np.random.default_rng(4).uniform(-2, 2, size=(5, 6))
     home = np.eye(4)

@@ -1,4 +1,4 @@
-"""Inertia of solids against sums over many small cubes, and pseudo-inertia there and back."""
+"""Inertia of solids against sums over many small cubes, and pseudo-inertia converted both ways."""
 
 import numpy as np
 import pytest

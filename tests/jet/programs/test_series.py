@@ -36,7 +36,7 @@ def series(function, *paths):
 
 
 def nested(function, *paths):
-    """Return the same by derivatives of derivatives of the function along the paths."""
+    """Return the same coefficients by nested derivatives of the function along the paths."""
 
     def along(t):
         powers = jnp.cumprod(jnp.concatenate([jnp.ones(1), jnp.full(len(paths[0]) - 1, t)]))
@@ -51,7 +51,7 @@ def nested(function, *paths):
 
 
 def paths(*shapes, order=ORDER, seed=0):
-    """Return random paths near values from 0.3 to 0.8, that shrink from order to order as those of motions do."""
+    """Return random paths near values from 0.3 to 0.8, with coefficients that shrink with the order as in motions."""
     random = np.random.default_rng(seed)
     shrink = 0.6 ** np.arange(order + 1)
     return [
@@ -154,7 +154,7 @@ def products(x, y):
 
 
 def structure(x, y):
-    """Operations that move entries and choose among them, on the same."""
+    """Operations that move and select entries, on the same arrays."""
     which = jnp.argmax(x)
     spread = jnp.zeros((4, 3)).at[jnp.array([2, 0])].set(x)
     return {
@@ -317,7 +317,7 @@ def test_what_does_not_change_stays():
 
 @pytest.mark.parametrize("operation", [jnp.subtract, jnp.divide, jnp.power, jnp.arctan2])
 def test_operands_in_another_order_are_another_operation(operation):
-    """What a program repeats is read once, and `b - a` does not repeat `a - b`."""
+    """Repeated operations are read once, and `b - a` does not repeat `a - b`."""
     a, b = jnp.asarray(2.0), jnp.asarray(3.0)
     recursion = Recursion(lambda a, b: (operation(a, b), operation(b, a)), (a, b), 1)
     assert recursion.outputs == (operation(a, b), operation(b, a))

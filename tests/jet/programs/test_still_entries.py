@@ -1,4 +1,4 @@
-"""What does not change in a differential equation, and series without the products of it."""
+"""Constant entries of a differential equation, and series without their products."""
 
 import jax
 import jax.numpy as jnp
@@ -13,7 +13,7 @@ ORDER = 5
 
 
 def turning(axis, vector, rate):
-    """Return how a vector changes that turns about an axis, and the axis itself."""
+    """Return the rate of a vector that turns about an axis, and the axis itself."""
     with by_certain_entries():
         spin = axis * rate
         return cross(spin, axis), cross(spin, vector), rate * rate
@@ -38,7 +38,7 @@ def test_what_is_not_known_may_change():
 
 
 def marched(axis, vector, entries):
-    """Return the series of the axis and of the vector, whose turn has the rate 1 + t."""
+    """Return the series of the axis and of the vector, which turns at the rate 1 + t."""
 
     def run(axis, vector):
         values = axis, vector, jnp.ones((1, 1))

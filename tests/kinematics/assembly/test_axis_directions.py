@@ -1,4 +1,4 @@
-"""Laws: from a rough guess no part is assembled turned over in its joint, and what can be assembled is."""
+"""Properties: from a rough guess, every mechanism that can be assembled is, with no part turned over in its joint."""
 
 import dataclasses
 
@@ -19,7 +19,7 @@ HINGED = ("revolute", "cylindrical", "prismatic", "screw")
 
 
 def tilted(model, coordinates, random, size):
-    """Return a guess in which every body is turned by up to an angle from where it is assembled, and shifted."""
+    """Return a guess with every body rotated, by up to an angle, and shifted from its assembled pose."""
     guess = {name: np.array(x) for name, x in coordinates.items()}
     guess["position"][:, 1:] += random.uniform(-0.3, 0.3, guess["position"][:, 1:].shape) * model.length
     if "angle" in guess:
@@ -110,7 +110,7 @@ def test_a_hinge_that_can_only_be_turned_over_is_named():
 
 
 def disc(line, *, on=0.1, heading=0.4):
-    """A disc on a line that is tilted, with its center to the left of the line where `on` is above zero."""
+    """A disc on a tilted line, with its center to the left of the line if `on` is positive."""
     c, s = np.cos(heading), np.sin(heading)
     return jn.Mechanism(
         space="planar",

@@ -1,4 +1,4 @@
-"""Degrees of freedom by count, by rank and in fact: what goes on, what is blocked at which order, where it branches."""
+"""Mobility by count, by rank and by finite motions: orders at which velocities are blocked, and branches."""
 
 import dataclasses
 import importlib
@@ -23,7 +23,7 @@ def linked(bodies, pins, **slots):
 
 
 def hinges_in_line(middle=1.0, off=0.0):
-    """A triangle of two bars and the ground that is flat."""
+    """A flat triangle of two bars and the ground."""
     bodies = {"left": ((0, 0), 0.0), "right": ((middle, off), 0.0)}
     pins = [
         ("ground", "left", (0, 0), (0, 0)),
@@ -45,7 +45,7 @@ def flat_parallelogram(crank=1.0, base=3.0, cranks=2, size=1.0):
 
 
 def rhombus_with_dyad():
-    """A rhombus folded flat, and two bars from its tip to its foot, where they turn freely as long as it is there."""
+    """A rhombus folded flat, with two bars from its tip to its foot, which turn freely in the folded position."""
     bodies = {
         "AB": ((0, 0), np.pi),
         "BC": ((-1, 0), 0.0),
@@ -88,7 +88,7 @@ def cusp_mechanism(tilt=0.3):
 
 
 def turns(branch, *names):
-    """Return how the bodies named begin to turn, over the first of them."""
+    """Return the initial rotation rates of the named bodies, relative to the first."""
     found = np.array([branch.tangents[name][0, 2] for name in names])
     return found / found[0]
 
@@ -105,7 +105,7 @@ def test_three_hinges_in_a_line_are_shaky():
 
 @pytest.mark.parametrize("size", [1e-3, 1.0])
 def test_a_flat_parallelogram_has_two_branches_with_their_tangents(size):
-    """Both cranks alike, or against each other: by the second derivatives of the closure, (L + r) to (L - r)."""
+    """Both cranks in the same or opposite sense: by the second derivatives of the closure, (L + r) to (L - r)."""
     crank, base = 1.0, 3.0
     found = jn.mobility(flat_parallelogram(crank, base, size=size))
     assert (found.kind, found.count, found.instantaneous, found.finite) == ("change point", 1, 2, 1)
@@ -152,7 +152,7 @@ def test_a_cusp_is_reported():
 
 @pytest.mark.slow
 def test_a_flatter_cusp_than_series_find_is_not_called_shaky():
-    """With arms across the coupler Watt's curve bends as the fifth power: the motion goes on all the same."""
+    """With arms perpendicular to the coupler, Watt's curve bends as the fifth power, and the motion continues."""
     found = jn.mobility(cusp_mechanism(tilt=0.0))
     assert found.kind in ("cusp", "singular")
     assert found.finite == 1

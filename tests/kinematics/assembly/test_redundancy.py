@@ -1,4 +1,4 @@
-"""Linkages that move although they have too many equations, against their closed forms; and those that must not."""
+"""Overconstrained linkages that move, against their closed forms; and overconstrained linkages that cannot."""
 
 import dataclasses
 import re
@@ -30,7 +30,7 @@ def exact(motion, times, order):
 
 
 def moves_as_told(case, times=TIMES, order=4, tolerance=1e-12):
-    """Assert that a case has as many redundant equations as told, and that its output is that of the closed form."""
+    """Check the number of redundant equations of a case, and its output against the closed form."""
     motion = jn.solve(case.mechanism, times, order=order)
     rows, _ = motion.model.system.shape
     assert rows - motion.model.system.rank == case.redundant
@@ -118,7 +118,7 @@ def test_a_tolerance_admits_numbers_of_few_digits():
 
 
 def turned(first, second):
-    """A crank with two drivers of its angle."""
+    """A crank whose angle has two drivers."""
     laws = {"one": first, "two": second}
     return jn.Mechanism(
         space="planar",
@@ -161,7 +161,7 @@ def test_a_structure_that_is_locked_can_rest_and_not_move():
 
 @pytest.mark.slow
 def test_a_dead_point_is_no_redundancy():
-    """A four-bar driven at its rocker runs into its dead point; started in it, that is told as such."""
+    """A four-bar driven at its rocker runs into its dead point; a start at the dead point is reported as such."""
     linkage = overconstrained.four_bar_of_hinges(law="")
     _, rocker = overconstrained.closing(1.0, 3.0, 2.5, 2.0, 0.7)
     driven = dataclasses.replace(
@@ -187,7 +187,7 @@ def test_a_dead_point_is_no_redundancy():
 
 
 def test_who_repeats_whom_follows_from_the_combinations_that_vanish():
-    """Joint c repeats both equations of a; of two drivers that are alike the second repeats the first."""
+    """Joint c repeats both equations of a; the second of two equal drivers repeats the first."""
     rows = ("joints.a", "joints.b", "joints.a", "joints.c", "joints.c", "drivers.x", "drivers.y")
     combinations = np.zeros((7, 3))
     combinations[[0, 3], 0] = combinations[[2, 4], 1] = combinations[[5, 6], 2] = np.sqrt(0.5) * np.array([1, -1])

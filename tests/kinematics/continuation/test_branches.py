@@ -1,4 +1,4 @@
-"""Motions stay on the branch that they start on, whatever the order and the grid, and end where they can go no further.
+"""Motions stay on the branch on which they start, for any order and grid, and end at their last reachable position.
 
 The branch of a slider-crank and of a four-bar is the sign of the root in its closed form, which nothing but a zero of
 the root can change. `benchmarks/branches.py` asks the same of thousands of linkages of eleven kinds.
@@ -82,7 +82,7 @@ def test_random_linkages_are_followed_as_far_as_they_go_and_no_further(family):
 @pytest.mark.parametrize("side", [1, -1], ids=["parallelogram", "antiparallelogram"])
 @pytest.mark.parametrize("instants", [30, 301])
 def test_smooth_passage_of_a_change_point_keeps_to_its_own_curve(side, instants):
-    """Where crank, rod and rocker lie on one line both curves cross, each smooth: what goes on is the same curve."""
+    """Where crank, rod and rocker are collinear, two smooth curves cross; the motion stays on its curve."""
     a, d = 0.5, 1.2
     law, time = uniform(0.4, 1.0), np.linspace(0, 2 * np.pi, instants)
     tip = a * np.exp(1j * law(time))

@@ -1,4 +1,4 @@
-"""Corrections with one Jacobian as long as they shrink fast: poses to rounding, and factors that solve there."""
+"""Simplified Newton corrections: poses exact to rounding, and factors valid at the final pose."""
 
 import jax
 import jax.numpy as jnp
@@ -19,7 +19,7 @@ LINKAGES = ["four_bar", "rsur", "bennett"]  # the last with a redundant constrai
 
 @pytest.fixture(scope="module", params=LINKAGES)
 def assembled(request):
-    """Return the system of a mechanism assembled at the start, its pose there, and what corrects and judges poses."""
+    """Return the system of an assembled mechanism, its pose, and functions that correct and check poses."""
     model, coordinates = assemble(build(jn.load(f"examples/{request.param}.yaml")), 0.0, TOLERANCE)
     wide = {name: np.repeat(values, LANES, axis=-1) for name, values in coordinates.items()}
     system, time = model.system, Jet([np.zeros((1, LANES))])
@@ -40,7 +40,7 @@ def assembled(request):
 
 
 def corrected(assembled, away, *, refine=True):
-    """Return what comes of poses that are off by up to `away`, each in another direction."""
+    """Return the corrections of poses displaced by up to `away`, each in another direction."""
     system, _, solved, _ = assembled
     return solved(away * np.random.default_rng(3).uniform(-1, 1, (system.shape[1], LANES)), np.asarray(refine))
 

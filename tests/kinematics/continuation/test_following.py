@@ -21,7 +21,7 @@ NEAR_MISS = {"a": 0.8, "b": 1.0, "e": 0.8 - np.sqrt(1 - 0.03**2)}  # comes withi
 
 
 def twin_slider_cranks(law="6*t"):
-    """Two slider-cranks alike on one crank: near their dead points both determinants change sign together."""
+    """Two equal slider-cranks on one crank: near their dead points both determinants change sign together."""
     a, b, e = NEAR_MISS.values()
     guide = {"vector_i": [1, 0], "vector_j": [1, 0], "point_i": [0, "e"], "point_j": [0, 0]}
     names = ("one", "two")
@@ -40,7 +40,7 @@ def twin_slider_cranks(law="6*t"):
 @pytest.mark.slow
 @pytest.mark.parametrize("count", [31, 301])
 def test_two_loops_that_miss_their_dead_points_together(count):
-    """The determinant of the whole would change its sign twice at once, if both went over to the other branch."""
+    """If both moved to the other branch, the determinant of the whole would change its sign twice at once."""
     time = np.linspace(0, 1, count)
     motion = jn.solve(twin_slider_cranks(), time, order=0)
     a, b, e = NEAR_MISS.values()
@@ -51,7 +51,7 @@ def test_two_loops_that_miss_their_dead_points_together(count):
 
 
 def det_rate_of(mechanism, instant):
-    """What `advance` finds for a solved instant, and all eigenvalues of J^-1 J' by differences, from NumPy."""
+    """Return the result of `advance` at an instant, and all eigenvalues of J^-1 J' by differences, from NumPy."""
     model, coordinates = assemble(build(mechanism), instant, 1e-12)
     solver = Solver(model, 4, 1e-12)
     known = {name: np.stack([x, *[np.zeros_like(x)] * 4]) for name, x in coordinates.items()}
@@ -95,7 +95,7 @@ def test_change_point_is_passed_at_any_instant_and_reported(order, tolerance):
 
 
 def test_where_both_sides_disagree_only_what_rounding_spoils_is_refused(monkeypatch):
-    """No motion is known on which they disagree, so they are made to."""
+    """No known motion makes the two tests disagree, so the disagreement is forced."""
     away = np.geomspace(1e-6, 0.5, 40)
     time = np.r_[0.5, np.pi - away[::-1], np.pi + away]
     monkeypatch.setattr("jounce.kinematics.position_analysis.grid.LARGEST_DISAGREEMENT", -1.0)
@@ -116,7 +116,7 @@ def test_change_point_at_the_end_of_a_grid():
 
 @pytest.mark.slow
 def test_dead_center_touched_by_the_law_is_a_change_point():
-    """The crank goes on through the dead center: cos(angle) follows from the position of the slider."""
+    """The crank continues through the dead center: cos(angle) follows from the position of the slider."""
     time = np.linspace(0, 3, 31)
     motion = jn.solve(slider_crank("4 - 0.5*cos(t)**2"), time, order=0)
     np.testing.assert_allclose(motion.change_points, [np.pi / 2], atol=1e-9)
@@ -180,7 +180,7 @@ def test_law_without_a_third_derivative_at_the_start():
 
 
 def test_nearly_singular_factor_is_singular():
-    """A pivot of 1e-13 of the largest leaves three digits: no instant is called OK there."""
+    """A pivot of 1e-13 of the largest leaves three digits: no such instant is OK."""
     matrix = np.diag([1.0, 1.0, 1e-13])[:, :, None]
     ratio = DenseFactor.of(jnp.asarray(matrix)).pivot_ratio()
     yes = jnp.ones(1, bool)
@@ -202,7 +202,7 @@ EXCURSIONS = [
 
 
 def excursion(law):
-    """A four-bar at the same position at both instants, which is elsewhere between them."""
+    """A four-bar at the same position at both instants, with another position between them."""
     crank_rocker = jn.load("examples/four_bar.yaml")
     driver = dataclasses.replace(crank_rocker.drivers["theta"], motion=law)
     return dataclasses.replace(crank_rocker, drivers={"theta": driver}, time=[0.0, 2.0])
@@ -211,7 +211,7 @@ def excursion(law):
 @pytest.mark.slow
 @pytest.mark.parametrize("law", EXCURSIONS)
 def test_a_motion_that_begins_at_rest_and_comes_back_is_not_stepped_over(law):
-    """Between two instants of the same position lies one that cannot be reached; the series of the law is zero."""
+    """Between two instants with the same position lies an unreachable one; the series of the law is zero."""
     mechanism = excursion(law)
     assert list(jn.solve(mechanism).status) == [Status.OK] * 2
     locking = mechanism.with_parameters(AB=0.12)  # no crank: it cannot pass the frame

@@ -1,4 +1,4 @@
-"""How fast a singular position nears: by products with random vectors as by the matrix, and never too small."""
+"""Rate of approach to a singular position: by products with random vectors as by the matrix, never too small."""
 
 import jax.numpy as jnp
 import numpy as np

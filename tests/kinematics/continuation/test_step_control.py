@@ -1,4 +1,4 @@
-"""How long steps are, and what comes after them, of many designs as of one motion."""
+"""Step control: the same step lengths and decisions for many designs as for one motion."""
 
 from typing import Any
 
@@ -21,13 +21,13 @@ LIMITS = StepLimits(np.asarray(1.0), np.asarray(1e-10))
 
 
 def placed(instant: Any, safe_step: Any, det_rate: Any = 0.0):
-    """Return the control of designs that have come to some places."""
+    """Return the control of designs that have reached given instants."""
     point = ExpansionPoint(*(np.array(x, float) for x in np.broadcast_arrays(instant, safe_step, 1.0, det_rate)))
     return initial_control(point, np.array(point.instant))
 
 
 def decided(control, status, there):
-    """Return what follows a step, and whether it was taken."""
+    """Return the control after a step, and whether the step was taken."""
     one = jax.tree.map(lambda x: x[:1], (control, status, there))
     return next_controls.program(LIMITS, one)((control, status, there))
 

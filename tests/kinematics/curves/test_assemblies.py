@@ -1,4 +1,4 @@
-"""All assemblies of linkages, against elimination; circuits and branches; which one a file means."""
+"""All assemblies of linkages, against elimination; circuits and branches; the assembly that a file selects."""
 
 import dataclasses
 
@@ -32,7 +32,7 @@ def six_bar(number):
 
 
 def agree(found, angles):
-    """Tell whether assemblies are those with these angles of the crank, each once."""
+    """Return whether the assemblies have exactly the given crank angles, each once."""
     crank = np.array([x.mechanism.bodies["crank"].angle for x in found])
     away = np.abs(np.angle(np.exp(1j * (crank[:, None] - angles))))
     return len(crank) == len(angles) and away.min(axis=0).max() < 1e-8 and away.min(axis=1).max() < 1e-8
@@ -109,7 +109,7 @@ def test_a_spatial_linkage():
 
 
 def folding_six_bar():
-    """A four-bar and, from its joint C, two equal links to one of the two places of C, where they fold and spin."""
+    """A four-bar with two equal links from its joint C to one of the two positions of C, where they fold and spin."""
     crank, rocker = np.array([np.cos(1.0), np.sin(1.0)]), np.array([3.0, 0.0])
     middle, along = (crank + rocker) / 2, rocker - crank
     across = np.array([-along[1], along[0]]) / np.linalg.norm(along) * np.sqrt(2.5**2 - along @ along / 4)

@@ -1,4 +1,4 @@
-"""Time grids: coarse, uneven, long, of one instant; angles over many turns; what compiles and what does not."""
+"""Time grids: coarse, uneven, long, of one instant; angles over many turns; number of compilations."""
 
 import jax
 import numpy as np
@@ -173,7 +173,7 @@ def test_a_tolerance_below_rounding_still_ends(tolerance):
 @pytest.mark.slow
 @pytest.mark.parametrize("time", [[0.0, 1.0], np.linspace(0, 1, 11)], ids=["ends", "grid"])
 def test_a_quick_whole_turn_between_rests_is_counted(time):
-    """Before and after it the nut rests in the same attitude: only the law tells that it has turned."""
+    """Before and after its turn the nut rests in the same attitude: only the law shows that it has turned."""
     motion = jn.solve(screw(0.01, law(rise=TURN)), time, order=1)
     assert motion.outputs["p"][-1, 0, 2] == pytest.approx(0.01, rel=1e-12)
     assert motion.outputs["angle"][-1, 0] == pytest.approx(TURN, rel=1e-12)

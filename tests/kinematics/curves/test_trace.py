@@ -19,7 +19,7 @@ FOUR_BAR = FourBar()
 
 
 def four_bar(a, b, c, d, value=1.0, seed=0):
-    """Return a four-bar assembled at an angle of its crank, in one of the two ways."""
+    """Return a four-bar assembled at a crank angle, in one of its two assemblies."""
     values = {"a": a, "b": b, "c": c, "d": d}
     start = FOUR_BAR.assembly(values, value, np.random.default_rng(seed))
     guess = map(float, FOUR_BAR.guess(values, value, start))
@@ -33,7 +33,7 @@ def uniform(value):
 
 
 def rates_of(way):
-    """Return the turns of crank and rocker, the larger one as one."""
+    """Return the rotations of crank and rocker, the larger one scaled to one."""
     turns = np.array([way[name][1][0] for name in ("crank", "rocker")])
     return turns / turns[np.argmax(np.abs(turns))]
 
@@ -162,7 +162,7 @@ def test_arc_length_and_limits_do_not_depend_on_units():
 
 
 def _against_time(mechanism, name, driver):
-    """Compare rates along a curve with those in time, where the driver goes at a uniform rate."""
+    """Compare derivatives along a curve with those in time for a driver with uniform rate."""
     curve = jn.trace(mechanism, order=3, count=41)
     away = np.flatnonzero(np.abs(curve.values[:, 1]) > 0.2)[2:14:4]
     for k in away:

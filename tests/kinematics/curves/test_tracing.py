@@ -1,4 +1,4 @@
-"""What JAX cannot trace is refused by name; what holds no traced values computes within jax.jit."""
+"""Functions that JAX cannot trace are refused by name; without traced values, they run within jax.jit."""
 
 import pathlib
 

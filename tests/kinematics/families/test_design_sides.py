@@ -1,4 +1,4 @@
-"""Where laws of designs jump or bend: looked for once where it is the same for all, and for each design otherwise."""
+"""Breaks of laws of designs: searched once if they are the same for all designs, else for each design."""
 
 import dataclasses
 

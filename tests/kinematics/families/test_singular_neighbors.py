@@ -1,4 +1,4 @@
-"""Families whose motions begin or end next to a change point: an outcome is that of the design alone."""
+"""Families with motions that begin or end next to a change point: outcomes are those of each design solved alone."""
 
 import numpy as np
 import pytest
@@ -13,7 +13,7 @@ BESIDE = {"AB": [0.0713, 0.0713]}
 
 @pytest.fixture(scope="module")
 def passed():
-    """The instant at which all bars lie in one line, as the motion through it tells."""
+    """The instant at which all bars are collinear, from the motion through it."""
     return jn.solve(CHANGING, np.linspace(0.0, 1.5, 41), order=2).change_points[0]
 
 

@@ -1,4 +1,4 @@
-"""Families of designs beside the same designs solved one by one."""
+"""Families of designs, compared with the same designs solved one by one."""
 
 import dataclasses
 
@@ -146,7 +146,7 @@ def test_more_designs_than_go_side_by_side(monkeypatch):
 @pytest.mark.slow
 @pytest.mark.parametrize("native", ["0", "1"])
 def test_either_back_end_solves_designs_as_alone(monkeypatch, native):
-    """A parameter on which nothing depends gives lanes that have no values of their own."""
+    """A parameter on which nothing depends gives lanes without individual values."""
     monkeypatch.setenv("JOUNCE_NATIVE", native)
     named = dataclasses.replace(FOUR_BAR, parameters={**FOUR_BAR.parameters, "unused": 1.0})
     time = np.linspace(0.0, 2.0, 41)

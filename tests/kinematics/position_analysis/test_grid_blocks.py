@@ -1,4 +1,4 @@
-"""Blocks of a grid: each instant once, after what it starts from; the same motion as one instant after another."""
+"""Blocks of a grid: each instant once, after its source; the same motion as instant by instant."""
 
 import numpy as np
 import pytest
@@ -110,7 +110,7 @@ def test_xla_has_the_same_outcome(monkeypatch, name, native):
 
 @needs_machine_code
 def test_instants_that_start_from_failures_are_solved_again(monkeypatch):
-    """Where it is told that some instants failed, they and what starts from them are solved once more."""
+    """Instants reported as failed, and all that start from them, are solved once more."""
     time, again = np.linspace(0, 2, 3001), []
     expected = jn.solve(four_bar(), time)
     in_blocks, solve = grid.GridSolver._in_blocks, solve_buffers.SolveBuffer.solve
@@ -162,7 +162,7 @@ def test_chunks_solved_at_once_are_those_solved_one_after_another(monkeypatch, n
 @pytest.mark.parametrize("keep", [True, False])
 @pytest.mark.parametrize("always", [True, False])
 def test_a_chunk_in_which_some_instant_fails_is_solved_again(monkeypatch, always, keep):
-    """Of what failed nothing is kept, of the chunks beside it everything, and progress does not go back."""
+    """Nothing of a failed chunk is kept, everything of the other chunks is, and progress does not decrease."""
     time, reports, spoiled = np.linspace(0, 2, 4400), [], []
     monkeypatch.setattr(grid_storage, "CHUNK", 1100)
     expected = jn.solve(four_bar(), time, keep=keep)

@@ -1,4 +1,4 @@
-"""Long grids, solved chunk by chunk: the same motion, and what was not kept is there when it is asked for."""
+"""Long grids, solved chunk by chunk: the same motion, and discarded results are computed again on request."""
 
 import numpy as np
 import pytest

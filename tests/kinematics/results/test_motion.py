@@ -1,4 +1,4 @@
-"""What a user takes from a solved motion: outputs, dataset, points, angles and angular velocities of any body."""
+"""Results of a solved motion: outputs, dataset, points, angles and angular velocities of any body."""
 
 import dataclasses
 
@@ -56,7 +56,7 @@ def test_points_and_angles_asked_for_later_are_the_outputs(planar):
 
 
 def test_what_is_asked_later_of_another_body_and_at_more_instants_compiles_nothing(planar):
-    """A program is for an output and the order, and knows the ground from bodies that move."""
+    """A program serves an output and an order, and treats the ground differently from moving bodies."""
 
     def count():
         return len(output_series.machine_code) + output_series.on_xla.jitted._cache_size()

@@ -1,4 +1,4 @@
-"""Laws of outputs in the place of those of drivers: the motion of the drivers follows by inversion."""
+"""Laws of outputs in place of laws of drivers: the motion of the drivers follows by inversion."""
 
 import dataclasses
 import math
@@ -122,7 +122,7 @@ def test_families_are_designs_solved_alone(forces):
 
 @pytest.mark.slow
 def test_gradients_of_the_driver_and_of_its_torque():
-    """As of `test_in_space_the_torque_is_that_of_the_motor`, by the length of the rod and the swing of its tip."""
+    """The torque of `test_in_space_the_torque_is_that_of_the_motor`, for a length of the rod and a swing of its tip."""
     mechanism = rod_in_the_plane({"length": 0.2, "swing": 0.1})
     values = np.array([0.2, 0.1])
 
@@ -153,7 +153,7 @@ def test_the_least_torque_of_a_driver_that_follows():
 
 
 def rod_in_the_plane(parameters):
-    """The rod of `rod_in_space`, in the plane."""
+    """The rod of `rod_in_space` in the plane."""
     law = jn.laws.OutputMotion("tip_y", "swing*sin(2*t) + 0.05")
     return jn.Mechanism(
         space="planar",
@@ -170,7 +170,7 @@ def rod_in_the_plane(parameters):
 
 
 def rod_in_space(parameters):
-    """A rod that turns about z, whose tip is held to a law of y; its motor carries an inertia of 0.01 kg m^2 only."""
+    """A rod that turns about z with its tip held to a law of y; its motor drives an inertia of 0.01 kg m^2 only."""
     rod = jn.Body([0, 0, 0], orientation=[math.cos(0.1), 0, 0, math.sin(0.1)], mass=2.0, inertia=[0.0, 0.01, 0.01])
     hinge = jn.spatial.Revolute(("ground", "rod"), [0, 0, 0], [0, 0, 0], axis_i=[0, 0, 1], axis_j=[0, 0, 1])
     motor = jn.drivers.RotationDriver(
