@@ -137,7 +137,7 @@ def test_planar_bodies_turn_with_the_driver(law, start):
 
 
 def test_bodies_that_a_gear_couples_go_back_by_whole_turns_together():
-    """The shortest way to close the loop turns the crank by more than half a turn; crank and wheel are shifted together."""
+    """The shortest way to close the loop turns the crank beyond half a turn; crank and wheel are shifted together."""
     mechanism = drag_link("0.5 + t", gear=True)
     wheel = dataclasses.replace(mechanism.joints["pair"], offset=3.8)
     mechanism = dataclasses.replace(mechanism, joints=mechanism.joints | {"pair": wheel})
