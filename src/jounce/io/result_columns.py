@@ -1,4 +1,4 @@
-"""Results as columns of a table, and back: a name for each component and derivative."""
+"""Results as columns of a table, with a name for each component and derivative, and tables as results."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ from jounce.units.shown_units import derivative_unit, time_axes
 if TYPE_CHECKING:
     import xarray
 
-SUFFIXES = (".csv", ".nc")  # of files of results
-ALONG = ("time", "angle", "point")  # what the rows of a table follow: of a motion, of a cam, of a curve
+SUFFIXES = (".csv", ".nc")  # endings of result files
+ALONG = ("time", "angle", "point")  # dimension along the rows of a table: of a motion, of a cam, or of a curve
 CURVE_AXES = ("arc_length", "driver_value")  # first columns of a curve of configurations
-AXES = {  # of outputs that are more than one number, and the labels along them
+AXES = {  # dimensions of outputs with several components, and the labels of the components
     ("component",): ("x", "y", "z"),
     ("euler_parameter",): EulerParametersOutput.labels,
     ("euler_angle",): EulerAnglesOutput.labels,
@@ -29,13 +29,13 @@ AXES = {  # of outputs that are more than one number, and the labels along them
 
 
 def columns(dataset: xarray.Dataset) -> dict[str, Float[np.ndarray, " time"]]:
-    """Return the columns of a table of a dataset, by name, each of shape (time,).
+    """Return the columns of the table of a dataset, by name, each of shape (time,).
 
     Raises
     ------
     OutputError
-        Two columns would have the same name, or an output that of a derivative of another, so that `read` could not
-        tell them apart.
+        If two columns have the same name, or an output has the name of a derivative of another, so that `read` could
+        not distinguish them.
     """
     from xarray import Variable
 
@@ -72,7 +72,7 @@ def columns(dataset: xarray.Dataset) -> dict[str, Float[np.ndarray, " time"]]:
 
 
 def column_units(dataset: xarray.Dataset, names: Iterable[str]) -> list[str | None]:
-    """Return the units of columns of a table; None where they are not known."""
+    """Return the units of columns of a table; None where a unit is unknown."""
     units = []
     for name in names:
         stem, order = re.fullmatch(r"(.*?)(?:_d([0-9]+))?", name, re.DOTALL).groups()  # type: ignore[union-attr]
@@ -80,18 +80,18 @@ def column_units(dataset: xarray.Dataset, names: Iterable[str]) -> list[str | No
         unit = dataset[holder].attrs.get("units") if holder is not None else None
         unit = "s" if unit is None and name == "time" else unit
         if unit and order and CURVE_AXES[0] in dataset.coords:
-            unit = None  # its derivatives are by arc length
+            unit = None  # derivatives of a curve are with respect to arc length
         units.append(derivative_unit(unit, int(order or 0)) if unit else None)
     return units
 
 
 def dataset_of(header: list[str], table: Float[np.ndarray, "time columns"], units: dict[str, str]) -> xarray.Dataset:
-    """Build the dataset of a table; what its heading says to have other units is no component of the same.
+    """Return the dataset of a table; columns with different units do not form one vector.
 
     Raises
     ------
     OutputError
-        A column has the name of an axis.
+        If a column has the name of an axis.
     """
     import xarray
 
@@ -105,7 +105,7 @@ def dataset_of(header: list[str], table: Float[np.ndarray, "time columns"], unit
         members = list(group)
         axes, labels = _axes_of(name, members, len(coordinates.get("component", ())))
         unit = {"units": units[members[0]]} if members[0] in units else {}
-        if not axes or name in stems or name in variables:  # each is an output by itself
+        if not axes or name in stems or name in variables:  # columns that do not form one output
             variables |= {x: (("time", "derivative"), np.stack(stems[x], axis=1), dict(unit)) for x in members}
             continue
         values = np.stack([np.stack(stems[member], axis=1) for member in members], axis=2)
@@ -118,9 +118,9 @@ def dataset_of(header: list[str], table: Float[np.ndarray, "time columns"], unit
 
 
 def _axes_of(name: str, members: list[str], components: int) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Return the axes that neighboring columns have as one output, and the labels along them; none if they are not.
+    """Return the axes of neighboring columns that form one output, and the labels along them; empty if they form none.
 
-    All vectors have as many components as the first one; what has others is several outputs.
+    All vectors have as many components as the first one; other groups are separate outputs.
     """
     for axes, labels in AXES.items():
         for count in (2, 3) if axes == ("component",) else (len(labels),):
@@ -131,9 +131,9 @@ def _axes_of(name: str, members: list[str], components: int) -> tuple[tuple[str,
 
 
 def _derivative_count(columns: list[str]) -> int:
-    """Return how many columns each quantity has: itself and its derivatives, one after the other, alike for all.
+    """Return the number of columns of each quantity: its value and its derivatives, consecutive and equally many.
 
-    A name may itself end as those of derivatives do.
+    The name of a quantity may itself look like that of a derivative.
     """
     for count in range(len(columns), 1, -1):
         starts = range(0, len(columns), count) if len(columns) % count == 0 else ()
@@ -143,6 +143,6 @@ def _derivative_count(columns: list[str]) -> int:
 
 
 def _name_of(column: str) -> str:
-    """Return the name of the output that a column may be a component of."""
+    """Return the name of the output of which a column may be a component."""
     stem, _, label = column.rpartition("_")
     return stem if stem and any(label in labels for labels in AXES.values()) else column

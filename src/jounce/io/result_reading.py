@@ -1,4 +1,4 @@
-"""Files of results read back: each is one, or an error that names the file and what is wrong with it."""
+"""Reading of result files: a dataset, or an error that names the file and the fault."""
 
 from __future__ import annotations
 
@@ -25,21 +25,21 @@ if TYPE_CHECKING:
 
 @under_own_settings
 def read(path: str | PathLike[str]) -> xarray.Dataset:
-    r"""Read a file that `write` wrote back into a dataset; values come back to the bit.
+    r"""Read a file from `write` into a dataset; values are exact.
 
-    A CSV file may say units in its heading, which become those of the variables: values stay as they are. It does not
-    say what is a vector: neighboring columns ``NAME_x, NAME_y`` (and ``NAME_z``) of one unit become the vector NAME,
-    and those of Euler parameters, Euler angles and rotation matrices likewise.
+    A CSV file may state units in its heading, which become those of the variables; values are not converted. It does
+    not state vectors: neighboring columns ``NAME_x, NAME_y`` (and ``NAME_z``) of one unit become the vector NAME, and
+    columns of Euler parameters, Euler angles and rotation matrices are joined in the same way.
 
     Returns
     -------
     xarray.Dataset
-        In memory, with dimensions time, derivative, and those of components.
+        Dataset in memory, with dimensions time, derivative, and those of components.
 
     Raises
     ------
     OutputError
-        The file cannot be read, or is not one of results.
+        If the file cannot be read, or is no result file.
 
     Examples
     --------
@@ -61,22 +61,22 @@ def read(path: str | PathLike[str]) -> xarray.Dataset:
 
 
 def _dataset(content: bytes, path: str) -> xarray.Dataset:
-    """Return what a NetCDF file holds; another process has read it before, unless this one wrote it."""
+    """Return the dataset of a NetCDF file, after a check by another process unless this process wrote the file."""
     import xarray
 
     if not is_result(path):
         check_readable(content, path)
     try:
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # of xarray, about its own decoding, where others wrote attributes
+            warnings.simplefilter("ignore")  # from xarray, about its decoding of attributes that others wrote
             return xarray.load_dataset(io.BytesIO(content), engine="h5netcdf", decode_times=False)
-    except Exception as error:  # noqa: BLE001 - what the libraries below raise for a file that they do not understand
+    except Exception as error:  # noqa: BLE001 - various errors of the libraries
         message = ascii(f"{type(error).__name__}: {error}"[:LONGEST])[1:-1]
         raise OutputError(f"is damaged, or is not a file of results: {message}", path=path) from None
 
 
 def _table(content: bytes, path: str) -> xarray.Dataset:
-    """Return what a CSV file holds."""
+    """Return the dataset of a CSV file."""
     try:
         text = content.decode("utf-8-sig")
     except UnicodeDecodeError:
@@ -100,7 +100,7 @@ def _table(content: bytes, path: str) -> xarray.Dataset:
 
 
 def _numbers(row: list[str], header: list[str], path: str, line: int) -> list[float]:
-    """Return the numbers of a row; 1_5 is none, which only Python takes for 15."""
+    """Return the numbers of a row; 1_5 is no number, although Python reads it as 15."""
     if len(row) != len(header):
         raise OutputError(f"must have {len(header)} entries", path=path, line=line, value=len(row))
     try:
@@ -121,6 +121,6 @@ def _is_number(entry: str) -> bool:
 
 
 def _named_columns(header: list[str]) -> tuple[list[str], dict[str, str]]:
-    """Return the names of columns, and the units of those that say one."""
+    """Return the names of columns, and the units of those that state one."""
     pairs = [name_and_unit(known_name(entry)) for entry in header]
     return [name for name, _ in pairs], {name: unit for name, unit in pairs if unit is not None}

@@ -1,4 +1,4 @@
-"""Results of a solve as files: CSV for any spreadsheet, NetCDF 4 with units and names for other programs."""
+"""Result files: CSV for spreadsheets, NetCDF 4 with units and names for other programs."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 
 class _SourceError(Exception):
-    """What computes the parts failed, not what writes them."""
+    """An error of the source of the parts, not of the writer."""
 
     def __init__(self, reason: Exception):
         super().__init__()
@@ -31,19 +31,19 @@ class _SourceError(Exception):
 
 
 def check_writable(path: str | PathLike[str], *, overwrite: bool = False) -> None:
-    """Raise OutputError unless results can be written to a path; meant to be asked before a long computation.
+    """Raise OutputError unless results can be written to a path; to be called before a long computation.
 
     Parameters
     ----------
     path
-        A file ending in .csv or .nc, in a folder that exists. A file there already is left as it is.
+        File ending in .csv or .nc, in an existing folder. An existing file is left unchanged.
     overwrite
-        Whether it may be a file that this process has read as an input.
+        Whether the file may be one that this process has read as an input.
 
     Raises
     ------
     OutputError
-        The ending is another, the folder does not exist, the file is an input, or nothing may be written there.
+        If the ending is not valid, the folder does not exist, the file is an input, or it cannot be written.
     """
     check_target(path, SUFFIXES, "an output", overwrite=overwrite)
 
@@ -56,32 +56,32 @@ def write(
     overwrite: bool = False,
     header_units: bool | None = None,
 ) -> None:
-    """Write the dataset of a motion to a .csv or .nc file, whole or not at all.
+    """Write the dataset of a motion to a .csv or .nc file, atomically.
 
     A CSV file has the columns ``time``, then for each output ``NAME, NAME_d1, NAME_d2, ...``, and for a vector
     ``NAME_x, NAME_x_d1, ..., NAME_y, ...``: ``_e0`` to ``_e3`` for Euler parameters, ``_alpha``, ``_beta``, ``_gamma``
-    for Euler angles, ``_xx``, ``_xy``, ... row by row for a rotation matrix. Numbers have 17 significant digits, so
-    that they read back to the bit, and a missing value is ``nan``. A name that spreadsheets would take for a formula,
-    as ``=A1``, has an apostrophe in front, which `read` takes away. A NetCDF 4 file holds the dataset as it is, by the
-    CF conventions.
+    for Euler angles, ``_xx``, ``_xy``, ... in rows for a rotation matrix. Numbers have 17 significant digits, so that
+    they are read back exactly, and a missing value is ``nan``. A name that spreadsheets would read as a formula, such
+    as ``=A1``, gets a leading apostrophe, which `read` removes. A NetCDF 4 file holds the dataset unchanged, by the CF
+    conventions.
 
     Parameters
     ----------
     dataset : xarray.Dataset
-        With dimensions time, derivative, and those of components, as ``Motion.dataset``; a curve of configurations,
-        ``Curve.dataset``, has the columns ``arc_length`` and ``driver_value`` in the place of ``time``.
+        Dataset with dimensions time, derivative, and those of components, as ``Motion.dataset``; a curve of
+        configurations, ``Curve.dataset``, has the columns ``arc_length`` and ``driver_value`` instead of ``time``.
     path
-        The file; one of that name is replaced.
+        File to write; an existing one is replaced.
     overwrite
-        Whether that may be a file which this process has read as an input, such as the samples of a motion law.
+        Whether it may be a file that this process has read as an input, such as the samples of a motion law.
     header_units
-        Whether the heading of a CSV file says the units, as ``psi_d1 [deg/s]``; unless given, where some are not of
-        SI, or a name reads as one with a unit: what reads such a file as samples takes them for what they are.
+        Whether the heading of a CSV file states the units, as ``psi_d1 [deg/s]``; by default, if a unit is not SI, or a
+        name looks as if it stated a unit, so that the samples are read with the right units.
 
     Raises
     ------
     OutputError
-        The file cannot be written, or is an input.
+        If the file cannot be written, or is an input.
 
     Examples
     --------
@@ -111,28 +111,28 @@ def write_parts(
     overwrite: bool = False,
     header_units: bool | None = None,
 ) -> None:
-    """Write a dataset that comes in parts along time to a .csv or .nc file, whole or not at all.
+    """Write a dataset given in parts along time to a .csv or .nc file, atomically.
 
-    The file holds what `write` writes of the whole dataset.
+    The file equals that of `write` for the whole dataset.
 
     Parameters
     ----------
     parts : iterable of xarray.Dataset
-        At least one, each as for `write`, and alike but for their instants; the next one is asked for when the one
-        before is written.
+        At least one part, each as for `write`, all alike except for their instants; a part is requested when the
+        previous one is written.
     path
-        The file; one of that name is replaced.
+        File to write; an existing one is replaced.
     count : int
-        Number of instants of all parts together.
+        Number of instants of all parts.
     overwrite
-        Whether that may be a file which this process has read as an input.
+        Whether it may be a file that this process has read as an input.
     header_units
-        As that of `write`.
+        See `write`.
 
     Raises
     ------
     OutputError
-        The file cannot be written, or is an input. What the parts themselves raise comes through as it is.
+        If the file cannot be written, or is an input. Errors of the parts themselves are raised unchanged.
 
     Examples
     --------
@@ -160,7 +160,7 @@ def write_parts(
 
 
 def _counted(parts: Iterable[xarray.Dataset], count: int) -> Iterator[tuple[int, xarray.Dataset]]:
-    """Yield parts with the index of their first instant, which must come to a number of instants in the end."""
+    """Yield the parts with the index of their first instant; raise OutputError unless `count` instants come."""
     first, source = 0, iter(parts)
     while True:
         try:
@@ -199,7 +199,7 @@ def _write_netcdf(dataset: xarray.Dataset, path: Path) -> None:
 
 
 def _write_rows(dataset: xarray.Dataset, stream: TextIO, header_units: bool | None, *, headed: bool = True) -> None:
-    """Write a dataset as the lines of a CSV file, below a heading with the names of the columns."""
+    """Write a dataset as rows of a CSV file, below a heading with the names of the columns."""
     table = columns(dataset)
     rows = np.stack(list(table.values()), axis=1)
     line = ",".join(["%.17g"] * rows.shape[1]) + "\n"
@@ -228,12 +228,12 @@ def _netcdf(dataset: xarray.Dataset) -> Any:
         named = named.assign_coords(time=named["time"].assign_attrs(usual | named["time"].attrs))
     for holder in (named, *(named[name] for name in named.variables)):
         holder.attrs = {key: _attribute(value) for key, value in holder.attrs.items() if value is not None}
-    # in memory: HDF5 never closes a file on a full disk, says so on standard error, and may take the process with it
+    # in memory: on a full disk, HDF5 does not close its file, prints to standard error, and may end the process
     return named.to_netcdf(engine="h5netcdf", format="NETCDF4")
 
 
 def _attribute(value: Any) -> Any:
-    """Return an attribute as NetCDF can hold it."""
+    """Return an attribute in a form that NetCDF can hold."""
     plain = isinstance(value, (str, int, float, np.ndarray, np.number)) and not isinstance(value, bool)
     return value if plain else str(value)
 

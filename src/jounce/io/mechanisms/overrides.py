@@ -1,4 +1,4 @@
-"""Parameters of a mechanism file given other values from outside, as ``NAME=VALUE`` with units."""
+"""Values of parameters that replace those of a mechanism file, given as ``NAME=VALUE`` with units."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from jounce.units.values import parse_value
 
 
 def times_chosen(mechanism: Mechanism, text: str) -> TimeGrid:
-    """Return the instants that ``START:STOP:COUNT`` names: times as a file would have them, and how many.
+    """Return the time grid of a text ``START:STOP:COUNT``, with times as in a file.
 
     Raises
     ------
     MechanismError, UnitError, ExpressionError
-        It has another form, or there are no such instants.
+        If the text has another form, or the grid is invalid.
 
     Examples
     --------
@@ -44,20 +44,20 @@ def override(mechanism: Mechanism, texts: Iterable[str]) -> Mechanism:
     Parameters
     ----------
     mechanism : Mechanism
-        As `load` read it, which knows what dimensions the parameters have.
+        Mechanism from `load`, which knows the dimensions of the parameters.
     texts : iterable of str
-        ``NAME=VALUE``, the value as a file would have it: a number in SI units, a number with a unit, or an expression
-        of the other parameters.
+        Texts ``NAME=VALUE``, with values as in a file: a number in SI units, a number with a unit, or an expression of
+        the other parameters.
 
     Raises
     ------
     MechanismError, UnitError, ExpressionError
-        A name is not a parameter, or a value does not fit.
+        If a name is not a parameter, or a value does not suit the parameter.
 
     Warns
     -----
     UnitWarning
-        A number without a unit is likely meant in degrees or millimeters.
+        If a number without a unit is likely in degrees or millimeters.
 
     Examples
     --------
@@ -73,7 +73,7 @@ def override(mechanism: Mechanism, texts: Iterable[str]) -> Mechanism:
     except JounceError as error:
         name = (error.name or "").removeprefix("parameters.")
         raise type(error)(error.message, name=f"--set {name}", value=error.value) from None
-    changed.parameter_values  # noqa: B018 - asked for, so that a circle is reported now
+    changed.parameter_values  # noqa: B018 - evaluated to report circular expressions now
     plain = [name for name, text in values.items() if is_plain(text)]
     if plain:
         warn_of_values(mechanism, changed, plain, "--set")

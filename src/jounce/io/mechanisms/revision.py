@@ -1,4 +1,4 @@
-"""A mechanism file with other values of some parameters, and all else as it was: comments, units, order, spaces."""
+"""A mechanism file with other parameter values, and otherwise unchanged: comments, units, order and spacing."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from jounce.io.mechanisms.loader import load
 from jounce.mechanism import Mechanism
 from jounce.units.values import parse_unit, parse_value
 
-ROUNDING = 4e-16  # of values in units whose size is no decimal number, relative
+ROUNDING = 4e-16  # relative, for units whose size is no decimal number
 _NUMBER_AND_UNIT = re.compile(r"\s*([-+]?[0-9.]+(?:[eE][-+]?[0-9]+)?)(\s*)([^\s0-9.*/+-].*?|/.*?)\s*")
 _TIMES_DEG = re.compile(r"\s*[-+]?[0-9.]+(?:[eE][-+]?[0-9]+)?(\s*\*\s*deg)\s*")
 
@@ -32,32 +32,28 @@ def write_revised(
     allow: Iterable[str | PathLike[str]] = (),
     overwrite: bool = False,
 ) -> None:
-    """Write a mechanism file again with the values that some parameters of a mechanism have.
+    """Write a copy of a mechanism file with the parameter values of a mechanism.
 
-    Nothing else of it changes. A value keeps the unit that it has in the file. What is written is read back before it
-    takes its place, and must give the same values.
-
-    Parameters
-    ----------
-    mechanism : Mechanism
-        As read from the file, with other values of parameters, and its wish for an assembly.
+    Nothing else changes, and values keep the units of the file. The new file is read back before it replaces an
+    existing one, and must give the same values. Parameters ---------- mechanism : Mechanism
+        Mechanism from the file, with other parameter values and possibly another choice of assembly.
     names : iterable of str
-        The parameters whose values are written.
+        Parameters whose values are written.
     original
-        The file that it was read from.
+        File from which the mechanism was read.
     path
-        The file to write, of the same format.
+        File to write, of the same format.
     allow
-        As for `load`.
+        See `load`.
     overwrite
-        Whether that file may be the original.
+        Whether the written file may be the original.
 
     Raises
     ------
     OutputError
-        The file cannot be written, is an input or of another format; nothing is written then.
+        If the file cannot be written, is an input, or has another format; then nothing is written.
     MechanismFileError
-        What would be written does not read back as the same mechanism.
+        If the written file does not read back as the same mechanism.
     """
     suffix = Path(fspath(path)).suffix.lower()
     check_target(path, DATA_FILES, "mechanism file", overwrite=overwrite)
@@ -87,19 +83,19 @@ def write_revised(
 
 
 def with_value(old: Any, value: float) -> Any:
-    """Return what a file is to hold for a value, in the unit of what it held.
+    """Return a value for a file, in the unit of the value that it replaces.
 
     Parameters
     ----------
     old : object
-        What it held: a number, or text with a number and a unit, or an expression.
+        Old value: a number, text with a number and a unit, or an expression.
     value : float
-        SI.
+        New value in SI units.
 
     Returns
     -------
     float or str
-        What reads as the value, to the bit where the size of the unit is a decimal number.
+        Text or number that reads as the value, exactly if the size of the unit is a decimal number.
 
     Examples
     --------
@@ -130,7 +126,7 @@ def with_value(old: Any, value: float) -> Any:
 
 
 def _digits(value: float, size: Any) -> Iterator[str]:
-    """Return texts of a value in a unit, the shortest first."""
+    """Yield texts of a value in a unit, with increasing numbers of digits."""
     if isinstance(size, Decimal):
         with localcontext(prec=40):
             exact = Decimal(value) / size
@@ -144,13 +140,13 @@ def _digits(value: float, size: Any) -> Iterator[str]:
 
 
 def _shortest(text: str) -> str:
-    """Return a number without zeros at its end, and without an exponent where that is short."""
+    """Return a number without trailing zeros, and without an exponent if that stays short."""
     number = Decimal(text).normalize()
     return f"{number:f}" if -6 <= number.adjusted() < 18 else f"{number:e}"
 
 
 def _with_replaced_scalars(text: str, values: Mapping[str, Any], assembly: Any) -> str:
-    """Return YAML or JSON text in which scalars stand in the places of others, and no other character changes."""
+    """Return YAML or JSON text with replaced scalars, and no other change."""
     from ruamel.yaml import YAML
     from ruamel.yaml.nodes import MappingNode
 
@@ -169,7 +165,7 @@ def _with_replaced_scalars(text: str, values: Mapping[str, Any], assembly: Any) 
 
 
 def _with_assembly(text: str, assembly: Any, *, flow: bool, start: int) -> str:
-    """Return text with one more key at the top level."""
+    """Return YAML or JSON text with the key `assembly` added at the top level."""
     if flow:
         return f'{text[: start + 1]}"assembly": {assembly}, {text[start + 1 :]}'
     line = "\r\n" if "\r\n" in text else "\n"
@@ -177,14 +173,14 @@ def _with_assembly(text: str, assembly: Any, *, flow: bool, start: int) -> str:
 
 
 def _scalar(value: Any, node: Any) -> str:
-    """Return a number or a text as YAML or JSON, in the quotes that it had."""
+    """Return a number or a text as YAML or JSON, in the quotes of the replaced node."""
     if not isinstance(value, str):
         return repr(value)
     return f"{node.style}{value}{node.style}" if node.style in ("'", '"') else value
 
 
 def _toml(text: str, values: Mapping[str, Any], assembly: Any) -> str:
-    """Return TOML text with other values, and its comments."""
+    """Return TOML text with other values, and with its comments."""
     import tomlkit
 
     document: Any = tomlkit.parse(text)

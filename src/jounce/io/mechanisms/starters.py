@@ -1,4 +1,4 @@
-"""Starter files: small mechanisms with comments, to begin one's own from."""
+"""Starter files: small mechanisms with comments, to be changed by the user."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ class Starter:
     Parameters
     ----------
     name : str
-        By which it is asked for.
+        Name of the starter.
     about : str
-        What it shows, in one sentence.
+        Description in one sentence.
     command : str
-        run or simulate: what moves it.
+        Command that moves it: run or simulate.
     """
 
     name: str
@@ -30,7 +30,7 @@ class Starter:
 
     @property
     def text(self) -> str:
-        """The file."""
+        """The text of the file."""
         return (importlib.resources.files("jounce") / "templates" / f"{self.name}.yaml").read_text(encoding="utf-8")
 
 
@@ -58,16 +58,16 @@ def write_starter(name: str, path: str | PathLike[str], *, overwrite: bool = Fal
     name : str
         One of `STARTERS`.
     path
-        A file ending in .yaml or .yml, with its comments, or in .toml or .json, without.
+        File ending in .yaml or .yml, with comments, or in .toml or .json, without.
     overwrite : bool, default False
-        Whether a file that is there may be replaced.
+        Whether an existing file may be replaced.
 
     Raises
     ------
     JounceError
-        There is no such starter.
+        If there is no such starter.
     OutputError
-        The file is there already, or cannot be written.
+        If the file exists already, or cannot be written.
 
     Examples
     --------
@@ -99,6 +99,6 @@ def write_starter(name: str, path: str | PathLike[str], *, overwrite: bool = Fal
 
 
 def refuse_existing(path: str | PathLike[str], *, overwrite: bool) -> None:
-    """Raise OutputError where a file is that must not be replaced."""
+    """Raise OutputError if a file exists that must not be replaced."""
     if not overwrite and Path(path).exists():
         raise OutputError("is there already; give another name, or replace it with --overwrite", path=str(path))

@@ -1,4 +1,4 @@
-"""A user's own joints and drivers, from Python files named by the user; nothing that a mechanism file names is run."""
+"""Import of a user's own joints and drivers from Python files; nothing that a mechanism file names is run."""
 
 from __future__ import annotations
 
@@ -14,23 +14,23 @@ from jounce.io.files.reading import read_file
 
 
 def import_file(path: str | PathLike[str]) -> None:
-    """Run a Python file, so that the joints and drivers it defines join the catalogue.
+    """Run a Python file, so that the joints and drivers that it defines are added to the catalogue.
 
     Parameters
     ----------
     path
-        A file ending in .py. Its ``__name__`` is not ``__main__``, so that what a script does besides is left out.
+        File ending in .py. Its ``__name__`` is not ``__main__``, so that code for scripts is not run.
 
     Raises
     ------
     MechanismFileError
-        There is no such file, or running it fails: the message names the line.
+        If there is no such file, or running it fails: the message names the line.
     """
     name = fspath(path)
     if not name.endswith(".py"):
         raise MechanismFileError("own joints come from a Python file, ending in .py", path=name)
     read_file(name)
-    checksum = zlib.crc32(os.fsencode(Path(name).resolve()))  # files of one name in two folders hold different classes
+    checksum = zlib.crc32(os.fsencode(Path(name).resolve()))  # distinguishes files of one name in different folders
     module_name = f"jounce_own_{Path(name).stem}_{checksum:08x}"
     spec = importlib.util.spec_from_file_location(module_name, name)
     if spec is None or spec.loader is None:
@@ -48,7 +48,7 @@ def import_file(path: str | PathLike[str]) -> None:
 
 
 def _line(error: BaseException, path: str) -> int | None:
-    """Return the last line of the file that a traceback passes through."""
+    """Return the line of the innermost frame of a traceback within a file; None if there is none."""
     line, step = None, error.__traceback__
     while step is not None:
         if step.tb_frame.f_code.co_filename == path:

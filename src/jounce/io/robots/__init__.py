@@ -1,1 +1,1 @@
-"""Files of robots and of their limits."""
+"""Reading of robots and their limits from files."""

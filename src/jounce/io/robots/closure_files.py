@@ -1,4 +1,4 @@
-"""What a robot file leaves out: loops, springs and rotors, from a small file beside it."""
+"""Loops, springs and rotors that a robot file lacks, from a small file beside it."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ from jounce.robot.robot import Robot
 from jounce.units.dimensions import Dimension, describe_dimension, dimension_of
 
 CLOSED_BY = {"fixed": "weld", "revolute": "pin", "continuous": "pin", "prismatic": "slider"}
-HEAVY = 0.05  # kg m^2, more than which no rotor of a motor behind gears has: a number without a unit may be in kg cm^2
-GEARED = 5.0  # a ratio from which on a motor counts as one behind gears
+HEAVY = 0.05  # kg m^2, above the inertia of any rotor behind gears: a number without a unit may be in kg cm^2
+GEARED = 5.0  # least gear ratio of a motor behind gears
 CLOSED_BY |= {"ball": "connect", "spherical": "connect"}
 TYPES = {**{name: name for name in CLOSURES}, **CLOSED_BY}
 OF_CLOSURE = ("type", "frames", "axis")
 OF_FRAME = ("link", "xyz", "rpy")
 OF_JOINT = ("stiffness", "reference", "damping", "friction", "rotor_inertia", "gear_ratio")
-STARTS = 16  # positions from which loops are closed before they are taken for such that cannot be
+STARTS = 16  # number of positions from which the closing of loops is attempted
 ANGLE, LENGTH = dimension_of(angle=1), dimension_of(length=1)
 
 
@@ -35,24 +35,24 @@ def with_closures(robot: Robot, path: str | PathLike[str]) -> Robot:
 
     The file has the keys ``closures``, by name of the loop joint, and ``joints``, by name of a moving joint, or one of
     them. A closure has a ``type``: revolute, continuous or pin; prismatic or slider; ball or connect; fixed or weld.
-    Its two ``frames``, each a link, or ``{link: NAME, xyz: [x, y, z], rpy: [r, p, y]}`` with the place in that link,
-    coincide where the loop is closed but for what the type leaves free. ``axis``, in the first frame, is z unless
-    given. A joint has ``stiffness`` and ``reference`` of a spring, ``damping``, ``friction`` (one value, or ``[forward,
-    backward]``), and ``rotor_inertia`` of its motor with ``gear_ratio``: what is seen at the joint is the inertia times
-    the square of the ratio. These take the place of what the robot file says. Values are numbers in SI units or have
-    a unit.
+    Its two ``frames``, each a link, or ``{link: NAME, xyz: [x, y, z], rpy: [r, p, y]}`` with the pose in that link,
+    coincide where the loop is closed, except for the freedoms of the type. ``axis``, in the first frame, is z by
+    default. A joint has ``stiffness`` and ``reference`` of a spring, ``damping``, ``friction`` (one value, or
+    ``[forward, backward]``), and ``rotor_inertia`` of its motor with ``gear_ratio``: the inertia at the joint is that
+    of the rotor times the square of the ratio. These values replace those of the robot file. Values are numbers in SI
+    units or have a unit.
 
     Parameters
     ----------
     robot : Robot
-        As its file has it.
+        Robot from its file.
     path
-        A file ending in .yaml, .yml, .toml or .json.
+        File ending in .yaml, .yml, .toml or .json.
 
     Raises
     ------
     RobotError
-        The file cannot be read, something in it is wrong, or the loops cannot be closed from any of several positions:
+        If the file cannot be read or contains an error, or the loops cannot be closed from any of several positions:
         the message names the file, the line and the entry.
     """
     return _ClosureFile(read_source(path, kind="closures", error_type=RobotError), robot).robot()
@@ -64,22 +64,23 @@ def loop_closure(
     frames: Sequence[tuple[str, Sequence[float], Sequence[float]]],
     axis: Sequence[float] | None = None,
 ) -> Closure:
-    """Return what holds two frames together, but for what a type of joint leaves free.
+    """Return the closure that holds two frames together, except for the freedoms of a type of joint.
 
     Parameters
     ----------
     name : str
+        Name of the closure.
     kind : str
-        Of a closure, or of a joint.
+        Type of a closure or of a joint.
     frames : sequence of two tuples of str and two sequences of 3 floats
-        Each the link, the origin in it, m, and turns about its fixed axes x, y, z, rad.
+        For each frame, the link, the origin in it, m, and turns about its fixed axes x, y, z, rad.
     axis : sequence of 3 floats, optional
-        In the first frame; z unless given.
+        Axis in the first frame; z by default.
 
     Raises
     ------
     RobotError
-        The links are one, or the axis has no direction.
+        If the links are the same, or the axis has no direction.
     """
     from scipy.spatial.transform import Rotation
 
@@ -93,13 +94,13 @@ def loop_closure(
 
 
 class _ClosureFile:
-    """Reads closures, springs and rotors from the plain data of a file; every error has its line."""
+    """Reads closures, springs and rotors from the data of a file; every error names the line."""
 
     def __init__(self, source: Source, robot: Robot):
         self.source, self.given = source, robot
 
     def robot(self) -> Robot:
-        """Return the robot with all that the file has."""
+        """Return the robot with everything in the file."""
         data = self.source.mapping((), ("title", "closures", "joints"))
         if not {"closures", "joints"} & data.keys():
             raise self.source.error("the file has neither closures nor joints", value=list(data))
@@ -209,7 +210,7 @@ class _ClosureFile:
 
 
 def rotor_doubt(inertia: float, ratio: float, values: Mapping[str, Any]) -> str:
-    """Return what is doubted of a rotor without a unit that is too heavy for a motor behind gears, or nothing."""
+    """Return a doubt about a rotor without a unit that is too heavy for a motor behind gears, or an empty text."""
     if not isinstance(values.get("rotor_inertia"), int | float) or inertia < HEAVY or abs(ratio) < GEARED:
         return ""
     seen = f"a rotor of {inertia:g} kg*m^2 is {inertia * ratio**2:.3g} kg*m^2 behind a gear ratio of {ratio:g}"
@@ -217,7 +218,7 @@ def rotor_doubt(inertia: float, ratio: float, values: Mapping[str, Any]) -> str:
 
 
 def _dimensions(key: str, turning: bool) -> tuple[Dimension, ...]:
-    """Return the dimensions that the unit of a value of a joint may have."""
+    """Return the valid dimensions of the unit of a value of a joint."""
     time = {"stiffness": -2, "damping": -1, "friction": -2, "rotor_inertia": 0}[key]
     length = 0 if not turning else 2
     if key == "friction":
@@ -228,7 +229,7 @@ def _dimensions(key: str, turning: bool) -> tuple[Dimension, ...]:
 
 
 def _check_closed(robot: Robot) -> None:
-    """Raise RobotError if loops cannot be closed from any of several positions within the limits of the joints."""
+    """Raise RobotError if loops cannot be closed from any of several positions within the joint limits."""
     loops, random = Loops(robot), np.random.default_rng(1)
     limits = [robot.joints[name].limits for name in robot.joint_names]
     lower = np.array([-math.pi / 2 if x.lower is None else x.lower for x in limits])

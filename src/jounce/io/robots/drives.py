@@ -30,40 +30,39 @@ UNITS = {
     "torque_limit": ("N*m", "N"),
     "velocity_limit": ("rad/s", "m/s"),
 }
-"""Units of each key where it turns, and where it slides; those of a motor itself are by what the motor does."""
-LONG = 2.0  # m, more than which no spindle and no pinion travels in a turn: a number without a unit may be in mm
+"""Units of each key if it turns, and if it slides; the motor decides for the keys of the motor."""
+LONG = 2.0  # m, above the travel in a turn of any spindle or pinion: a number without a unit may be in mm
 OF_MOTOR = ("rotor_inertia", "torque_limit", "velocity_limit")
 
 
 @under_own_settings
 def load_drives(path: str | PathLike[str], system: Robot | Mechanism) -> dict[str, Drive]:
-    """Read the drives of a robot's joints, or of a mechanism's drivers, from a file.
+    """Read the drives of the joints of a robot, or of the drivers of a mechanism, from a file.
 
     The file has the keys ``joints`` (of a robot) or ``drivers`` (of a mechanism), with an entry for each, and
-    ``default``, for all. Each entry has some of the keys of `Drive`: ``stiffness``, ``damping``, ``deflection_limit``,
-    which are those seen at the joint; ``rotor_inertia``, ``torque_limit``, ``velocity_limit``, which are the motor's
-    own; and ``gear_ratio`` or, where a motor that turns makes something slide, ``lead``. A value is a number in SI
-    units or a number with a unit; ``null`` takes a value of ``default`` away, and in the place of an entry all of it. A
-    default with units of what turns is for what turns, one with units of what slides for that. What has no entry is
-    rigid.
+    ``default``, for all. Each entry has some of the keys of `Drive`: ``stiffness``, ``damping`` and
+    ``deflection_limit``, as seen at the joint; ``rotor_inertia``, ``torque_limit`` and ``velocity_limit``, of the motor
+    itself; and ``gear_ratio`` or, if a rotary motor drives a slide, ``lead``. A value is a number in SI units or a
+    number with a unit; ``null`` removes a value of ``default``, and in the place of an entry all of them. A default
+    with units of rotation holds for rotary joints, one with units of translation for slides. A joint without an entry
+    is rigid.
 
     Parameters
     ----------
     path
         A file ending in .yaml, .yml, .toml or .json.
     system : Robot or Mechanism
-        That the names belong to.
+        System with the named joints or drivers.
 
     Returns
     -------
     dict of str to Drive
-        As `feedforward` takes it.
+        Drives for `feedforward`.
 
     Raises
     ------
     RobotError
-        The file cannot be read or something in it is wrong: the message names the file, the line, the entry and the
-        value.
+        If the file cannot be read or contains an error: the message names the file, the line, the entry and the value.
 
     Examples
     --------
@@ -76,7 +75,7 @@ def load_drives(path: str | PathLike[str], system: Robot | Mechanism) -> dict[st
 
 
 class _DrivesFile:
-    """Reads drives from the plain data of a file; every error names the file, the line and the entry."""
+    """Reads drives from the data of a file; every error names the file, the line and the entry."""
 
     def __init__(self, source: Source, system: Robot | Mechanism) -> None:
         self.source, self.system = source, system
@@ -88,7 +87,7 @@ class _DrivesFile:
             self.turning = {name: is_turning(driver) for name, driver in system.drivers.items()}
 
     def drives(self) -> dict[str, Drive]:
-        """Return the drives that the file has."""
+        """Return the drives in the file."""
         data = self.source.mapping((), ("title", "default", "joints", "drivers"))
         other = "drivers" if self.key == "joints" else "joints"
         if other in data:
@@ -103,7 +102,7 @@ class _DrivesFile:
         default = self.source.mapping(("default",), KEYS) if "default" in data else {}
         fitting = {kind: self._fits(default, kind) for kind in (True, False)}
         if default and not any(fitting.values()):
-            self._drive(default, dict.fromkeys(default, ("default",)), True)  # says what does not fit
+            self._drive(default, dict.fromkeys(default, ("default",)), True)  # raises the error about the unit
         drives = {}
         for name, kind in self.turning.items():
             if name in own and own[name] is None:
@@ -117,7 +116,7 @@ class _DrivesFile:
         return drives
 
     def _fits(self, default: Mapping[str, Any], turning: bool) -> bool:
-        """Whether the units of a default are those of what turns, or of what slides."""
+        """Return whether the units of the default suit joints that turn, or joints that slide."""
         motor = turning or default.get("lead") is not None
         if turning and default.get("lead") is not None:
             return False
@@ -162,7 +161,7 @@ class _DrivesFile:
 
     def _parsed(self, raw: Any, at: Location) -> tuple[float, Dimension | None]:
         parsed = self.source.value(at, raw)
-        assert isinstance(parsed.value, float)  # no names are allowed, so that expressions are worked out
+        assert isinstance(parsed.value, float)  # expressions are evaluated, since no names are allowed
         return parsed.value, parsed.dimension
 
     def _why_not(self, name: str) -> str:
@@ -179,7 +178,7 @@ PER_ANGLE = dimension_of(length=1, angle=-1)
 
 
 def _dimensions(key: str, turning: bool) -> tuple[Dimension, ...]:
-    """Return the dimensions that the unit of a key may have."""
+    """Return the valid dimensions of the unit of a key."""
     time = {"stiffness": -2, "damping": -1, "torque_limit": -2, "velocity_limit": -1}.get(key, 0)
     length = 2 if turning else 1
     match key:

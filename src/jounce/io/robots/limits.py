@@ -1,4 +1,4 @@
-"""Limits of joints from files, laid over those that the robot has."""
+"""Joint limits from files, which complete or replace those of the robot."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ FIELDS = tuple(field.name for field in dataclasses.fields(Limits))
 KEYS = (*FIELDS, "jounce")
 RANGE = ("lower", "upper")
 POWERS = dict(zip(KEYS, (0, 0, 1, 2, 3, 2, 3, 2, 4), strict=True))
-"""Powers of 1/s in the units of each key."""
+"""Powers of 1/s in the units of the keys."""
 OTHER_WORDS = {
     **dict.fromkeys(("torque", "force", "max_torque", "max_force", "max_effort"), "effort"),
     **dict.fromkeys(("torque_rate", "force_rate", "rotatum", "yank"), "effort_rate"),
@@ -45,39 +45,38 @@ EXAMPLES = {
 }
 """Units of the keys for a joint that turns, and for one that slides."""
 DEGREES, MILLIMETERS = math.degrees(1.0), 1000.0
-FAR_OFF = 10.0  # times the robot's own limit, which another one rarely is
-ALIKE = 5.0  # within which it is to the robot's own where it is in degrees or millimeters
-FAST = {True: 60.0, False: 20.0}  # rad/s and m/s, which joints of robots hardly reach
+FAR_OFF = 10.0  # ratio to the robot's own limit that other limits rarely exceed
+ALIKE = 5.0  # largest ratio of a converted limit to the robot's own
+FAST = {True: 60.0, False: 20.0}  # rad/s and m/s, which robot joints hardly reach
 
 
 @under_own_settings
 def load_limits(path: str | PathLike[str], robot: Robot) -> dict[str, Limits]:
-    """Read limits of the joints of a robot from a file, in addition to those that it has or in their place.
+    """Read limits of the joints of a robot from a file, which complete or replace its own limits.
 
     The file has the keys ``joints``, with an entry for each joint, and ``default``, for all joints; each entry has some
     of the keys ``lower``, ``upper``, ``velocity``, ``acceleration``, ``deceleration``, ``jerk``, ``effort`` (torque or
-    force) and ``effort_rate``. A value is a number in SI units or a number with a unit; ``null`` takes a limit away. An
-    entry of a joint goes before ``default``, and that before the robot's own; limits of joints that follow others hold
-    as well. A default with a unit of angle or torque
-    is for the joints that turn, one with a unit of length or force for those that slide.
+    force) and ``effort_rate``. A value is a number in SI units or a number with a unit; ``null`` removes a limit. The
+    entry of a joint precedes ``default``, which precedes the robot's own limits; limits of joints that follow others
+    hold as well. A default with a unit of angle or torque holds for joints that turn, one with a unit of length or
+    force for joints that slide.
 
     Parameters
     ----------
     path
-        A file ending in .yaml, .yml, .toml or .json.
+        File ending in .yaml, .yml, .toml or .json.
     robot : Robot
-        The robot that the names of joints belong to.
+        Robot with the named joints.
 
     Returns
     -------
     dict of str to Limits
-        For every joint of `robot.joint_names`, as `check_limits` takes it.
+        Limits of every joint of `robot.joint_names`, for `check_limits`.
 
     Raises
     ------
     RobotError
-        The file cannot be read or something in it is wrong: the message names the file, the line, the entry and the
-        value.
+        If the file cannot be read or contains an error: the message names the file, the line, the entry and the value.
 
     Examples
     --------
@@ -100,30 +99,29 @@ def load_limits(path: str | PathLike[str], robot: Robot) -> dict[str, Limits]:
 
 @under_own_settings
 def load_motion_limits(path: str | PathLike[str], robot: Robot) -> MotionLimits:
-    """Read limits of all kinds that `retime` and ``jounce check`` keep from a file.
+    """Read limits of all kinds that `retime` and ``jounce check`` observe from a file.
 
-    Besides what `load_limits` reads, entries have the key ``jounce``; a limit of a joint may depend on its position
-    ``q``, as an expression or as a table, ``{q: [0, 1 rad], value: [2, 1 rad/s]}``, which is interpolated linearly, or
-    on the direction, ``[-1 rad/s, 2 rad/s]``: the lowest and the highest value;
-    and ``points`` gives links, with the keys ``point`` (in the frame of the link), ``speed`` and ``acceleration``.
+    In addition to what `load_limits` reads, entries have the key ``jounce``. A limit of a joint may depend on its
+    position ``q``, as an expression or as a table, ``{q: [0, 1 rad], value: [2, 1 rad/s]}``, which is interpolated
+    linearly, or on the direction, ``[-1 rad/s, 2 rad/s]``: the lowest and the highest value. The key ``points`` gives
+    links, with the keys ``point`` (in the frame of the link), ``speed`` and ``acceleration``.
 
     Parameters
     ----------
     path
-        A file ending in .yaml, .yml, .toml or .json.
+        File ending in .yaml, .yml, .toml or .json.
     robot : Robot
-        The robot that the names of joints and links belong to.
+        Robot with the named joints and links.
 
     Returns
     -------
     MotionLimits
-        Of every joint of `robot.joint_names`.
+        Limits of every joint of `robot.joint_names`.
 
     Raises
     ------
     RobotError
-        The file cannot be read or something in it is wrong: the message names the file, the line, the entry and the
-        value.
+        If the file cannot be read or contains an error: the message names the file, the line, the entry and the value.
 
     Examples
     --------
@@ -140,7 +138,7 @@ def load_motion_limits(path: str | PathLike[str], robot: Robot) -> MotionLimits:
 
 
 class _LimitsFile:
-    """Reads limits from the plain data of a file; every error names the file, the line and the entry."""
+    """Reads limits from the data of a file; every error names the file, the line and the entry."""
 
     def __init__(self, source: Source, robot: Robot) -> None:
         self.source, self.robot = source, robot
@@ -210,7 +208,7 @@ class _LimitsFile:
         return -low, high
 
     def _law(self, raw: Any, key: str, at: Location, joint: Joint) -> PositionLaw | None:
-        """Return a limit that depends on the position of its joint, from an expression of q or a table."""
+        """Return a position-dependent limit, from an expression of q or a table; None for a constant one."""
         if isinstance(raw, dict):
             data = self.source.mapping(at, ("q", "value"))
             columns = []
@@ -255,7 +253,7 @@ class _LimitsFile:
         return tuple(points)
 
     def _measured(self, raw: Any, rate: int, at: Location) -> float:
-        """Return a length by time to a power, greater than zero where it is a rate."""
+        """Return a length, speed or acceleration, by the order `rate` of the derivative; a rate must be positive."""
         number, dimension = self._parsed(raw, at)
         expected = tuple(sorted(({"length": 1} | ({"time": -rate} if rate else {})).items()))
         if dimension and dimension != expected:
@@ -265,7 +263,7 @@ class _LimitsFile:
         return number
 
     def _value(self, raw: Any, key: str, at: Location, joint: Joint) -> float | None:
-        """Return a limit in SI units; None where there is none."""
+        """Return a limit in SI units; None if there is none."""
         if raw is None:
             return None
         number = self._number(raw, key, at, joint)
@@ -285,7 +283,7 @@ class _LimitsFile:
 
     def _parsed(self, raw: Any, at: Location) -> tuple[float, Dimension | None]:
         parsed = self.source.value(at, raw)
-        assert isinstance(parsed.value, float)  # no names are allowed, so that expressions are worked out
+        assert isinstance(parsed.value, float)  # expressions are evaluated, since no names are allowed
         return parsed.value, parsed.dimension
 
     def _check_size(self, number: float, raw: Any, key: str, at: Location) -> None:
@@ -295,7 +293,7 @@ class _LimitsFile:
             raise self.source.error("must be greater than zero; null means no limit", at, value=raw)
 
     def _check_default(self, key: str) -> None:
-        """Check an entry of the defaults by itself: it may be one that fits no joint of this robot."""
+        """Raise an error for an invalid entry of the defaults, which may suit no joint of this robot."""
         at: Location = ("default", key)
         raw = self.source.data["default"][key]
         if raw is None:
@@ -308,7 +306,7 @@ class _LimitsFile:
         self._check_size(number, raw, key, at)
 
     def _fits(self, raw: Any, key: str, joint: Joint) -> bool:
-        """Whether a default is meant for a joint: one with the unit of the other kind of joint is not."""
+        """Return whether the unit of a default suits a joint."""
         dimension = None if raw is None else self._parsed(raw, ("default", key))[1]
         return not dimension or dimension in _dimensions(key, joint.turning)
 
@@ -322,7 +320,7 @@ class _LimitsFile:
 
 
 def _doubt(number: float, key: str, joint: Joint) -> str:
-    """Word why a number without a unit is likely one of degrees or millimeters; nothing if it is not."""
+    """Return why a number without a unit is likely in degrees or millimeters; an empty text if it is not."""
     if key not in (*RANGE, "velocity") or not math.isfinite(number):
         return ""
     unit = EXAMPLES[joint.turning][KEYS.index(key)]
@@ -346,7 +344,7 @@ def _wrong_unit(dimension: Dimension) -> str:
 
 
 def _dimensions(key: str, turning: bool) -> tuple[Dimension, ...]:
-    """Return the dimensions that the unit of a key may have; a pure number counts as an angle."""
+    """Return the valid dimensions of the unit of a key; a pure number counts as an angle."""
     time = POWERS[key]
     if key.startswith("effort"):
         return (tuple(sorted({"mass": 1, "length": 2 if turning else 1, "time": -time}.items())),)

@@ -1,4 +1,4 @@
-"""Robots from files."""
+"""Reading of robot files."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from jounce.settings import under_own_settings
 
 SHAPES = ("visual", "collision")
 XACRO_SOURCE = ("xacro:include", "xacro:macro", "xacro:property", "xacro:arg", "xacro:if", "xacro:unless")
-OLD_XACRO = ("include", "macro", "property")  # as it was written before it had a prefix
+OLD_XACRO = ("include", "macro", "property")  # tags of xacro before it had a prefix
 XACRO = "is a xacro file, which must first be expanded to a URDF; run: xacro FILE.urdf.xacro > FILE.urdf"
 
 
@@ -38,47 +38,47 @@ def load_robot(
 ) -> Robot:
     """Read a robot from a URDF, MJCF or SDF file.
 
-    Which of them it is, the root element says. Only what moves is read: links, joints and their limits, masses and
-    inertias, from MJCF also gravity and the forces of actuators; shapes and meshes need not be there. URDF needs the
-    extra ``robots``, MJCF the extra ``mjcf``.
+    The root element determines the format. The reader takes what moves: links, joints and their limits, masses and
+    inertias, from MJCF also gravity and the forces of actuators; shapes and meshes need not exist. URDF needs the extra
+    ``robots``, MJCF the extra ``mjcf``.
 
     Parameters
     ----------
     path
-        A file ending in .urdf, .xml or .sdf.
+        File ending in .urdf, .xml or .sdf.
     floating_base : bool or str, default False
-        Set the base free, by three slides and three turns, as `Robot.with_floating_base` does; three letters give the
-        sequence of the turns. A base that is only a massless frame with one link fixed to it is left out.
+        Whether to free the base, by three slides and three turns, as `Robot.with_floating_base` does; three letters
+        give the sequence of the turns. A base that is only a massless frame with one link fixed to it is left out.
     massless : bool, default False
-        URDF links that move, have no mass and carry some are meant so: there is no warning of them.
+        Whether moving URDF links without mass that carry others are intended, and need no warning.
     strict : bool, default False
-        Make an error of what is warned of.
+        Whether to raise errors instead of warnings.
     model : str, optional
-        Name of the model of an SDF file that holds several; needed unless only one of them moves.
+        Name of the model in an SDF file with several; required unless only one of them moves.
     closures
-        File beside it with loops, springs and rotors that the robot file does not have; see `with_closures`.
+        File with loops, springs and rotors that the robot file lacks; see `with_closures`.
     allow
-        Folders besides that of the file that included files, models and meshes may be below.
+        Folders besides that of the file below which included files, models and meshes may lie.
 
     Returns
     -------
     Robot
-        Its frames, links and joints have the names of the file.
+        Robot whose frames, links and joints have the names of the file.
 
     Raises
     ------
     RobotFileError
-        The file cannot be read or describes no possible robot: the message names the file, the line, the entry and the
-        value.
+        If the file cannot be read or describes no possible robot: the message names the file, the line, the entry and
+        the value.
 
     Warns
     -----
     RobotWarning
-        Links are as those of no real robot: negative moments of inertia, one that exceeds the sum of the other two by
-        more than rounding, moments without mass, links that move and have no mass, a mass without moments of inertia,
-        links of SDF without a mass and all moments. All is computed with the numbers of the file. Or the file has what
-        is left out: springs that are not linear, fluids, what tendons between points add, elements that their format
-        does not have; or ranges of joints that leave the joint that they follow no room. One warning names links,
+        If links have values that no real robot has: negative moments of inertia, one that exceeds the sum of the other
+        two by more than rounding, moments without mass, moving links without mass, a mass without moments of inertia,
+        or SDF links without a mass or all moments. All results are computed with the numbers of the file. Or if parts
+        of the file are left out: nonlinear springs, fluids, contributions of tendons between points, elements that the
+        format does not have, or ranges of joints that leave their leader no room to move. One warning names all links,
         joints and parts.
 
     Examples
@@ -128,7 +128,7 @@ def load_robot(
 
 
 def _check_expanded(root: Element, faults: Faults) -> None:
-    """Refuse what xacro has yet to work out, where it bears on links and joints; calls left in a URDF are noted."""
+    """Raise an error for unexpanded xacro code in links and joints; other calls left in a URDF are recorded."""
     used = [root]
     source = any(child.tag in XACRO_SOURCE for child in root.children) or root.first("link") is None
     for child in root.children:
@@ -149,7 +149,7 @@ def _check_expanded(root: Element, faults: Faults) -> None:
 
 
 def _released(robot: Robot, sequence: str, path: str) -> Robot:
-    """Return the robot on a floating base, which takes the name world."""
+    """Return the robot on a floating base, which is named world."""
     joints = list(robot.joints.values())
     attached = [joint for joint in joints if joint.parent == robot.base]
     closed_links = {link for closure in robot.closures.values() for link in closure.links}

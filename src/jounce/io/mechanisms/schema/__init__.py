@@ -1,1 +1,1 @@
-"""The schema of mechanism files: keys, models, and the messages for what does not match."""
+"""The schema of mechanism files: keys, models, and messages for errors."""

@@ -1,4 +1,4 @@
-"""The schema of mechanism files as JSON Schema, for editors that complete and check while one types."""
+"""The schema of mechanism files as JSON Schema, for completion and checks in editors."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ def json_schema(*, own_types: bool = True) -> dict[str, Any]:
     Parameters
     ----------
     own_types : bool, default True
-        Whether joints and drivers registered outside this package are in it too.
+        Whether to include joints and drivers registered outside this package.
 
     Returns
     -------
     dict
-        Plain data, ready for ``json.dumps``. It checks names and shapes; units, expressions and the names of bodies and
-        parameters are checked by ``load`` only.
+        Plain data, ready for ``json.dumps``. It checks names and shapes; only ``load`` checks units, expressions and
+        the names of bodies and parameters.
 
     Examples
     --------
@@ -40,7 +40,7 @@ def json_schema(*, own_types: bool = True) -> dict[str, Any]:
     union: Any = Annotated[Union[models], Discriminator("space")]  # noqa: UP007
     generated = TypeAdapter(union).json_schema()
     missing = set(_definitions(generated))
-    while missing:  # a definition may name others
+    while missing:  # a definition may refer to others
         generated["$defs"] |= {name: definitions[name] for name in sorted(missing)}
         missing = set(_definitions(generated)) - generated["$defs"].keys()
     head = {
@@ -52,7 +52,7 @@ def json_schema(*, own_types: bool = True) -> dict[str, Any]:
 
 
 def _definitions(node: Any) -> Iterator[str]:
-    """Return the names of the definitions that parts of a schema stand for."""
+    """Yield the names of the definitions to which parts of a schema refer."""
     if isinstance(node, dict) and isinstance(node.get("definition"), str):
         yield node["definition"]
     elif isinstance(node, dict | list):
@@ -61,12 +61,12 @@ def _definitions(node: Any) -> Iterator[str]:
 
 
 def _without_generated_titles(node: Any) -> Any:
-    """Drop titles that pydantic makes up from the names of keys, and defaults that say nothing; put in references."""
+    """Return a schema without titles from pydantic and without defaults of None, and with references resolved."""
     if isinstance(node, list):
         return [_without_generated_titles(item) for item in node]
     if not isinstance(node, dict):
         return node
-    if isinstance(node.get("definition"), str):  # pydantic adds a title
+    if isinstance(node.get("definition"), str):  # pydantic adds a title to it
         return {"$ref": f"#/$defs/{node['definition']}"}
     return {
         key: _without_generated_titles(item)
@@ -76,7 +76,7 @@ def _without_generated_titles(node: Any) -> Any:
 
 
 def write_json_schema(path: str | PathLike[str]) -> None:
-    """Write the JSON Schema of the types of this package to a file, as the documentation publishes it."""
+    """Write the JSON Schema of the types of this package to a file, for the documentation."""
     from jounce.io.files.writing import replacing
 
     with replacing(path) as scratch:

@@ -1,4 +1,4 @@
-"""Keys and types of mechanism files checked by the published schema, before JAX is imported for all else."""
+"""A check of the keys and types of mechanism files by the published schema, before JAX is imported."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from jounce.io.files.located_data import Location, Source
 from jounce.io.files.source import read_source
 
 ROLES = {"joints": "joint", "drivers": "driver", "forces": "force", "initial": "driver"}
-"""The sections of a file whose entries are distinguished by ``type``, and the role of each."""
+"""Sections of a file whose entries have a ``type``, and the role of each."""
 
-LARGEST = 200_000  # bytes of a file that is read twice
+LARGEST = 200_000  # largest size of a file that is read twice, bytes
 _HINTS = {
     ("planar", "orientation"): "a planar body has an angle",
     ("spatial", "angle"): "a spatial body has an orientation",
@@ -33,19 +33,19 @@ _OTHER_WORDS = {
     "screw": ("helical",),
     "parallel2": ("pin_in_slot", "slot"),
 }
-"""What else types of joints are called, in words that name no type."""
+"""Other common names of joint types."""
 
 
 def check_keys(path: str | PathLike[str]) -> None:
-    """Raise the error that `load` would, where a file breaks its syntax, or has an unknown key or type.
+    """Raise the error that `load` would raise if a file violates the syntax, or has an unknown key or type.
 
-    What it lets pass may still be wrong. It knows the types of this package only: do not call it where a user's own
-    joints and forces are imported.
+    Files that pass may still be wrong. Only the types of this package are known: do not call this function if a user's
+    own joints or forces are imported.
 
     Parameters
     ----------
     path
-        A .yaml, .toml or .json file; one that holds no mechanism passes.
+        File ending in .yaml, .toml or .json; a file without a mechanism passes.
 
     Raises
     ------
@@ -55,7 +55,7 @@ def check_keys(path: str | PathLike[str]) -> None:
     file, schema = Path(path), _schema()
     if not schema or not file.is_file() or file.stat().st_size > LARGEST:
         return
-    if file.read_bytes().lstrip(b"\xef\xbb\xbf \t\r\n").startswith(b"<"):  # a robot, whatever its ending
+    if file.read_bytes().lstrip(b"\xef\xbb\xbf \t\r\n").startswith(b"<"):  # a robot, whatever the ending
         return
     source = read_source(file, many=True)
     space = source.data.get("space") if isinstance(source.data, dict) else None
@@ -67,7 +67,7 @@ def check_keys(path: str | PathLike[str]) -> None:
 
 
 def unknown_key(source: Source, space: str, at: Location, valid: Iterable[str]) -> JounceError:
-    """Return the error for a key that an entry does not have, with those that it may have."""
+    """Return the error for an unknown key of an entry, with the valid ones."""
     hint = _HINTS.get((space, str(at[-1]))) if at[0] == "bodies" else None
     if str(at[-1])[:1].isdigit():
         hint = "a comma ends a value here; for a decimal comma write a point, such as 4.5 mm"
@@ -77,7 +77,7 @@ def unknown_key(source: Source, space: str, at: Location, valid: Iterable[str]) 
 def unknown_type(
     source: Source, space: str, at: Location, entry: dict[str, Any], types: Callable[[str, str], Iterable[str]]
 ) -> JounceError:
-    """Return the error for a joint, driver or force whose type is missing, or is none of those that `types` returns."""
+    """Return the error for a joint, driver or force without a valid type; `types` returns the valid ones."""
     role = ROLES[str(at[0])]
     valid = types(space, role)
     glued = next((key for key in entry if str(key).startswith("type:")), None)
@@ -103,7 +103,7 @@ def unknown_type(
 
 @functools.cache
 def _schema() -> dict[str, Any]:
-    """Return the definitions of the published schema; none where the package was copied without it."""
+    """Return the definitions of the published schema; empty if the package was copied without it."""
     name = "mechanism.schema.json"
     for path in (Path(__file__).with_name(name), Path(__file__).parents[5] / "docs" / "schema" / name):
         if path.is_file():
@@ -112,7 +112,7 @@ def _schema() -> dict[str, Any]:
 
 
 def _problems(source: Source, space: str, schema: dict[str, Any]) -> Iterator[JounceError | None]:
-    """Yield an error for each unknown key or type."""
+    """Yield an error for each unknown key or type, or None for an entry that cannot be judged."""
     data = source.data
     yield from _unknown(source, space, (), data, schema[f"{space}_mechanism"])
     entries = {section: data[section] for section in (*ROLES, "bodies") if isinstance(data.get(section), dict)}
@@ -134,16 +134,16 @@ def _problems(source: Source, space: str, schema: dict[str, Any]) -> Iterator[Jo
 
 
 def _types(space: str, role: str) -> list[str]:
-    """Return the types of this package."""
+    """Return the types of this package for a role."""
     start, end = f"{space}_", f"_{role}"
     types = [name[len(start) : -len(end)] for name in _schema() if name.startswith(start) and name.endswith(end)]
-    return [name for name in types if not name.endswith("_of_a")]  # those are outputs
+    return [name for name in types if not name.endswith("_of_a")]  # names of outputs
 
 
 def _unknown(
     source: Source, space: str, at: Location, entry: dict[str, Any], model: dict[str, Any]
 ) -> Iterator[JounceError]:
-    """Yield an error for each key of an entry that its model does not have."""
+    """Yield an error for each key of an entry that is not in its model."""
     valid = model["properties"]
     for key in entry:
         if key not in valid:

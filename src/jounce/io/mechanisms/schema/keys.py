@@ -1,8 +1,8 @@
-"""The keys of each type in a mechanism file, read off the fields of its class.
+"""The keys of each type in a mechanism file, derived from the fields of its class.
 
-Fields that differ only in the body they belong to, such as ``point_i`` and ``point_j``, are one key with a list,
-``points``; a lone ``vector_i`` is the key ``vector``; every other field keeps its name. So a joint of a user's own is
-readable from files as soon as its class exists.
+Fields that differ only in their body, such as ``point_i`` and ``point_j``, form one key with a list, ``points``; a
+single ``vector_i`` is the key ``vector``; every other field keeps its name. So files can contain a user's own joint as
+soon as its class exists.
 """
 
 from __future__ import annotations
@@ -26,15 +26,15 @@ class FileKey:
     Attributes
     ----------
     key : str
-        As written in a file.
+        Name in a file.
     fields : tuple of str
-        Fields of the class that it fills; more than one when the key holds a list with an entry for each body.
+        Fields of the class that it fills; several fields for a list with an entry for each body.
     kind : str
         ``scalar``, ``vector``, ``motion``, ``law``, ``laws``, ``wrenches``, ``whole``, ``flag``, ``points``, ``curve``,
         ``text``, ``parts`` or ``nested``.
     quantity : str
-        Kind of unit that the class states: one of ``units.KINDS``; or ``direction`` (any unit, the same in all
-        components), or ``of coordinate`` and ``per angle``, which follow the key ``coordinate`` beside it.
+        Kind of quantity that the class states: one of ``units.KINDS``; or ``direction`` (any unit, the same for all
+        components), or ``of coordinate`` and ``per angle``, which follow from the key ``coordinate`` of the same entry.
     required : bool
         Whether the key must be given.
     """
@@ -45,13 +45,13 @@ class FileKey:
     quantity: str
     required: bool
     names: tuple[str, ...] = ()
-    """Of the keys within this one, for each field, where it holds a mapping; then `kind` is ``parts``."""
+    """Keys within this one, for each field, if it holds a mapping; then `kind` is ``parts``."""
 
 
 def file_keys(kind: type[Any]) -> tuple[FileKey, ...]:
-    """Return the keys of a class of joints, drivers or outputs besides ``type``, ``quantity`` and ``bodies``.
+    """Return the keys of a class of joints, drivers or outputs, except ``type``, ``quantity`` and ``bodies``.
 
-    Words come first, since the units of other keys may follow from them.
+    Text keys come first, since the units of other keys may follow from them.
 
     Examples
     --------
@@ -77,7 +77,7 @@ def file_keys(kind: type[Any]) -> tuple[FileKey, ...]:
 
 
 def cam_types(space: str) -> dict[str, type[Any]]:
-    """Return the drivers of this package whose coordinate may be that of a cam, by type.
+    """Return the drivers of this package whose coordinates cams may have, by type.
 
     Examples
     --------
@@ -92,7 +92,7 @@ def cam_types(space: str) -> dict[str, type[Any]]:
 
 
 def is_cam(space: str, entry: dict[str, Any]) -> bool:
-    """Return whether an entry of the joints of a file is a cam: a driver of which the law is of another coordinate."""
+    """Return whether an entry of the joints of a file is a cam: a driver whose law depends on another coordinate."""
     kind = entry.get("type")
     if "motion" not in entry or not isinstance(kind, str) or kind not in cam_types(space):
         return False
@@ -101,7 +101,7 @@ def is_cam(space: str, entry: dict[str, Any]) -> bool:
 
 
 def location_of(keys: Iterable[FileKey], field: str) -> Location:
-    """Return the place in a file of the value of a field, below its joint, driver or output."""
+    """Return the location in a file of the value of a field, relative to its joint, driver or output."""
     for key in keys:
         if field in key.fields:
             index = key.fields.index(field)

@@ -1,7 +1,7 @@
 """The schema of mechanism files, as pydantic models built from the classes of joints, drivers and outputs.
 
-It checks names, shapes and units, and turns every value into a number in SI units or an expression. Imported only when
-a file is loaded, since pydantic takes a while.
+It checks names, shapes and units, and converts every value to a number in SI units or an expression. The module is
+imported when a file is loaded, because the import of pydantic is slow.
 """
 
 from __future__ import annotations
@@ -105,7 +105,7 @@ def _assembly(raw: object, info: Any) -> Any:
 
 
 def _names(counts: Sequence[int]) -> Any:
-    """Return the annotation of a list of names of bodies, as many as one of the counts."""
+    """Return the annotation of a list of body names; `counts` are the permitted lengths."""
 
     def check(raw: object, info: Any) -> tuple[str, ...]:
         if not isinstance(raw, (list, tuple)) or len(raw) not in counts:
@@ -133,7 +133,7 @@ def _check_file_name(name: object, error: type[JounceError]) -> None:
 
 
 def _named(item: Any, *checks: Callable[[Any, type[JounceError]], None], pattern: re.Pattern[str] | None = None) -> Any:
-    """Return the annotation of a mapping of names to items; names that files allow by default."""
+    """Return the annotation of a mapping of names to items; the default pattern is that of names in files."""
     whole = checks if pattern else (_check_file_name, *checks)
 
     def name_of(raw: object, _info: Any) -> Any:
@@ -149,7 +149,7 @@ def _named(item: Any, *checks: Callable[[Any, type[JounceError]], None], pattern
 
 
 def _model(name: str, doc: str | None, fields: dict[str, tuple[Any, Any]]) -> type[BaseModel]:
-    """Create a closed model; fields of awkward names are fine, since they are known by alias only."""
+    """Return a model that forbids other keys; its fields have aliases, so that any key is permitted."""
     summary = (doc or "").strip().split("\n\n")[0]
     aliased = {
         key if key in ("space", "type", "coordinate") else f"key_{key}": (kind, Field(default, alias=key))
@@ -197,17 +197,17 @@ def _annotation(kind: type[Any], key: FileKey, size: int) -> Any:
 
 
 def _has_free_laws(kind: type[Any]) -> bool:
-    """Return whether the laws of a class may be of anything: those of a joint of a user's own, which is no driver."""
+    """Return whether laws of a class may be functions of anything: those of a user's joint that is no driver."""
     return kind.role == "joint" and not belongs_to_package(kind)
 
 
 def _values(kind: type[Any], size: int) -> dict[str, tuple[Any, Any]]:
-    """Return the keys of a class besides its bodies, as fields of a model."""
+    """Return the keys of a class except its bodies, as fields of a model."""
     return {key.key: (_annotation(kind, key, size), ... if key.required else None) for key in file_keys(kind)}
 
 
 def _bodies(kind: type[Any]) -> dict[str, tuple[Any, Any]]:
-    """Return the key of the bodies of a class: ``body`` for one alone."""
+    """Return the key of the bodies of a class, as a field of a model: ``body`` for a single one."""
     if kind.body_count > 1:
         return {"bodies": (_names(getattr(kind, "body_counts", ()) or (kind.body_count,)), ...)}
     return {"body": (Annotated[Any, Checked(_check_body, {"type": "string"})], ...)}
@@ -239,7 +239,7 @@ def _constraint_union(space: str, role: str, types: _Types) -> Any:
 
 
 def output_form(raw: object) -> Any:
-    """Return the tag of the form that an output of a file has, None when it is not a mapping."""
+    """Return the tag of the form of an output in a file; None if the output is not a mapping."""
     if not isinstance(raw, dict):
         return None
     return output_tag(raw.get("quantity"), next((key for key in HOLDERS if key in raw), "body"))
@@ -296,9 +296,9 @@ def _file_model(space: str, joints: _Types, drivers: _Types, forces: _Types) -> 
 
 
 def file_model(space: str, *, own_types: bool = True) -> type[BaseModel]:
-    """Return the model of a whole file of a space, with every joint, driver and force registered by now.
+    """Return the model of a file of a space, with every joint, driver and force that is registered now.
 
-    Without ``own_types``, with those of this package only.
+    Without `own_types`, only those of this package are included.
     """
     types = []
     for role in ("joint", "driver", "force"):

@@ -1,4 +1,4 @@
-"""The forms of output in a mechanism file, each with its class: of motions, of forces and of energies."""
+"""The forms of outputs in a mechanism file, and their classes."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ OUTPUTS: tuple[tuple[str | None, type[AbstractQuantity]], ...] = (
     ("torque", dynamics.AppliedTorqueOutput),
     *ENERGY_OUTPUTS,
 )
-"""The word for ``quantity`` in a file (None when there is none) and the class of each output."""
+"""The value of ``quantity`` in a file (None if it has none) and the class of each output."""
 
 HOLDERS = {
     "driver": "a driver",
@@ -56,21 +56,21 @@ HOLDERS = {
     "mechanism": "the mechanism",
     "of": "an output",
 }
-"""The keys that say what an output is of, and their words; the first that is there counts."""
+"""Keys that state the source of an output, and their words; the first key present counts."""
 
 
 def output_holder(kind: type[AbstractQuantity]) -> str:
-    """Return the key that says what an output of a class is of, one of ``HOLDERS``."""
+    """Return the key that states the source of an output of a class, one of ``HOLDERS``."""
     return getattr(kind, "source", "body" if kind.body_count == 1 else "bodies")
 
 
 def output_tag(quantity: object, holder: str) -> str:
-    """Return the name of a form of output, by its quantity and the key that says what it is of."""
+    """Return the tag of a form of output, by its quantity and the key that states its source."""
     return f"{quantity or 'point'} of {HOLDERS[holder]}"
 
 
 def output_types(space: str) -> dict[str, tuple[str | None, type[AbstractQuantity]]]:
-    """Return the forms of output that exist in a space, by tag: the word for ``quantity``, and the class."""
+    """Return the forms of outputs in a space, by tag: the value of ``quantity``, and the class."""
     return {
         output_tag(quantity, output_holder(kind)): (quantity, kind)
         for quantity, kind in OUTPUTS

@@ -1,4 +1,4 @@
-"""From what pydantic finds wrong to one sentence with file, line, dotted name and value."""
+"""Errors of pydantic as one sentence with file, line, dotted name and value."""
 
 from __future__ import annotations
 
@@ -14,16 +14,16 @@ from jounce.io.mechanisms.schema.output_types import output_holder, output_types
 
 
 def first_problem(source: Source, space: str, problems: list[Any]) -> JounceError:
-    """Return the error for the first problem in the file; an unknown key goes before the missing one that it misspells.
+    """Return the error for the first problem in a file; an unknown key precedes the missing one that it misspells.
 
     Parameters
     ----------
     source : Source
-        The file.
+        Source of the file.
     space : str
         planar or spatial.
     problems : list of dict
-        As ``pydantic.ValidationError.errors()`` lists them.
+        Problems from ``pydantic.ValidationError.errors()``.
     """
     ranks = {"extra_forbidden": 0, "missing": 2}
 
@@ -34,7 +34,7 @@ def first_problem(source: Source, space: str, problems: list[Any]) -> JounceErro
 
 
 def _location(problem: Any) -> Location:
-    """Return the place in the file: without pydantic's tags, and led on to the entry within a value."""
+    """Return the location of a problem in the file: without the tags of pydantic, and with the entry within a value."""
     at: Location = problem["loc"]
     if at and at[-1] == "[key]":
         at = at[:-1]
@@ -65,7 +65,7 @@ def _word(source: Source, space: str, problem: Any) -> JounceError:
 
 
 def _valid_keys(source: Source, space: str, parent: Location) -> list[str]:
-    """Return the keys that the mapping at a place may have."""
+    """Return the valid keys of the mapping at a location."""
     if not parent:
         return [field.alias for field in file_model(space).model_fields.values()]  # type: ignore[misc]
     kind = parent[0]
@@ -85,7 +85,7 @@ def _valid_keys(source: Source, space: str, parent: Location) -> list[str]:
 
 
 def _unknown_type(source: Source, space: str, at: Location, entry: dict[str, Any]) -> JounceError:
-    """Word a joint, driver, force or output of a kind that does not exist."""
+    """Return the error for a joint, driver, force or output of an unknown type."""
     if at[0] == "outputs":
         return _unknown_output(source, space, at, entry)
     return unknown_type(source, space, at, entry, catalogue)

@@ -1,4 +1,4 @@
-"""Values without a unit that are likely meant in another one than SI: degrees for radians, millimeters for meters."""
+"""Warnings of values without a unit that are likely in degrees instead of radians, or millimeters instead of m."""
 
 from __future__ import annotations
 
@@ -39,24 +39,24 @@ from jounce.units import Expression
 from jounce.units.dimensions import ANGLE, LENGTH, Dimension
 from jounce.units.values import parse_value
 
-FAR_OFF = 100.0  # times the other lengths
-ALIKE = 30.0  # within which a thousandth of a length must be to them
-WIDE = 0.3  # of a length, more than which no tolerance is
-TO_COMPARE = 3  # lengths, at least
-LARGE = 5.0  # m, from which on a machine may be one in millimeters
-FAST = 120.0  # m/s, which nothing so large reaches
-LIGHT = 0.1  # kg/m, less than which nothing so large has
+FAR_OFF = 100.0  # least ratio to the usual length
+ALIKE = 30.0  # largest ratio of a thousandth of such a length to the usual one
+WIDE = 0.3  # largest likely tolerance, relative to the length
+TO_COMPARE = 3  # least number of lengths to compare
+LARGE = 5.0  # m, from which a machine may be meant in millimeters
+FAST = 120.0  # m/s, above the speeds of such large machines
+LIGHT = 0.1  # kg/m, below the mass per size of such large machines
 NUMBER = re.compile(r"(?<![\w.])\d+\.?\d*(?:[eE][-+]?\d+)?")
-SLENDER = 1e-5  # of the mass by the square of the size, less than which no body's inertia is
+SLENDER = 1e-5  # least inertia of a body, relative to mass times size squared
 
 
 def warn_of_units(source: Source, mechanism: Mechanism) -> None:
-    """Warn of angles that are likely in degrees, laws over the run among them, and of lengths likely in millimeters.
+    """Warn of angles and angle laws that are likely in degrees, and of lengths and length laws likely in millimeters.
 
     Warns
     -----
     UnitWarning
-        With the file, the line, the name and what may be meant.
+        With the file, the line, the name and the unit that may be meant.
     """
     warned = set()
     for location, value in _angles(source.data, mechanism):
@@ -69,27 +69,28 @@ def warn_of_units(source: Source, mechanism: Mechanism) -> None:
         at: Location = ("drivers", law.name, "motion")
         why = degrees_doubt(law.law, *run)
         if at in warned or why:
-            settle(law.driver)  # warned of now, or known to be meant as it is
+            settle(law.driver)  # warned of now, or confirmed by its unit
         if why and at not in warned and not names_angle(law, angles) and not _has_unit(source, at):
             _warn(source, at, why)
     _warn_of_lengths(source, mechanism, laws)
 
 
 def warn_of_values(before: Mechanism, after: Mechanism, given: Iterable[str], option: str) -> None:
-    """Warn of parameters that were given as plain numbers, likely in degrees or millimeters, by the values before.
+    """Warn of plain numbers for parameters that are likely in degrees or millimeters, compared with the old values.
 
     Parameters
     ----------
     before, after : Mechanism
-        With the values of a file, and with those given.
+        Mechanism with the values of a file, and with the new ones.
     given : iterable of str
-        Names of parameters whose values are plain numbers.
+        Names of the parameters whose new values are plain numbers.
     option : str
-        By which they were given.
+        Option by which they are given.
 
     Warns
     -----
     UnitWarning
+        With the option, the name and the unit that may be meant.
     """
     old, new, warned = before.parameter_values, after.parameter_values, False
     for name in given:
@@ -109,16 +110,16 @@ def warn_of_values(before: Mechanism, after: Mechanism, given: Iterable[str], op
 
 
 def warn_of_variations(mechanism: Mechanism, forms: Mapping[str, str], option: str) -> None:
-    """Warn of ranges and spreads of parameters given as plain numbers, likely in degrees or millimeters.
+    """Warn of ranges and spreads of parameters in plain numbers that are likely in degrees or millimeters.
 
     Parameters
     ----------
     mechanism : Mechanism
-        With the values of a file.
+        Mechanism with the values of a file.
     forms : dict of str to str
-        By parameter, ``LOW:HIGH``, ``LOW:HIGH:COUNT``, ``normal:SIGMA`` or ``uniform:HALFWIDTH``.
+        ``LOW:HIGH``, ``LOW:HIGH:COUNT``, ``normal:SIGMA`` or ``uniform:HALFWIDTH``, by parameter.
     option : str
-        By which they were given.
+        Option by which they are given.
 
     Warns
     -----
@@ -153,7 +154,7 @@ def is_plain(text: str) -> bool:
 
 
 def _doubt(dimensions: Iterable[Dimension], value: float, was: float, which: str) -> str:
-    """Word why a number for a parameter is likely one of degrees or millimeters; nothing if it is not."""
+    """Return why the number of a parameter is likely in degrees or millimeters; an empty text if it is not."""
     if ANGLE in dimensions and (hint := number_doubt(value)):
         return hint
     if LENGTH in dimensions and was and is_thousandfold(abs(value), abs(was)):
@@ -162,21 +163,21 @@ def _doubt(dimensions: Iterable[Dimension], value: float, was: float, which: str
 
 
 def is_thousandfold(value: float, usual: float, times: float = FAR_OFF) -> bool:
-    """Return whether a length is far larger than usual, and a usual one where it is in millimeters."""
+    """Return whether a length is far larger than usual, but usual if it is in millimeters."""
     return value > times * usual and usual / ALIKE < value / 1000 < ALIKE * usual
 
 
 def _run(mechanism: Mechanism) -> tuple[float, float]:
-    """Return the first and the last instant of a mechanism, s; of one that has none, those of a second."""
+    """Return the first and the last instant of a mechanism, s; (0, 1) if it has no time grid."""
     try:
         instants = None if mechanism.time is None else instants_of(mechanism.time, mechanism.parameter_values)
-    except JounceError:  # their use raises it
+    except JounceError:  # raised when the grid is used
         instants = None
     return (0.0, 1.0) if instants is None else (float(instants[0]), float(instants[-1]))
 
 
 def _has_unit(source: Source, at: Location) -> bool:
-    """Return whether the samples of a law say their unit."""
+    """Return whether the samples of a law state their unit."""
     raw = source.at(at)
     if not isinstance(raw, dict) or not isinstance(raw.get("samples"), str):
         return False
@@ -188,7 +189,7 @@ def _has_unit(source: Source, at: Location) -> bool:
 
 
 def _warn_of_length_laws(source: Source, mechanism: Mechanism, usual: float) -> None:
-    """Warn of laws of lengths over the run that go as far and as fast as no machine of the usual length does."""
+    """Warn of length laws that go too far and too fast for a machine of the usual length."""
     first, last = _run(mechanism)
     for name, _, law in laws_of(mechanism, "length"):
         at: Location = ("drivers", name, "motion")
@@ -204,7 +205,7 @@ def _warn_of_length_laws(source: Source, mechanism: Mechanism, usual: float) -> 
 
 
 def _has_plain_number(source: Source, law: AbstractMotion, least: float) -> bool:
-    """Return whether a formula has a number without a unit of a size, its parameters included; other laws may have."""
+    """Return whether an expression or its parameters have a plain number above `least`; True for other laws."""
     if not isinstance(law, ExpressionMotion):
         return True
     parameters = source.data.get("parameters") or {}
@@ -239,7 +240,7 @@ def _warn_of_lengths(source: Source, mechanism: Mechanism, laws: Iterable[Driver
 
 
 def _too_large(mechanism: Mechanism, size: float, laws: Iterable[DriverLaw]) -> str:
-    """Word why no mechanism of this one's motion or masses is of a size, m; nothing if there may be one."""
+    """Return why the motion or the masses rule out a mechanism of this size, m; an empty text if they do not."""
     first, last = _run(mechanism)
     for law in laws:
         values = values_of(law.law, first, last)
@@ -262,7 +263,7 @@ def _too_large(mechanism: Mechanism, size: float, laws: Iterable[DriverLaw]) -> 
 
 
 def _stated_lengths(data: dict[str, Any], mechanism: Mechanism) -> list[float]:
-    """Return the lengths of a file that have a unit, m; expressions have none of their own."""
+    """Return the lengths of a file that have a unit, m; expressions are left out."""
     names, lengths = dict.fromkeys(mechanism.parameters), []
     given = [raw for _, quantity, raw in _fields(data, mechanism) if quantity == "length"]
     for raw in [*(raw for _, raw in _parameters(data, mechanism, LENGTH)), *given]:
@@ -278,7 +279,7 @@ def _stated_lengths(data: dict[str, Any], mechanism: Mechanism) -> list[float]:
 
 
 def _median_of_others(in_order: list[float], value: float) -> float:
-    """Return the median of numbers in order without one of them."""
+    """Return the median of sorted numbers without one of them."""
     own, count = bisect_left(in_order, value), len(in_order) - 1
     low, high = (in_order[k + (k >= own)] for k in ((count - 1) // 2, count // 2))
     return (low + high) / 2
@@ -291,7 +292,7 @@ def _warn(source: Source, location: Location, hint: str) -> None:
 
 
 def _fields(data: dict[str, Any], mechanism: Mechanism) -> Iterator[tuple[Location, str, Any]]:
-    """Return the values of elements, bodies and outputs as the file has them, with their kind."""
+    """Yield the values of elements, bodies and outputs as the file gives them, with location and kind."""
     for section, role in ROLES.items():
         for name, given in (data.get(section) or {}).items():
             own = "driver" if section == "joints" and is_cam(mechanism.space, given) else role
@@ -327,7 +328,7 @@ def _parameters(data: dict[str, Any], mechanism: Mechanism, dimension: Dimension
 
 
 def _angles(data: dict[str, Any], mechanism: Mechanism) -> Iterator[tuple[Location, float]]:
-    """Return angles that stand without a unit, laws at time zero."""
+    """Yield the angles without a unit, including laws at time zero."""
     given = [(location, raw) for location, quantity, raw in _fields(data, mechanism) if quantity == "angle"]
     for location, raw in [*given, *_parameters(data, mechanism, ANGLE), *_angles_of_leaders(data, mechanism)]:
         text = str(raw)
@@ -336,12 +337,12 @@ def _angles(data: dict[str, Any], mechanism: Mechanism) -> Iterator[tuple[Locati
         try:
             formula = Expression(text, ["t"])
             yield location, float(formula.evaluate({"t": 0.0}))
-        except JounceError:  # it has a unit, or depends on parameters
+        except JounceError:  # a value with a unit, or one that depends on parameters
             continue
 
 
 def _angles_of_leaders(data: dict[str, Any], mechanism: Mechanism) -> Iterator[tuple[Location, Any]]:
-    """Return angles of leaders at which segments and pieces of laws end, the longest of each law."""
+    """Yield the angles of leaders at which segments and pieces of laws end, the largest one of each law."""
     for section, known in (("drivers", mechanism.drivers), ("joints", mechanism.joints)):
         for name, element in known.items():
             law = ((data.get(section) or {}).get(name) or {}).get("motion")
@@ -359,7 +360,7 @@ def _angles_of_leaders(data: dict[str, Any], mechanism: Mechanism) -> Iterator[t
 
 
 def _lengths(data: dict[str, Any], mechanism: Mechanism) -> Iterator[tuple[Location, float, bool]]:
-    """Return lengths in m, and whether they stand without a unit."""
+    """Yield the lengths, m, and whether they have no unit."""
     values = mechanism.parameter_values
     for location, raw in _parameters(data, mechanism, LENGTH):
         yield location, float(values[str(location[-1])]), isinstance(raw, int | float)

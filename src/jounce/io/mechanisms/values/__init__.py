@@ -1,1 +1,1 @@
-"""Values of mechanism files: expressions, units, laws of motion, curves and inertias."""
+"""Values of mechanism files: expressions, units, motion laws, curves and inertias."""

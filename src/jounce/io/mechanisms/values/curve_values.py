@@ -23,7 +23,7 @@ CAM_KEYS = ("cam",)
 
 @dataclasses.dataclass(frozen=True)
 class CurvePoints:
-    """A curve through points of a file that was not read yet."""
+    """A curve through the points of a file that is not yet read."""
 
     file: str
     closed: bool
@@ -32,19 +32,19 @@ class CurvePoints:
 
 @dataclasses.dataclass(frozen=True)
 class CurveOfCam:
-    """The path of the roller, or of the edge, round a plate cam of a file that was not read yet."""
+    """The path of the roller center, or of the knife edge, around a plate cam from a file that is not yet read."""
 
     cam: str
 
 
 class _Reader:
-    """Reads a curve, or a surface, of parameters of these names, in a plane or in space."""
+    """Reads a curve or a surface with given parameter names, in the plane or in space."""
 
     def __init__(self, names: tuple[str, ...], size: int):
         self.names, self.size = names, size
 
     def __call__(self, raw: object, info: Any) -> Any:
-        """Return a curve, or the points of one that are in a file."""
+        """Return a curve, or the description of one that is in a file."""
         if not isinstance(raw, dict):
             return ParametricCurve(self._expressions(raw, info))
         if "cam" in raw and self.size == 2:
@@ -104,7 +104,7 @@ def _points(raw: dict[str, Any], closed: bool) -> CurvePoints:
 
 
 def curve(names: tuple[str, ...], size: int) -> Any:
-    """Return the annotation of a curve, or of a surface, of parameters of these names, in a plane or in space."""
+    """Return the annotation of a curve or a surface with given parameter names, in the plane or in space."""
     words = f"expressions of {' and '.join(names)}, m, one for each coordinate in the frame of the first body"
     whole = {"description": words, **list_schema({"anyOf": ANY_VALUE}, size)}
     pair = list_schema({"anyOf": ANY_VALUE}, 2)

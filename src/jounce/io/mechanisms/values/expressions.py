@@ -1,7 +1,7 @@
 """Annotations of single values for the schema: scalars, vectors, orientations.
 
-Each checks a value as a file holds it, turns it into a number in SI units or an expression, and describes itself in the
-JSON Schema. Imported only when a file is loaded, since pydantic takes a while.
+Each annotation checks a value of a file, converts it to a number in SI units or an expression, and describes itself in
+the JSON Schema. The module is imported when a file is loaded, because the import of pydantic is slow.
 """
 
 from __future__ import annotations
@@ -22,17 +22,17 @@ from jounce.units.values import Value, parse_value
 
 
 def problem(message: str, *at: str | int, value: object = ...) -> ValueError:
-    """Return an error for pydantic to collect; ``at`` leads on from the entry being validated.
+    """Return an error for pydantic to collect; ``at`` is its location relative to the validated entry.
 
-    The value shown is that of the entry unless another is given, and none when it is ``UNSET``.
+    The error shows the value of the entry unless another value is given, and no value if that is ``UNSET``.
     """
-    from pydantic_core import PydanticCustomError  # here, as importing it takes a tenth of the first name's time
+    from pydantic_core import PydanticCustomError  # local, since its import takes a tenth of the time to the first name
 
     return PydanticCustomError("jounce", "{message}", {"message": message, "at": at, "value": value})
 
 
 class Checked:
-    """An annotation: validated by a function of the value and pydantic's context, with a JSON schema of its own."""
+    """An annotation with a validating function of the value and pydantic's context, and with its own JSON schema."""
 
     def __init__(self, function: Callable[[Any, Any], Any], schema: dict[str, Any]) -> None:
         self.function = function
@@ -50,7 +50,7 @@ class Checked:
 def parse(
     raw: object, quantity: str, info: Any, *at: str | int, variables: dict[str, Dimension | None] | None = None
 ) -> Value:
-    """Read one value of a kind of ``dimensions.KINDS``; ``at`` leads on from the entry being validated."""
+    """Return a value of a kind of ``dimensions.KINDS``; ``at`` is its location relative to the validated entry."""
     quantity = at_coordinate(quantity, info.data.get("coordinate"))
     context = info.context or {}
     try:
@@ -62,7 +62,7 @@ def parse(
 
 
 def _note_use(uses: dict[str, tuple[Dimension, ...]], value: Any, quantity: str) -> None:
-    """Note the dimensions that a parameter may have where it stands alone, or with a sign before it."""
+    """Record the dimensions that a parameter may have if it is the whole value, up to a sign."""
     name = value.text.lstrip("+- ") if isinstance(value, Expression) else ""
     allowed = KINDS[quantity][1]
     if name in uses and allowed:
@@ -80,11 +80,11 @@ ANY_VALUE = [{"type": "number"}, {"type": "string", "minLength": 1}]
 
 
 definitions: dict[str, dict[str, Any]] = {}
-"""Parts of the JSON Schema that stand in it once, by name."""
+"""Parts of the JSON Schema that are defined once, by name."""
 
 
 def defined(name: str, schema: dict[str, Any]) -> dict[str, Any]:
-    """Return what stands for a part of the JSON Schema until the whole is made: pydantic has references of its own."""
+    """Return a placeholder for a defined part of the JSON Schema, since pydantic has references of its own."""
     definitions[name] = schema
     return {"definition": name}
 
@@ -96,23 +96,23 @@ def scalar_schema(quantity: str, described: str = "") -> dict[str, Any]:
 
 
 def list_schema(items: dict[str, Any], size: int) -> dict[str, Any]:
-    """Return the JSON Schema of a list of a length."""
+    """Return the JSON Schema of a list of given length."""
     return {"type": "array", "items": items, "minItems": size, "maxItems": size}
 
 
 def object_schema(properties: dict[str, Any], required: Iterable[str] | None = None) -> dict[str, Any]:
-    """Return the JSON Schema of a mapping without other keys; all are required unless some are named."""
+    """Return the JSON Schema of a mapping without other keys; by default all keys are required."""
     needed = list(properties if required is None else required)
     return {"type": "object", "properties": properties, "required": needed, "additionalProperties": False}
 
 
 def scalar(quantity: str) -> Any:
-    """Return the annotation of one value of a kind of ``units.KINDS``."""
+    """Return the annotation of a value of a kind of ``units.KINDS``."""
     return Annotated[Any, Checked(lambda raw, info: parse(raw, quantity, info).value, scalar_schema(quantity))]
 
 
 def scalars(count: int, quantity: str) -> Any:
-    """Return the annotation of a list of values of one kind, one of each body."""
+    """Return the annotation of a list of values of one kind, one for each body."""
 
     def check(raw: object, info: Any) -> tuple[float | Expression, ...]:
         if not isinstance(raw, (list, tuple)) or len(raw) != count:
@@ -124,7 +124,7 @@ def scalars(count: int, quantity: str) -> Any:
 
 
 def vector_value(raw: object, size: int, quantity: str, info: Any, *at: str | int) -> tuple[float | Expression, ...]:
-    """Read a list of values of one kind."""
+    """Return a list of values of one kind, after a check."""
     if not isinstance(raw, (list, tuple)) or len(raw) != size:
         raise problem(f"must be a list of {size} values", *at, value=raw)
     kind = "any" if quantity == "direction" else quantity
@@ -150,7 +150,7 @@ def vector(size: int, quantity: str) -> Any:
 
 
 def vectors(count: int, size: int, quantity: str) -> Any:
-    """Return the annotation of a list of vectors, one on each body."""
+    """Return the annotation of a list of vectors, one for each body."""
 
     def check(raw: object, info: Any) -> tuple[Any, ...]:
         if not isinstance(raw, (list, tuple)) or len(raw) != count:
@@ -161,7 +161,7 @@ def vectors(count: int, size: int, quantity: str) -> Any:
 
 
 def parts(kinds: dict[str, str], size: int) -> Any:
-    """Return the annotation of a mapping of vectors, each of a kind of its own, by name."""
+    """Return the annotation of a mapping of vectors; `kinds` are their kinds by name."""
 
     def check(raw: object, info: Any) -> tuple[Any, ...]:
         if not isinstance(raw, dict) or set(raw) != set(kinds):
@@ -178,7 +178,7 @@ def parts(kinds: dict[str, str], size: int) -> Any:
 
 
 def nested(kind: type[Any]) -> Any:
-    """Return the annotation of a mapping of the scalar fields of a class, of which it makes an instance."""
+    """Return the annotation of a mapping of the scalar fields of a class, which is converted to an instance."""
     fields, quantities = value_fields(kind), facts_of(kind).dimensions
     needed = [name for name, field in fields.items() if field.default is MISSING]
     words = f"{{{', '.join(f'{name}: ...' for name in needed)}}}"
@@ -203,7 +203,7 @@ def nested(kind: type[Any]) -> Any:
 
 
 def points(size: int, quantity: str) -> Any:
-    """Return the annotation of points, one on each body of a list of any length."""
+    """Return the annotation of a list of points of any length, one on each body."""
 
     def check(raw: object, info: Any) -> tuple[Any, ...]:
         count = len(info.data.get("key_bodies") or ())
@@ -226,7 +226,7 @@ def wrenches() -> Any:
 
 
 def _orientation(raw: object, info: Any) -> dict[str, Any]:
-    """Read one of the three forms of an orientation; the values stay numbers or expressions."""
+    """Return an orientation in one of its three forms, with numbers or expressions."""
     if not isinstance(raw, dict):
         raise problem("must be {quaternion: [e0, e1, e2, e3]}, {axis, angle} or {euler: zxz, angles}")
     try:
@@ -256,7 +256,7 @@ def orientation() -> Any:
 
 
 def redundant_reactions() -> Any:
-    """Return the annotation of which reactions are requested where constraints are redundant."""
+    """Return the annotation of the choice of reactions for redundant constraints."""
 
     def check(raw: object, info: Any) -> Any:
         if not isinstance(raw, dict):

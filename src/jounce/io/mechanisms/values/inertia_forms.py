@@ -1,6 +1,6 @@
-"""Inertia as a mechanism file writes it: moments, a solid with its sizes, or a matrix of pseudo-inertia.
+"""Inertia in a mechanism file: moments, a solid with its sizes, or a pseudo-inertia matrix.
 
-Solids and pseudo-inertias become moments here, by formulas of the parameters, so that these can still be changed.
+Solids and pseudo-inertias are converted to moments as expressions of the parameters, so that these can be changed.
 """
 
 from __future__ import annotations
@@ -135,7 +135,7 @@ _SIGNS = {np.add: "+", np.subtract: "-", np.multiply: "*", np.true_divide: "/"}
 
 
 class _Formula(np.lib.mixins.NDArrayOperatorsMixin):
-    """A formula that grows by arithmetic, as text."""
+    """An expression as text, which grows by arithmetic."""
 
     def __init__(self, text: str):
         self.text = text
@@ -146,36 +146,36 @@ class _Formula(np.lib.mixins.NDArrayOperatorsMixin):
 
 
 def _open(value: Any) -> Any:
-    """Make values of a file, in any nesting of lists, ready for arithmetic."""
+    """Return values of a file, in any nesting of lists, ready for arithmetic: expressions become formulas."""
     if isinstance(value, (list, tuple)):
         return [_open(entry) for entry in value]
     return _Formula(f"({value.text})") if isinstance(value, Expression) else value
 
 
 def _closed(value: Any) -> Any:
-    """Turn formulas back into expressions."""
+    """Return values with expressions in the place of formulas."""
     if isinstance(value, (list, tuple)):
         return tuple(_closed(entry) for entry in value)
     return Expression(value.text) if isinstance(value, _Formula) else value
 
 
 def expanded(given: dict[str, Any], parameters: dict[str, Any], *, planar: bool) -> dict[str, Any]:
-    """Return mass, inertia and center of mass of a body whose inertia is a solid or a pseudo-inertia.
+    """Return the mass, the inertia and the center of mass of a body with a solid or a pseudo-inertia.
 
     Parameters
     ----------
     given : dict
-        The keys of a body, as the file gives them.
+        Keys of a body, as in the file.
     parameters : dict of str to float
-        Values by which sizes are checked.
+        Values with which the sizes are checked.
     planar : bool
-        Whether the body moves in the plane; then the moment is that about z.
+        Whether the body is planar; then the moment is that about z.
 
     Raises
     ------
     JounceError
-        A size is not greater than zero, a mass is missing or given twice, or no real body has such moments; the name
-        is the key within the body.
+        If a size is not positive, a mass is missing or given twice, or no rigid body has such moments; the name is the
+        key within the body.
     """
     form, mass = given["inertia"], given["mass"]
     if "pseudo" in form:

@@ -1,4 +1,4 @@
-"""Annotations of laws for the schema: of motion and of force, by expression, samples, segments or pieces."""
+"""Annotations of laws for the schema: laws of motion and of force, by expression, samples, segments or pieces."""
 
 from __future__ import annotations
 
@@ -46,11 +46,10 @@ WAYS = ("refuse", "hold", "repeat", "advance")
 class Samples(BaseModel):
     """A motion law through samples: a CSV file, the degree of the spline, and the columns of time and value.
 
-    Beyond the samples there is no law, unless it is to hold the value at the end, to repeat them as one period, or to
-    advance: to repeat them from where they ended. Of a
-    law whose derivative was measured, such as 2, the acceleration, initial holds the value, the velocity and so on at
-    the first sample, zero unless given. Of a law of the coordinate of another driver, `of` is the driver's name, or
-    an expression of t, and the column of the time is that of the coordinate.
+    Beyond the samples, the law is refused, holds the value at the end, repeats the samples as one period, or advances:
+    it repeats them from the value at their end. If the samples are a derivative, such as 2, the acceleration, initial
+    holds the value, the velocity and so on at the first sample, zero by default. If the law is a function of another
+    coordinate, `of` is the name of its driver or an expression of t, and the column of time is that of the coordinate.
     """
 
     model_config = ConfigDict(extra="forbid", strict=True)
@@ -63,11 +62,11 @@ class Samples(BaseModel):
     initial: tuple[Any, ...] = ()
     of: Any = None
     _bases: tuple[str, ...] = PrivateAttr(default=())
-    _free: bool = PrivateAttr(default=False)  # of whatever a class of a user's own calls it with
+    _free: bool = PrivateAttr(default=False)  # whether a user's class calls the law with an unknown quantity
 
     @property
     def dimensions(self) -> tuple[tuple[Dimension, ...], tuple[Dimension, ...]]:
-        """What units in the heading of the file may measure, of the time and of the value; anything where none is."""
+        """Dimensions that the units of the columns of time and value may have; any dimension if empty."""
         if self.of is not None or self._free:
             return rates(("angle", "length"), 0), () if self.derivative else rates(self._bases, 0)
         return (TIME,), rates(self._bases, self.derivative)
@@ -75,7 +74,7 @@ class Samples(BaseModel):
 
 @dataclasses.dataclass(frozen=True)
 class OutputLaw:
-    """The law of an output from which that of a driver follows; samples in it are not read yet."""
+    """The law of an output that a driver follows; its samples are not yet read."""
 
     output: str
     held: Any
@@ -88,11 +87,11 @@ FORMS = {
     "piecewise": PIECEWISE_KEYS,
     "output": ("output", "law"),
 }
-"""Keys of a law by the one that says which form it has."""
+"""Keys of a law, by the key that determines its form."""
 
 
 def cam_motion(quantity: str) -> Any:
-    """Return the annotation of the law of a cam: of a coordinate, that of a driver, a joint or an output."""
+    """Return the annotation of the law of a cam, a function of the coordinate of a driver, a joint or an output."""
     plain: Checked = motion(quantity).__metadata__[0]
 
     def check(raw: object, info: Any) -> Any:
@@ -109,9 +108,9 @@ def cam_motion(quantity: str) -> Any:
 
 
 def motion(quantity: str, variables: dict[str, Dimension | None] | None = None, *, free: bool = False) -> Any:
-    """Return the annotation of a law of time, and of other variables where there are some: of motion, or of a force.
+    """Return the annotation of a law of motion or force as a function of time and of other variables, if any.
 
-    A free law is of whatever a class of a user's own calls it with, in any unit.
+    A free law is a function of whatever a user's class calls it with, in any unit.
     """
     variables = ({"t": None} if free else {"t": TIME}) if variables is None else variables
 
@@ -165,7 +164,7 @@ def motion(quantity: str, variables: dict[str, Dimension | None] | None = None, 
 
 
 def _output_law(raw: dict[str, Any], info: Any, variables: dict[str, Dimension | None]) -> OutputLaw:
-    """Return the law of an output from which that of a driver follows."""
+    """Return the law of an output that a driver follows."""
     if set(variables) != {"t"}:
         raise problem("a force cannot have the law of an output; a driver can", "output", value=UNSET)
     for key in ("output", "law"):
@@ -185,7 +184,7 @@ def _output_law(raw: dict[str, Any], info: Any, variables: dict[str, Dimension |
 
 
 def _below(single: Checked, raw: object, info: Any, at: str | int) -> Any:
-    """Return what a check makes of an entry below another one; errors state where."""
+    """Return the checked value of a nested entry; errors are located at `at`."""
     try:
         return single.function(raw, info)
     except PydanticCustomError as error:
@@ -195,7 +194,7 @@ def _below(single: Checked, raw: object, info: Any, at: str | int) -> Any:
 
 
 def _samples(raw: dict[str, Any], quantity: str, info: Any) -> Samples:
-    """Return what a law through samples is made of; values that it begins with follow parameters, in SI units."""
+    """Return the description of a law through samples, with initial values in SI units or as expressions."""
     for key in ("samples", "time", "value"):
         if key in raw and not isinstance(raw[key], str):
             raise problem("must be a name", key, value=raw[key])

@@ -1,4 +1,4 @@
-"""Motion laws of segments and of pieces as files hold them, and laws of the coordinate of another driver."""
+"""Motion laws of segments and of pieces in files, and laws of the coordinate of another driver."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ PROFILE_KEYS = ("profile", "initial", "start", "beyond", "of", "derivative")
 SEGMENT_KEYS = tuple(field.name for field in dataclasses.fields(Segment))
 PIECEWISE_KEYS = ("piecewise", "start", "beyond", "of", "derivative", "initial")
 LAPSES = {"time": "s", "angle": "rad", "length": "m"}
-"""What a law may be of, and its unit."""
+"""Kinds of the variable of a law, and their units."""
 LEADER_SCHEMA = {
     "description": "name of a driver, or an expression of t: its coordinate takes the place of the time",
     "type": "string",
@@ -46,14 +46,14 @@ _DIMENSIONS = {"time": TIME, "angle": ANGLE, "length": LENGTH}
 
 @dataclasses.dataclass(frozen=True)
 class UnresolvedFollower:
-    """A law of the coordinate of another driver, which has a name only until all drivers are read."""
+    """A law of the coordinate of another driver, known by name until all drivers are read."""
 
     law: Any
     driver: str
 
 
 def leader(raw: dict[str, Any], info: Any) -> str | Expression | None:
-    """Return the name of a driver, or an expression, whose value takes the place of the time, or None."""
+    """Return the name of a driver, or an expression, whose value replaces the time in a law; None for a law of time."""
     given = raw.get("of")
     if given is None:
         return None
@@ -78,7 +78,7 @@ def leader(raw: dict[str, Any], info: Any) -> str | Expression | None:
 
 
 def followed_law(law: Any, by: str | Expression | None) -> Any:
-    """Return a law as one of the coordinate of a driver, of an expression, or of the time."""
+    """Return a law of time, of the coordinate of a driver, or of an expression."""
     if by is None:
         return law
     law = law if isinstance(law, AbstractMotion | Expression) else Expression(repr(law))
@@ -109,7 +109,7 @@ def segmented(raw: dict[str, Any], quantity: str, info: Any) -> AbstractMotion |
 
 
 def order_of(raw: dict[str, Any]) -> int:
-    """Return which derivative a law gives, 0 for the law itself."""
+    """Return the order of the derivative that a law gives; 0 for the law itself."""
     level = raw.get("derivative", 0)
     if isinstance(level, bool) or not isinstance(level, int) or not 0 <= level <= HIGHEST:
         words = f"must be a whole number from 0 to {HIGHEST}; 0 is the value itself, 1 the velocity"
@@ -118,7 +118,7 @@ def order_of(raw: dict[str, Any]) -> int:
 
 
 def initial_values(raw: dict[str, Any], most: int, quantity: str, lapse: str, info: Any) -> list[Any]:
-    """Return the values with which a law begins of which a derivative is given, lowest first."""
+    """Return the initial values of a law that is given by a derivative, lowest order first."""
     given = raw.get("initial", [])
     if not isinstance(given, list | tuple) or len(given) > most:
         words = f"must be a list of at most {most} values: the law and its derivatives below the one that is given"
@@ -127,7 +127,7 @@ def initial_values(raw: dict[str, Any], most: int, quantity: str, lapse: str, in
 
 
 def _integrated(law: Any, raw: dict[str, Any], quantity: str, lapse: str, info: Any, start: Any = None) -> Any:
-    """Return a law of which the entry gives a derivative; the law that it gives where it is none."""
+    """Return the integral of a law that an entry gives by a derivative; the law itself if it gives none."""
     level = order_of(raw)
     if not level:
         for key in ("initial", *(("start",) if start is None else ())):
@@ -145,7 +145,7 @@ def _integrated(law: Any, raw: dict[str, Any], quantity: str, lapse: str, info: 
 
 
 def expressed(raw: dict[str, Any], quantity: str, info: Any, variables: dict[str, Dimension | None]) -> Any:
-    """Return the law of an expression, also of the coordinate of a driver, or one of which it is a derivative."""
+    """Return the law of an expression, of time or the coordinate of a driver, integrated if it is a derivative."""
     for key in ("beyond", "until"):
         if key in raw:
             words = "an expression has no end; write it as a piece: piecewise: [{until: ..., expression: ...}]"
@@ -169,14 +169,14 @@ def _rate_law(
     by: str,
     variables: dict[str, Dimension | None],
 ) -> Any:
-    """Return an expression of t that is a derivative of a driven quantity, or the quantity itself."""
+    """Return an expression of t for a driven quantity, or for its derivative of some order."""
     if not order:
         return parse(raw, quantity, info, *at, variables=variables).value
     return rate(raw, order, quantity, info, *at, by=by, variables=variables)
 
 
 def _place(name: str | None) -> tuple[str | int, ...]:
-    """Return the place in the entry of a name such as ``segments[2].to``."""
+    """Return the location in the entry of a name such as ``segments[2].to``."""
     if not name or not name.startswith("segments"):
         return (name,) if name else ()
     index, _, key = name.removeprefix("segments").partition("].")
@@ -185,7 +185,7 @@ def _place(name: str | None) -> tuple[str | int, ...]:
 
 
 def _independent_variable(by: str | Expression | None, info: Any) -> str:
-    """Return what a law is of: the time, unless it is that of a cam or of the coordinate of a driver."""
+    """Return the kind of the variable of a law: time, or that of a cam or of the coordinate of a driver."""
     context = info.context or {}
     if by is None:
         return context.get("lapse", "time")
@@ -218,7 +218,7 @@ def _segment(entry: object, k: int, quantity: str, lapse: str, level: int, info:
 
 
 def piecewise(raw: dict[str, Any], quantity: str, info: Any, variables: dict[str, Dimension | None]) -> Any:
-    """Return the law of expressions that follow each other."""
+    """Return the law of consecutive expressions."""
     entries, by, level = raw["piecewise"], leader(raw, info), order_of(raw)
     if not isinstance(entries, list | tuple) or not entries:
         raise problem("must be a list such as [{until: 1 s, expression: t**2}, {expression: 1}]", "piecewise")
@@ -268,7 +268,7 @@ def rate(
     by: str = "time",
     variables: dict[str, Dimension | None] | None = None,
 ) -> float | Expression:
-    """Return a derivative of a driven quantity by the time or another one, in SI units."""
+    """Return a derivative of a driven quantity with respect to the variable of its law, in SI units."""
     value = parse(raw, quantity if order == 0 else "any", info, *at, variables=variables)
     if order and value.dimension:
         known, lapses = bases(quantity, info), [by] if by in LAPSES else LAPSES
@@ -279,7 +279,7 @@ def rate(
 
 
 def bases(quantity: str, info: Any) -> list[str]:
-    """Return the dimensions that a driven quantity may have; none of what is no coordinate, such as a force."""
+    """Return the kinds of coordinate that a driven quantity may be; empty for other quantities, such as forces."""
     quantity = at_coordinate(quantity, info.data.get("coordinate"))
     return [quantity] if quantity in ("length", "angle") else ["angle", "length"] if quantity == "any" else []
 
@@ -308,7 +308,7 @@ def segmented_schema() -> dict[str, Any]:
 
 
 def piecewise_schema(law: dict[str, Any]) -> dict[str, Any]:
-    """Return the JSON Schema of expressions that follow each other; of the law itself, `law`."""
+    """Return the JSON Schema of consecutive expressions; `law` is that of one expression."""
     value = {"anyOf": ANY_VALUE}
     piece = object_schema({"expression": law, "until": value}, ["expression"])
     whole = {
@@ -323,6 +323,6 @@ def piecewise_schema(law: dict[str, Any]) -> dict[str, Any]:
 
 
 def expression_schema(law: dict[str, Any]) -> dict[str, Any]:
-    """Return the JSON Schema of a law by one expression, `law`."""
+    """Return the JSON Schema of a law by one expression; `law` is that of the expression."""
     rest = {"of": LEADER_SCHEMA, "derivative": DERIVATIVE_SCHEMA, "initial": INITIAL_SCHEMA}
     return object_schema({"expression": law, **rest, "start": {"anyOf": ANY_VALUE}}, ["expression"])

@@ -1,4 +1,4 @@
-"""Mechanisms as the data of a mechanism file: every joint, driver, force, output and mass that files know."""
+"""Mechanisms as the data of a mechanism file, with every joint, driver, force, output and mass known to files."""
 
 from __future__ import annotations
 
@@ -32,23 +32,23 @@ from jounce.settings import under_own_settings
 def write_mechanism(mechanism: Mechanism, path: str | PathLike[str], *, overwrite: bool = False) -> None:
     """Write a mechanism to a YAML, TOML or JSON file that `load` reads.
 
-    Values are written in SI units, expressions as they are. Splines through samples go to CSV files beside the file.
+    Values are written in SI units, expressions unchanged. Splines through samples go to CSV files beside the file.
 
     Parameters
     ----------
     mechanism : Mechanism
-        Built in Python, read from a file, or made of a robot (`Robot.mechanism`).
+        Mechanism built in Python, read from a file, or derived from a robot (`Robot.mechanism`).
     path
-        A file ending in .yaml, .yml, .toml or .json; one that is there is replaced.
+        File ending in .yaml, .yml, .toml or .json; an existing file is replaced.
     overwrite
-        Whether that file, or one of samples beside it, may be one that this process has read as an input.
+        Whether a written file may be one that this process has read as an input.
 
     Raises
     ------
     MechanismError
-        Something in the mechanism has no form in files, such as a Python function.
+        If a part of the mechanism cannot be written to a file, such as a Python function.
     OutputError
-        The file cannot be written, or is an input; nothing is written then.
+        If the file cannot be written, or is an input; then nothing is written.
 
     Examples
     --------
@@ -68,7 +68,7 @@ def write_mechanism(mechanism: Mechanism, path: str | PathLike[str], *, overwrit
     data, samples = mechanism_data(mechanism, Path(path).stem)
     text = dumped(data, Path(path).suffix.lower(), str(path))
     tables = {Path(path).parent / name: columns for name, columns in samples.items()}
-    for table_file in tables:  # all, before the first is replaced
+    for table_file in tables:  # all checks before the first replacement
         check_target(table_file, overwrite=overwrite)
     for table_file, columns in tables.items():
         rows = "".join(f"{','.join(map(repr, row))}\n" for row in zip(*columns.values(), strict=True))
@@ -79,26 +79,26 @@ def write_mechanism(mechanism: Mechanism, path: str | PathLike[str], *, overwrit
 
 
 def mechanism_data(mechanism: Mechanism, stem: str = "mechanism") -> tuple[dict[str, Any], dict[str, Any]]:
-    """Return what a mechanism file holds, and the samples that go with it.
+    """Return the data of a mechanism file, and the samples of its splines.
 
     Parameters
     ----------
     mechanism : Mechanism
-        To be written.
+        Mechanism to be written.
     stem : str
-        What the names of files of samples begin with.
+        Prefix of the names of sample files.
 
     Returns
     -------
     data : dict
         Mappings, lists, numbers and text by the keys of the schema.
     samples : dict of str to dict of str to list
-        Columns by name, by the name of their CSV file: times, s, and values of splines, or coordinates of points, m.
+        Columns by name, for each CSV file: times, s, and values of splines, or coordinates of points, m.
 
     Raises
     ------
     MechanismError
-        Something in the mechanism has no form in files.
+        If a part of the mechanism cannot be written to a file.
 
     Examples
     --------
@@ -168,7 +168,7 @@ class _Writer:
         return entries | self._values(location, element)
 
     def _cam(self, location: str, cam: Cam) -> dict[str, Any]:
-        """Return a cam: the driver that has its coordinate, with its law of the leader."""
+        """Return the entry of a cam: the driver with its coordinate, and its law of the leader."""
         driver, leader = cam.follower, leader_name(self.mechanism, cam)
         if leader is None:
             message = (
@@ -193,12 +193,12 @@ class _Writer:
         values = self._values(location, output, kind)
         if holder in values:
             entries[holder] = values.pop(holder)
-        if words[-1] is not None:  # of a joint, reaction rather than force
+        if words[-1] is not None:  # a joint has two words; reaction rather than force
             entries["quantity"] = words[-1]
         return entries | values
 
     def _values(self, location: str, element: Any, kind: type[Any] | None = None) -> dict[str, Any]:
-        """Return the values of an element by key; those that a file need not give are left out."""
+        """Return the values of an element by key, without defaults."""
         kind = kind or type(element)
         entries: dict[str, Any] = {}
         fields = value_fields(kind)
@@ -227,7 +227,7 @@ def _is_default(value: Any, field: Any) -> bool:
 
 
 def _tensor(value: Any) -> Any:
-    """Return a matrix of inertia as its three principal moments where it is diagonal, symmetric to the last digit."""
+    """Return a diagonal matrix of inertia as its principal moments; other matrices exactly symmetric."""
     if not isinstance(value, np.ndarray) or value.shape != (3, 3):
         return value
     upper = np.triu(value)

@@ -1,4 +1,4 @@
-"""Laws of motion and of forces as a mechanism file holds them; splines go to files of samples beside it."""
+"""Laws of motion and force as data of a mechanism file; splines go to sample files beside it."""
 
 from __future__ import annotations
 
@@ -35,19 +35,19 @@ _WORD = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 
 
 class WrittenLaws:
-    """Writes laws, and collects the samples of splines.
+    """Converts laws to data of a file, and collects the samples of splines.
 
     Parameters
     ----------
     stem : str
-        What the names of files of samples begin with.
+        Prefix of the names of sample files.
     drivers : dict of str to driver
-        Those of the mechanism, which other laws may follow by name.
+        Drivers of the mechanism, which other laws may follow by name.
 
     Attributes
     ----------
     samples : dict of str to dict of str to list
-        Columns by name of their CSV file: times, s, and values of splines, or coordinates of points, m.
+        Columns by name, for each CSV file: times, s, and values of splines, or coordinates of points, m.
     """
 
     def __init__(self, stem: str, drivers: Mapping[str, Any]):
@@ -55,7 +55,7 @@ class WrittenLaws:
         self.samples: dict[str, dict[str, list[float]]] = {}
 
     def written(self, location: str, law: Any, element: Any) -> Any:
-        """Return a law of motion, or of a force, as a file holds it."""
+        """Return a law of motion or force as data of a file."""
         if isinstance(law, VectorLaw):
             law = law.parts
         if isinstance(law, (list, tuple, np.ndarray)):
@@ -82,7 +82,7 @@ class WrittenLaws:
         raise MechanismError(message, name=location)
 
     def _spline(self, location: str, law: SplineMotion) -> dict[str, Any]:
-        """Return a spline as its samples, or as samples through which there is no other with the same breakpoints."""
+        """Return a spline as its samples, or as samples that determine it by its degree and breakpoints."""
         if law.degree % 2 == 0 and not isinstance(law, MeasuredMotion):
             message = f"a spline of even degree ({law.degree}) has no form in a file; use an odd degree"
             raise MechanismError(message, name=location)
@@ -104,7 +104,7 @@ class WrittenLaws:
         return entry if beyond == "refuse" else entry | {"beyond": beyond}
 
     def _integrated(self, location: str, law: IntegratedMotion, element: Any) -> dict[str, Any]:
-        """Return a law of which a derivative is given."""
+        """Return a law that is given by a derivative."""
         _, given, initial, start = law.recipe.value
         if not isinstance(given, PiecewiseMotion | ExpressionMotion | SegmentedMotion | Expression | str):
             message = f"a {type(given).__name__} as a derivative has no form in a file; give expressions or segments"
@@ -122,7 +122,7 @@ class WrittenLaws:
         return entry if plain(start, location) == 0.0 else entry | {"start": plain(start, location)}
 
     def curve(self, location: str, given: Any) -> Any:
-        """Return a curve or a surface as a file holds it."""
+        """Return a curve or a surface as data of a file."""
         if isinstance(given, SampledCurve):
             name = self._file_of(location)
             self.samples[name] = {letter: x.tolist() for letter, x in zip("xyz", given.points.T, strict=False)}
@@ -139,7 +139,7 @@ class WrittenLaws:
         return f"{self.stem}_{re.sub(r'[^A-Za-z0-9_]+', '_', location)}.csv"
 
     def _following(self, location: str, law: FollowingMotion, element: Any) -> dict[str, Any]:
-        """Return a law of the coordinate of a driver, by its name, or of an expression of t."""
+        """Return a law of the coordinate of a driver, by name, or of an expression of t."""
         followed, leader = law.recipe.value[0]
         if isinstance(followed, FollowingMotion | OutputMotion | TrapezoidalMotion):
             message = f"a {type(followed).__name__} of another coordinate has no form in a file; use segments"
@@ -157,13 +157,13 @@ class WrittenLaws:
 
 
 def _same(law: Any, leader: Any) -> bool:
-    """Return whether a law of a driver is the leader: itself, or the same expression."""
+    """Return whether the law of a driver is the leader: the same object, or the same expression."""
     texts = [x.text if isinstance(x, Expression) else x for x in (law, leader)]
     return law is leader or (isinstance(texts[0], str) and texts[0] == texts[1])
 
 
 def _segmented(location: str, law: SegmentedMotion) -> dict[str, Any]:
-    """Return a law of segments as they were given."""
+    """Return a law of segments as it was given."""
     segments, initial, start, beyond = law.recipe.value
     entries = []
     for segment in segments:
@@ -174,7 +174,7 @@ def _segmented(location: str, law: SegmentedMotion) -> dict[str, Any]:
 
 
 def _piecewise(location: str, law: PiecewiseMotion) -> dict[str, Any]:
-    """Return expressions that follow each other."""
+    """Return a law of consecutive expressions."""
     (parts, ends, start, beyond), entries = law.recipe.value, []
     for k, part in enumerate(parts):
         if isinstance(part, ExpressionMotion):
@@ -192,12 +192,12 @@ def _piecewise(location: str, law: PiecewiseMotion) -> dict[str, Any]:
 
 
 def _samples_of(law: SplineMotion) -> tuple[Any, Any]:
-    """Return samples through which there is one spline only of the degree and the breakpoints of a law."""
+    """Return samples that determine the spline of a law by its degree and breakpoints."""
     ends = np.asarray(law.breakpoints, float)
     pieces = np.asarray(law.coefficients, float)
-    between = (law.degree - 1) // 2  # samples near each end, which are no breakpoints
+    between = (law.degree - 1) // 2  # samples within each end interval, which are no breakpoints
     last = float(law.stop)
-    if last <= ends[-1]:  # the last piece is rest, without an end
+    if last <= ends[-1]:  # the last piece is at rest, without an end
         last = ends[-1] + ((between + 1) * (ends[-1] - ends[0]) / (len(ends) + between) if len(ends) > 1 else 1.0)
     times = np.unique(np.concatenate([
         np.linspace(ends[0], ends[1] if len(ends) > 1 else last, between + 2),
@@ -216,7 +216,7 @@ def _own_names(law: ExpressionLaw, element: Any) -> bool:
 
 
 def _substituted(expression: Expression, parameters: Mapping[str, Any]) -> Any:
-    """Return the text of an expression with the values of its own parameters in their places."""
+    """Return the text of an expression with the values of its own parameters inserted."""
 
     def value_of(match: re.Match[str]) -> str:
         name = match.group()

@@ -1,4 +1,4 @@
-"""Values as a mechanism file holds them: numbers, text and lists."""
+"""Values as data of a mechanism file: numbers, text and lists."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from jounce.trajectory import Expression
 
 
 def plain(value: Any, location: str) -> Any:
-    """Return a value as numbers, text and lists; whole numbers without a point."""
+    """Return a value as numbers, text and lists; integers without a decimal point."""
     if isinstance(value, Expression):
         return value.text
     if isinstance(value, str | bool):
@@ -31,7 +31,7 @@ def plain(value: Any, location: str) -> Any:
 
 
 def plain_number(value: float, location: str) -> float | int:
-    """Return a finite number, a whole one without a point."""
+    """Return a finite number, as an int if it is an integer."""
     if not math.isfinite(value):
         raise MechanismError("must be finite", name=location, value=value)
     whole = value.is_integer() and abs(value) < 1e9 and math.copysign(1.0, value) == (1.0 if value >= 0 else -1.0)

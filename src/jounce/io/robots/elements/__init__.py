@@ -1,1 +1,1 @@
-"""Elements of XML, the faults of a file, and joints that follow others: what the readers of robot files share."""
+"""Common parts of the readers of robot files: XML elements, faults of a file, and joints that follow others."""

@@ -1,4 +1,4 @@
-"""What robot files hold that no real robot has, or that is left out: read all the same, with one warning."""
+"""Faults of robot files, and their parts that are left out: the file is read all the same, with one warning."""
 
 from __future__ import annotations
 
@@ -41,48 +41,48 @@ FLUID_PLUGINS = "forces of air and water by plugins"
 ROTORS = "inertia of the rotors of drives"
 MASS_OF_SHAPES = "masses that follow from shapes, or from a total mass"
 LEAVE = "motions and forces are computed without {}; take it out of the file, or read it without strict"
-SHOWN = 200  # names for each fault
-FEW = 6  # names for each part that is left out
+SHOWN = 200  # names listed for each fault
+FEW = 6  # names listed for each part that is left out
 
 
 def left_out(heading: str, unless: str = "zero") -> str:
-    """Return the message of an error about what is left out unless it has a value."""
+    """Return the message of an error about a part that is left out unless it has a neutral value."""
     return f"motions and forces are computed without {heading}; set it to {unless}, or read the file without strict"
 
 
 class Faults:
-    """Gathers the faults of a file, and what is left out of it; if it is strict, the first one is an error.
+    """Collects the faults of a file and the parts that are left out; in a strict reading, the first one is an error.
 
     Parameters
     ----------
     path : str
-        The file.
+        Path of the file.
     strict : bool
         Whether faults are errors.
     """
 
     def __init__(self, path: str, strict: bool = False):
         self.path, self.strict = path, strict
-        self.names: dict[str, dict[str, None]] = {}  # what is noted under each heading, each once
+        self.names: dict[str, dict[str, None]] = {}  # names under each heading, each once
         self.unread: dict[str, dict[str, None]] = {}
 
     def add(self, heading: str, name: str, error: RobotFileError) -> None:
-        """Note a fault of a link or joint.
+        """Record a fault of a link or joint.
 
         Raises
         ------
         RobotFileError
-            The error given, if faults are errors.
+            The given error, if faults are errors.
         """
         self._note(self.names, heading, name, error)
 
     def leave_out(self, heading: str, name: str, error: RobotFileError) -> None:
-        """Note what a link, a joint or another part has that bears on motions or forces and is not read.
+        """Record a part of a link, joint or other element that affects motions or forces and is not read.
 
         Raises
         ------
         RobotFileError
-            The error given, if faults are errors.
+            The given error, if faults are errors.
         """
         self._note(self.unread, heading, name, error)
 
@@ -93,7 +93,7 @@ class Faults:
         names.setdefault(heading, {})[ascii(name)[1:-1] + line] = None
 
     def check(self, inertia: Inertia, link: str, line: int | None) -> None:
-        """Note what is wrong with the inertia of a link."""
+        """Record the fault of the inertia of a link, if any."""
         if fault := inertia.fault:
             location = {"path": self.path, "line": line, "name": f"links.{ascii(link)[1:-1]}.inertia"}
             self.add(
@@ -101,7 +101,7 @@ class Faults:
             )
 
     def warning(self) -> RobotWarning | None:
-        """Return the warning that names links, joints and other parts, None if there is nothing to tell."""
+        """Return the warning that names links, joints and other parts; None if there is nothing to report."""
         parts = []
         if self.names:
             parts.append("values that no real robot has are used as they are in the file")

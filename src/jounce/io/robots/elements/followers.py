@@ -1,4 +1,4 @@
-"""Joints of a file whose ranges leave the joint that they follow no room: that one keeps its own."""
+"""Joints whose ranges leave their leader no room to move: these ranges are ignored."""
 
 from __future__ import annotations
 
@@ -18,27 +18,27 @@ def with_room(
     located: Callable[[RobotError], RobotFileError],
     fixed: Collection[str] = (),
 ) -> list[Joint]:
-    """Return the joints, those that leave the joint that they follow no room without their range.
+    """Return the joints, without the ranges that leave the leader of their joint no room to move.
 
-    A range of which nothing or one point is left, seen from the leader, is a fault of the file: a copied block of
-    limits, or one without the sign of the multiplier. A range that suits the leader alone goes before one that does
-    not; of those that suit it but not one another none counts.
+    A range that leaves at most one point of the range of the leader is a fault of the file: a copied block of limits,
+    or a missing sign of the multiplier. A range that suits the leader alone precedes one that does not. Of ranges that
+    suit the leader but not one another, all are ignored.
 
     Parameters
     ----------
     joints : sequence of Joint
-        Of the file.
+        Joints of the file.
     faults : Faults
-        Takes the ranges that do not count.
+        Records the ignored ranges.
     located : callable
-        Makes an error of the file of one of the robot, with the line of what it names.
+        Converts an error of the robot to an error of the file, with the line.
     fixed : collection of str, optional
-        Joints that are held in one place, whatever their range.
+        Joints that are held in one position, whatever their range.
 
     Raises
     ------
     RobotFileError
-        If such a range is an error.
+        If an ignored range is an error.
     """
     by_name = {joint.name: joint for joint in joints}
     following: dict[str, list[Joint]] = {}
@@ -75,7 +75,7 @@ def with_room(
 
 
 def _narrowing(leader: Joint, followers: Sequence[Joint]) -> list[Joint]:
-    """Return the two followers whose ranges begin last at their leader, and the two whose ranges end first there.
+    """Return the two followers with the highest lower ends, and the two with the lowest upper ends, seen at the leader.
 
     If a joint has no room beside another follower, it has none beside one of these.
     """

@@ -1,4 +1,4 @@
-"""Which element of a robot file has a name that the robot's own checks report."""
+"""Look-up of the elements of a robot file by the names that errors of the robot report."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ class NamedElements:
     Parameters
     ----------
     root : Element
-        Stands for what has no element of its own.
+        Element for names without an element of their own.
     """
 
     def __init__(self, root: Element):
@@ -20,12 +20,12 @@ class NamedElements:
         self.elements: dict[str, Element] = {}
 
     def add(self, element: Element | None, *name: str) -> None:
-        """Note the element behind a name given in steps, unless there is one, or none is given."""
+        """Record the element of a name given in steps, unless the name has one or the element is None."""
         if element is not None:
             self.elements.setdefault(".".join(name), element)
 
     def located(self, error: RobotError) -> RobotFileError:
-        """Return an error of the robot with the file and the line that it is about."""
+        """Return an error of the robot as an error of the file, with the line of the named element."""
         name = error.name or ""
         if isinstance(error.value, list) and name in ("links", "joints") and error.value:
             name = f"{name}.{error.value[-1]}"

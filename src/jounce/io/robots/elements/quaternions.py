@@ -12,16 +12,16 @@ from jounce.io.robots.elements.faults import NOT_UNIT
 from jounce.io.robots.elements.xml_elements import Element
 
 LEAST = 1e-9
-ROUNDED = 0.01  # what two decimals may make of the length
+ROUNDED = 0.01  # deviation of the length by rounding to two decimals
 
 
 def rotation_of(quaternion: Sequence[float], element: Element, *name: str) -> Float[np.ndarray, "3 3"]:
-    """Return the rotation of a quaternion x, y, z, w; one whose length is not about one is noted.
+    """Return the rotation matrix of a quaternion x, y, z, w; a length that is far from 1 is recorded as a fault.
 
     Raises
     ------
     RobotFileError
-        If it is zero, or is noted and the faults of the file are errors.
+        If the quaternion is zero, or a recorded fault is an error.
     """
     from scipy.spatial.transform import Rotation
 

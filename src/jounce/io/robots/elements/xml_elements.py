@@ -1,4 +1,4 @@
-"""XML read into plain elements that know their lines, so that every message about a robot file can name one."""
+"""XML as plain elements with lines, so that every message about a robot file can name a line."""
 
 from __future__ import annotations
 
@@ -26,25 +26,25 @@ class Element:
     path: str
     line: int
     children: list[Element] = field(default_factory=list)
-    pieces: list[str] = field(default_factory=list)  # of the text within, but for that of the children
-    faults: Faults | None = None  # of the file, which take elements that nobody knows
+    pieces: list[str] = field(default_factory=list)  # text of the element without that of its children
+    faults: Faults | None = None  # of the file, which record unknown elements
 
     @property
     def content(self) -> str:
-        """The text within, but for that of the children."""
+        """The text of the element without that of its children."""
         return "".join(self.pieces)
 
     def first(self, tag: str) -> Element | None:
-        """Return the first child of a tag, None if there is none."""
+        """Return the first child with a tag; None if there is none."""
         return next((child for child in self.children if child.tag == tag), None)
 
     def only(self, tag: str, *name: str) -> Element | None:
-        """Return the first child of a tag, None if there is none; others are noted.
+        """Return the first child with a tag; None if there is none; further ones are recorded.
 
         Raises
         ------
         RobotFileError
-            There are others, and the faults of the file are errors.
+            If there are further ones, and faults are errors.
         """
         elements = self.every(tag)
         if len(elements) > 1:
@@ -53,11 +53,11 @@ class Element:
         return elements[0] if elements else None
 
     def every(self, tag: str) -> list[Element]:
-        """Return all children of a tag."""
+        """Return all children with a tag."""
         return [child for child in self.children if child.tag == tag]
 
     def walk(self) -> Iterator[Element]:
-        """Give the element and all within it, in the order of the file."""
+        """Yield the element and all its descendants, in the order of the file."""
         waiting: list[Element] = [self]
         while waiting:
             element = waiting.pop()
@@ -65,11 +65,11 @@ class Element:
             waiting.extend(reversed(element.children))
 
     def error(self, message: str, *name: str, **value: Any) -> RobotFileError:
-        """Return an error at the line of the element, about the entry whose name is given in steps."""
+        """Return an error at the line of the element, about an entry whose name is given in steps."""
         return RobotFileError(message, path=self.path, line=self.line, name=dotted(name) or None, **value)
 
     def text(self, key: str, *name: str) -> str:
-        """Return an attribute that must be there and not be blank."""
+        """Return a required attribute, which must not be blank."""
         value = self.attributes.get(key)
         if value is None:
             raise self.error(f"<{self.tag}> has no attribute {key}", *name)
@@ -78,21 +78,21 @@ class Element:
         return value
 
     def number(self, key: str, *name: str, default: float | None = None) -> float:
-        """Return the finite number in an attribute, which must be there unless there is a default."""
+        """Return the finite number of an attribute, which is required unless there is a default."""
         if default is None:
             self.text(key, *name)
         numbers = self.numbers(key, 1, *name)
         return numbers[0] if numbers else float(default or 0.0)
 
     def numbers(self, key: str, count: int, *name: str, infinite: bool = False) -> list[float] | None:
-        """Return the finite numbers in an attribute, None if it is not there."""
+        """Return the finite numbers of an attribute; None if it is missing."""
         text = self.attributes.get(key)
         if text is None:
             return None
         return self._parsed(text, f"{key} must be", count, name, infinite)
 
     def content_numbers(self, count: int, *name: str, infinite: bool = False) -> list[float]:
-        """Return the finite numbers that an element holds as its text."""
+        """Return the finite numbers in the text of the element."""
         return self._parsed(self.content.strip(), f"<{self.tag}> must hold", count, name, infinite)
 
     def _parsed(self, text: str, words: str, count: int, name: tuple[str, ...], infinite: bool) -> list[float]:
@@ -110,12 +110,12 @@ class Element:
         return values
 
     def check_children(self, known: Iterable[str], *name: str) -> None:
-        """Note a child whose tag is nearly a known one: what it holds is left out.
+        """Record a child whose tag is nearly a known one, since its content is left out.
 
         Raises
         ------
         RobotFileError
-            If the faults of the file are errors.
+            If faults are errors.
         """
         valid = set(known)
         for child in self.children:
@@ -124,23 +124,23 @@ class Element:
                 child.leave_out_unknown(f"unknown element; {near}", *name)
 
     def leave_out_unknown(self, message: str, *name: str) -> None:
-        """Note the element as one that its format does not have.
+        """Record the element as one that its format does not have.
 
         Raises
         ------
         RobotFileError
-            If the faults of the file are errors.
+            If faults are errors.
         """
         shown = f"<{self.tag}> of {name[1]}" if len(name) > 1 else f"<{self.tag}>"
         self.leave_out(UNKNOWN, shown, message, *name)
 
     def leave_out(self, heading: str, shown: str, message: str, *name: str) -> None:
-        """Note under a heading that the element is left out.
+        """Record under a heading that the element is left out.
 
         Raises
         ------
         RobotFileError
-            If the faults of the file are errors.
+            If faults are errors.
         """
         error = self.error(message, *name, value=f"<{self.tag}>")
         if self.faults is None:
@@ -151,26 +151,26 @@ class Element:
 def read_markup(path: str, faults: Faults | None = None) -> Element:
     """Read an XML file of at most 10 MB.
 
-    What the readers of other programs let pass is read as they do, and noted: a declaration after blank lines or
-    comments, two hyphens within a comment, zero bytes or other text at the end.
+    Some faults that the readers of other programs tolerate are read as they do, and recorded: a declaration after blank
+    lines or comments, two hyphens within a comment, zero bytes or other text at the end.
 
     Parameters
     ----------
     path : str
-        The file.
+        Path of the file.
     faults : Faults, optional
-        Take what is read though it is not XML, and elements that nobody knows.
+        Records tolerated faults and unknown elements.
 
     Returns
     -------
     Element
-        The root.
+        The root element.
 
     Raises
     ------
     RobotFileError
-        The file cannot be read, is empty, or is not well-formed XML: the message has line and column, and what the
-        parser says.
+        If the file cannot be read, is empty, or is not well-formed XML: the message has line, column and the words of
+        the parser.
     """
     content = read_file(path, error=RobotFileError)
     if not content.strip():
@@ -206,7 +206,7 @@ def read_markup(path: str, faults: Faults | None = None) -> Element:
 
 
 def _tolerated(content: bytes) -> tuple[bytes, list[tuple[str, int]]]:
-    """Return text without what other readers let pass, all in its line, and what that is, with the line of each."""
+    """Return XML without the faults that other readers tolerate, with all lines kept, and these faults with lines."""
     noted: list[tuple[str, int]] = []
 
     def blank(match: re.Match[bytes]) -> bytes:
@@ -252,7 +252,7 @@ class _Reader:
         return self.root
 
     def complete(self, content: bytes) -> Element | None:
-        """Return the root where it had ended before the parser stopped, and no other element begins after it."""
+        """Return the root if it ended before the parser stopped, and no other element follows."""
         rest = content[self.parser.ErrorByteIndex :]
         return None if self.open or re.search(rb"<[^/!?]", rest) else self.root
 

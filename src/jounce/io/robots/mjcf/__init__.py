@@ -1,1 +1,1 @@
-"""MJCF, compiled by MuJoCo: bodies, drives, ties, and what is left out."""
+"""MJCF, compiled by MuJoCo: bodies, drives, ties, and parts that are left out."""

@@ -1,4 +1,4 @@
-"""What drives the joints of a compiled MJCF model: armature, damping, friction, springs, and tendons along joints."""
+"""Drives of the joints of a compiled MJCF model: armature, damping, friction, springs, and tendons along joints."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 
 from jounce.robot.model.couplings import BallDrive, Tendon
 
-OF_CONSTRAINTS = ("FRICTIONLOSS", "EQUALITY", "LIMIT")  # which the flag of all constraints switches off, too
+OF_CONSTRAINTS = ("FRICTIONLOSS", "EQUALITY", "LIMIT")  # which the flag of all constraints disables, too
 OF_BALL = {"armature": "armature", "damping": "damping", "friction": "frictionloss"}
 
 
@@ -19,9 +19,9 @@ class Drives:
     Parameters
     ----------
     model, mujoco
-        The compiled model, and the package.
+        Compiled model, and the package.
     names : sequence of str
-        Of the joints, by number.
+        Names of the joints, by number.
     """
 
     def __init__(self, model: Any, mujoco: Any, names: Sequence[str]):
@@ -29,18 +29,18 @@ class Drives:
         self.efforts = _efforts(model, mujoco)
 
     def works(self, part: str) -> bool:
-        """Whether no flag of the file takes a part of the dynamics away."""
+        """Return whether no flag of the file disables a part of the dynamics."""
         return works(self.model.opt.disableflags, part, self.mujoco)
 
     @property
     def passive(self) -> bool:
-        """Whether there are passive forces; MuJoCo leaves all out where it leaves out springs and dampers both."""
+        """Whether there are passive forces; MuJoCo disables all of them if it disables both springs and dampers."""
         return self.works("SPRING") or self.works("DAMPER")
 
     def of_joint(self, j: int) -> tuple[dict[str, float], str]:
-        """Return what drives a hinge or a slide, and which part of it is no single number, empty if none is.
+        """Return the drive of a hinge or a slide, and the part of it that is no single number; empty if there is none.
 
-        Armature and damping are with those of its actuators times the square of the gear.
+        Armature and damping include those of its actuators times the square of the gear.
         """
         model, dof = self.model, self.model.jnt_dofadr[j]
         armature, damping = float(model.dof_armature[dof]), float(model.dof_damping[dof])
@@ -62,23 +62,23 @@ class Drives:
         return given, several
 
     def of_several(self, j: int) -> dict[str, float]:
-        """Return what drives a ball or free joint, alike along all that it leaves free."""
+        """Return the drive of a ball or free joint, which is the same along all its freedoms."""
         dof = self.model.jnt_dofadr[j]
         on = {"armature": True, "damping": self.works("DAMPER"), "friction": self.works("FRICTIONLOSS")}
         values = {key: float(getattr(self.model, f"dof_{name}")[dof]) for key, name in OF_BALL.items()}
         return {key: value if on[key] else 0.0 for key, value in values.items()}
 
     def ball(self, name: str, turns: Sequence[str], given: Mapping[str, float]) -> list[BallDrive]:
-        """Return the drive of three turns, none if nothing drives them."""
+        """Return the drive of three turns, in a list that is empty if nothing drives them."""
         return [BallDrive(name, turns, **given)] if any(given.values()) else []
 
     def compensated(self, body: int) -> float:
-        """Return the share of gravity that is taken off a body."""
+        """Return the share of gravity that is compensated for a body."""
         known = self.passive and not self.model.jnt_actgravcomp.any()
         return float(self.model.body_gravcomp[body]) if known else 0.0
 
     def tendons(self, fixed: Mapping[str, float]) -> list[Tendon]:
-        """Return the tendons along joints that have a spring, damping or friction, but for joints that are held."""
+        """Return the tendons along joints with a spring, damping or friction, unless all their joints are held."""
         model, made = self.model, []
         for k in range(model.ntendon):
             if not along_joints(model, k, self.mujoco):
@@ -103,26 +103,26 @@ class Drives:
 
 
 def works(flags: int, part: str, mujoco: Any) -> bool:
-    """Whether the flags of a file leave a part of the dynamics, by MuJoCo's name of it, on."""
+    """Return whether the flags of a file enable a part of the dynamics, by its name in MuJoCo."""
     switches = (part, "CONSTRAINT") if part in OF_CONSTRAINTS else (part,)
     return not any(flags & int(getattr(mujoco.mjtDisableBit, f"mjDSBL_{switch}")) for switch in switches)
 
 
 def single_spring(model: Any, j: int) -> bool:
-    """Whether the spring of a joint is linear and holds one coordinate."""
+    """Return whether the spring of a joint is linear and acts on one coordinate."""
     single = model.jnt_type[j] >= 2
     return bool(single and not model.jnt_stiffnesspoly[j].any())
 
 
 def along_joints(model: Any, tendon: int, mujoco: Any) -> bool:
-    """Whether a tendon runs along joints, and not between points."""
+    """Return whether a tendon runs along joints, not between points."""
     first = int(model.tendon_adr[tendon])
     kinds = model.wrap_type[first : first + int(model.tendon_num[tendon])]
     return bool(np.all(kinds == int(mujoco.mjtWrap.mjWRAP_JOINT)))
 
 
 def _efforts(model: Any, mujoco: Any) -> dict[int, float]:
-    """Return the largest force of each joint where its own range, or that of its only actuator, is symmetric."""
+    """Return the largest force of each joint whose own range, or that of its only actuator, is symmetric."""
     efforts: dict[int, float] = {}
     for j in range(model.njnt):
         actuators = np.flatnonzero(model.actuator_trnid[:, 0] == j)

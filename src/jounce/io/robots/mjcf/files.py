@@ -1,4 +1,4 @@
-"""The files that an MJCF file names, checked before MuJoCo reads them, and its warnings, kept from its log file."""
+"""Files that an MJCF file names, checked before MuJoCo reads them, and MuJoCo's warnings, kept from its log file."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ from jounce.io.files.reading import MAX_SAMPLES, named_file, read_file
 from jounce.io.robots.elements.xml_elements import Element, read_markup
 
 MOST_BODIES = 2000
-"""Of a robot, with those that are repeated; MuJoCo's own time grows with their square."""
+"""Largest number of bodies of a robot, with repeated ones; the time of MuJoCo grows with its square."""
 MOST_NESTED = 50
-"""Files within files."""
+"""Deepest nesting of files."""
 
 
 @contextmanager
 def quiet_mujoco(mujoco: Any) -> Iterator[None]:
-    """Keep what MuJoCo warns of, which is about simulations, from Python and from a log file in the working folder."""
+    """Suppress warnings of MuJoCo, which concern simulations, in Python and in a log file in the working folder."""
     before = mujoco.get_mju_user_warning()
     mujoco.set_mju_user_warning(lambda _message: None)
     try:
@@ -35,14 +35,14 @@ def quiet_mujoco(mujoco: Any) -> Iterator[None]:
 
 
 def included(root: Element, allow: Iterable[str | PathLike[str]] = ()) -> list[Element]:
-    """Return the roots of all files that an MJCF file includes or attaches, each of them once.
+    """Return the roots of all files that an MJCF file includes or attaches, each once.
 
-    MuJoCo looks for them beside the main file, and then beside the one that names them.
+    Like MuJoCo, look for each file beside the main file, and then beside the file that names it.
 
     Raises
     ------
     RobotFileError
-        One cannot be read, or lies where it may not.
+        If a file cannot be read, or lies where it may not.
     """
     elements: dict[str, Element] = {}
     waiting = [root]
@@ -63,7 +63,7 @@ def included(root: Element, allow: Iterable[str | PathLike[str]] = ()) -> list[E
 
 
 def _included(element: Element, name: str, path: str) -> Element:
-    """Read a file that an element names; one of which nothing can be read is an error of that element."""
+    """Return the root of a file that an element names; an error of the whole file is reported for that element."""
     try:
         return read_markup(path)
     except RobotFileError as error:
@@ -73,12 +73,12 @@ def _included(element: Element, name: str, path: str) -> Element:
 
 
 def check_copies(parts: Iterable[Element]) -> None:
-    """Refuse more bodies than a robot has, which few lines of MJCF files can ask for, before MuJoCo makes them.
+    """Raise an error for more bodies than any robot has, which few lines of MJCF can create, before MuJoCo does.
 
     Raises
     ------
     RobotFileError
-        Repeated, attached and included parts hold too many bodies together.
+        If repeated, attached and included parts hold too many bodies.
     """
     copies = _Copies(list(parts))
     for root in copies.roots:
@@ -86,11 +86,11 @@ def check_copies(parts: Iterable[Element]) -> None:
 
 
 class _Copies:
-    """Counts the bodies that files stand for, each file once however often it is attached or included."""
+    """Counts the bodies of files, each file once however often it is attached or included."""
 
     def __init__(self, roots: list[Element]):
         self.roots = roots
-        self._files: dict[str, list[Element]] = {}  # by their names without folders
+        self._files: dict[str, list[Element]] = {}  # by name without folders
         for root in roots:
             self._files.setdefault(Path(root.path).name, []).append(root)
         self._models: dict[str | None, list[Element]] = {}
@@ -101,12 +101,12 @@ class _Copies:
         self._counts: dict[int, int] = {}
 
     def bodies(self, root: Element, depth: int = 0) -> int:
-        """Return how many bodies a file stands for, with all that it repeats, attaches and includes."""
+        """Return the number of bodies of a file, with all that it repeats, attaches and includes."""
         if id(root) in self._counts:
             return self._counts[id(root)]
         if depth > MOST_NESTED:
             raise root.error(f"files attach or include one another more than {MOST_NESTED} deep")
-        self._counts[id(root)] = total = 0  # a file within itself is for MuJoCo to refuse
+        self._counts[id(root)] = total = 0  # MuJoCo refuses a file within itself
         waiting = [(root, 1)]
         while waiting:
             element, copies = waiting.pop()
@@ -121,7 +121,7 @@ class _Copies:
         return total
 
     def _body_count(self, element: Element, depth: int) -> int:
-        """Return how many bodies an element is or brings from other files, those of its children left out."""
+        """Return the number of bodies of an element or the files that it brings, without its children."""
         if element.tag == "attach":
             others = self._models.get(element.attributes.get("model"), [])
         elif element.tag == "include":
@@ -147,27 +147,27 @@ def _named(
 
 
 def line_of(text: str) -> int | None:
-    """Return the line that a text of MuJoCo speaks of."""
+    """Return the line that a text of MuJoCo mentions; None if it mentions none."""
     match = re.search(r"[Ll]ine (?:number=)?(\d+)", text)
     return None if match is None else int(match[1])
 
 
 def check_assets(spec: Any, parts: Iterable[Element], allow: Iterable[str | PathLike[str]] = ()) -> None:
-    """Refuse meshes and pictures that lie where they may not, or are no files: MuJoCo reads whatever it is given.
+    """Raise an error for meshes and pictures in forbidden places, or that are no files: MuJoCo reads anything.
 
     Parameters
     ----------
     spec : mujoco.MjSpec
-        With those only that will be read.
+        Specification with only the parts that will be read.
     parts : iterable of Element
-        The root of the file, and those of the files that it includes.
+        Root of the file, and those of the included files.
     allow
-        Folders besides that of the file that they may be below.
+        Folders besides that of the file below which they may lie.
 
     Raises
     ------
     RobotFileError
-        One is refused; MuJoCo says what is missing.
+        If a file is refused; MuJoCo itself reports missing files.
     """
     roots = list(parts)
     folders = list(dict.fromkeys(Path(part.path).parent for part in roots))
@@ -185,7 +185,7 @@ def check_assets(spec: Any, parts: Iterable[Element], allow: Iterable[str | Path
 
 
 def _asset_files(spec: Any) -> Iterator[tuple[str, Any, str]]:
-    """Give the kind of each part that comes from a file, the part, and the name of the file."""
+    """Yield each part that comes from a file: its kind, the part, and the name of the file."""
     kinds = {"mesh": spec.meshes, "texture": spec.textures, "hfield": spec.hfields, "skin": spec.skins}
     for tag, assets in kinds.items():
         for asset in assets:

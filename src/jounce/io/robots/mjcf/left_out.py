@@ -1,4 +1,4 @@
-"""What MuJoCo's dynamics has and a robot has not: springs, tendons, compensated gravity, a fluid; it warns."""
+"""Parts of MuJoCo's dynamics that a robot lacks: some springs and tendons, gravity compensation, fluids."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ FLUID_UNITS = {"density": "kg/m^3", "viscosity": "Pa s"}
 
 
 class SkippedPart(NamedTuple):
-    """A part of the file that is not read: what it is of whom, its name and line, the entry and its value."""
+    """A part of the file that is not read: heading, shown name, line, dotted name of the entry, and value."""
 
     heading: str
     shown: str
@@ -42,7 +42,7 @@ class SkippedPart(NamedTuple):
 
 
 def left_out_of_spec(spec: Any, mujoco: Any) -> list[SkippedPart]:
-    """Return what is left out with tendons and their actuators, before these are taken away."""
+    """Return the parts that are left out with tendons and their actuators, before these are removed."""
     on = _is_enabled(spec.option.disableflags, mujoco)
     # MuJoCo itself refuses damping and armature of actuators of other kinds
     drives = [(k, x) for k, x in enumerate(spec.actuators) if x.trntype == mujoco.mjtTrn.mjTRN_TENDON]
@@ -57,7 +57,7 @@ def left_out_of_spec(spec: Any, mujoco: Any) -> list[SkippedPart]:
                 if value.any() and on(key) and (key not in read or value[1:].any()):
                     left.append(SkippedPart(heading, name, line_of(part.info), f"{kind}s.{name}.{key}", _plain(value)))
     for k, actuator in enumerate(spec.actuators if on("actuation") else ()):
-        if actuator.ctrlspec == int(mujoco.mjtCtrlInput.mjINPUT_NONE):  # friction and cogging of a motor, its brake
+        if actuator.ctrlspec == int(mujoco.mjtCtrlInput.mjINPUT_NONE):  # such as friction and cogging of a motor, its brake
             name = actuator.name or f"actuator_{k}"
             left.append(SkippedPart(UNCONTROLLED, name, line_of(actuator.info), f"actuators.{name}.input", "none"))
     for k, tendon in enumerate(spec.tendons if on("range") else ()):
@@ -70,7 +70,7 @@ def left_out_of_spec(spec: Any, mujoco: Any) -> list[SkippedPart]:
 
 
 def _read_of(tendon: Any, mujoco: Any) -> tuple[str, ...]:
-    """Return the attributes of a tendon that are read, as far as they are one number."""
+    """Return the attributes of a tendon that are read, as far as they are single numbers."""
     if not len(tendon.path) or any(part.type != mujoco.mjtWrap.mjWRAP_JOINT for part in tendon.path):
         return ()
     lengths = np.ravel(tendon.springlength)
@@ -82,16 +82,18 @@ def _read_of(tendon: Any, mujoco: Any) -> tuple[str, ...]:
 def left_out_of_model(
     model: Any, mujoco: Any, bodies: Sequence[str], joints: Sequence[str], fixed: Container[str]
 ) -> Iterator[SkippedPart]:
-    """Give what is left out of joints, bodies and the whole of a compiled model; lines are those of the elements.
+    """Yield the parts of the joints, the bodies and the whole of a compiled model that are left out.
+
+    Lines are those of the elements.
 
     Parameters
     ----------
     model, mujoco
-        The compiled model, and the package.
+        Compiled model, and the package.
     bodies, joints : sequence of str
-        Their names, by number.
+        Names of the bodies and joints, by number.
     fixed : container of str
-        Joints that an equality holds where they are, which no force moves.
+        Joints that an equality holds in place, which no force moves.
     """
     on = _is_enabled(model.opt.disableflags, mujoco)
     free = [name not in fixed for name in joints]
@@ -103,9 +105,9 @@ def left_out_of_model(
             yield SkippedPart(YIELD, name, None, f"joints.{name}.springyield", float(model.jnt_springyield[j]))
         if model.jnt_limited[j] and model.jnt_type[j] == int(mujoco.mjtJoint.mjJNT_BALL) and on("range"):
             yield SkippedPart(RANGE_OF_BALLS, name, None, f"joints.{name}.range", float(model.jnt_range[j, 1]))
-    passive = on("stiffness") or on("damping")  # MuJoCo leaves out all such forces where it leaves out both
+    passive = on("stiffness") or on("damping")  # MuJoCo disables all such forces if it disables both
     falls = model.opt.gravity.any() and on("gravity")
-    matters = passive and falls and model.jnt_actgravcomp.any()  # else bodies feel less of gravity
+    matters = passive and falls and model.jnt_actgravcomp.any()  # otherwise bodies feel less gravity
     for k in np.flatnonzero((model.body_gravcomp != 0) & (model.body_mass > 0)).tolist() if matters else ():
         if any(free[j] and not model.jnt_actgravcomp[j] for j in _moved_by(model, k)):
             yield SkippedPart(
@@ -119,7 +121,7 @@ def left_out_of_model(
 
 
 def _moved_by(model: Any, body: int) -> Iterable[int]:
-    """Give the joints between a body and the world."""
+    """Yield the joints between a body and the world."""
     while body > 0:
         first = int(model.body_jntadr[body])
         yield from range(first, first + int(model.body_jntnum[body]))
@@ -127,12 +129,12 @@ def _moved_by(model: Any, body: int) -> Iterable[int]:
 
 
 def _is_enabled(flags: int, mujoco: Any) -> Callable[[str], bool]:
-    """Return whether MuJoCo computes what belongs to an attribute, or the file switches it off."""
+    """Return a function that tells whether the file leaves the dynamics of an attribute enabled."""
     parts = {"stiffness": "SPRING", "damping": "DAMPER", "frictionloss": "FRICTIONLOSS", "gravity": "GRAVITY"}
     parts |= {"springyield": "SPRING", "actuation": "ACTUATION", "range": "LIMIT"}
     return lambda key: key not in parts or works(flags, parts[key], mujoco)
 
 
 def _plain(values: np.ndarray) -> object:
-    """Return one number where those of higher powers are zero, else all of them."""
+    """Return a single number if those of higher powers are zero, else all numbers."""
     return values.tolist() if values[1:].any() else float(values[0])

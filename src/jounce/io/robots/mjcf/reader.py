@@ -32,7 +32,7 @@ _Vector = Float[np.ndarray, "3"]
 _Matrix = Float[np.ndarray, "3 3"]
 DEFORMABLE = "has deformable parts (flex), which no rigid body stands for"
 POSE_KEYS = ("pos", "quat", "axisangle", "xyaxes", "zaxis", "euler")
-NUMERIC = {  # attributes whose numbers MuJoCo takes even when they are not finite
+NUMERIC = {  # attributes whose numbers MuJoCo accepts even if they are not finite
     **dict.fromkeys(("body", "site"), POSE_KEYS),
     "inertial": (*POSE_KEYS, "mass", "diaginertia", "fullinertia"),
     "joint": ("pos", "axis", "range", "ref", "armature", "damping", "frictionloss", "polycoef"),
@@ -43,34 +43,36 @@ NUMERIC = {  # attributes whose numbers MuJoCo takes even when they are not fini
 
 
 def read_mjcf(root: Element, faults: Faults, allow: Iterable[str | PathLike[str]] = ()) -> Robot:
-    """Return the robot that an MJCF file describes, as MuJoCo compiles it.
+    """Return the robot of an MJCF file, as compiled by MuJoCo.
 
-    The base is the link ``world``. Hinges and slides are taken with their anchors and reference positions: a coordinate
-    is MuJoCo's ``qpos``. A ball becomes three turns z, y, x about moving axes, zero in the pose of the file; a free
-    joint three slides along the axes of the world, whose coordinates are the position of the body, and three such
-    turns, zero where its axes are those of the world; what drives them acts on the angular velocity (`BallDrive`).
-    Several joints on one body have massless links between them. Bodies and joints without a name are called
-    ``body_1``, ``joint_0`` and so on, by their number in MuJoCo. Armature, damping, friction and linear springs of
-    joints are read, with the armature and damping of actuators on them, tendons along joints (`Tendon`), and the share
-    of gravity that is compensated for bodies; ranges become limits, and symmetric ranges of force limits of effort. A
-    joint tied to another by a linear equality, of joints or of tendons along joints, follows it; active equalities of
-    type connect and weld become closures, named closure_0 and so on where they have no name. Contacts and all else that
-    is no body, joint or actuator of a joint are left out; there is a warning of springs that are not linear, fluids,
-    and what other tendons and the actuators on them add. What a flag switches off is zero.
+    The base is the link ``world``. Hinges and slides keep their anchors and reference positions: a coordinate is
+    MuJoCo's ``qpos``. A ball becomes three turns z, y, x about moving axes, zero in the pose of the file. A free joint
+    becomes three slides along the axes of the world, whose coordinates are the position of the body, and three such
+    turns, zero where the axes of the body are those of the world. The drive of such joints acts on the angular velocity
+    (`BallDrive`). Several joints on one body have massless links between them. Bodies and joints without a name are
+    called ``body_1``, ``joint_0`` and so on, by their number in MuJoCo.
+
+    The reader takes armature, damping, friction and linear springs of joints, with the armature and damping of their
+    actuators, tendons along joints (`Tendon`), and the compensated share of gravity of bodies. Ranges become limits,
+    and symmetric ranges of force limits of effort. A joint tied to another by a linear equality, of joints or of
+    tendons along joints, follows it. Active equalities of type connect and weld become closures, named closure_0 and so
+    on if they have no name. Contacts and everything else that is no body, joint or actuator of a joint are left out,
+    with a warning of nonlinear springs, fluids, and contributions of other tendons and their actuators. A disabled part
+    is zero.
 
     Parameters
     ----------
     root : Element
-        The element ``<mujoco>``; MuJoCo reads the file again itself.
+        Element ``<mujoco>``; MuJoCo itself reads the file again.
     faults : Faults
-        Takes what no real robot has, and what is left out.
+        Records values that no real robot has, and parts that are left out.
     allow
-        Folders besides that of the file that included files and meshes may be below.
+        Folders besides that of the file below which included files and meshes may lie.
 
     Raises
     ------
     RobotFileError
-        MuJoCo refuses the file, or it holds what a tree of rigid bodies cannot have.
+        If MuJoCo refuses the file, or it contains something that a tree of rigid bodies cannot have.
     """
     try:
         mujoco: Any = importlib.import_module("mujoco")
@@ -84,7 +86,7 @@ def read_mjcf(root: Element, faults: Faults, allow: Iterable[str | PathLike[str]
     try:
         with quiet_mujoco(mujoco):
             spec = mujoco.MjSpec.from_file(root.path)
-            scaled = spec.compiler.fusestatic and getattr(spec.compiler, "settotalmass", 0.0) > 0  # which is deprecated
+            scaled = spec.compiler.fusestatic and getattr(spec.compiler, "settotalmass", 0.0) > 0  # deprecated
             unread = left_out_of_spec(spec, mujoco)
             if not works(spec.option.disableflags, "EQUALITY", mujoco):
                 for equality in spec.equalities:
@@ -95,7 +97,7 @@ def read_mjcf(root: Element, faults: Faults, allow: Iterable[str | PathLike[str]
     except (ValueError, RuntimeError, OSError) as error:
         raise _as_file_error(str(error), root) from None
     if scaled and model.body_mass[model.body_weldid == 0].any():
-        # MuJoCo counts bodies fixed to the world in the total or not, by whether a sensor or the like refers to them
+        # whether MuJoCo counts bodies fixed to the world depends on references to them, such as by a sensor
         message = "settotalmass with fusestatic depends on which bodies fixed to the world are kept"
         raise root.error(f"{message}; remove fusestatic, or give masses instead", "compiler.settotalmass")
     reader = _Reader(root, mujoco, spec, model, faults)
@@ -105,7 +107,7 @@ def read_mjcf(root: Element, faults: Faults, allow: Iterable[str | PathLike[str]
 
 
 def _check_numbers(root: Element) -> None:
-    """Refuse numbers that are not finite, some of which MuJoCo takes, and deformable parts, whose files it reads."""
+    """Raise an error for numbers that are not finite, which MuJoCo may accept, and for deformable parts."""
     names = {element.attributes.get(key) for element in root.walk() for key in ("name", "class")}
     for element in root.walk():
         if element.tag in ("flex", "flexcomp"):
@@ -118,7 +120,7 @@ def _check_numbers(root: Element) -> None:
 
 
 def _as_file_error(says: str, root: Element) -> RobotFileError:
-    """Return MuJoCo's own message as an error with the place that it names."""
+    """Return a message of MuJoCo as an error with the place that it names."""
     name = re.search(r"[Ee]lement (?:name )?'([^']+)'", says)
     words = re.sub(r"\s*\n?Element (?:name )?'.*", "", says, flags=re.DOTALL)
     words = ascii(re.sub(r"^(?:XML )?Error: (?:Error: )?", "", words.strip()))[1:-1]
@@ -133,12 +135,12 @@ def _as_file_error(says: str, root: Element) -> RobotFileError:
 
 
 def _strip(spec: Any, mujoco: Any, tied: Container[str]) -> None:
-    """Take away what does not bear on the motion of rigid bodies, so that no mesh or texture has to be there.
+    """Delete parts that do not affect the motion of rigid bodies, so that no mesh or texture has to exist.
 
-    A shape stays where it gives a body its mass, a tendon where it is tied.
+    A shape is kept if it gives a body its mass, a tendon if it is tied.
     """
-    spec.compiler.fusestatic = False  # or bodies without joints would lose their frames
-    joints = (mujoco.mjtTrn.mjTRN_JOINT, mujoco.mjtTrn.mjTRN_JOINTINPARENT)  # which differ for balls and free joints
+    spec.compiler.fusestatic = False  # otherwise bodies without joints would lose their frames
+    joints = (mujoco.mjtTrn.mjTRN_JOINT, mujoco.mjtTrn.mjTRN_JOINTINPARENT)  # these differ for balls and free joints
     unused = [actuator for actuator in spec.actuators if actuator.trntype not in joints]
     unused += list(spec.lights)
     unused += [tendon for tendon in spec.tendons if tendon.name not in tied]
@@ -153,7 +155,7 @@ def _strip(spec: Any, mujoco: Any, tied: Container[str]) -> None:
             (remaining if moves and _has_mass(shape, spec.compiler) else unused).append(shape)
     for shown in (*remaining, *spec.sites):
         shown.material = ""
-    for material in spec.materials:  # which stay, for tendons keep their names whatever is set here
+    for material in spec.materials:  # materials are kept, because tendons keep their names whatever is set here
         material.textures = [""] * len(material.textures)
     meshes, fields = ({getattr(shape, name) for shape in remaining} for name in ("meshname", "hfieldname"))
     unused += [mesh for mesh in spec.meshes if mesh.name not in meshes]
@@ -164,13 +166,13 @@ def _strip(spec: Any, mujoco: Any, tied: Container[str]) -> None:
 
 
 def _has_mass(shape: Any, compiler: Any) -> bool:
-    """Whether a shape has a part in the mass of its body; its mass is NaN where it follows from the density."""
+    """Return whether a shape contributes to the mass of its body; its mass is NaN if it follows from the density."""
     first, last = compiler.inertiagrouprange
     return bool(first <= shape.group <= last and (shape.density if np.isnan(shape.mass) else shape.mass) > 0)
 
 
 class _Reader:
-    """Turns a compiled model into links and joints."""
+    """Converts a compiled model to links and joints."""
 
     def __init__(self, root: Element, mujoco: Any, spec: Any, model: Any, faults: Faults):
         self.root, self.mujoco, self.spec, self.model, self.faults = root, mujoco, spec, model, faults
@@ -222,7 +224,7 @@ class _Reader:
         return self.error(error.message, error.name or "", value=error.value)
 
     def tell(self, noted: Iterable[SkippedPart], parts: Iterable[Element]) -> None:
-        """Note what is left out, in tendons and actuators as found, and in what is compiled."""
+        """Record the parts that are left out, of tendons and actuators (`noted`) and of the compiled model."""
         options = [element for part in parts for element in part.walk() if element.tag == "option"]
         self.lines |= {f"option.{key}": element.line for element in options for key in element.attributes}
         more = left_out_of_model(self.model, self.mujoco, self.bodies, self.joint_names, self.ties.fixed)
@@ -232,7 +234,7 @@ class _Reader:
             self.faults.leave_out(heading, shown, self.error(left_out(heading), name, value=value))
 
     def _tie(self) -> None:
-        """Read what joints have to do with one another, and what closes loops."""
+        """Read the equalities: ties between joints, and closures of loops."""
         model, kinds = self.model, self.mujoco.mjtEq
         lines = [line_of(equality.info) for equality in self.spec.equalities]
         names = _names([model.equality(k).name for k in range(model.neq)], "closure")
@@ -263,7 +265,7 @@ class _Reader:
         self.mimics = leaders(self.ties.mimics)
 
     def _closure(self, k: Any, name: str) -> Closure:
-        """Return a connect or weld: its anchors and its relative pose as MuJoCo holds them."""
+        """Return a connect or weld equality as a closure, with the anchors and the relative pose in MuJoCo."""
         model, data = self.model, self.model.eq_data[k]
         weld = model.eq_type[k] == int(self.mujoco.mjtEq.mjEQ_WELD)
         numbers = (int(model.eq_obj1id[k]), int(model.eq_obj2id[k]))
@@ -271,16 +273,16 @@ class _Reader:
             sites, turns = list(numbers), [quaternion_matrix(model.site_quat[i]) for i in numbers]
             points, rotation = [model.site_pos[i] for i in sites], turns[0] @ turns[1].T
             numbers = tuple(int(model.site_bodyid[i]) for i in sites)
-        elif weld:  # the anchor is kept in the frame of the second body, and where it has to be in that of the first
+        elif weld:  # the anchor in the frame of the second body, and its target in the frame of the first
             points, rotation = [data[3:6], data[0:3]], quaternion_matrix(data[6:10])
         else:
             points, rotation = [data[0:3], data[3:6]], None
-        turning = weld and data[10] != 0  # a weld without torque holds a point only
+        turning = weld and data[10] != 0  # a weld without torque holds only a point
         links = (self.bodies[numbers[0]], self.bodies[numbers[1]])
         return Closure(name, links, "weld" if turning else "connect", points, rotation=rotation if turning else None)
 
     def _body(self, k: int) -> None:
-        """Add the link of a body, the joints that move it, and the massless links between these."""
+        """Add the link of a body, the joints that move it, and the massless links between them."""
         model, name = self.model, self.bodies[k]
         inertia = None
         if model.body_mass[k] > 0 or model.body_inertia[k].any():
@@ -320,7 +322,7 @@ class _Reader:
         return name
 
     def _single(self, j: int, parent: str, child: str, position: _Vector, rotation: _Matrix) -> None:
-        """Add a hinge or a slide; the pose in the file is that at its reference coordinate."""
+        """Add a hinge or a slide; the pose in the file is that at the reference coordinate."""
         model, name = self.model, self.joint_names[j]
         turning, axis, reference = model.jnt_type[j] == self.kind["hinge"], model.jnt_axis[j], self.ties.reference(j)
         if turning and reference:
@@ -340,7 +342,7 @@ class _Reader:
         )
 
     def _expand(self, j: int, parent: str, child: str, position: _Vector, rotation: _Matrix) -> None:
-        """Add the slides and turns that a free joint or a ball stands for."""
+        """Add the slides and turns that represent a free joint or a ball."""
         model, name = self.model, self.joint_names[j]
         _, joints = floating_joints(child, prefix=name)
         start = [0.0] * 6
@@ -348,7 +350,7 @@ class _Reader:
             joints = joints[3:]
         else:
             first = model.jnt_qposadr[j]
-            from scipy.spatial.transform import Rotation  # here, since importing SciPy takes half a second
+            from scipy.spatial.transform import Rotation  # local, since the import of SciPy takes half a second
 
             turns = Rotation.from_matrix(quaternion_matrix(model.qpos0[first + 3 : first + 7])).as_euler("ZYX")
             start = [*model.qpos0[first : first + 3], *turns]
@@ -375,12 +377,12 @@ class _Reader:
 
 
 def names_of_bodies(model: Any) -> list[str]:
-    """Return the names of the links that the bodies of a compiled model become, by number."""
+    """Return the names of the links of the bodies of a compiled model, by number."""
     return _names([model.body(k).name for k in range(model.nbody)], "body")
 
 
 def _names(given: list[str], kind: str) -> list[str]:
-    """Return the names, with others for those that are empty."""
+    """Return the names, with new ones in the place of empty ones."""
     names = list(given)
     for k, name in enumerate(names):
         if not name:

@@ -14,12 +14,12 @@ NO_CLOSURE = f"has no equivalent joint or closure; {INACTIVE}"
 
 
 def tied_tendons(spec: Any, mujoco: Any, path: str) -> set[str]:
-    """Return the names of the tendons in active equalities, which run along joints only.
+    """Return the names of the tendons in active equalities, which must run along joints.
 
     Raises
     ------
     RobotFileError
-        One runs from site to site.
+        If one runs between sites.
     """
     along = {t.name for t in spec.tendons if all(part.type == mujoco.mjtWrap.mjWRAP_JOINT for part in t.path)}
     tied: set[str] = set()
@@ -35,7 +35,10 @@ def tied_tendons(spec: Any, mujoco: Any, path: str) -> set[str]:
 
 
 def linear_tendons(spec: Any, mujoco: Any) -> set[str]:
-    """Return the names of the tendons along joints, whose lengths are weighted sums of coordinates; all have names."""
+    """Return the names of the tendons along joints, whose lengths are weighted sums of coordinates.
+
+    All tendons get names.
+    """
     for k, tendon in enumerate(spec.tendons):
         tendon.name = tendon.name or f"tendon_{k}"
     along = mujoco.mjtWrap.mjWRAP_JOINT
@@ -43,14 +46,14 @@ def linear_tendons(spec: Any, mujoco: Any) -> set[str]:
 
 
 class JointRelations:
-    """What joints have to do with one another: those that are held, and those that follow another.
+    """Relations of joints by equalities: held joints, and joints that follow others.
 
     Parameters
     ----------
     model, mujoco
-        The compiled model, and the package.
+        Compiled model, and the package.
     names : sequence of str
-        Names of the joints, by their number in the model.
+        Names of the joints, by number.
     """
 
     def __init__(self, model: Any, mujoco: Any, names: Sequence[str]):
@@ -64,7 +67,7 @@ class JointRelations:
         return float(self.model.qpos0[self.model.jnt_qposadr[joint]])
 
     def add_joints(self, k: Any, location: Mapping[str, Any]) -> None:
-        """Take an equality of one joint, or of two: ``q_1 - ref_1 = a_0 + a_1 (q_2 - ref_2)``."""
+        """Add an equality of one joint, or of two: ``q_1 - ref_1 = a_0 + a_1 (q_2 - ref_2)``."""
         first, second = int(self.model.eq_obj1id[k]), int(self.model.eq_obj2id[k])
         coefficients = self.model.eq_data[k][:5]
         self._check_free(first, (first,) if second < 0 else (first, second), location)
@@ -78,9 +81,10 @@ class JointRelations:
             self._follow(first, second, float(coefficients[1]), start)
 
     def add_tendons(self, k: Any, location: Mapping[str, Any]) -> None:
-        """Take an equality of one tendon, or of two, whose lengths are weighted sums of coordinates.
+        """Add an equality of one tendon, or of two, whose lengths are weighted sums of coordinates.
 
-        ``L_1 - ref_1 = a_0 + a_1 (L_2 - ref_2)``: of two joints, the second follows the first unless it follows one.
+        ``L_1 - ref_1 = a_0 + a_1 (L_2 - ref_2)``: of two joints, the second follows the first, unless it follows
+        another.
         """
         model = self.model
         first, second = int(model.eq_obj1id[k]), int(model.eq_obj2id[k])
@@ -109,7 +113,7 @@ class JointRelations:
             self._follow(follower, leader, -weights[leader] / weights[follower], start)
 
     def _follow(self, joint: int, leader: int, slope: float, start: float) -> None:
-        """Make a joint follow another; it is at `start` where the other is as in the pose of the file."""
+        """Make a joint follow another; it is at `start` if the other is in the pose of the file."""
         self.mimics[self.names[joint]] = Mimic(self.names[leader], slope, start - slope * self.reference(leader))
 
     def _check_free(self, joint: int, tied: Sequence[int], location: Mapping[str, Any]) -> None:
