@@ -1,6 +1,6 @@
-"""How other programs number the coordinates of the same robot file: what turns our vectors into theirs.
+"""Numbering of the coordinates of a robot file in other programs, and the conversion of vectors to it.
 
-The rules are those of the versions named here, found by reading files with each; ``docs/other_readers.md`` has the
+The rules are those of the versions below, found by reading files with each program; ``docs/other_readers.md`` has the
 measurements.
 """
 
@@ -20,7 +20,7 @@ from jounce.robot.model.tree import axes_with_z_along
 from jounce.robot.robot import Robot
 
 READERS = {"pinocchio": "4.1", "mujoco": "4.0", "drake": "1.51", "pybullet": "3.2.7", "yourdfpy": "0.0.60"}
-"""Programs whose coordinates are known, and the version in which they were looked at."""
+"""Programs whose numbering is known, and the examined version of each."""
 OF_FORMAT = {"robot": tuple(READERS), "mujoco": ("mujoco",)}
 FREE_BASE = {
     "drake": "the base is free, with 7 positions and 6 velocities before these, unless it is welded to the world",
@@ -29,7 +29,7 @@ FREE_BASE = {
 VALUE = ("value",)
 PLACE, TURN = ("x", "y", "z"), ("qw", "qx", "qy", "qz")
 SPIN, SPEED = ("wx", "wy", "wz"), ("vx", "vy", "vz")
-FREE = {  # positions and velocities of a joint that is free
+FREE = {  # positions and velocities of a floating joint
     "pinocchio": ((*PLACE, "qx", "qy", "qz", "qw"), (*SPEED, *SPIN), "velocities along the axes of the link"),
     "mujoco": ((*PLACE, *TURN), (*SPEED, *SPIN), "wx, wy, wz along the axes of the link, vx, vy, vz of the parent"),
     "drake": ((*TURN, *PLACE), (*SPIN, *SPEED), "velocities along the axes of the parent"),
@@ -44,18 +44,18 @@ class ForeignJoint:
     Parameters
     ----------
     joint : str
-        Its name in the file.
+        Name of the joint in the file.
     coordinates : tuple of str
-        Our names of what it stands for, as in `Robot.joints`.
+        Names of the coordinates that represent it here, as in `Robot.joints`.
     positions, velocities : tuple of str
-        What the other program has for it: ``value``, or parts such as ``cos``, ``qw``, ``vx``.
+        Components of the joint in the other program: ``value``, or parts such as ``cos``, ``qw``, ``vx``.
     factors : tuple of dict of str to float, optional
-        Each velocity of theirs as a sum of ours, by the name in `Robot.joint_names` times the number; None where it
-        depends on the position.
+        Each velocity of the other program as a sum of velocities here, as factors by the name in `Robot.joint_names`;
+        None if it depends on the position.
     offset : float, default 0
-        What is added to the sum for a position that is one value, rad or m.
+        Constant added to the sum for a position of a single value, rad or m.
     note : str
-        What else is to be known.
+        Further remark.
     """
 
     joint: str
@@ -73,17 +73,17 @@ def as_read_by(reader: str, path: str | PathLike[str], robot: Robot) -> list[For
     Parameters
     ----------
     reader : str
-        ``"pinocchio"``, ``"mujoco"``, ``"drake"``, ``"pybullet"`` or ``"yourdfpy"``; of MJCF files only MuJoCo is
-        known, and of SDF files none.
+        ``"pinocchio"``, ``"mujoco"``, ``"drake"``, ``"pybullet"`` or ``"yourdfpy"``; for MJCF files only ``"mujoco"``,
+        and for SDF files none.
     path
-        The file.
+        Robot file.
     robot : Robot
-        As it was read from the file.
+        Robot read from the file.
 
     Raises
     ------
     RobotError
-        No such program is known, or it does not read such files or joints.
+        If the program is unknown, or its reading of such files or joints has not been examined.
 
     Examples
     --------
@@ -104,7 +104,7 @@ def as_read_by(reader: str, path: str | PathLike[str], robot: Robot) -> list[For
 def permutation(joints: Sequence[ForeignJoint], robot: Robot) -> tuple[list[int], list[float]] | None:
     """Return indices and factors with ``theirs = factors * ours[indices]`` for velocities.
 
-    None where a velocity of theirs is no multiple of one of ours, or depends on the position.
+    None if a velocity of the other program is no multiple of one of ours, or depends on the position.
     """
     indices, factors = [], []
     for joint in joints:
@@ -119,7 +119,7 @@ def permutation(joints: Sequence[ForeignJoint], robot: Robot) -> tuple[list[int]
 
 def _of_urdf(reader: str, root: Element, robot: Robot) -> Iterator[ForeignJoint]:
     elements = {element.attributes.get("name", ""): element for element in root.every("joint")}
-    by_name = reader == "pinocchio"  # the parser that it uses keeps joints by name
+    by_name = reader == "pinocchio"  # its parser sorts joints by name
     for name in list(elements) if reader == "yourdfpy" else _depth_first(elements, by_name):
         element = elements[name]
         kind = element.attributes.get("type", "")
@@ -130,7 +130,7 @@ def _of_urdf(reader: str, root: Element, robot: Robot) -> Iterator[ForeignJoint]
 
 
 def _depth_first(elements: Mapping[str, Element], by_name: bool) -> list[str]:
-    """Return joints from the base outwards, those of one link by their names or in the order of the file."""
+    """Return joints from the base outward, depth first; those of one link by name or in the order of the file."""
     names = sorted(elements, key=str.encode) if by_name else list(elements)
     ends = {name: [_link(elements[name], role) for role in ("parent", "child")] for name in names}
     below: dict[str, list[str]] = {}
@@ -184,7 +184,7 @@ def _of_several(reader: str, name: str, kind: str, element: Element, *, first: b
 
 
 def _planar(reader: str, name: str, element: Element) -> ForeignJoint:
-    """Return a planar joint: all but Pinocchio turn x and y with z onto the axis by the shortest turn."""
+    """Return a planar joint: all programs but Pinocchio turn x and y by the shortest turn of z onto the axis."""
     ours = tuple(f"{name}_{suffix}" for suffix in ("x", "y", "angle"))
     if reader == "pinocchio":
         note = "in the plane of x and y whatever the axis; velocities along the axes of the link"
@@ -206,7 +206,7 @@ def _planar(reader: str, name: str, element: Element) -> ForeignJoint:
 
 
 def _of_mjcf(path: str | PathLike[str], robot: Robot) -> Iterator[ForeignJoint]:
-    """Give the joints of an MJCF file by their number in MuJoCo; what they became is in the same order."""
+    """Yield the joints of an MJCF file by their number in MuJoCo; those of the robot have the same order."""
     import mujoco as package
 
     from jounce.io.robots.mjcf.files import quiet_mujoco

@@ -1,4 +1,4 @@
-"""Loads that a robot holds, given from outside as ``LINK=MASS`` with units, or for a part of a motion."""
+"""Loads that a robot holds, given as ``LINK=MASS`` with units, also for a part of a motion."""
 
 from __future__ import annotations
 
@@ -17,19 +17,19 @@ PLACE_FORMS = "instants such as 0.8 s, shares of a path such as 30 %, or waypoin
 
 
 def with_payloads(robot: Robot, texts: Iterable[str]) -> Robot:
-    """Return a robot that holds point masses in the origins of links.
+    """Return a robot that holds point masses at the origins of links.
 
     Parameters
     ----------
     robot : Robot
-        The robot without them.
+        Robot without the loads.
     texts : iterable of str
-        ``LINK=MASS``, the mass a number in kg or a number with a unit.
+        Texts ``LINK=MASS``; the mass is a number in kg or a number with a unit.
 
     Raises
     ------
     RobotError
-        There is no such link, no such mass, or it is carried for a part of a motion.
+        If a link does not exist, a mass is not valid, or a load is for a part of a motion.
 
     Examples
     --------
@@ -58,17 +58,17 @@ def parsed_loads(robot: Robot, texts: Iterable[str], *, moving: bool = False) ->
     Parameters
     ----------
     robot : Robot
-        The robot.
+        Robot with the links.
     texts : iterable of str
-        ``LINK=MASS@FROM:TO``, the ends instants with a unit, shares of a path in percent, or ``waypoint NUMBER``, of
-        which the first is 1; one that is missing is an end of the motion.
+        Texts ``LINK=MASS@FROM:TO``. The ends are instants with a unit, shares of a path in percent, or ``waypoint
+        NUMBER``, counted from 1; a missing one is the end of the motion.
     moving : bool, default False
-        Whether they change in motion.
+        Whether the loads change while the robot moves.
 
     Raises
     ------
     RobotError
-        There is no such link, mass or place.
+        If a link does not exist, or a mass or an end is not valid.
 
     Examples
     --------
@@ -98,12 +98,12 @@ def parsed_loads(robot: Robot, texts: Iterable[str], *, moving: bool = False) ->
 
 def _mass(text: str) -> float:
     number = parse_value(text, "mass").value
-    assert isinstance(number, float)  # no names are allowed, so that expressions are worked out
+    assert isinstance(number, float)  # expressions are evaluated, since no names are allowed
     return number
 
 
 def _place(text: str) -> tuple[float | None, str | None]:
-    """Return what a text counts to, and by what; nothing of an empty one."""
+    """Return the value of an end of a load, and its kind; None for both if the text is empty."""
     if not text:
         return None, None
     if waypoint := re.fullmatch(r"waypoint\s*([0-9]+)", text):

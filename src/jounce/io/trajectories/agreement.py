@@ -1,4 +1,4 @@
-"""Whether positions of a recording count whole turns, and velocities and accelerations are those of its positions."""
+"""Checks of a recording: whole turns of its positions, and the agreement of its derivatives with one another."""
 
 from __future__ import annotations
 
@@ -11,34 +11,34 @@ from jounce.io.trajectories.recordings import LEVELS, Recording
 from jounce.trajectory.sample_errors import noise
 
 CONTRADICTS, DOUBTFUL = 0.2, 0.05
-"""Of the change over a stretch: from there on a column is refused, or mentioned."""
-WINDOWS = 50  # of a recording, over which changes are compared
-NOISES = 6.0  # times the deviation of what noise makes of a change: a smaller difference says nothing
-FEWEST = 12  # samples, of which some may be outliers
+"""Share of the change over a window from which a difference is refused, or mentioned."""
+WINDOWS = 50  # number of windows over which changes are compared
+NOISES = 6.0  # standard deviations of a change by noise that a difference must exceed
+FEWEST = 12  # samples for the search for outliers
 MOST = 3  # outliers in a row
 PARTS = 5
-OUTLYING = 0.05  # of the range of a derivative: a smaller distance is none of an outlier
+OUTLYING = 0.05  # of the range of a derivative, which the distance of an outlier must exceed
 TURN = 2.0 * np.pi
-SMALL = 0.125 * TURN  # a step beside one of a turn: larger ones tell nothing of turns
-SAME = 1.5  # times the largest step beside: a step is no larger, but for whole turns
-BLOCK = 20_000  # samples that noise is estimated from
+SMALL = 0.125 * TURN  # largest neighbor of a step by a turn; larger steps say nothing about turns
+SAME = 1.5  # times the largest neighboring step: largest remainder of a step by whole turns
+BLOCK = 20_000  # samples for an estimate of noise
 
 
 @dataclasses.dataclass(frozen=True)
 class _Difference:
-    share: float  # of the change, by the root of the mean of squares
-    row: int  # where it is largest
-    given: float  # the change there, by the derivative
-    integral: float  # the change there, by the level below it
+    share: float  # of the change, by root mean squares
+    row: int  # row of the largest difference
+    given: float  # change by the derivative
+    integral: float  # change by the level below
 
 
 def check_turns(recording: Recording) -> None:
-    """Check that no angle goes by a whole turn from one sample to the next, as angles do that are kept within one.
+    """Raise an error if an angle changes by a whole turn between two samples, like an angle wrapped to one turn.
 
     Raises
     ------
     TrajectoryError
-        If one does, and the steps beside are small: the message names the joint and the line.
+        If an angle does so, and the neighboring steps are small: the message names the joint and the line.
     """
     for k, name in enumerate(recording.names):
         rows = np.flatnonzero(~np.isnan(recording.values[:, 0, k]))
@@ -48,7 +48,7 @@ def check_turns(recording: Recording) -> None:
         rest = np.abs((steps + TURN / 2) % TURN - TURN / 2)
         neighbors = np.maximum(np.append(0.0, rest[:-1]), np.append(rest[1:], 0.0))
         long = np.sign(steps) * (np.abs(steps) > TURN - SMALL)
-        again = long[:-1] * long[1:] > 0  # of one that turns so fast, or whose samples are so few
+        again = long[:-1] * long[1:] > 0  # a joint that turns so fast, or has so few samples
         goes_on = np.append(False, again) | np.append(again, False)
         whole = (long != 0) & ~goes_on & (neighbors < SMALL) & (rest <= SAME * neighbors + 1e-3)
         if whole.any():
@@ -61,16 +61,16 @@ def check_turns(recording: Recording) -> None:
 
 
 def check_agreement(recording: Recording) -> list[str]:
-    """Return in words where derivatives differ a little from what positions say.
+    """Return descriptions of small differences between derivatives and positions.
 
-    Over stretches of the recording the change of a level is compared with the integral of the one above it, beyond what
-    noise and the distance of the samples explain.
+    Over windows of the recording, the change of a level is compared with the integral of the level above it.
+    Differences that noise and the sampling period explain are ignored.
 
     Raises
     ------
     TrajectoryError
-        If they differ by more than a fifth, or up to three samples of a derivative in a row are outliers: the message
-        names the joint and the line.
+        If they differ by more than a fifth, or up to three consecutive samples of a derivative are outliers: the
+        message names the joint and the line.
     """
     doubts = []
     for level in range(1, recording.values.shape[1]):
@@ -104,7 +104,7 @@ def check_agreement(recording: Recording) -> list[str]:
 
 
 def _outlier_words(recording: Recording, rows: np.ndarray, level: int, joint: int) -> str:
-    """Return where outliers are, and what they are."""
+    """Return a description of outliers: their instants and values."""
     values = ", ".join(f"{x:.6g}" for x in recording.values[rows, level, joint])
     first, last = recording.times[rows[[0, -1]]]
     if len(rows) == 1:
@@ -114,23 +114,23 @@ def _outlier_words(recording: Recording, rows: np.ndarray, level: int, joint: in
 
 
 def _outliers(times: np.ndarray, below: np.ndarray, rate: np.ndarray) -> tuple[int, int, float] | None:
-    """Return the samples of a rate, in a row, that are far from what the level below says, and from their neighbors.
+    """Return consecutive outliers of a rate: the first and the last sample, and the expected value of the first.
 
-    Each is farther from both than noise makes it, and than the rate itself changes about them: neither a jump of the
-    rate nor a knock, which positions show too, is an outlier. First and last of them, and the value of the first.
+    An outlier is farther from the slope of the level below, and from its neighbors, than noise and the changes of the
+    rate about it explain. So neither a jump of the rate nor a shock that the positions show is an outlier.
     """
     if len(times) < FEWEST:
         return None
     steps = np.diff(times)
     slopes = np.diff(below) / steps
     before, after = steps[:-1], steps[1:]
-    middle = (slopes[:-1] * after + slopes[1:] * before) / (before + after)  # of the parabola through three samples
+    middle = (slopes[:-1] * after + slopes[1:] * before) / (before + after)  # slope of the parabola
     sigmas = [float(np.median([noise(times[b], x[b]) for b in _blocks(len(times))])) for x in (below, rate)]
     by_noise = NOISES * (sigmas[1] + 2 * sigmas[0] / np.minimum(before, after))
-    away = np.abs(rate[1:-1] - middle) - by_noise  # of all but the first and the last
+    away = np.abs(rate[1:-1] - middle) - by_noise  # of all samples but the first and the last
     best = None
     for count in range(1, MOST + 1):
-        groups = len(times) - count - 3  # how many have two neighbors on each side
+        groups = len(times) - count - 3  # number of groups with two neighbors on each side
         left, right = slice(1, groups + 1), slice(count + 2, count + 2 + groups)
         turn = rate[right] - rate[left]
         seen = np.stack([slopes[k : k + groups] for k in range(1, count + 2)])
@@ -154,14 +154,14 @@ def _outliers(times: np.ndarray, below: np.ndarray, rate: np.ndarray) -> tuple[i
 
 
 def _blocks(count: int) -> list[slice]:
-    """Return parts of samples over which noise is estimated, since an outlier raises the estimate of its own part."""
+    """Return parts of the samples for separate estimates of noise, since an outlier raises that of its own part."""
     length = max(count // PARTS, FEWEST)
     own = min(length, BLOCK)
     return [slice(first, first + own) for first in range(0, max(count - length, 0) + 1, length)][:PARTS]
 
 
 def _difference(times: np.ndarray, below: np.ndarray, rate: np.ndarray) -> _Difference | None:
-    """Return by how much the integral of a rate differs from what it is the rate of; None where nothing is known."""
+    """Return the difference between the integral of a rate and the level below; None if it cannot be judged."""
     steps = np.diff(times)
     length = max(1, len(steps) // WINDOWS)
     sums = np.append(0.0, np.cumsum(steps * (rate[1:] + rate[:-1]) / 2))
@@ -174,7 +174,7 @@ def _difference(times: np.ndarray, below: np.ndarray, rate: np.ndarray) -> _Diff
     sigmas = noise(times[block], below[block]), noise(times[block], rate[block])
     step = float(np.median(steps))
     by_noise = np.hypot(np.sqrt(2) * sigmas[0], sigmas[1] * step * np.sqrt(length))
-    by_step = np.abs(coarse[last] - coarse[first] - given) / 3  # of the trapezoidal rule, by twice the step
+    by_step = np.abs(coarse[last] - coarse[first] - given) / 3  # error of the trapezoidal rule, from twice the step
     size = max(_root(given), _root(integral))
     beyond = np.maximum(np.abs(difference) - by_step - NOISES * by_noise, 0.0)
     if size == 0 or not beyond.any():

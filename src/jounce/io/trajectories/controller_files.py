@@ -1,4 +1,4 @@
-"""Trajectories in the forms that controllers take, written at their rates."""
+"""Trajectories in the file formats of controllers, sampled at their rates."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from jounce.settings import under_own_settings
 from jounce.trajectory import JointTrajectory
 
 UNITS = ("", "/s", "/s^2")
-REST_SPEED = 1e-9  # rad/s or m/s: slower is at rest
+REST_SPEED = 1e-9  # rad/s or m/s, below which a joint is at rest
 UNFORCED = 1e-6  # rad/s^2 or m/s^2
 NANO = 1_000_000_000
 LEVELS = ("positions", "velocities", "accelerations")
@@ -28,7 +28,7 @@ def export_trajectory(
     robot: Robot,
     trajectory: JointTrajectory,
     path: str | PathLike[str],
-    format: str,  # noqa: A002 - what the command calls it, too
+    format: str,  # noqa: A002 - also the name of the option of the command
     rate: float | None = None,
     *,
     joints: Sequence[str] | None = None,
@@ -37,43 +37,43 @@ def export_trajectory(
     header_units: bool = False,
     overwrite: bool = False,
 ) -> Float[np.ndarray, " time"]:
-    """Write a trajectory as a controller takes it, at its rate.
+    """Write a trajectory in the file format of a controller, at its rate.
 
     Parameters
     ----------
     robot : Robot
-        The robot, with what it holds.
+        Robot with its loads.
     trajectory : JointTrajectory
-        Of its joints.
+        Trajectory of its joints.
     path
-        The file: .csv for ``franka`` and ``ur``, .yaml for ``ros``.
+        File to write: .csv for ``franka`` and ``ur``, .yaml for ``ros``.
     format : {"franka", "ur", "ros"}
         Columns of libfranka's robot state (``q_d_0``, ``dq_d_0``, ``ddq_d_0``, ...), of Universal Robots' real-time
         data exchange (``target_q_0``, ``target_qd_0``, ``target_qdd_0``, ...), or a ROS ``JointTrajectory`` message.
     rate : float, optional
-        Rows a second; 1000 for ``franka``, 500 for ``ur``, 100 for ``ros`` unless given.
+        Rows per second; by default 1000 for ``franka``, 500 for ``ur``, 100 for ``ros``.
     joints : sequence of str, optional
-        Joints in the order of the controller; those of the trajectory in the order of the robot unless given.
+        Joints in the order of the controller; by default those of the trajectory in the order of the robot.
     torques : bool, default False
-        Write torques, too: ``tau_J_d_0`` without gravity on the side of the links, and its rate ``dtau_J_d_0``;
+        Whether to write torques, too: ``tau_J_d_0``, on the link side and without gravity, and its rate ``dtau_J_d_0``;
         ``target_moment_0``; ``effort``.
     loads : sequence of CarriedLoad, optional
-        What links carry during parts of the motion, which torques follow.
+        Loads that links carry during parts of the motion, for the torques.
     header_units : bool, default False
-        Tell units in the heading of a table, as ``q_d_0 [rad]``.
+        Whether to state units in the heading of a table, as ``q_d_0 [rad]``.
     overwrite : bool, default False
         Whether the file may be one that was read as an input.
 
     Returns
     -------
     numpy.ndarray of shape (time,)
-        The instants written, s. Where the period does not divide the duration, the last row of a table holds the end
-        for the rest of its period, which asks for a trajectory that ends at rest; a ROS message ends at the end.
+        Instants of the rows, s. If the period does not divide the duration, the last row of a table holds the end for
+        the rest of its period, which requires a trajectory that ends at rest; a ROS message ends exactly at the end.
 
     Raises
     ------
     TrajectoryError
-        If there is no such format, the joints or the rate do not fit it, or the end is not at rest where it must be.
+        If the format does not exist, the joints or the rate do not suit it, or a required rest at the end is missing.
     OutputError
         If the file cannot be written.
 
@@ -138,8 +138,8 @@ def _values(
     known: Any,
     loads: Sequence[CarriedLoad],
 ) -> list[np.ndarray]:
-    """Return positions, velocities and accelerations at instants, then torques and their rates; (time, joints) each."""
-    # a sixth of a second, which reading does not need
+    """Return positions, velocities, accelerations, torques and their rates at instants, (time, joints) each."""
+    # local, because the import takes a sixth of a second, which reading does not need
     from jounce.dynamics.limits.trajectories import FollowedTrajectory, in_time
 
     order = max(2, efforts + 1)
@@ -205,7 +205,7 @@ def _message(
     torques: bool,
     loads: Sequence[CarriedLoad],
 ) -> tuple[str, np.ndarray]:
-    """Return a ROS message as YAML; its times are whole nanoseconds, at which the values are taken."""
+    """Return a ROS message as YAML; its times are whole nanoseconds, at which the values are evaluated."""
     duration = round((trajectory.stop - trajectory.start) * NANO)
     count = int(np.ceil(duration / NANO * frequency * (1 - 1e-12) - 1e-9))
     ticks = [*(tick for k in range(count) if (tick := round(k * NANO / frequency)) < duration), duration]
@@ -226,7 +226,7 @@ def _message(
 
 
 def _number(value: float) -> str:
-    """Return a number with a point in it: without one, readers of YAML 1.1 take 1e-09 for text, and 0 for whole."""
+    """Return a number with a decimal point: without it, YAML 1.1 reads 1e-09 as text, and 0 as an integer."""
     mantissa, exponent, power = repr(value).partition("e")
     return f"{mantissa if '.' in mantissa else mantissa + '.0'}{exponent}{power}"
 

@@ -1,4 +1,4 @@
-"""What controllers call the columns of a trajectory, and at what rates they take it."""
+"""Names of the columns of a trajectory in the formats of controllers, and their rates."""
 
 from __future__ import annotations
 
@@ -18,15 +18,15 @@ class ControllerFormat:
     time : str
         Name of the column of times.
     levels : tuple of str
-        Names of positions, velocities and accelerations; the number of a joint, from 0, follows.
+        Names of positions, velocities and accelerations, to which the number of the joint, from 0, is appended.
     efforts : tuple of str
-        Names of torques, and of their rates where there are such.
+        Names of torques, and of their rates, if any.
     joints : int
-        How many there are.
+        Number of joints.
     rates : tuple of float
-        Rows a second that it takes; the first is usual.
+        Rows per second that it accepts; the first is the default.
     gravity, drives : bool
-        Whether torques contain what holds the weight, and what moves the drives.
+        Whether torques include those that hold the weight, and those that move the drives.
     """
 
     time: str
@@ -39,11 +39,11 @@ class ControllerFormat:
 
 
 FORMATS = {
-    # libfranka, RobotState: tau_J_d is on the link side and without gravity; its rate has no name there
+    # libfranka, RobotState: tau_J_d is on the link side and without gravity; it has no name for its rate
     "franka": ControllerFormat(
         "time", ("q_d", "dq_d", "ddq_d"), ("tau_J_d", "dtau_J_d"), 7, (1000.0,), gravity=False, drives=False
     ),
-    # Real-Time Data Exchange, as its client records it
+    # Real-Time Data Exchange, as recorded by its client
     "ur": ControllerFormat(
         "timestamp",
         ("target_q", "target_qd", "target_qdd"),
@@ -58,7 +58,7 @@ NAMES = (*FORMATS, "ros")
 
 
 def format_of(columns: Sequence[str]) -> ControllerFormat | None:
-    """Return the format whose positions are among columns, None for any other table."""
+    """Return the format whose positions are among the columns; None for other tables."""
     for known in FORMATS.values():
         if known.time in columns and f"{known.levels[0]}_0" in columns:
             return known
@@ -66,18 +66,18 @@ def format_of(columns: Sequence[str]) -> ControllerFormat | None:
 
 
 def joint_count(known: ControllerFormat, columns: Sequence[str]) -> int:
-    """Return how many joints a table has positions of."""
+    """Return the number of joints with positions in a table."""
     pattern = re.compile(rf"{known.levels[0]}_([0-9]+)$")
     return sum(pattern.match(name) is not None for name in columns)
 
 
 def checked_format(name: str) -> str:
-    """Return the name of a format.
+    """Return the name of a format after a check.
 
     Raises
     ------
     TrajectoryError
-        If there is none of this name.
+        If the format does not exist.
     """
     check_name("controller format", name, NAMES, TrajectoryError, name="format")
     return name

@@ -57,7 +57,7 @@ def left_out_of_spec(spec: Any, mujoco: Any) -> list[SkippedPart]:
                 if value.any() and on(key) and (key not in read or value[1:].any()):
                     left.append(SkippedPart(heading, name, line_of(part.info), f"{kind}s.{name}.{key}", _plain(value)))
     for k, actuator in enumerate(spec.actuators if on("actuation") else ()):
-        if actuator.ctrlspec == int(mujoco.mjtCtrlInput.mjINPUT_NONE):  # such as friction and cogging of a motor, its brake
+        if actuator.ctrlspec == int(mujoco.mjtCtrlInput.mjINPUT_NONE):  # such as friction of a motor, or its brake
             name = actuator.name or f"actuator_{k}"
             left.append(SkippedPart(UNCONTROLLED, name, line_of(actuator.info), f"actuators.{name}.input", "none"))
     for k, tendon in enumerate(spec.tendons if on("range") else ()):

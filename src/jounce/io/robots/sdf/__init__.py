@@ -1,1 +1,1 @@
-"""SDF: models, scopes, poses, links, joints and shapes, and what is left out."""
+"""SDF: models, scopes, poses, links, joints and shapes, and parts that are left out."""

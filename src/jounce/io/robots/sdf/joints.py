@@ -1,4 +1,4 @@
-"""Joints of SDF files: their axes, limits and drives, all in the frame of the model."""
+"""Joints of SDF files: their axes, limits and drives, in the frame of the model."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from jounce.robot.model.links_and_joints import Limits
 AXIS_TAGS = ("axis", "axis2")
 AXES = {"revolute": 1, "continuous": 1, "prismatic": 1, "fixed": 0, "universal": 2, "revolute2": 2, "ball": 0}
 AXES |= {"screw": 1}
-UNBOUNDED = 1e16  # SDF writes it for no bound
+UNBOUNDED = 1e16  # written in SDF for no bound
 JOINT = ("parent", "child", "pose", "axis", "axis2", "physics", "sensor", "plugin", "frame", "thread_pitch")
 JOINT += ("screw_thread_pitch", "gearbox_ratio", "gearbox_reference_body")
 AXIS = ("xyz", "limit", "dynamics", "use_parent_model_frame", "mimic", "initial_position")
@@ -37,7 +37,7 @@ DYNAMICS = ("damping", "friction", "spring_reference", "spring_stiffness")
 
 @dataclasses.dataclass(frozen=True)
 class SdfAxis:
-    """An axis of a joint: its tag in the file, its direction in the model, and what goes with it."""
+    """An axis of a joint: its tag in the file, its direction in the model, its limits and its drive."""
 
     tag: str
     direction: Float[np.ndarray, "3"]
@@ -51,7 +51,7 @@ class SdfAxis:
 
 @dataclasses.dataclass(frozen=True)
 class SdfJoint:
-    """A joint as the file has it, all in the frame of the model."""
+    """A joint of the file, in the frame of the model."""
 
     name: str
     kind: str
@@ -68,7 +68,7 @@ class SdfJoint:
 
 
 def read_joint(name: str, element: Element, frames: Frames, version: tuple[int, ...]) -> SdfJoint:
-    """Return a joint, all in the frame of the model."""
+    """Return a joint in the frame of the model."""
     where = ("joints", name)
     check_known(element, JOINT, *where)
     kind = element.text("type", *where, "type")
@@ -89,15 +89,15 @@ def read_joint(name: str, element: Element, frames: Frames, version: tuple[int, 
 
 
 def pitch_of(element: Element, *where: str) -> float:
-    """Return how far a screw joint travels along its axis for a radian, m/rad.
+    """Return the travel of a screw joint along its axis per radian, m/rad.
 
-    ``screw_thread_pitch`` is the travel of a turn, right-handed; the older ``thread_pitch`` counts radians for a meter,
-    left-handed. Without both the travel of a turn is 1 m.
+    ``screw_thread_pitch`` is the travel per turn, right-handed; the older ``thread_pitch`` is in radians per meter,
+    left-handed. Without both, the travel per turn is 1 m.
 
     Raises
     ------
     RobotFileError
-        A value is no number, or the older one is zero.
+        If a value is no number, or the older one is zero.
     """
     if (old := element.only("thread_pitch", *where)) and not element.only("screw_thread_pitch", *where):
         radians = number_of(element, "thread_pitch", *where, default=1.0)
@@ -108,12 +108,12 @@ def pitch_of(element: Element, *where: str) -> float:
 
 
 def rotor_of(element: Element, *where: str) -> float:
-    """Return the inertia of the rotor of a joint, seen at the joint, as Drake reads it.
+    """Return the inertia of the rotor of a joint, as seen at the joint and read by Drake.
 
     Raises
     ------
     RobotFileError
-        A value is no number, or the inertia is negative.
+        If a value is no number, or the inertia is negative.
     """
     inertia, ratio = (number_of(element, key, *where, default=default) for key, default in ((ROTOR, 0.0), (RATIO, 1.0)))
     if inertia < 0:
@@ -157,7 +157,7 @@ def _limits(limit: Element | None, *where: str) -> Limits:
 
 
 def with_named_axes(joint: Element, version: tuple[int, ...]) -> Element:
-    """Return a joint whose axes say by name which frame they are in, whatever the version of the file."""
+    """Return a joint whose axes name their frames, whatever the version of the file."""
     children = []
     for axis in joint.children:
         if axis.tag in ("axis", "axis2") and version < (1, 7):

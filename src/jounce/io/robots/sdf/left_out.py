@@ -1,4 +1,4 @@
-"""What SDF files hold that bears on motions or forces and is not read: springs, decay, what holds models still."""
+"""Parts of SDF files that affect motions or forces and are not read: springs, decay, fixed or kinematic models."""
 
 from __future__ import annotations
 
@@ -33,23 +33,23 @@ _OF_FLUIDS = re.compile("buoyancy|hydrodynamics|lift[-_]?drag|wind", re.IGNORECA
 def note_left_out(
     model: Element, links: Mapping[str, Element], tree: Iterable[SdfJoint], closing: Iterable[SdfJoint], faults: Faults
 ) -> None:
-    """Note what is left out of a model.
+    """Record the parts of a model that are left out.
 
     Parameters
     ----------
     model : Element
-        The element ``<model>``.
+        Element ``<model>``.
     links : dict of str to Element
-        Its links by name.
+        Links of the model by name.
     tree, closing : iterable of SdfJoint
-        The joints of the tree, and those that close its loops.
+        Joints of the tree, and joints that close its loops.
     faults : Faults
-        Takes what is left out.
+        Records the parts.
 
     Raises
     ------
     RobotFileError
-        A value is no number, or none that it may be; or something is left out and that is an error.
+        If a value is no number or is not valid, or if a part that is left out is an error.
     """
     tree, closing = list(tree), list(closing)
     if flag_of(model, "static", "static") and any(joint.kind != "fixed" for joint in tree):
@@ -70,7 +70,7 @@ def note_left_out(
 
 
 def _note_extensions(model: Element, tree: Sequence[SdfJoint], closing: Sequence[SdfJoint], faults: Faults) -> None:
-    """Note what Drake adds to a model, and followers that are those of a plugin alone."""
+    """Record the extensions of Drake, and joints that follow others by a plugin only."""
     for tag, heading in OF_MODEL.items():
         for element in model.every(tag):
             faults.leave_out(heading, f"<{tag}>", element.error(LEAVE.format(heading), tag))
@@ -85,12 +85,12 @@ def _note_extensions(model: Element, tree: Sequence[SdfJoint], closing: Sequence
 
 
 def note_fluids(holder: Element, faults: Faults) -> None:
-    """Note plugins of a world, a model or an element for Gazebo that compute forces of fluids.
+    """Record Gazebo plugins of a world, a model or an element that compute forces of fluids.
 
     Raises
     ------
     RobotFileError
-        There is one, and what is left out is an error.
+        If there is one, and parts that are left out are errors.
     """
     for plugin in holder.every("plugin"):
         given = [plugin.attributes.get(key, "") for key in ("name", "filename")]
@@ -100,13 +100,13 @@ def note_fluids(holder: Element, faults: Faults) -> None:
 
 
 def follower(plugin: Element) -> str:
-    """Return the joint that a plugin makes follow another, empty if it is of another kind."""
+    """Return the joint that a plugin makes follow another; empty if it is no such plugin."""
     part = plugin.first("mimicJoint")
     return "" if part is None else part.content.strip()
 
 
 def _note_numbers(holder: Element | None, shown: str, headings: Mapping[str, str], faults: Faults, *where: str) -> None:
-    """Note the numbers within an element that are not zero, once for each heading."""
+    """Record the nonzero numbers within an element, once for each heading."""
     noted = set()
     for key, heading in headings.items():
         value = number_of(holder, key, *where, default=0.0)

@@ -1,4 +1,4 @@
-"""Links of SDF files: their inertias, and the gravity that they feel."""
+"""Links of SDF files: their inertias and the gravity of the world."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ INERTIAL = ("pose", "mass", "inertia", "density", "auto_inertia_params", "fluid_
 
 
 def read_inertia(name: str, element: Element, frames: Frames, faults: Faults) -> Inertia | None:
-    """Return the inertia of a link in its frame, None where all of it is zero."""
+    """Return the inertia of a link in its frame; None if all of it is zero."""
     where = ("links", name)
     check_known(element, LINK, *where)
     inertial = element.only("inertial", *where)
@@ -54,7 +54,7 @@ def read_inertia(name: str, element: Element, frames: Frames, faults: Faults) ->
 
 
 def _check_readable(name: str, inertial: Element, faults: Faults, *where: str) -> None:
-    """Refuse an inertia that is placed elsewhere, and note the mass of a fluid, which is left out."""
+    """Raise an error for an inertia with another reference frame; record the mass of a fluid, which is left out."""
     pose, added = inertial.only("pose", *where), inertial.only("fluid_added_mass", *where)
     given = {} if pose is None else pose.attributes
     frame = given.get("relative_to") or given.get("frame") or name
@@ -68,7 +68,7 @@ def _check_readable(name: str, inertial: Element, faults: Faults, *where: str) -
 
 
 def _check_whole(name: str, inertial: Element, moments: Element | None, faults: Faults) -> None:
-    """Note a mass or moments that are not given, which SDF takes for 1."""
+    """Record a missing mass or missing moments, for which SDF takes 1."""
     missing = [] if inertial.first("mass") is not None else ["mass"]
     missing += [key for key in ("ixx", "iyy", "izz") if moments is None or moments.first(key) is None]
     if missing:
@@ -82,9 +82,9 @@ def gravity_of(world: Element | None) -> Float[np.ndarray, "3"]:
     Parameters
     ----------
     world : Element or None
-        The element ``<world>`` that holds the model.
+        Element ``<world>`` with the model.
     """
-    holders = [] if world is None else [world, *world.every("physics")]  # up to SDF 1.5 it was a matter of the physics
+    holders = [] if world is None else [world, *world.every("physics")]  # up to SDF 1.5, in the physics
     for holder in holders:
         if (element := holder.only("gravity", "world")) is not None:
             return np.array(element.content_numbers(3, "world", "gravity"))

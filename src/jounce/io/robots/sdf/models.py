@@ -1,7 +1,7 @@
-"""Models of SDF files: the one that is asked for, with what it includes and nests as links and joints of its own.
+"""Selection of a model of an SDF file, with included and nested models as links and joints of its own.
 
-A nested model becomes links, joints and frames whose names begin with its own and ``::``, as SDF itself names them, and
-a frame for the model, which the poses within it are relative to.
+A nested model becomes links, joints and frames whose names begin with its own and ``::``, as in SDF itself, and a frame
+for the model, to which the poses within it are relative.
 """
 
 from __future__ import annotations
@@ -29,25 +29,25 @@ MODEL_PARTS += ("plugin", "gripper", "include", "model")
 INCLUDE_PARTS = ("uri", "name", "pose", "placement_frame", "static", "plugin", "merge")
 ROOT = ("model", "world")
 NOT_THERE = "models that the world includes and that are not there"
-NEWEST = (1, 7)  # version of what is made here: axes name their frames
+NEWEST = (1, 7)  # version of the resulting models: axes name their frames
 MOST_NESTED = 50
 MOST_LINKS = 20_000
 
 
 @dataclasses.dataclass(frozen=True)
 class ChosenModel:
-    """A model of a file, all that it nests among its own links and joints.
+    """A model of a file, with all nested models among its own links and joints.
 
     Attributes
     ----------
     model : Element
-        Without nested models.
+        Model without nested models.
     pose : FramePose
-        In the world.
+        Pose in the world.
     world : Element or None
-        The element ``<world>`` that holds it.
+        Element ``<world>`` that contains it.
     version : tuple of int
-        Of SDF, which its joints are written in.
+        Version of SDF in which its joints are written.
     """
 
     model: Element
@@ -59,23 +59,23 @@ class ChosenModel:
 def chosen_model(
     root: Element, faults: Faults, name: str | None = None, allow: Iterable[str | PathLike[str]] = ()
 ) -> ChosenModel:
-    """Return the model of a file that is asked for, or the only one that moves.
+    """Return the model of a file with a given name, or the only one that moves.
 
     Parameters
     ----------
     root : Element
-        The element ``<sdf>``.
+        Element ``<sdf>``.
     faults : Faults
-        Takes models that are included and not there.
+        Records missing included models.
     name : str, optional
-        Of the model.
+        Name of the model.
     allow
-        Folders besides that of the file that included models may be below.
+        Folders besides that of the file below which included models may lie.
 
     Raises
     ------
     RobotFileError
-        There is no such model, several move, or one cannot be read.
+        If the model does not exist, several models move, or a model cannot be read.
     """
     check_known(root, (*ROOT, "actor", "light", "include"))
     reader = _Models(faults, tuple(allow))
@@ -111,7 +111,7 @@ def chosen_model(
 
 
 def version_of(root: Element) -> tuple[int, ...]:
-    """Return the version of SDF that a file is written in."""
+    """Return the version of SDF of a file."""
     text = root.text("version", "version")
     try:
         return tuple(int(part) for part in text.split("."))
@@ -122,7 +122,7 @@ def version_of(root: Element) -> tuple[int, ...]:
 
 
 class _SourceModel(NamedTuple):
-    """A model as its file has it, the version of that, and the world that holds it."""
+    """A model as given in its file, its version of SDF, and the world that contains it."""
 
     model: Element
     version: tuple[int, ...]
@@ -130,7 +130,7 @@ class _SourceModel(NamedTuple):
 
 
 def _only_one(given: dict[str, _SourceModel], reader: _Models) -> str:
-    """Return the name of the only model, or of the only one that moves, or is not static."""
+    """Return the name of the only model, or of the only one that moves or is not static."""
     loose = [name for name, one in given.items() if not _static(one.model)]
     moving = [name for name in loose if _moves(given[name], reader)] if len(given) > 1 else []
     for names in (list(given), moving, loose if not moving else []):
@@ -149,7 +149,7 @@ def _static(model: Element) -> bool:
 
 
 def _moves(given: _SourceModel, reader: _Models) -> bool:
-    """Whether a model has joints that move, of its own or of those that it nests."""
+    """Return whether a model has moving joints, of its own or of nested models."""
     if any(part.tag == "joint" and part.attributes.get("type") not in ("fixed", None) for part in given.model.walk()):
         return True
     if not any(part.tag == "include" for part in given.model.walk()):
@@ -159,12 +159,12 @@ def _moves(given: _SourceModel, reader: _Models) -> bool:
 
 
 def _models_of(joint: Element) -> set[str]:
-    """Return the names of the models whose frames a joint of the world joins."""
+    """Return the names of the models that a joint of the world connects."""
     return {part.content.strip().partition("::")[0] for tag in ("parent", "child") for part in joint.every(tag)}
 
 
 def _joined(label: str, given: dict[str, _SourceModel], joints: list[Element], reader: _Models) -> Element:
-    """Return models that joints of the world join as one, those that are static fixed to the world."""
+    """Return the models that joints of the world connect as one model; static ones are fixed to the world."""
     members, before = {label}, 0
     while len(members) != before:
         before = len(members)
@@ -187,7 +187,7 @@ def _joined(label: str, given: dict[str, _SourceModel], joints: list[Element], r
 
 
 class _Models:
-    """Reads models, with those that they include, each file once."""
+    """Reads models and the models that they include, each file once."""
 
     def __init__(self, faults: Faults, allow: tuple[str | PathLike[str], ...]):
         self.faults, self.allow = faults, allow
@@ -196,7 +196,7 @@ class _Models:
         self.links = 0
 
     def models(self, holder: Element, version: tuple[int, ...]) -> Iterator[tuple[Element, tuple[int, ...]]]:
-        """Give the models of a file or a world, those that it includes too; what is not there is noted."""
+        """Yield the models of a file or a world, and their versions, with included ones; missing ones are recorded."""
         for child in holder.children:
             if child.tag == "model":
                 yield child, version
@@ -212,7 +212,7 @@ class _Models:
                 yield self._included(child, path)
 
     def flattened(self, model: Element, version: tuple[int, ...], *, top: bool = False) -> Element:
-        """Return a model whose nested ones are among its own links, joints and frames, in the newest version."""
+        """Return a model in the newest version, with nested models among its own links, joints and frames."""
         check_known(model, MODEL_PARTS)
         children: list[Element] = []
         for child in model.children:
@@ -230,7 +230,7 @@ class _Models:
         return whole
 
     def _newest(self, joint: Element, model: Element, version: tuple[int, ...]) -> Element:
-        """Return a joint as the newest version has it: axes name their frames, no link has its name."""
+        """Return a joint in the newest version: its axes name their frames, and no link has its name."""
         name = joint.attributes.get("name", "")
         if version < (1, 7) and any(link.attributes.get("name") == name for link in model.every("link")):
             taken = {part.attributes.get("name") for part in model.children}
@@ -243,7 +243,7 @@ class _Models:
         return with_named_axes(joint, version)
 
     def _nested(self, child: Element, version: tuple[int, ...]) -> list[Element]:
-        """Return the parts of a nested or included model, by their names in the one that holds it."""
+        """Return the parts of a nested or included model, with their names in the containing model."""
         model, merged = child, False
         if child.tag == "include":
             path = self._path(child)
@@ -262,7 +262,7 @@ class _Models:
         return scoped(whole, name, reference_pose(whole), whole.only("pose") or child, merged=merged)
 
     def _included(self, include: Element, path: str) -> tuple[Element, tuple[int, ...]]:
-        """Return an included model, with the name, the pose and the flag that the element gives it."""
+        """Return an included model, with the name, the pose and the static flag of the including element."""
         check_known(include, INCLUDE_PARTS, "include")
         if path not in self.files:
             root = read_markup(path, self.faults)
@@ -289,7 +289,7 @@ class _Models:
         return uri.content.strip()
 
     def _path(self, include: Element) -> str | None:
-        """Return the file of an included model, None if it is not there."""
+        """Return the file of an included model; None if it is missing."""
         uri = self._uri(include)
         match = re.fullmatch(r"(?:(model|package|file)://)?(.*)", uri)
         assert match is not None  # it matches anything
@@ -312,7 +312,7 @@ class _Models:
 
 
 def _manifest(folder: Path) -> str:
-    """Return the file of a model's folder: the newest of its manifest, else the usual one."""
+    """Return the file of a model folder: the newest one of its manifest, else model.sdf."""
     config = folder / "model.config"
     if os.path.lexists(config):
         files = [x for x in read_markup(str(config)).every("sdf") if x.content.strip()]

@@ -1,4 +1,4 @@
-"""Poses in SDF files: each relative to a frame that has a name, and so resolved from one frame to the next."""
+"""Poses in SDF files: each is relative to a named frame, and resolved along the chain of frames."""
 
 from __future__ import annotations
 
@@ -14,21 +14,21 @@ from jounce.io.robots.elements.xml_elements import Element
 
 MODEL = "__model__"
 WORLD = "world"
-MAX_CHAIN = 1000  # frames, each attached to the next
+MAX_CHAIN = 1000  # frames in a chain of references
 
 
 class FramePose(NamedTuple):
-    """Where a frame is in another one: its origin, and its axes as columns."""
+    """The pose of a frame in another frame: its origin, and its axes as columns."""
 
     position: Float[np.ndarray, "3"]
     rotation: Float[np.ndarray, "3 3"]
 
     def then(self, inner: FramePose) -> FramePose:
-        """Return where a frame is that this one holds at a place."""
+        """Return the pose of an inner frame in the outer frame of this pose."""
         return FramePose(self.position + self.rotation @ inner.position, self.rotation @ inner.rotation)
 
     def seen_from(self, outer: FramePose) -> FramePose:
-        """Return where the frame is in another one; both places are in one frame."""
+        """Return the pose of this frame in another one, given both poses in one frame."""
         return FramePose(outer.rotation.T @ (self.position - outer.position), outer.rotation.T @ self.rotation)
 
 
@@ -36,12 +36,12 @@ HERE = FramePose(np.zeros(3), np.eye(3))
 
 
 class Frames:
-    """The frames of a model: its links, joints and further frames by name, and where they are in the model.
+    """The frames of a model: its links, joints and further frames by name, and their poses in the model.
 
     Parameters
     ----------
     model : Element
-        The element ``<model>``.
+        Element ``<model>``.
     elements : dict of str to Element
         Links, joints and frames by name.
     """
@@ -51,7 +51,7 @@ class Frames:
         self._resolved: dict[str, FramePose] = {MODEL: HERE}
 
     def pose(self, name: str) -> FramePose:
-        """Return where a frame is in the model."""
+        """Return the pose of a frame in the model."""
         chain = [name]
         while chain[-1] not in self._resolved:
             element = self.elements[chain[-1]]
@@ -62,11 +62,11 @@ class Frames:
         return self._resolved[name]
 
     def of(self, name: str, element: Element, *where: str) -> FramePose:
-        """Return where a frame is in the model; `element` names the frame, which must be there."""
+        """Return the pose of a frame in the model; `element` is the one that names the frame."""
         return self.pose(self._known(name, element, *where))
 
     def link(self, name: str, element: Element, *where: str) -> str:
-        """Return the link that a frame is fixed to, or ``world``; `element` names the frame."""
+        """Return the link to which a frame is fixed, or ``world``; `element` is the one that names the frame."""
         chain = [name]
         while True:
             name = chain[-1]
@@ -82,7 +82,7 @@ class Frames:
             self._extend(chain, following, target)
 
     def canonical_link(self) -> str:
-        """Return the link that stands for the model: the first one, unless it names another."""
+        """Return the canonical link of the model: the first one, unless it names another."""
         links = [name for name, element in self.elements.items() if element.tag == "link"]
         chosen = self.model.attributes.get("canonical_link") or links[0]
         if chosen not in links:
@@ -96,7 +96,7 @@ class Frames:
         chain.append(name)
 
     def _reference(self, element: Element) -> str:
-        """Return the frame that the pose of an element is relative to."""
+        """Return the frame to which the pose of an element is relative."""
         pose = element.first("pose")
         given = "" if pose is None else pose.attributes.get("relative_to") or pose.attributes.get("frame") or ""
         if not given:
@@ -106,7 +106,7 @@ class Frames:
         return self._known(given, pose or element)
 
     def _known(self, name: str, element: Element, *where: str) -> str:
-        """Return the name of a frame that must be there; that of a nested model stands for its own frame."""
+        """Return the name of an existing frame; the name of a nested model denotes its own frame."""
         if name == MODEL or name in self.elements:
             return name
         if (own := f"{name}::{MODEL}") in self.elements:
@@ -119,7 +119,7 @@ def _attachment(frame: Element) -> str:
 
 
 def pose_of(element: Element, *name: str) -> FramePose:
-    """Return the pose of an element in the frame that it is relative to: turns about fixed axes, or a quaternion."""
+    """Return the pose of an element relative to its reference frame, by turns about fixed axes or a quaternion."""
     from scipy.spatial.transform import Rotation
 
     pose = element.first("pose")
@@ -137,7 +137,7 @@ def pose_of(element: Element, *name: str) -> FramePose:
 
 
 def needed(element: Element, tag: str, *name: str) -> Element:
-    """Return the one child of a tag, which must be there."""
+    """Return the only child with a tag, which is required."""
     single = element.only(tag, *name)
     if single is None:
         raise element.error(f"<{element.tag}> has no <{tag}>", *name)
@@ -145,7 +145,7 @@ def needed(element: Element, tag: str, *name: str) -> Element:
 
 
 def text_of(element: Element, tag: str, *name: str) -> str:
-    """Return the text of a child that must be there and not be blank."""
+    """Return the text of a required child, which must not be blank."""
     child = needed(element, tag, *name)
     text = child.content.strip()
     if not text:
@@ -154,13 +154,13 @@ def text_of(element: Element, tag: str, *name: str) -> str:
 
 
 def number_of(element: Element | None, tag: str, *name: str, default: float, infinite: bool = False) -> float:
-    """Return the number in a child, or the default where there is none."""
+    """Return the number in a child; the default if there is no child."""
     child = None if element is None else element.only(tag, *name)
     return default if child is None else child.content_numbers(1, *name, tag, infinite=infinite)[0]
 
 
 def flag_of(element: Element | None, tag: str, *name: str, default: bool = False) -> bool:
-    """Return the truth value in a child, or the default where there is none."""
+    """Return the truth value in a child; the default if there is no child."""
     child = None if element is None else element.only(tag, *name)
     if child is None:
         return default
@@ -171,14 +171,14 @@ def flag_of(element: Element | None, tag: str, *name: str, default: bool = False
 
 
 def check_known(element: Element, known: Iterable[str], *name: str) -> None:
-    """Note an element that SDF does not have; those of other programs have a prefix, such as ``gz:``."""
+    """Record elements that SDF does not have; those of other programs have a prefix, such as ``gz:``."""
     for child in element.children:
         if child.tag not in known and ":" not in child.tag:
             child.leave_out_unknown(no_such("element of SDF here", child.tag, known), *name)
 
 
 def vector_of(element: Element, *name: str) -> Float[np.ndarray, "3"]:
-    """Return the direction in an element, of length one."""
+    """Return the direction in an element as a unit vector."""
     values = np.array(element.content_numbers(3, *name))
     length = float(np.linalg.norm(values))
     if length < 1e-9:

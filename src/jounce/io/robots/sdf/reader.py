@@ -1,4 +1,4 @@
-"""Robots from SDF files: loops are native there, so that a tree is chosen and what is left closes it."""
+"""Robots from SDF files, which may contain loops: a spanning tree is chosen, and the other joints close loops."""
 
 from __future__ import annotations
 
@@ -46,40 +46,42 @@ BALL = "drake:ball_constraint"
 def read_sdf(
     root: Element, faults: Faults, model: str | None = None, allow: Iterable[str | PathLike[str]] = ()
 ) -> Robot:
-    """Return the robot that an SDF file describes; its loops become closures.
+    """Return the robot of an SDF file; its loops become closures.
 
-    Of several models the one is taken that is asked for, or that alone moves; models which it nests or includes are
-    part of it, their links and joints under names such as ``arm::elbow``. The base is the link ``world`` if a joint
-    holds the model there or it is static, else the model's canonical link. Gravity is that of the world in the file, or
-    else 9.81 m/s^2 along its -z; links may be out of it.
-    Screws come into the tree first, then joints of one axis, of two, balls last, each in the order of the file; what
-    closes a loop then is a closure: a revolute joint a pin, a prismatic one a slider, a ball a point, a fixed one a
-    weld. A joint of the tree whose child is nearer the base is taken the other way round, about the opposite axis, so
-    that its coordinate stays that of the file. A universal joint becomes two turns, a ball three about moving axes z,
-    y, x, with massless links between. A joint whose axis passes beside the origin of its child has a massless link
-    there. A gearbox makes the second of its two joints follow the first; so does ``drake:mimic``, and rotors that Drake
-    reads are armature. A link without ``<inertial>`` weighs 1 kg, as
-    SDF says; there is a warning of it. Sensors and plugins are left out, and limits of a joint that closes a loop; of
-    springs, damping and friction there, and of decaying velocities, which are left out too, there is a warning. So
-    there is of a static model whose joints move: a simulator holds it still, and here its joints have coordinates. A
-    screw is a turn and a travel that follows it. Links that nothing joins to the base have six coordinates, which are
-    zero where the file places them; of that there is a warning.
+    Of several models, the one with the given name is read, or the only one that moves. Models that it nests or includes
+    are part of it, their links and joints under names such as ``arm::elbow``. The base is the link ``world`` if a joint
+    connects the model to it or the model is static, else the canonical link of the model. Gravity is that of the world
+    in the file, or 9.81 m/s^2 along its -z; links may be free of it.
+
+    The tree takes screws first, then joints of one axis, of two axes, and balls, each in the order of the file. Every
+    other joint becomes a closure: a revolute joint a pin, a prismatic one a slider, a ball a point, a fixed one a weld.
+    A joint of the tree whose child is nearer to the base is reversed, about the opposite axis, so that its coordinate
+    stays that of the file. A universal joint becomes two turns, a ball three turns about moving axes z, y, x, with
+    massless links between them. A joint whose axis does not pass through the origin of its child has a massless link. A
+    screw is a turn and a travel that follows it. A gearbox makes the second of its two joints follow the first, as
+    ``drake:mimic`` does for one joint; rotors that Drake reads become armature.
+
+    A link without ``<inertial>`` has a mass of 1 kg, as SDF states, with a warning. Sensors, plugins, and limits of
+    joints that close a loop are left out. Springs, damping and friction of such joints, and decaying velocities, are
+    left out with a warning. There is also a warning of a static model with movable joints: a simulator holds it still,
+    and here its joints have coordinates. Links without a connection to the base have six coordinates, which are zero in
+    the pose of the file, with a warning.
 
     Parameters
     ----------
     root : Element
-        The element ``<sdf>``.
+        Element ``<sdf>``.
     faults : Faults
-        Takes what no real robot has, and what is left out.
+        Records values that no real robot has, and parts that are left out.
     model : str, optional
-        Name of the model to read.
+        Name of the model.
     allow
-        Folders besides that of the file that included models may be below.
+        Folders besides that of the file below which included models may lie.
 
     Raises
     ------
     RobotFileError
-        Something is missing, unknown or impossible; the message has the line.
+        If something is missing, unknown or impossible; the message has the line.
     """
     chosen = chosen_model(root, faults, model, allow)
     frames = Frames(chosen.model, named(chosen.model))
@@ -87,7 +89,7 @@ def read_sdf(
 
 
 class _Reader:
-    """Turns the links and joints of a model into those of a tree, and closures."""
+    """Converts the links and joints of a model to a tree with closures."""
 
     def __init__(
         self, frames: Frames, pose: FramePose, world: Element | None, version: tuple[int, ...], faults: Faults
@@ -97,7 +99,7 @@ class _Reader:
         self.links: list[Link] = []
         self.joints: list[Joint] = []
         self.taken = {WORLD, *self.elements}
-        self.coordinates: dict[tuple[str, str], str] = {}  # of joints of two axes, by joint and axis
+        self.coordinates: dict[tuple[str, str], str] = {}  # of joints with two axes, by joint and axis
         for name, element in self.elements.items():
             self.lines.add(element, f"{element.tag}s", name)
             self.lines.add(element, "closures", name)
@@ -139,13 +141,13 @@ class _Reader:
             raise self.lines.located(error) from None
 
     def _link_pose(self, link: str) -> FramePose:
-        """Return where a link is in the model."""
+        """Return the pose of a link in the model."""
         return HERE.seen_from(self.pose) if link == WORLD else self.frames.pose(link)
 
     def _divided(
         self, joints: Sequence[SdfJoint], base: str, links: Sequence[str], fixed: bool
     ) -> tuple[list[SdfJoint], list[SdfJoint]]:
-        """Return the joints of a tree, each away from the base, and those that close its loops."""
+        """Return the joints of a spanning tree, each directed away from the base, and the joints that close loops."""
         group = {link: link for link in links}
 
         def head(link: str) -> str:
@@ -180,7 +182,7 @@ class _Reader:
         return tree, [joint for joint in joints if joint.name not in chosen]
 
     def _loose(self, link: str, base: str, fixed: bool) -> SdfJoint:
-        """Return what joins a link to the base where the file does not: nothing moves in a static model."""
+        """Return a joint between the base and a link without a connection: free, or fixed in a static model."""
         element, origin = self.elements[link], self.frames.pose(link).position
         if fixed:
             return SdfJoint(self._unused(f"{link}_{WORLD}"), "fixed", WORLD, link, origin, (), self.model)
@@ -197,7 +199,7 @@ class _Reader:
     def _add(self, joint: SdfJoint, mimics: dict[str, Mimic]) -> None:
         """Add a joint of the tree, with the massless links that it needs."""
         parent, child = self._link_pose(joint.parent), self._link_pose(joint.child)
-        here = FramePose(joint.origin, child.rotation)  # of the joint, with the axes of the child
+        here = FramePose(joint.origin, child.rotation)  # frame of the joint, with the axes of the child
         offset_origin = joint.kind != "fixed" and bool(np.any(np.abs(joint.origin - child.position) > 1e-12))
         intermediate = self._unused(f"{joint.child}_{joint.name}") if offset_origin else joint.child
         if offset_origin:
@@ -214,7 +216,7 @@ class _Reader:
     def _parts(
         self, joint: SdfJoint, child: str, rotation: Float[np.ndarray, "3 3"], mimics: dict[str, Mimic]
     ) -> list[Joint]:
-        """Return the joints that one stands for, from its parent to the link given, all at one place."""
+        """Return the joints that represent a joint, from its parent to a given link, all at one point."""
         if joint.kind in ("ball", "free"):
             return self._turns(joint, child)
         if joint.kind == "fixed":
@@ -238,7 +240,7 @@ class _Reader:
         return made
 
     def _screw(self, joint: SdfJoint, turn: Joint, child: str) -> list[Joint]:
-        """Return the turn of a screw and the travel along its axis, which follows."""
+        """Return the turn of a screw, and the travel along its axis that follows the turn."""
         between = self._unused(f"{joint.name}_frame")
         self.links.append(Link(between))
         pitch = pitch_of(joint.element, "joints", joint.name)
@@ -248,7 +250,7 @@ class _Reader:
         return [dataclasses.replace(turn, child=between), slide]
 
     def _turns(self, joint: SdfJoint, child: str) -> list[Joint]:
-        """Return the three turns of a ball, or all that a free link does, with names that nothing else has."""
+        """Return the three turns of a ball, or the six joints of a free link, with unused names."""
         turns, parent = floating_joints(child, prefix=joint.name)[1], joint.parent
         turns = turns[3:] if joint.kind == "ball" else turns
         for k, turn in enumerate(turns):
@@ -260,7 +262,7 @@ class _Reader:
         return turns
 
     def _closure(self, joint: SdfJoint) -> Closure:
-        """Return what closes a loop."""
+        """Return the closure of a joint that closes a loop."""
         if joint.kind not in CLOSED_BY:
             message = f"a {joint.kind} joint closes a loop here; make it two revolute joints with a link between"
             raise joint.element.error(message, "joints", joint.name, value=joint.kind)
@@ -282,7 +284,7 @@ class _Reader:
             raise self.lines.located(error) from None
 
     def _ball_constraints(self) -> list[Closure]:
-        """Return the ball constraints of Drake, each a point of one link held at a point of another."""
+        """Return the ball constraints of Drake, each of which holds a point of one link at a point of another."""
         closures = []
         for k, element in enumerate(self.model.every(BALL)):
             name = self._unused(f"ball_constraint_{k}")
@@ -300,7 +302,7 @@ class _Reader:
         return closures
 
     def _mimics(self, tree: Sequence[SdfJoint], gears: Sequence[SdfJoint]) -> dict[str, Mimic]:
-        """Return what joints follow: by ``<mimic>``, and by gearboxes."""
+        """Return the leaders of joints, by ``<mimic>`` and by gearboxes."""
         mimics: dict[str, Mimic] = {}
         for joint, tag in ((follower, axis.tag) for follower in tree for axis in follower.axes):
             name = self.coordinates.get((joint.name, tag), joint.name)
@@ -326,7 +328,7 @@ class _Reader:
         return leaders(mimics)
 
     def _drake_mimic(self, joint: SdfJoint, mimic: Element, mimics: dict[str, Mimic]) -> None:
-        """Add what Drake writes as attributes of an element of the joint."""
+        """Add the leader of a joint that Drake states as attributes of an element."""
         where = ("joints", joint.name, DRAKE_MIMIC)
         if len(joint.axes) != 1 or joint.name in mimics:
             message = "is for a joint of one axis, and one that follows no other already"
@@ -338,14 +340,14 @@ class _Reader:
         self.lines.add(mimic, "joints", joint.name, "mimic")
 
     def _leader(self, mimic: Element, *where: str) -> str:
-        """Return the coordinate that one follows, which may be about the first or the second axis of a joint."""
+        """Return the leading coordinate of a mimic, about the first or the second axis of a joint."""
         joint, tag = mimic.text("joint", *where), mimic.attributes.get("axis", AXIS_TAGS[0])
         if tag != AXIS_TAGS[0] and (joint, tag) not in self.coordinates:
             raise mimic.error(f"{joint} has no axis of this name", *where, "axis", value=tag)
         return self.coordinates.get((joint, tag), joint)
 
     def _gearing(self, gear: SdfJoint, tree: Sequence[SdfJoint]) -> tuple[str, Mimic]:
-        """Return which joint a gearbox makes follow, and how: theta_2 = -ratio theta_1 about its own axes."""
+        """Return the follower of a gearbox and its relation: theta_2 = -ratio theta_1 about the axes of the gearbox."""
         where = ("joints", gear.name)
         body = needed(gear.element, "gearbox_reference_body", *where)
         reference = self.frames.link(text_of(gear.element, "gearbox_reference_body", *where), body, *where)

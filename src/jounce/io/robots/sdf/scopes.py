@@ -1,4 +1,4 @@
-"""Parts of nested models of SDF under the names that they have in the model or the world that holds them."""
+"""Parts of nested SDF models, under their names in the containing model or world."""
 
 from __future__ import annotations
 
@@ -37,12 +37,12 @@ def named(model: Element) -> dict[str, Element]:
 
 
 def scope(name: str, model: Element) -> list[Element]:
-    """Return the parts of a model by the names that they have in the world."""
+    """Return the parts of a model with their names in the world."""
     return scoped(model, name, reference_pose(model), model.only("pose") or model)
 
 
 def placed(model: Element) -> FramePose:
-    """Return the pose of a model, from that of the frame which it is placed by."""
+    """Return the pose of a model, given that of its placement frame."""
     frame, pose = model.attributes.get("placement_frame", "").strip(), pose_of(model)
     if not frame:
         return pose
@@ -51,21 +51,21 @@ def placed(model: Element) -> FramePose:
 
 
 def reference_pose(model: Element) -> tuple[FramePose, str]:
-    """Return the pose of a model and the frame that it is relative to, empty for the model that holds it."""
+    """Return the pose of a model and its reference frame, which is empty for the containing model."""
     pose = model.only("pose")
     given = "" if pose is None else pose.attributes.get("relative_to") or pose.attributes.get("frame") or ""
     return placed(model), "" if given == WORLD else given
 
 
 def made(like: Element, tag: str, text: str = "", **attributes: str) -> Element:
-    """Return an element of the file and line of another one."""
+    """Return a new element with the file and the line of another one."""
     return Element(tag, attributes, like.path, like.line, pieces=[text], faults=like.faults)
 
 
 def scoped(
     model: Element, scope: str, placed: tuple[FramePose, str], at: Element, *, merged: bool = False
 ) -> list[Element]:
-    """Return the parts of a model with the names that they have in the one that holds it, and its frame."""
+    """Return the parts of a model with their names in the containing model, and the frame of the model."""
     from scipy.spatial.transform import Rotation
 
     frame = f"_merged__{scope}__model__" if merged else f"{scope}::{MODEL}"
@@ -98,7 +98,7 @@ def scoped(
 
 
 def _renamed(element: Element, rename: Any) -> Element:
-    """Return an element in which all that names a link, a joint or a frame names it anew."""
+    """Return an element in which all references to links, joints and frames are renamed."""
     attributes = {key: rename(x) if key in REFERENCES else x for key, x in element.attributes.items()}
     if element.tag == "pose" and "frame" in attributes:
         attributes["frame"] = rename(attributes["frame"])
@@ -110,7 +110,7 @@ def _renamed(element: Element, rename: Any) -> Element:
 
 
 def _relative(link: Element, frame: str) -> None:
-    """Place a link relative to a frame unless it names one."""
+    """Place a link relative to a frame, unless it names a frame."""
     pose = link.first("pose")
     if pose is None:
         link.children.append(made(link, "pose", relative_to=frame))

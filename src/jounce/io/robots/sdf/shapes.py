@@ -21,30 +21,30 @@ SIZES = {
     "ellipsoid": {"size": ("radii", 2.0)},
     "sphere": {"radius": ("radius", 1.0)},
 }
-"""Of each shape the sizes of the solid: the element that holds each, and by what it is to be multiplied."""
+"""For each shape, the sizes of the solid: the element of each size, and its factor."""
 
 
 def inertia_of_shapes(name: str, link: Element, inertial: Element, frames: Frames, faults: Faults) -> Inertia:
-    """Return the inertia of a link in its frame, from its collision shapes, as the reference library of SDF adds them.
+    """Return the inertia of a link in its frame, from its collision shapes, as the reference library of SDF does.
 
-    The density is that of the collision, else that of ``<inertial>``, else 1000 kg/m^3. A ``<mass>`` scales the whole
-    to that mass. A cone has its axis along z, its middle at the pose of the collision.
+    The density is that of the collision, else that of ``<inertial>``, else 1000 kg/m^3. A ``<mass>`` scales the result
+    to that mass. A cone has its axis along z, and its middle at the pose of the collision.
 
     Parameters
     ----------
     name : str
-        Of the link.
+        Name of the link.
     link, inertial : Element
-        The elements ``<link>`` and ``<inertial>``.
+        Elements ``<link>`` and ``<inertial>``.
     frames : Frames
-        Of the model, which collisions may be placed relative to.
+        Frames of the model, relative to which collisions may be placed.
     faults : Faults
-        Takes a density that is not given, and moments that are not used.
+        Records a missing density, and moments that are not used.
 
     Raises
     ------
     RobotFileError
-        There is no collision, one has a shape whose inertia is not computed, or a size is missing or impossible.
+        If there is no collision, the inertia of a shape is not computed, or a size is missing or impossible.
     """
     where = ("links", name, "inertial")
     collisions = link.every("collision")

@@ -1,1 +1,1 @@
-"""URDF: links and joints, extensions of simulators, and what is left out."""
+"""URDF: links and joints, extensions of simulators, and parts that are left out."""

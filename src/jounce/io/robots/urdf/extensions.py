@@ -1,4 +1,4 @@
-"""What simulators add to URDF files and is read: loops, springs of joints, links that gravity does not pull at."""
+"""Extensions of simulators in URDF files that are read: loops, springs of joints, and links without gravity."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ BALL = "drake:ball_constraint"
 
 
 class Loop(NamedTuple):
-    """A closure, and the element that it is of."""
+    """A closure, and its element."""
 
     closure: Closure
     element: Element
 
 
 def shares_of_gravity(root: Element) -> dict[str, float]:
-    """Return 0 for the links that Gazebo takes out of gravity, by name."""
+    """Return 0 for each link that Gazebo exempts from gravity, by name."""
     off = {}
     for gazebo in root.every("gazebo"):
         link = gazebo.attributes.get("reference", "").strip()
@@ -39,12 +39,12 @@ def shares_of_gravity(root: Element) -> dict[str, float]:
 
 
 def joint_springs(root: Element) -> dict[str, dict[str, float]]:
-    """Return stiffness and reference of the springs of joints, as Gazebo has them or within ``<dynamics>``.
+    """Return stiffness and reference of the springs of joints, as given for Gazebo or within ``<dynamics>``.
 
     Raises
     ------
     RobotFileError
-        A value is no number, or the stiffness is negative.
+        If a value is no number, or the stiffness is negative.
     """
     springs: dict[str, dict[str, float]] = {}
     for gazebo in root.every("gazebo"):
@@ -73,12 +73,12 @@ def urdf_closures(root: Element, links: Collection[str]) -> list[Loop]:
     """Return the loops of a file: ``<loop_joint>``, and the ball constraints of Drake.
 
     A ``<loop_joint>`` holds two frames together, each placed in its link by ``xyz`` and ``rpy``; its axis is in the
-    first. A joint of SDF within ``<gazebo>`` joins two links of the file as they are at coordinates zero.
+    first frame. An SDF joint within ``<gazebo>`` joins two links of the file in the pose at coordinates zero.
 
     Raises
     ------
     RobotFileError
-        Something is missing or wrong.
+        If something is missing or wrong.
     """
     loops = []
     for element in root.every("loop_joint"):
@@ -117,14 +117,14 @@ def gazebo_joints(root: Element) -> list[Element]:
 
 
 def gazebo_loop(element: Element, links: Collection[str]) -> Loop | None:
-    """Return the loop that a joint of SDF closes between two links of a file; None if it is of another kind.
+    """Return the loop that an SDF joint closes between two links of a file; None if it is of another kind.
 
-    Its frame is that of the child, moved by its ``<pose>``; the axis is in that frame.
+    The frame of the joint is that of its child, moved by its ``<pose>``; the axis is in that frame.
 
     Raises
     ------
     RobotFileError
-        A number is missing or none.
+        If a number is missing or not valid.
     """
     name, kind = element.attributes.get("name", ""), element.attributes.get("type", "")
     ends = [part.content.strip() for role in ("child", "parent") for part in element.every(role)]

@@ -1,6 +1,6 @@
-"""What URDF files hold beside links and joints that bears on motions or forces: rotors are read, the rest warned of.
+"""Parts of URDF files that affect motions or forces besides links and joints: rotors are read, others warned of.
 
-Drake, Gazebo, Isaac Sim and MuJoCo each add elements of their own, of which a reader of links and joints sees nothing.
+Drake, Gazebo, Isaac Sim and MuJoCo have elements of their own, which a reader of links and joints does not see.
 """
 
 from __future__ import annotations
@@ -43,21 +43,21 @@ OF_DYNAMICS = dict.fromkeys(("stiffness", "spring_k"), JOINT_SPRINGS) | dict.fro
     ("armature", "rotor_inertia"), ROTORS
 )
 SPRINGS = ("springStiffness", "spring_stiffness")
-OTHER_ROTORS = ("rotorInertia", "rotor_inertia", "motorInertia", "motor_inertia")  # of actuators, by nobody's rule
+OTHER_ROTORS = ("rotorInertia", "rotor_inertia", "motorInertia", "motor_inertia")  # of actuators, undocumented
 VERSIONS = ((1, 0), (1, 1), (1, 2))
 YES, NO = ("true", "1"), ("false", "0")
 
 
 def check_version(root: Element, faults: Faults) -> None:
-    """Take ``quat_xyzw`` out of a file whose version does not have it, with a note: it turns nothing there.
+    """Remove ``quat_xyzw`` from a file whose version does not have it, and record it: there it has no effect.
 
-    The reference parser, urdfdom, reads it from version 1.1 on; below, and where no version is given, which is 1.0, it
-    takes the identity, or ``rpy``. Versions that it does not know are refused, as there.
+    The reference parser, urdfdom, reads it from version 1.1 on. In version 1.0, which is the default, it takes the
+    identity, or ``rpy``. Unknown versions are refused, as in urdfdom.
 
     Raises
     ------
     RobotFileError
-        The version is none of those that there are, or something is left out and that is an error.
+        If the version does not exist, or if a part that is left out is an error.
     """
     text = root.attributes.get("version", "1.0")
     match = re.fullmatch(r"(\d+)\.(\d+)", text.strip(), re.ASCII)
@@ -83,8 +83,8 @@ def check_version(root: Element, faults: Faults) -> None:
 def rotors(root: Element, faults: Faults) -> dict[str, float]:
     """Return the inertia of rotors seen at the joints, by name: ``rotor_inertia * gear_ratio^2`` of transmissions.
 
-    As Drake reads them: the ratio is 1 unless given, and ``mechanicalReduction`` has no part in it. A transmission of
-    several joints or actuators is left out.
+    As in Drake, the ratio is 1 by default, and ``mechanicalReduction`` is ignored. Transmissions of several joints or
+    actuators are left out.
     """
     inertias: dict[str, float] = {}
     known = dict.fromkeys(element.attributes.get("name", "") for element in root.every("joint"))
@@ -113,23 +113,23 @@ def rotors(root: Element, faults: Faults) -> dict[str, float]:
 
 
 def note_left_out(root: Element, robot: Robot, names: Mapping[str, list[Joint]], faults: Faults) -> None:
-    """Note what else a file holds that changes motions or forces, once the robot is made.
+    """Record other parts of a file that change motions or forces, after the robot is made.
 
     Parameters
     ----------
     root : Element
-        The element ``<robot>``.
+        Element ``<robot>``.
     robot : Robot
-        What was made of it.
+        Robot made from the element.
     names : dict of str to list of Joint
-        What each joint of the file became.
+        Joints of the robot that represent each joint of the file.
     faults : Faults
-        Takes what is left out.
+        Records the parts.
 
     Raises
     ------
     RobotFileError
-        Something is left out and that is an error.
+        If a part that is left out is an error.
     """
     elements = {element.attributes.get("name", ""): element for element in root.every("joint")}
     moving = bool(robot.moving_joints)
@@ -159,7 +159,7 @@ def _leave(faults: Faults, heading: str, shown: str, element: Element, message: 
 
 
 def _note_dynamics(joint: Element, faults: Faults) -> None:
-    """Note what simulators add to the dynamics of a joint."""
+    """Record the extensions of simulators in the dynamics of a joint."""
     dynamics, name = joint.first("dynamics"), joint.attributes["name"]
     for key, heading in OF_DYNAMICS.items() if dynamics is not None and joint.attributes["type"] != "fixed" else ():
         where = ("joints", name, "dynamics", key)
@@ -168,7 +168,7 @@ def _note_dynamics(joint: Element, faults: Faults) -> None:
 
 
 def _note_control(control: Element, joints: Mapping[str, Element], faults: Faults) -> None:
-    """Note the joints that a controller alone makes follow others."""
+    """Record joints that follow others by a controller only."""
     for interface in control.every("joint"):
         joint = joints.get(interface.attributes.get("name", ""))
         for part in interface.every("param") if joint is not None and joint.first("mimic") is None else ():
@@ -177,7 +177,7 @@ def _note_control(control: Element, joints: Mapping[str, Element], faults: Fault
 
 
 def _note_mujoco(element: Element, faults: Faults) -> None:
-    """Note what a file says to MuJoCo about forces and masses."""
+    """Record settings of MuJoCo for forces and masses."""
     for part in element.children:
         given = [key for key in ("gravity", "density", "viscosity") if part.tag == "option" and key in part.attributes]
         for key in given:
@@ -195,7 +195,7 @@ def _of_gazebo(
     *,
     moving: bool,
 ) -> Iterator[tuple[str, str, Element]]:
-    """Give what an element for Gazebo changes: the heading, of which link or joint, and its place."""
+    """Yield the changes by an element for Gazebo: heading, name of the link or joint, and element."""
     about = gazebo.attributes.get("reference", "").strip()
     moves = any(joint.moving for joint in names.get(about, ()))
     frame = robot.frames.get(about)
@@ -215,14 +215,14 @@ def _of_gazebo(
         "plugin": (PLUGINS, True, lambda x: _followed(x, joints)),
     }
     for part in gazebo.children:
-        heading, bears, counts = table.get(part.tag.partition(":")[0], ("", False, _counts))  # <joint:hinge>, as it was
+        heading, bears, counts = table.get(part.tag.partition(":")[0], ("", False, _counts))  # <joint:hinge>, once
         if bears and counts(part):
             shown = about or part.attributes.get("name") or robot.name
             yield heading, follower(part) if part.tag == "plugin" else shown, part
 
 
 def _counts(element: Element) -> bool:
-    """Whether an element holds anything but the number zero; so is what is no number."""
+    """Return whether the content of an element is other than zero; content that is no number counts."""
     try:
         return float(element.content) != 0 and not math.isnan(float(element.content))
     except ValueError:
@@ -230,6 +230,6 @@ def _counts(element: Element) -> bool:
 
 
 def _followed(plugin: Element, joints: Mapping[str, Element]) -> bool:
-    """Whether a plugin makes a joint follow another that does not do so by itself."""
+    """Return whether a plugin makes a joint follow another that does not follow it by itself."""
     joint = joints.get(follower(plugin))
     return joint is not None and joint.first("mimic") is None

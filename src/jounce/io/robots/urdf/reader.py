@@ -1,4 +1,4 @@
-"""Robots from URDF files: checked entry by entry, with the line of each, then read."""
+"""Robots from URDF files, read and checked entry by entry, with the line of each."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ from jounce.robot.model.links_and_joints import Closure, Joint, Limits, Link, Mi
 from jounce.robot.model.tree import axes_with_z_along, ordered
 from jounce.robot.robot import Robot
 
-WORLD = "world"  # which need not be a link of the file
+WORLD = "world"  # it need not be a link of the file
 EXPANDED = ("floating", "planar", "spherical")
 TYPES = ("continuous", "fixed", "prismatic", "revolute", *EXPANDED)
 LINK_PARTS = ("inertial", "visual", "collision", "contact", "material", "sensor")
@@ -48,37 +48,38 @@ TENSOR = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 
 
 def read_urdf(root: Element, faults: Faults, massless: bool = False) -> Robot:
-    """Return the robot that a URDF file describes.
+    """Return the robot of a URDF file.
 
-    Revolute, continuous, prismatic and fixed joints are taken as they are. A floating joint becomes three slides and
-    three turns, a planar one two slides and a turn, a spherical one (of MuJoCo and Bullet) three turns, all massless
-    between; what the file says of their limits, damping and friction is left out, since it does not say to which of the
-    coordinates it belongs; of damping and friction there is a warning. An ``<inertial>`` of zero mass and zero inertia
-    is a frame; one that has a mass alone is a point mass, with a warning. Limits that are zero are not given, nor is a
-    range from zero to zero. A joint that follows one which itself follows another follows that one. Rotors that Drake
-    reads from transmissions are armature: ``drake:rotor_inertia`` times the square of ``drake:gear_ratio``. Loops
-    (``loop_joint``, ``drake:ball_constraint``) become closures, ``springStiffness`` and ``springReference`` of Gazebo
-    are springs, and links may be out of gravity. Of other elements by which simulators change motions or forces there
-    is a warning.
+    Revolute, continuous, prismatic and fixed joints are taken unchanged. A floating joint becomes three slides and
+    three turns, a planar one two slides and a turn, a spherical one (of MuJoCo and Bullet) three turns, with massless
+    links between them. The limits, damping and friction of such joints are left out, because the file does not state
+    for which coordinates they hold; there is a warning of damping and friction.
+
+    An ``<inertial>`` with zero mass and zero inertia is a frame; one with only a mass is a point mass, with a warning.
+    Limits of zero count as not given, as does a range from zero to zero. A joint whose leader follows another joint
+    follows the latter. Rotors that Drake reads from transmissions become armature: ``drake:rotor_inertia`` times the
+    square of ``drake:gear_ratio``. Loops (``loop_joint``, ``drake:ball_constraint``) become closures;
+    ``springStiffness`` and ``springReference`` of Gazebo are springs, and links may be free of gravity. There is a
+    warning of other elements by which simulators change motions or forces.
 
     Parameters
     ----------
     root : Element
-        The element ``<robot>``.
+        Element ``<robot>``.
     faults : Faults
-        Takes what no real robot has, and what is left out.
+        Records values that no real robot has, and parts that are left out.
     massless : bool, default False
-        Whether links that move and have no mass, but carry some, are no fault.
+        Whether moving links without mass that carry others are no fault.
 
     Returns
     -------
     Robot
-        With the names of the file.
+        Robot with the names of the file.
 
     Raises
     ------
     RobotFileError
-        Something is missing or impossible; the message has the line.
+        If something is missing or impossible; the message has the line.
     """
     check_version(root, faults)
     links, joints = _named(root, "link"), _named(root, "joint")
@@ -124,7 +125,7 @@ def read_urdf(root: Element, faults: Faults, massless: bool = False) -> Robot:
 
 
 def _closure(loop: Loop, joints: Collection[str], faults: Faults) -> Closure:
-    """Return the closure of a loop, under a name that no joint has."""
+    """Return the closure of a loop, with a name that no joint has."""
     name = loop.closure.name
     if name not in joints:
         return loop.closure
@@ -156,7 +157,7 @@ def _named(root: Element, tag: str) -> dict[str, Element]:
 
 
 def _distinct(kind: str, parts: list[Any], root: Element) -> dict[str, Any]:
-    """Return links or joints by name; two of one name come from a joint that was expanded."""
+    """Return links or joints by name; equal names come from an expanded joint."""
     values: dict[str, Any] = {}
     for part in parts:
         if part.name in values:
@@ -166,7 +167,7 @@ def _distinct(kind: str, parts: list[Any], root: Element) -> dict[str, Any]:
 
 
 def _link(name: str, element: Element, faults: Faults, gravity: float) -> Link:
-    """Return a link; its inertia is turned from the axes of ``<inertial>`` to those of the link."""
+    """Return a link; its inertia is transformed from the axes of ``<inertial>`` to those of the link."""
     where = ("links", name)
     element.check_children(LINK_PARTS, *where)
     inertial = element.only("inertial", *where)
@@ -194,7 +195,7 @@ def _link(name: str, element: Element, faults: Faults, gravity: float) -> Link:
 
 
 def _part(element: Element, tag: str, advice: str, *name: str) -> Element:
-    """Return a child that must be there."""
+    """Return a required child."""
     part = element.first(tag)
     if part is None:
         raise element.error(f"has no <{tag}>{advice}", *name)
@@ -218,7 +219,7 @@ def _pose(element: Element, *name: str) -> _Pose:
 
 
 def _parent(joint: Element) -> str:
-    """Return what a joint says of its parent, empty where it says nothing."""
+    """Return the parent link of a joint; empty if it is not given."""
     parent = joint.first("parent")
     return "" if parent is None else parent.attributes.get("link", "")
 
@@ -254,7 +255,7 @@ def _ends(element: Element) -> tuple[str, str]:
 def _joints(
     name: str, element: Element, mimics: dict[str, Mimic], armature: float, faults: Faults
 ) -> tuple[list[Link], list[Joint]]:
-    """Return a joint of the file, or those that it is expanded to and the massless links between them."""
+    """Return the joints that represent a joint of the file, with the massless links between them."""
     where = ("joints", name)
     kind, (parent, child), (position, rotation) = element.attributes["type"], _ends(element), _pose(element, *where)
     axis, limit, dynamics = (element.first(tag) for tag in ("axis", "limit", "dynamics"))
@@ -287,7 +288,7 @@ def _joints(
 
 
 def _mimics(joints: dict[str, Element], faults: Faults) -> dict[str, Mimic]:
-    """Return what joints follow; one that follows a joint which is not there is free, as in Pinocchio."""
+    """Return the leaders of joints; a joint whose leader does not exist is free, as in Pinocchio."""
     moving = {name: x for name, x in joints.items() if x.attributes["type"] not in ("fixed", *EXPANDED)}
     leading = [name for name, element in moving.items() if element.first("mimic") is None]
     mimics = {}
@@ -320,7 +321,7 @@ def _planar(
 
 
 def _bound(limit: Element, key: str, name: str) -> float:
-    """Return a bound of a joint, zero where none is given; an infinite one bounds nothing."""
+    """Return a bound of a joint; zero if it is not given; an infinite value is no bound."""
     location = ("joints", name, "limit", key)
     key = key if key in limit.attributes else f"drake:{key}"
     given = limit.numbers(key, 1, *location, infinite=True)
@@ -339,7 +340,7 @@ def _limits(name: str, limit: Element | None, kind: str, bounds: dict[str, float
     if kind != "continuous" and (bounds["lower"], bounds["upper"]) != (0, 0):
         ends = {key: bounds[key] for key in ("lower", "upper")}
         if bounds["lower"] > bounds["upper"] and (absent := ends.keys() - limit.attributes.keys()):
-            for key in absent:  # it would be zero
+            for key in absent:  # a missing end would be zero
                 message = f"is missing and so is zero, beyond the other end of the range; give {key}"
                 faults.add(ONE_END, name, limit.error(message, "joints", name, "limit", key))
                 del ends[key]
@@ -359,7 +360,7 @@ def _limits(name: str, limit: Element | None, kind: str, bounds: dict[str, float
 def _check_masses(
     robot: Robot, joints: dict[str, Element], elements: dict[str, Element], faults: Faults, meant: bool
 ) -> None:
-    """Note every link that a joint of the file moves and that has no mass, with all that is fixed to it."""
+    """Record every link that a joint of the file moves and that, with all links fixed to it, has no mass."""
     heavy = {robot.frames[name].body for name, link in robot.links.items() if link.inertia is not None}
     idle = {robot.joints[name].child for name in robot.massless_joints}
     for joint in joints.values():
