@@ -1,6 +1,6 @@
-"""Dimensions of values: what each kind of value may have, and what an expression has.
+"""Dimensions of values: those permitted for each kind of value, and those of expressions.
 
-Plane angle counts as a dimension of its own here, so that degrees are refused where a length is expected.
+Plane angle counts as a base dimension, so that degrees are refused where a length is expected.
 """
 
 from __future__ import annotations
@@ -19,12 +19,12 @@ Dimension = tuple[tuple[str, int | Fraction], ...]
 
 
 def dimension_of(**powers: int | Fraction) -> Dimension:
-    """Return the dimension of some powers of length, angle, time and mass."""
+    """Return the dimension of given powers of length, angle, time and mass."""
     return tuple(sorted((name, power) for name, power in powers.items() if power))
 
 
 def times(first: Dimension, second: Dimension, power: int | Fraction = 1) -> Dimension:
-    """Return the dimension of a product of one value and a power of another."""
+    """Return the dimension of the product of a value and a power of another."""
     powers: dict[str, int | Fraction] = dict(first)
     for name, count in second:
         total = Fraction(powers.get(name, 0)) + Fraction(count) * power
@@ -64,7 +64,7 @@ KINDS: dict[str, tuple[str, tuple[Dimension, ...]]] = {
     "acceleration": ("an acceleration, such as 9.81 m/s^2", (dimension_of(length=1, time=-2),)),
     "any": ("a value", ()),
 }
-"""Kinds of value: how to word each, and the dimensions that its unit may have (any when none is listed)."""
+"""Kinds of value: a description, and the permitted dimensions (any if empty)."""
 
 _WORDS: dict[Dimension, str] = {
     **{powers[0]: words.partition(",")[0] for words, powers in KINDS.values() if len(powers) == 1},
@@ -76,7 +76,7 @@ _WORDS: dict[Dimension, str] = {
 
 
 def describe_dimension(dimension: Dimension) -> str:
-    """Word a dimension.
+    """Return a description of a dimension.
 
     Examples
     --------
@@ -93,9 +93,9 @@ def describe_dimension(dimension: Dimension) -> str:
 
 
 def check_dimension(dimension: Dimension, kind: str, what: str, *, exactly: bool = True) -> None:
-    """Raise UnitError unless a dimension fits a kind of value; ``what`` names what has the dimension.
+    """Raise UnitError unless a dimension suits a kind of value; ``what`` names the value.
 
-    Of a computed value, powers of angles do not count (not ``exactly``): a radius times an angle is a length.
+    For computed values (not ``exactly``), powers of angles are ignored: a radius times an angle is a length.
     """
     words, allowed = KINDS[kind]
     if not exactly:
@@ -107,21 +107,22 @@ def check_dimension(dimension: Dimension, kind: str, what: str, *, exactly: bool
 
 
 def is_rate(dimension: Dimension, bases: Iterable[str], order: int, by: str = "time") -> bool:
-    """Return whether a dimension is that of a derivative of one of some base quantities by the time, or by another one.
+    """Return whether a dimension is that of a derivative of a base quantity by time, or by another quantity.
 
-    By an angle or a length, powers of angles do not count: mm, mm/rad and mm/deg^2 are rates of a cam by its angle.
+    If `by` is an angle or a length, powers of angles are ignored: mm, mm/rad and mm/deg^2 are rates of a cam by its
+    angle.
     """
     rates = [times(dimension_of(**{base: 1}), dimension_of(**{by: 1}), -order) for base in bases]
     return dimension in rates if by == "time" else without_angles(dimension) in map(without_angles, rates)
 
 
 def per_power(order: int, unit: str = "s") -> str:
-    """Word what a derivative is by, as it follows the unit of what is derived."""
+    """Return the words for the order of a derivative, to follow the unit of the quantity."""
     return ("", f" per {unit}")[order] if order < 2 else f" per {unit}^{order}"
 
 
 def check_one_of(dimension: Dimension, allowed: tuple[Dimension, ...], *, exactly: bool = True) -> None:
-    """Raise UnitError unless the dimension of a new value of a parameter is one that it may have."""
+    """Raise UnitError unless the dimension of a new value of a parameter is permitted."""
     if dimension in allowed or (not exactly and without_angles(dimension) in map(without_angles, allowed)):
         return
     message = f"this is {describe_dimension(dimension)}, but the parameter is {describe_dimension(allowed[0])}"
@@ -135,19 +136,19 @@ def without_angles(dimension: Dimension) -> Dimension:
 
 @dataclass(frozen=True)
 class _Part:
-    """What is known of the dimension of a part of an expression.
+    """The dimension of a part of an expression, as far as known.
 
     Attributes
     ----------
     dimension : Dimension or None
-        None where nothing is known: a parameter without a unit.
+        Dimension; None if nothing is known, as for a parameter without a unit.
     doubt : int
-        0 where that is sure; `LIKELY` or `DOUBTFUL` where a number in a product may have a unit that is not written, as
-        500 in ``-500*(x - a)``, or 12 in ``m/12``, of a rod of 1 m.
+        0 if the dimension is certain; `LIKELY` or `DOUBTFUL` if a number in a product may have an unwritten unit, as
+        500 in ``-500*(x - a)``, or 12 in ``m/12``, for a rod of 1 m.
     stated : bool
-        Whether a parameter with a unit is in it; what has none can be meant in any unit, as ``sin(t)``.
+        Whether the part contains a parameter with a unit; without one, it may be in any unit, as ``sin(t)``.
     number : float or None
-        The value of a number as it is written.
+        Value of a number.
     """
 
     dimension: Dimension | None
@@ -170,27 +171,27 @@ def inferred(
     variables: Mapping[str, Dimension | None] | None = None,
     kind: str = "any",
 ) -> Dimension | None:
-    """Return the dimension of an expression, None where it is not certain.
+    """Return the dimension of an expression; None if it is not certain.
 
-    Certain is what follows from parameters with units alone. Numbers in an expression are in SI, and may have a unit
-    that is not written: nothing is said of a product with one. Where a length, an angle or a time is expected, whole
-    numbers up to 12 and 0.5 are taken for pure ones, unless a variable is there too.
+    Only parameters with units make a dimension certain. Numbers in an expression are in SI, and may have an unwritten
+    unit: a product with a number has no certain dimension. Where a length, an angle or a time is expected, integers up
+    to 12 and 0.5 count as pure numbers, unless the expression contains a variable.
 
     Parameters
     ----------
     expression : Expression
-        Of names.
+        Expression of named values.
     known : mapping of str to Dimension
-        Those of the parameters that have a unit.
+        Dimensions of the parameters with units.
     variables : mapping of str to Dimension or None, optional
-        Time and other variables of a law; None where the dimension is not known.
+        Dimensions of time and other variables of a law; None if unknown.
     kind : str, default "any"
-        What is expected, one of `KINDS`.
+        Expected kind of value, one of `KINDS`.
 
     Raises
     ------
     UnitError
-        Values of different dimensions are added, or a function is applied to a value with a dimension.
+        If values of different dimensions are added, or a function is applied to a value with a dimension.
 
     Examples
     --------
@@ -208,7 +209,7 @@ def inferred(
 
 
 class _Reader:
-    """Works out the dimension of an expression from those of its names."""
+    """Derives the dimension of an expression from those of its names."""
 
     def __init__(
         self, expression: Expression, known: Mapping[str, Dimension], variables: Mapping[str, Dimension | None]
@@ -271,7 +272,7 @@ class _Reader:
             raise UnitError(f"'{self.text}' adds {a} to {b}")
         best, other = stated[0], second if stated[0] is first else first
         if len(stated) == 1 and not other.doubt and other.dimension and other.dimension == best.dimension:
-            return replace(best, stated=False)  # t - start, which may be meant in any unit, as t may
+            return replace(best, stated=False)  # t - start may be in any unit, as t may
         return replace(best, number=None)
 
     @staticmethod
@@ -292,7 +293,7 @@ class _Reader:
 
 
 def variables_of(kind: Any) -> dict[str, Dimension | None]:
-    """Return the variables of a law of a force, time among them, with what is known of their dimensions."""
+    """Return the variables of a force law, including time, with their dimensions; None if unknown."""
     base = {"N": LENGTH, "N*m": ANGLE}.get(kind.unit) if kind.__module__.startswith("jounce.") else None
     dimensions: dict[str, Dimension | None] = {"t": TIME}
     for names, dimension in ((kind.displacement_names, base), (kind.velocity_names, base and times(base, _PER_TIME))):

@@ -1,4 +1,4 @@
-"""Expressions of named values, parsed with a whitelist over Python's syntax tree and never handed to ``eval``."""
+"""Expressions of named values, parsed with a whitelist over Python's syntax tree and never passed to ``eval``."""
 
 from __future__ import annotations
 
@@ -18,22 +18,22 @@ from typing import Any, NoReturn
 from jounce.errors import ExpressionError, JounceError, did_you_mean, show_value
 
 CONSTANTS: dict[str, float] = {"pi": math.pi, "deg": math.pi / 180.0}
-"""Constants that every expression knows."""
+"""Constants in every expression."""
 
-_UNITS = "mm cm m um km inch s ms min rad mrad rev rpm Hz kHz N kN Nm kg g J W kW MPa bar".split()  # likely meant
+_UNITS = "mm cm m um km inch s ms min rad mrad rev rpm Hz kHz N kN Nm kg g J W kW MPa bar".split()  # likely units
 _NAMES = "sin cos tan asin acos atan atan2 sinh cosh tanh exp log sqrt".split()
 FUNCTIONS: dict[str, tuple[int, Callable[..., float]]] = {
     **{name: (2 if name == "atan2" else 1, getattr(math, name)) for name in _NAMES},
     "abs": (1, math.fabs),
     "sign": (1, lambda x: float((x > 0) - (x < 0))),
 }
-"""Functions that every expression knows: number of arguments, and what to call on plain numbers."""
+"""Functions in every expression: number of arguments, and implementation for plain numbers."""
 
 RESERVED = frozenset({"t", *CONSTANTS, *FUNCTIONS})
 """Names that no parameter can have."""
 
 PARAMETER_NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]{0,99}")
-"""Form of the name of a parameter."""
+"""Pattern of the name of a parameter."""
 
 MAX_CHARACTERS = 2000
 MAX_NESTING = 50
@@ -67,12 +67,12 @@ _REPORTED = {
 }
 _ALLOWED = "allowed are numbers, names, + - * / **, parentheses and the usual functions"
 
-# One instruction of the postfix program: kind, operand, number of arguments, column.
+# An instruction of the postfix program: kind, operand, number of arguments, column.
 _Instruction = tuple[str, Any, int, int]
 
 
 def check_parameter_name(given: object, error: type[JounceError], **location: Any) -> None:
-    """Raise an error unless a parameter may have a name: expressions must be able to use it; `location` says where."""
+    """Raise an error unless expressions can use the name of a parameter; `location` says where it is given."""
     if not isinstance(given, str) or not PARAMETER_NAME.fullmatch(given):
         raise error("a name is up to 100 letters, digits, _, not starting with a digit", value=given, **location)
     if given in RESERVED:
@@ -85,31 +85,31 @@ def check_parameter_name(given: object, error: type[JounceError], **location: An
 class Expression:
     """A formula of numbers, names and the usual functions, safe to read from a file.
 
-    Allowed are numbers, names, ``+ - * / **``, parentheses, the constants ``pi`` and ``deg`` (pi/180), and the
-    functions sin cos tan asin acos atan atan2 sinh cosh tanh exp log sqrt abs sign. Angles are in radians. An
-    expression is frozen, and two of them are equal when their texts are.
+    Expressions contain numbers, names, ``+ - * / **``, parentheses, the constants ``pi`` and ``deg`` (pi/180), and the
+    functions sin cos tan asin acos atan atan2 sinh cosh tanh exp log sqrt abs sign. Angles are in radians. Expressions
+    are immutable, and equal if their texts are.
 
     Parameters
     ----------
     text : str
         The formula, at most 2000 ASCII characters, nested at most 50 deep.
     names : iterable of str, optional
-        The free names that may appear; any name may when not given.
+        Permitted free names; any name by default.
     functions : mapping of str to tuple of int, optional
-        Functions that may appear besides, with the numbers of arguments that they may have. Such an expression is not
-        evaluated, but given a meaning by `folded`.
+        Additional functions, with their permitted numbers of arguments. Such an expression cannot be evaluated, but
+        interpreted by `folded`.
 
     Attributes
     ----------
     text : str
         The formula, without surrounding spaces.
     names : frozenset of str
-        The free names in it; constants and functions are not among them.
+        The free names in it, without constants and functions.
 
     Raises
     ------
     ExpressionError
-        Anything else is in the text; the message names the piece and its column.
+        If the text contains anything else; the message names the piece and its column.
 
     Examples
     --------
@@ -145,7 +145,7 @@ class Expression:
         Parameters
         ----------
         names : iterable of str
-            The names that are defined.
+            The defined names.
         """
         known = names if isinstance(names, Mapping | AbstractSet) else set(names)
         for kind, operand, _, column in self._program:
@@ -153,23 +153,23 @@ class Expression:
                 _refuse_name(operand, column, self.text, known)
 
     def evaluate(self, environment: Mapping[str, Any] | None = None) -> Any:
-        """Return the value, in the units of the values given.
+        """Return the value, in the units of the given values.
 
         Parameters
         ----------
         environment : mapping of str to number, array, tracer or Jet
-            The value of every free name; shapes broadcast.
+            Value of every free name; shapes broadcast.
 
         Returns
         -------
         float, array or Jet
-            A float when every value is a plain number.
+            A float if every value is a plain number.
 
         Raises
         ------
         ExpressionError
-            A name has no value, or plain numbers leave the domain of a function (a division by zero, the logarithm of
-            a negative number, an overflow). Arrays and jets give ``nan`` or ``inf`` there.
+            If a name has no value, or plain numbers leave the domain of a function (a division by zero, the logarithm
+            of a negative number, an overflow). Arrays and jets give ``nan`` or ``inf`` instead.
 
         Examples
         --------
@@ -189,9 +189,9 @@ class Expression:
     def folded(
         self, number: Callable[[float], Any], name: Callable[[str], Any], operation: Callable[[str, list[Any]], Any]
     ) -> Any:
-        """Return what comes of the formula when its numbers, names and operations mean something else.
+        """Return the result of the formula for given interpretations of its numbers, names and operations.
 
-        The last are given by the word for them (``+ - * / ** pos neg``, or a function), with their arguments.
+        `operation` takes the word of an operation (``+ - * / ** pos neg``, or a function) and its arguments.
         """
         return self._folded(number, lambda text, _: name(text), lambda word, arguments, _: operation(word, arguments))
 
@@ -209,7 +209,7 @@ class Expression:
         return stack[0]
 
     def _apply(self, word: str, arguments: list[Any], column: int) -> Any:
-        """Apply one operator or function; plain numbers stay plain."""
+        """Return the result of an operator or function; a float for plain numbers."""
         if not all(isinstance(argument, float) for argument in arguments):
             return _operate_on_arrays(word, arguments)
         try:
@@ -236,16 +236,16 @@ class Expression:
 
 
 def _show_operation(word: str, arguments: list[float]) -> str:
-    """Word one operation on plain numbers, for messages."""
+    """Return the text of an operation on plain numbers, for messages."""
     if word in FUNCTIONS:
         return f"{word}({', '.join(f'{argument:g}' for argument in arguments)})"
     return f" {word} ".join(f"{argument:g}" if argument >= 0 else f"({argument:g})" for argument in arguments)
 
 
 def _operate_on_arrays(word: str, arguments: list[Any]) -> Any:
-    """Apply an operator or a function to jets, arrays, tracers and numbers."""
+    """Return the result of an operator or a function for jets, arrays, tracers and numbers."""
     if word in FUNCTIONS:
-        import jounce.jet  # here, to start quickly
+        import jounce.jet  # local, to start quickly
 
         return getattr(jounce.jet, word)(*arguments)
     exponent = arguments[-1]
@@ -270,9 +270,9 @@ def _refuse_name(name: str, column: int, text: str, known: Iterable[str]) -> NoR
     _fail(f"unknown name '{name}'", column, text, did_you_mean(name, candidates) + unit)
 
 
-@lru_cache(maxsize=4096)  # a file of many bodies says the same again and again
+@lru_cache(maxsize=4096)  # a file with many bodies repeats its expressions
 def _compile(text: str, functions: tuple[tuple[str, tuple[int, ...]], ...] = ()) -> tuple[_Instruction, ...]:
-    """Parse the text and flatten the tree to a postfix program, without recursion; functions may be added."""
+    """Return the postfix program of a text, without recursion; `functions` are permitted in addition."""
     counts = {name: (count,) for name, (count, _) in FUNCTIONS.items()} | dict(functions)
     if not text:
         raise ExpressionError("the expression is empty", value=text)
@@ -287,7 +287,7 @@ def _compile(text: str, functions: tuple[tuple[str, tuple[int, ...]], ...] = ())
     body = _parse(text)
     program: list[_Instruction] = []
     pending: list[tuple[ast.AST, int]] = [(body, 1)]
-    while pending:  # root first, children pushed left to right and so taken right to left: postfix, backwards
+    while pending:  # preorder from right to left, which is the reverse of postfix
         node, depth = pending.pop()
         if depth > MAX_NESTING:
             _fail(f"the expression is nested more than {MAX_NESTING} deep", _column(node), text, "use parameters")
@@ -300,7 +300,7 @@ def _compile(text: str, functions: tuple[tuple[str, tuple[int, ...]], ...] = ())
 
 
 def _check_parentheses(text: str) -> None:
-    """Bound the nesting before Python's parser sees it."""
+    """Raise an error for parentheses nested too deeply, before Python's parser reads them."""
     depth = 0
     for position, character in enumerate(text):
         depth += (character in "([{") - (character in ")]}")
@@ -328,7 +328,7 @@ def _column(node: ast.AST) -> int:
 
 
 def _examine(node: ast.AST, text: str, counts: Mapping[str, tuple[int, ...]]) -> tuple[str, Any, list[ast.AST]]:
-    """Return kind, operand and children of an allowed node; refuse every other node."""
+    """Return kind, operand and children of a permitted node; raise an error for every other node."""
     match node:
         case ast.Constant(value=int() | float() as value) if not isinstance(value, bool):
             return "number", _number(value, _column(node), text), []
@@ -344,7 +344,7 @@ def _examine(node: ast.AST, text: str, counts: Mapping[str, tuple[int, ...]]) ->
 
 
 def _refuse(node: ast.AST, column: int, text: str) -> NoReturn:
-    """Name what is not allowed."""
+    """Raise an error that names the forbidden element."""
     match node:
         case ast.Name(id=name):
             _refuse_name(name, column, text, ())
@@ -386,7 +386,7 @@ def _arguments(
     text: str,
     counts: Mapping[str, tuple[int, ...]],
 ) -> list[ast.AST]:
-    """Check that a function exists and has its number of arguments."""
+    """Return the arguments of a function, after a check that it exists and accepts their number."""
     if name not in counts:
         near = difflib.get_close_matches(name, counts, n=1)
         hint = f"did you mean '{near[0]}'?" if near else f"valid: {', '.join(counts)}"

@@ -1,4 +1,4 @@
-"""Units that are not in the table of usual ones, asked of pint, which is imported only then."""
+"""Units outside the table of common ones, looked up in pint, which is imported only then."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ _MECHANICAL: frozenset[Dimension] = frozenset(
         (0, 2, -1, 0),
     ]
 )
-"""What a unit of mechanics may measure: a yarn count (length/mass) or a steradian is not among it."""
+"""Dimensions of units of mechanics, which do not include that of a yarn count (length/mass) or a steradian."""
 
 _PURE = frozenset("percent permille ppm".split())
 
@@ -45,12 +45,12 @@ def _registry() -> Any:
 
 
 def ask_pint(name: str) -> tuple[float, Dimension] | None:
-    """Return the size of a unit in SI base units and its dimension, the radian kept; None for what pint does not know.
+    """Return the size of a unit in SI base units and its dimension, with the radian; None if pint does not know it.
 
     Raises
     ------
     UnitError
-        The unit has a dimension that no mechanism uses, has no fixed zero, or has a prefix that it never has.
+        If the unit has a dimension that no mechanism uses, has no fixed zero, or has a prefix that nobody uses.
     """
     registry = _registry()
     try:

@@ -1,8 +1,8 @@
-"""Units in which results are shown and written; inside, everything is in SI.
+"""Units of shown and written results; internal values are in SI.
 
-A unit is chosen for a kind of quantity, or for an output by its name. Derivatives follow, by s: an angle in deg has
-velocities in deg/s, and quotients: an angle over a length is in deg/mm where these are chosen. Products of lengths and
-forces do not follow from them: a torque stays in N m, whatever the unit of length, unless a unit of torque is chosen.
+A unit is chosen for a kind of quantity, or for an output by its name. It determines the units of time derivatives: an
+angle in deg has velocities in deg/s; and of quotients: an angle over a length is in deg/mm if these are chosen.
+Products do not follow from the units of lengths and forces: a torque stays in N m unless a unit of torque is chosen.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ QUANTITIES: dict[str, tuple[str, Dimension]] = {
     "energy": ("J", TORQUE),
     "power": ("W", times(TORQUE, TIME, -1)),
 }
-"""The kinds of quantity that a unit can be chosen for: the unit in SI, and the dimension."""
+"""Kinds of quantity for which a unit can be chosen: the SI unit, and the dimension."""
 
 
 _RAISED = str.maketrans("-0123456789", "\u207b\u2070\u00b9\u00b2\u00b3\u2074\u2075\u2076\u2077\u2078\u2079")
@@ -59,7 +59,7 @@ def derivative_unit(unit: str, order: int) -> str:
 
 
 def raised(unit: str) -> str:
-    """Return a unit as people write it: exponents raised, products by spaces.
+    """Return a unit in typeset form: raised exponents, spaces for products.
 
     Examples
     --------
@@ -79,12 +79,12 @@ def time_axes(instants: Float[Numbers, " time"], levels: int) -> dict[str, Any]:
 
 
 def component_axes(output: Any, count: int) -> dict[str, list[str]]:
-    """Return the axes that the components of an output have, by name, with their labels: one, or those of a matrix."""
+    """Return the axes of the components of an output, one or those of a matrix, by name, with their labels."""
     return {axis: list(labels) for axis, labels in output.axes or (("component", output.labels[:count]),)}
 
 
 def derivatives_of(name: str) -> str:
-    """Return the long name of an array of a quantity and its derivatives, whose unit is that of the quantity itself.
+    """Return the long name of an array of a quantity and its derivatives, with the unit of the quantity itself.
 
     Plots label an axis with the long name and the unit, whatever derivative they show.
 
@@ -102,7 +102,7 @@ def unit_size(text: str) -> tuple[float, Dimension]:
     Raises
     ------
     UnitError
-        It is no unit of mechanics.
+        If the text is no unit of mechanics.
     """
     if not isinstance(text, str) or not re.match(r"[A-Za-z\u00b0\u00b5\u03bc]|1\s*/", text.strip()):
         raise UnitError("must be a unit, such as deg or mm", value=text)
@@ -123,14 +123,14 @@ class ShownUnits:
     ----------
     chosen : dict of str to str
         Units by ``angle``, ``length``, ``force``, ``torque``, ``energy``, ``power``, or by the name of an output, which
-        counts first.
+        takes precedence.
     outputs : dict of str to str, optional
-        The SI units of the outputs that there are, by name.
+        SI units of the existing outputs, by name.
 
     Raises
     ------
     UnitError
-        If a name is neither, or a unit does not measure what it is chosen for.
+        If a name is neither, or a unit does not suit the quantity.
 
     Examples
     --------
@@ -162,27 +162,27 @@ class ShownUnits:
                 raise UnitError(message, name=f"units.{name}", value=unit)
 
     def _of_output(self, name: str) -> Dimension | None:
-        """Return the dimension of the output of a name, None where there is none."""
+        """Return the dimension of the output with a name; None if there is none."""
         return _dimension(self.outputs[name]) if name in self.outputs else None
 
     def _of_kind(self, name: str) -> Dimension | None:
-        """Return the dimension of a kind of quantity, None for any other name."""
+        """Return the dimension of a kind of quantity; None for other names."""
         return QUANTITIES[name][1] if name in QUANTITIES else None
 
     def _chosen(self, name: str, dimension: Dimension | None) -> str | None:
-        """Return the unit chosen for a name, if its dimension is the given one: a name may be of a kind as well."""
+        """Return the unit chosen for a name if it has a given dimension: a name may be that of a kind as well."""
         unit = self.chosen.get(name)
         return unit if unit is not None and unit_size(unit)[1] == dimension else None
 
     def of(self, unit: str, name: str = "") -> tuple[str, float]:
-        """Return the unit in which a quantity is shown, and by what its values in SI are multiplied.
+        """Return the unit in which a quantity is shown, and the factor of its SI values.
 
         Parameters
         ----------
         unit : str
-            Its unit in SI: one of those that outputs have, or a time derivative of one.
+            SI unit of the quantity: that of an output, or of a time derivative of one.
         name : str, optional
-            Of the output.
+            Name of the output.
         """
         per_time = re.search(r"/s(?:\^(\d+))?$", unit)
         order = int(per_time[1] or 1) if per_time else 0
@@ -201,18 +201,18 @@ class ShownUnits:
         return derivative_unit("".join([shown, *parts]), order), factor
 
     def _of_base(self, base: str) -> tuple[str, float]:
-        """Return the unit in which a quantity of a kind is shown, and by what its values in SI are multiplied."""
+        """Return the unit in which a kind of quantity is shown, and the factor of its SI values."""
         kind = next((kind for kind, (known, _) in QUANTITIES.items() if known == base), "")
         shown = self._chosen(kind, self._of_kind(kind))
         return (shown, 1.0 / unit_size(shown)[0]) if shown else (base, 1.0)
 
     def merged(self, others: Mapping[str, str] | None) -> "ShownUnits":
-        """Return these units with others in their place."""
+        """Return these units, with some of them replaced."""
         return ShownUnits({**self.chosen, **(others or {})}, self.outputs)
 
 
 def _dimension(unit: str) -> Dimension:
-    """Return the dimension of a unit that an output has."""
+    """Return the dimension of the unit of an output."""
     return dimension_of() if unit in ("", "1") else parse_unit(unit)[1]
 
 
@@ -222,7 +222,7 @@ def units_given(texts: Iterable[str]) -> dict[str, str]:
     Raises
     ------
     UnitError
-        A name or a unit is missing, or a name is given twice.
+        If a name or a unit is missing, or a name is given twice.
 
     Examples
     --------

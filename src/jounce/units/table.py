@@ -1,4 +1,4 @@
-"""The units that engineers write, with their sizes in SI and dimensions; every other one is asked of pint."""
+"""Common units of engineers, with their SI sizes and dimensions; others are looked up in pint."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ COMPACT: dict[str, tuple[str, ...]] = {
     **dict.fromkeys(("lbin", "inlb", "lbfin", "inlbf"), ("lbf", "in")),
     "ozin": ("ozf", "in"),
 }
-"""Products that are written without a sign between; a power belongs to the last factor, as in ``kgm^2``."""
+"""Products written without a sign; a power belongs to the last factor, as in ``kgm^2``."""
 
 
 LONG = tuple(
@@ -55,11 +55,11 @@ LONG = tuple(
     for prefix in ("", "milli", "centi", "micro", "kilo")
     for ending in ("", "s")
 )
-"""Units written out, which pint knows, for the suggestion of one that is misspelled."""
+"""Units written in full, which pint knows, to suggest for misspelled ones."""
 
 
 def nearest_unit(name: str) -> str:
-    """Suggest the unit of the table that is meant: the one that differs in capitals only, or else the nearest."""
+    """Return a suggestion of a unit: one that differs in capitals only, or else the nearest; may be empty."""
     names = [*COMMON, *COMPACT, *LONG]
     same = [known for known in names if known.lower() == name.lower() and known != name]
     return f"did you mean '{same[0]}'?" if same else did_you_mean(name, names, limit=0)

@@ -1,7 +1,6 @@
-"""Values as a mechanism file writes them: a number (SI), a number with a unit, or an expression of parameters.
+"""Values of a mechanism file: a number (SI), a number with a unit, or an expression of parameters.
 
-The units that engineers write are in a table; every other one is asked of a library of units, which is imported only
-then.
+Common units are in a table; others are looked up in a library of units, which is imported only then.
 """
 
 from __future__ import annotations
@@ -32,7 +31,7 @@ _GROUP = rf"\(\s*{_TERM}(?:{_SIGN}{_TERM})*\s*\)"
 _WITH_UNIT = re.compile(
     rf"({_NUMBER_PATTERN})\s*((?:1?\s*/\s*(?:{_GROUP}|{_TERM})|{_TERM})(?:{_SIGN}(?:{_GROUP}|{_TERM}))*)"
 )
-MOST_LOOKED_AT = 5  # units within an expression that cannot be read
+MOST_LOOKED_AT = 5  # number of possible units to look up within an invalid expression
 _DECIMAL_COMMA = re.compile(rf"([-+]?[0-9]+),([0-9]+)\s*({_TERM}(?:{_SIGN}{_TERM})*)?")
 _UNIT_WITHIN = re.compile(rf"(?<![A-Za-z_0-9.])([0-9]+\.?[0-9]*(?:[eE][-+]?[0-9]+)?)\s+({_ATOM})")
 _PIECE = re.compile(rf"({_SIGN})?(?:({_ATOM})({_POWER})|\(([^()]*)\))")
@@ -41,7 +40,7 @@ _TIMES_DEG = re.compile(rf"{_NUMBER_PATTERN}\s*\*\s*deg")
 
 @dataclass(frozen=True)
 class Value:
-    """A value from a file: a number in SI units or an expression, and its dimension (None where it is not known)."""
+    """A value of a file: a number in SI units or an expression, and its dimension (None if unknown)."""
 
     value: float | Expression
     dimension: Dimension | None = None
@@ -54,13 +53,13 @@ def parse_unit(text: str) -> tuple[Size, Dimension]:
     Parameters
     ----------
     text : str
-        Names of units with whole powers, joined by ``*``, ``/`` or spaces: ``kg*m^2/s**2``, ``N/(m*s)``; or a product
+        Names of units with integer powers, joined by ``*``, ``/`` or spaces: ``kg*m^2/s**2``, ``N/(m*s)``; or a product
         as engineers write it, ``kNm``, ``N/mm2``.
 
     Raises
     ------
     UnitError
-        A unit does not exist, is none of mechanics, or has no fixed zero, as degC.
+        If a unit does not exist, is outside mechanics, or has no fixed zero, as degC.
 
     Examples
     --------
@@ -90,7 +89,7 @@ def _whole_power(text: str) -> int:
 
 
 def _powered(name: str, power: int) -> tuple[Size, Dimension]:
-    """Return the size and dimension of a unit to a power; of a compact product the last factor has the power."""
+    """Return the size and dimension of a power of a unit; in a compact product, the last factor has the power."""
     factors = COMPACT.get(name) if name not in COMMON else None
     if factors is None and name not in COMMON and (digit := re.fullmatch(r"([A-Za-z]+)([2-4])", name)) and power == 1:
         return _powered(digit[1], int(digit[2]))
@@ -110,7 +109,7 @@ def _product(size: Size, factor: Size, power: int) -> Size:
 
 
 def _looked_up(name: str) -> tuple[Size, Dimension]:
-    """Return what the library of units knows."""
+    """Return the size and dimension of a unit in the library of units."""
     if answer := ask_pint(name):
         return answer
     shown = name.encode("ascii", "backslashreplace").decode("ascii")
@@ -124,30 +123,30 @@ def parse_value(
     dimensions: Mapping[str, Dimension] | None = None,
     variables: Mapping[str, Dimension | None] | None = None,
 ) -> Value:
-    """Read one value of a file.
+    """Return a value of a file in SI units, or as an expression.
 
     Parameters
     ----------
     raw : object
-        What the file holds: a number, or text with a number and a unit, or an expression.
+        Value in the file: a number, or text with a number and a unit, or an expression.
     kind : str
-        What is expected, one of ``KINDS``.
+        Expected kind of value, one of ``KINDS``.
     names : iterable of str
-        Names that an expression may use; a dictionary of thousands is not copied.
+        Names permitted in expressions; a dictionary is not copied.
     dimensions : mapping of str to Dimension, optional
-        Dimensions of those parameters that have a unit; what follows from them in an expression is checked.
+        Dimensions of the parameters with units; those of expressions are derived and checked.
     variables : mapping of str to Dimension or None, optional
-        Names that an expression may use besides, of variables: time, s, and others of a law.
+        Additional names permitted in expressions, of variables: time, s, and others of a law.
 
     Returns
     -------
     Value
-        The number in SI units, or the expression.
+        Number in SI units, or expression.
 
     Raises
     ------
     UnitError, ExpressionError
-        What is wrong, without the place and without the value.
+        If the value is not valid; the message contains neither location nor value.
 
     Examples
     --------
@@ -174,16 +173,16 @@ def parse_value(
 def stated_dimensions(
     parameters: Mapping[str, object], known: Mapping[str, Dimension] | None = None
 ) -> dict[str, Dimension]:
-    """Return the dimensions of those parameters that have a unit, or follow from others that have one.
+    """Return the dimensions of parameters that have a unit, or follow from parameters with units.
 
-    A product with a number has none that is certain, as the number may have any.
+    A product with a number has no certain dimension, because the number may have any unit.
 
     Parameters
     ----------
     parameters : mapping of str to object
-        Their values, as a file holds them.
+        Values of the parameters, as in a file.
     known : mapping of str to Dimension, optional
-        Those that are known already; they are returned, too.
+        Known dimensions, which are also returned.
 
     Examples
     --------
@@ -196,7 +195,7 @@ def stated_dimensions(
         for name, raw in list(waiting.items()):
             try:
                 dimension = parse_value(raw, "any", parameters, dimensions).dimension
-            except JounceError:  # reported with its location
+            except JounceError:  # reported elsewhere, with its location
                 continue
             if dimension is not None:
                 dimensions.setdefault(name, dimension)
@@ -241,14 +240,14 @@ def _parse_text(
 
 
 def expression_in_si(text: str) -> Expression:
-    """Return the expression that a text stands for where only files, and parameters, state units.
+    """Return the expression of a text in a place without units, which only files and parameters may state.
 
     Raises
     ------
     UnitError
-        There is a number with a unit in it.
+        If the text contains a number with a unit.
     ExpressionError
-        It is no expression.
+        If the text is no expression.
     """
     try:
         return Expression(text)
@@ -260,7 +259,7 @@ def expression_in_si(text: str) -> Expression:
 
 
 def _with_units_named(error: ExpressionError, text: str, known: Collection[str]) -> JounceError:
-    """Return an error that says so where a number with a unit is part of an expression, else the error as it is."""
+    """Return an error about a number with a unit in an expression, if there is one; otherwise the given error."""
     if (quantity := _unit_within(text, known)) is None:
         return error
     message = (
@@ -271,7 +270,7 @@ def _with_units_named(error: ExpressionError, text: str, known: Collection[str])
 
 
 def _unit_within(text: str, known: Collection[str]) -> str | None:
-    """Return the first number with a unit in a text, which is no expression therefore."""
+    """Return the first number with a unit in a text that is no expression; None if there is none."""
     for number, unit in _UNIT_WITHIN.findall(text)[:MOST_LOOKED_AT]:
         if unit in known or unit in CONSTANTS:
             continue
@@ -284,13 +283,13 @@ def _unit_within(text: str, known: Collection[str]) -> str | None:
 
 
 def _divided_by_a_name(unit: str, known: Collection[str]) -> bool:
-    """Return whether what follows a number is a division by a name of an expression: 1/t is no number per tonne."""
+    """Return whether a division by a name of an expression follows a number: 1/t is no number per tonne."""
     first = re.match(_ATOM, unit.lstrip("/ "))
     return unit.startswith("/") and first is not None and (first.group() in known or first.group() == "pi")
 
 
 def _multiplied(sign: re.Match[str]) -> str:
-    """Return the sign between two factors, a * for a space."""
+    """Return the sign between two factors, with * for a space."""
     return sign[0].strip() or "*"
 
 
@@ -299,7 +298,7 @@ def _parse_with_unit(
 ) -> Value:
     first = re.match(_ATOM, unit)
     named = next((atom for atom in re.finditer(_ATOM, unit) if atom.start() and atom[0] in variables), None)
-    if named:  # in a law t is no tonne
+    if named:  # in a law, t is no tonne
         before = unit[: named.start()].rstrip()
         if set(re.findall(_ATOM, before)) <= {*known, *CONSTANTS}:
             raise UnitError(f"a product needs its *, as in {number}*{re.sub(_SIGN, _multiplied, unit)}")

@@ -34,13 +34,13 @@ _MOTION_KEYS = ("profile", "duration", "start_time", "from", "to", "limits")
 
 
 def _order(data: Mapping[str, Any]) -> int:
-    """Return which derivative samples are of; reading refuses what is no number."""
+    """Return the order of the derivative that samples give; an invalid entry is refused later."""
     order = data.get("derivative", 0)
     return order if isinstance(order, int) else 0
 
 
 class LawFile:
-    """Reads laws from the plain data of a file; every error names the file, the line and the entry."""
+    """Reads laws from the data of a file; every error names the file, the line and the entry."""
 
     def __init__(self, source: Source) -> None:
         self.source = source
@@ -50,7 +50,7 @@ class LawFile:
             raise source.error(message, value=list(self.data))
         self.parameters: dict[str, float] = {}
         self.dimensions: dict[str, Dimension] = {}
-        self.measures: dict[str, str] = {}  # of joints whose laws say a unit
+        self.measures: dict[str, str] = {}  # angle or length, for joints whose laws state a unit
         for name, raw in (source.mapping(("parameters",)) if "parameters" in self.data else {}).items():
             self._add_parameter(name, raw)
 
@@ -60,7 +60,7 @@ class LawFile:
         value = self.source.value(at, raw, "any", self.parameters, self.dimensions)
         if value.dimension is not None:
             self.dimensions[name] = value.dimension
-        self.parameters[name] = self._finite(value.value, raw, at)  # an expression may use those above
+        self.parameters[name] = self._finite(value.value, raw, at)  # an expression may use the parameters above it
 
     def trajectory(self) -> JointTrajectory:
         """Return the trajectory of the file."""
@@ -72,7 +72,7 @@ class LawFile:
         return self._on_grid(laws, self._times())
 
     def _law(self, at: Location, raw: Any) -> AbstractMotion | float:
-        """Return the law of a joint: an expression, a number, or samples of a column of a file."""
+        """Return the law of a joint: an expression, a number, or samples in a column of a file."""
         if not isinstance(raw, dict):
             value = self._value(raw, "any", at, ("t",), joint=at[-1])
             return ExpressionMotion(value, self.parameters) if isinstance(value, Expression) else value
@@ -85,7 +85,7 @@ class LawFile:
         return self._spline(at, data, times, values, (*at, "initial"), at[-1])
 
     def _sampled_motion(self) -> JointTrajectory:
-        """Return the trajectory whose joints are the columns of a file of samples."""
+        """Return the trajectory whose joints are the columns of a sample file."""
         at: Location = ("motion",)
         data = self.source.mapping(at, _SAMPLE_KEYS)
         times, columns, units = self._samples(at, lambda path: read_columns(path, TrajectoryError, _order(data)))
@@ -104,7 +104,7 @@ class LawFile:
         return self._with_location(("time",), lambda: JointTrajectory(laws, times[0], times[-1], times, self.measures))
 
     def _samples(self, at: Location, read: Callable[[str], Any]) -> Any:
-        """Return what is read from the file of samples that an entry names."""
+        """Return the content of the sample file that an entry names."""
         location = (*at, "samples")
         if self.source.at(location) is None:
             raise self.source.error("is missing; give the name of a CSV file", location)
@@ -113,7 +113,7 @@ class LawFile:
     def _spline(
         self, at: Location, data: Mapping[str, Any], times: ArrayLike, values: ArrayLike, location: Location, joint: Any
     ) -> SplineMotion:
-        """Return the spline through samples of a coordinate, or the integral of one through those of a derivative."""
+        """Return the spline through samples of a coordinate, or the integral of the spline through a derivative."""
         degree, derivative = (self._whole(data.get(key, usual), (*at, key)) for key, usual in _ORDERS)
         initial = [] if self.source.at(location) is None else self.source.at(location)
         if not isinstance(initial, list):
@@ -181,7 +181,7 @@ class LawFile:
         return times
 
     def _number(self, raw: Any, kind: str, at: Location, per_time: int = 0, joint: Any = None) -> float:
-        """Return a number in SI units; "any" is a coordinate, per s to the power of `per_time`."""
+        """Return a number in SI units; "any" is a coordinate, per second to the power `per_time`."""
         return self._finite(self._value(raw, kind, at, (), per_time, joint), raw, at)
 
     def _finite(self, value: float | Expression, raw: Any, at: Location) -> float:
@@ -205,14 +205,14 @@ class LawFile:
         return value.value
 
     def _note(self, joint: Any, dimension: Dimension | None, at: Location) -> None:
-        """Keep whether a unit of the law of a joint says that its coordinate is an angle or a length."""
+        """Record whether the unit of a law shows that the coordinate of its joint is an angle or a length."""
         measure = measured(dimension)
         if measure and self.measures.setdefault(joint, measure) != measure:
             message = f"the units of {show_value(joint)} are those of an angle here and of a length there"
             raise self.source.error(message, at)
 
     def _with_location(self, at: Location, make: Callable[[], Any]) -> Any:
-        """Return what is made; an error from within gets the place in the file."""
+        """Return the result of a call; errors within it get a location in the file."""
         try:
             return make()
         except JounceError as error:

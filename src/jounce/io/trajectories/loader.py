@@ -1,4 +1,4 @@
-"""The trajectory of a robot from a file: laws, samples, messages and recordings of other tools."""
+"""Reading of robot trajectories: laws, samples, messages and recordings of other tools."""
 
 from __future__ import annotations
 
@@ -36,71 +36,72 @@ def load_trajectory(
     samples: bool = False,
     only: Iterable[str] | None = None,
 ) -> JointTrajectory:
-    """Read the trajectory of a robot: laws, samples, or what controllers and other tools write.
+    """Read the trajectory of a robot: laws, samples, or files of controllers and other tools.
 
-    A CSV file has a row of names, ``time, JOINT, JOINT, ...``, and below it numbers in s, m and rad; splines go through
-    them. The columns ``JOINT_d1, JOINT_d2, ...`` of derivatives, which files of results have, are not read, but
-    velocities ``JOINT_d1`` are compared with the positions. ``JOINT_vel`` and ``JOINT_acc`` beside ``JOINT`` (or
-    ``velocity``, ``acceleration``; positions ``JOINT_pos``) are: the spline has them at its samples. So are series of
-    PlotJuggler (``/joint_states/JOINT/position``), ``rostopic echo -p`` (``field.position0``), libfranka
-    (``state.q[0]``, whose times are in ms) and numbered columns (``q_0``, ``dq_0``).
+    A CSV file has a row of names, ``time, JOINT, JOINT, ...``, and rows of numbers in s, m and rad, through which
+    splines are laid. The columns ``JOINT_d1, JOINT_d2, ...`` of derivatives in result files are not read, but
+    velocities ``JOINT_d1`` are compared with the positions. Velocities and accelerations ``JOINT_vel`` and
+    ``JOINT_acc`` beside ``JOINT`` (or ``velocity``, ``acceleration``; positions ``JOINT_pos``) are read: the spline has
+    them at its samples. Series of PlotJuggler (``/joint_states/JOINT/position``), ``rostopic echo -p``
+    (``field.position0``) and libfranka (``state.q[0]``, with times in ms), and numbered columns (``q_0``, ``dq_0``),
+    are read in the same way.
 
     A YAML, TOML or JSON file has either ``joints``, a law for each joint, or ``point_to_point`` with the keys
-    ``profile``, ``duration``, ``start_time``, ``from``, ``to`` and ``limits``. Laws are expressions of ``t`` and
-    of ``parameters``; ``time`` has the keys ``start``, ``stop`` and ``step`` or ``count``, and may be left out for
+    ``profile``, ``duration``, ``start_time``, ``from``, ``to`` and ``limits``. Laws are expressions of ``t`` and of
+    ``parameters``; ``time`` has the keys ``start``, ``stop`` and ``step`` or ``count``, and may be omitted with
     ``point_to_point``. A law may also go through samples, ``{samples: FILE.csv, value: COLUMN}``, of the coordinate or,
     with ``derivative: 2``, of its acceleration; ``initial`` holds the coordinate and the velocity at the first sample.
-    In the place of ``joints``, ``motion: {samples: FILE.csv, derivative: 2}`` gives each column to the joint of its
-    name, ``initial`` then being a list for each joint, and ``time`` may be left out.
+    Instead of ``joints``, ``motion: {samples: FILE.csv, derivative: 2}`` gives each column to the joint with its name;
+    ``initial`` is then a list for each joint, and ``time`` may be omitted.
 
-    What controllers take (`export_trajectory`) is recognized by its content: tables with the columns ``q_d_0`` or
-    ``target_q_0``, and messages of ROS: JointTrajectory, FollowJointTrajectory goals, RobotTrajectory and
-    DisplayTrajectory of MoveIt, as YAML (also as ``ros2 topic echo`` prints them) or JSON. Polynomials go through their
-    positions with velocities and accelerations, where there are such. Joint states, echoed or in a bag (.bag, .db3,
-    .mcap, or the folder of a bag; needs rosbags), are samples; so are the states of joint_trajectory_controller, of
-    which what was measured is read.
+    Files for controllers (`export_trajectory`) are recognized by their content: tables with the columns ``q_d_0`` or
+    ``target_q_0``, and ROS messages: JointTrajectory, FollowJointTrajectory goals, RobotTrajectory and
+    DisplayTrajectory of MoveIt, as YAML (also as printed by ``ros2 topic echo``) or JSON. Polynomials go through their
+    positions, with velocities and accelerations if given. Joint states, echoed or in a bag (.bag, .db3, .mcap, or the
+    folder of a bag; needs rosbags), are samples, as are the measured values in the states of
+    joint_trajectory_controller.
 
     Parameters
     ----------
     path
-        A file ending in .csv, .yaml, .yml, .toml or .json, or a bag.
+        File ending in .csv, .yaml, .yml, .toml or .json, or a bag.
     degree : int, default 5
-        Degree of the splines through samples of positions alone, odd from 3 to 11.
+        Degree of the splines through samples of positions only, odd from 3 to 11.
     allow
-        Folders besides its own that files named in it may be below.
+        Folders besides its own below which files named in it may lie.
     joints
-        Names of the joints of a file that names none, in its order; ``joint_0``, ``joint_1``, ... or the names of the
-        columns unless given.
+        Names of the joints of a file without names, in its order; by default ``joint_0``, ``joint_1``, ... or the names
+        of the columns.
     as_controller : bool, default False
-        Between the rows of a file what joint_trajectory_controller of ros2_control does: straight lines between
-        positions alone, cubics where velocities are given, quintics where accelerations are, too.
+        Whether to interpolate like joint_trajectory_controller of ros2_control: linearly between positions only, by
+        cubics if velocities are given, by quintics if accelerations are given, too.
     topic : str, optional
-        Of a bag; that of the joint states, or of the one trajectory, unless given.
+        Topic of a bag; by default that of the joint states, or of the only trajectory.
     robot : Robot, optional
-        Whose joints a file has that names none: all of its moving joints, or all that turn, in its order.
+        Robot whose joints are meant in a file without names: all moving joints, or all that turn, in its order.
     samples : bool, default False
-        Straight lines between positions in the place of splines through samples, as `jounce.smooth` needs no more: an
-        hour at 1 kHz takes a third of the memory.
+        Whether to interpolate samples linearly instead of by splines, which suffices for `jounce.smooth`: an hour at 1
+        kHz takes a third of the memory.
     only : iterable of str, optional
-        Joints that are read, where a file has more of them than a robot; unless given, all of them, but for columns of
-        CSV files that are named after torques, currents and the like.
+        Joints to read, if a file has more joints than the robot; by default all of them, except for columns of CSV
+        files that are named after torques, currents and the like.
 
     Returns
     -------
     JointTrajectory
-        Its `times` are those of the samples, or the instants of ``time``; from the first stamp where stamps are
-        counted from an epoch.
+        Trajectory whose `times` are those of the samples, or the instants of ``time``; they start at the first stamp if
+        stamps are counted from an epoch.
 
     Raises
     ------
     TrajectoryError
-        The file cannot be read or something in it is wrong: the message names the file, the line, the column or entry,
-        and the value.
+        If the file cannot be read or contains an error: the message names the file, the line, the column or entry, and
+        the value.
 
     Warns
     -----
     RecordingWarning
-        What of a recording was not taken as it is: rows out of order, repeated stamps, stamps from an epoch.
+        If parts of a recording were changed: rows out of order, repeated stamps, stamps from an epoch.
 
     Examples
     --------
@@ -131,7 +132,7 @@ def load_trajectory(
 
 
 def _selected_laws(trajectory: JointTrajectory, joints: tuple[str, ...] | None, path: str) -> JointTrajectory:
-    """Return the trajectory of some joints alone."""
+    """Return the trajectory of some joints."""
     if joints is None:
         return trajectory
     for name in joints:
@@ -145,7 +146,7 @@ def load_recording(
     joints: Iterable[str] | None = None,
     topic: str | None = None,
 ) -> Recording | LawFile:
-    """Return what `load_trajectory` makes a trajectory of: rows of a recording, or laws."""
+    """Return the source of `load_trajectory`: rows of a recording, or laws."""
     name = str(fspath(path))
     given = None if joints is None else tuple(joints)
     if is_bag(name):
@@ -171,7 +172,7 @@ def load_recording(
 
 
 def _named_by(recording: Recording, robot: Robot) -> Recording:
-    """Return a recording that names no joints with those of a robot, where their number tells which."""
+    """Return a recording without joint names with the names of a robot, if the number of joints determines them."""
     if all(name in robot.joint_names for name in recording.names):
         return recording
     turning = [name for name in robot.joint_names if robot.joints[name].turning]
@@ -187,7 +188,7 @@ def _named_by(recording: Recording, robot: Robot) -> Recording:
 
 
 def _positions_only(recording: Recording, robot: Robot | None) -> Recording:
-    """Return a recording without columns whose names say that they hold torques or the like of no joint of a robot."""
+    """Return a recording without columns whose names, unknown to the robot, are those of torques or the like."""
     known = () if robot is None else robot.joints
     others = [name for name in recording.names if name in recording.others and name not in known]
     if not others:
@@ -203,7 +204,7 @@ def _positions_only(recording: Recording, robot: Robot | None) -> Recording:
 
 
 def _check_taken(recording: Recording) -> None:
-    """Check that a controller would take the points as they are."""
+    """Raise an error if a controller would refuse the points."""
     if recording.points and recording.notes:
         message = f"the controller refuses such points: {'; '.join(recording.notes)}; correct them"
         raise TrajectoryError(message, path=recording.path, name="as_controller")

@@ -29,32 +29,32 @@ def load_path(
     robot: Robot | None = None,
     only: Iterable[str] | None = None,
 ) -> Path | JointTrajectory:
-    """Read the path of a robot: a trajectory, of which only the geometry counts, or a path that knows of no time.
+    """Read the path of a robot: a path without time, or a trajectory, of which only the geometry matters.
 
-    A CSV file with a column ``time`` is a trajectory; without it, its rows are waypoints, rad or m, its columns joints.
-    A YAML, TOML or JSON file has the key ``path``: for each joint an expression of ``s``, which runs from 0 to 1, or
-    the list of its positions at the waypoints; or it is a trajectory file.
+    A CSV file with a column ``time`` is a trajectory; otherwise its rows are waypoints, rad or m, and its columns
+    joints. A YAML, TOML or JSON file has the key ``path``: for each joint an expression of ``s``, which runs from 0 to
+    1, or the list of its positions at the waypoints; or it is a trajectory file.
 
     Parameters
     ----------
     path
-        A file ending in .csv, .yaml, .yml, .toml or .json.
+        File ending in .csv, .yaml, .yml, .toml or .json.
     degree : int, default 5
         Degree of the splines through samples of a trajectory.
     allow
-        Folders besides its own that files named in it may be below.
+        Folders besides its own below which files named in it may lie.
     topic, robot, only
-        As for `load_trajectory`.
+        See `load_trajectory`.
 
     Returns
     -------
     Path or JointTrajectory
-        As `retime` takes it.
+        Path for `retime`.
 
     Raises
     ------
     TrajectoryError
-        The file cannot be read or something in it is wrong: the message names the file, and the line or the entry.
+        If the file cannot be read or contains an error: the message names the file, and the line or the entry.
     """
     name = str(fspath(path))
     suffix = FilePath(name).suffix.lower()

@@ -1,4 +1,4 @@
-"""The trajectory that a recording becomes: splines through samples, or what a controller does between points."""
+"""Trajectories from recordings: splines through samples, or the interpolation of a controller between points."""
 
 from __future__ import annotations
 
@@ -31,25 +31,25 @@ def trajectory_of(
     Parameters
     ----------
     recording : Recording
-        Of a file.
+        Recording from a file.
     degree : int, default 5
-        Of splines through positions alone.
+        Degree of the splines through positions only.
     as_controller : bool, default False
-        Between the rows what joint_trajectory_controller of ros2_control does: straight lines between positions alone,
-        cubics with velocities, quintics with accelerations.
+        Whether to interpolate like joint_trajectory_controller of ros2_control: linearly between positions only, by
+        cubics with velocities, by quintics with accelerations.
     samples : bool, default False
-        Straight lines between the positions of samples, in the place of splines through them.
+        Whether to interpolate positions of samples linearly, instead of by splines.
 
     Raises
     ------
     TrajectoryError
-        If there are too few rows, angles are kept within one turn, or velocities and positions contradict each other:
+        If there are too few rows, angles are wrapped to one turn, or velocities and positions contradict each other:
         the message names the line.
 
     Warns
     -----
     RecordingWarning
-        What of the file was not taken as it is, and gaps between samples.
+        If parts of the file were changed, or if there are gaps between samples.
     """
     if len(recording.times) < 2:
         raise recording.error("at least two samples are needed", value=len(recording.times))
@@ -91,7 +91,7 @@ def _as_points(recording: Recording, joint: int) -> AbstractMotion:
 
 
 def _trimmed(table: Float[np.ndarray, "row level"]) -> Float[np.ndarray, "row known"]:
-    """Leave out levels that no two points beside each other know."""
+    """Return a table without the levels that no two adjacent points have."""
     known = ~np.isnan(table)
     both = (known[1:] & known[:-1]).any(axis=0)
     return table[:, : int(np.argmin(np.append(both, False)))]
@@ -115,5 +115,5 @@ def _as_samples(recording: Recording, joint: int, degree: int) -> AbstractMotion
 
 
 def complete_levels(known: Bool[np.ndarray, "row level"]) -> int:
-    """Return how many levels all rows know."""
+    """Return the number of levels that all rows have."""
     return int(np.argmin(np.append(known.all(axis=0), False)))

@@ -1,4 +1,4 @@
-"""What a file recorded or ordered of joints at instants."""
+"""Recordings: measured or commanded values of joints at instants, from a file."""
 
 from __future__ import annotations
 
@@ -16,30 +16,30 @@ LEVELS = ("positions", "velocities", "accelerations")
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Recording:
-    """Positions of joints at instants, with velocities and accelerations where a file has them.
+    """Positions of joints at instants, with velocities and accelerations if a file has them.
 
     Parameters
     ----------
     path : str
-        The file.
+        Path of the file.
     names : tuple of str
-        Of the joints.
+        Names of the joints.
     times : array of shape (row,)
-        Strictly increasing, s.
+        Strictly increasing instants, s.
     values : array of shape (row, level, joint)
-        Positions, velocities and accelerations; NaN where there is none.
+        Positions, velocities and accelerations; NaN for missing values.
     lines : sequence of int
-        The line of each row; empty where the file has none.
+        Line of each row; empty if the file has no lines.
     points : bool
-        Whether these are points that a controller goes to, and not samples of a motion.
+        Whether the rows are points for a controller, instead of samples of a motion.
     notes : tuple of str
-        What of the file was not taken as it is.
+        Descriptions of parts of the file that were changed.
     measures : dict of str to {"angle", "length"}
-        What joints move by, where units say it.
+        Kinds of the coordinates, if units state them.
     unnamed : bool
         Whether the file does not name its joints.
     others : frozenset of str
-        Names by which columns say that they hold torques or the like, and no positions of a joint.
+        Names of columns that state torques or the like instead of positions of a joint.
     """
 
     path: str
@@ -59,7 +59,7 @@ class Recording:
         return TrajectoryError(message, path=self.path, line=line, **fields)  # type: ignore[arg-type]
 
     def renamed(self, joints: Sequence[str]) -> Recording:
-        """Return the recording with other names of the joints, in its order."""
+        """Return the recording with other names of its joints, in its order."""
         names = tuple(joints)
         if len(names) != len(self.names) or len(set(names)) < len(names):
             message = f"the file has {len(self.names)} joints; give as many different names, in its order"
@@ -67,7 +67,7 @@ class Recording:
         return dataclasses.replace(self, names=names, unnamed=False)
 
     def selected(self, joints: Sequence[str]) -> Recording:
-        """Return the recording of some of its joints alone, and without rows that say nothing of them."""
+        """Return the recording of some joints, without the rows that have no values of them."""
         for name in joints:
             check_name("joint", name, self.names, TrajectoryError, name="joints")
         columns = [self.names.index(name) for name in dict.fromkeys(joints)]

@@ -14,14 +14,14 @@ from jounce.io.trajectories.recordings import Recording
 
 NANO = 10**9  # ns in a second
 EPOCH = 1e8
-"""s: no recording lasts so long; larger stamps are counted from an epoch, if need be in ms, us or ns."""
+"""Largest duration of a recording, s; larger stamps are counted from an epoch, possibly in ms, us or ns."""
 SCALES = ((1e17, 9, "ns"), (1e14, 6, "us"), (1e11, 3, "ms"), (EPOCH, 0, "s"))
-"""From which stamp on they are whole parts of a second, and of which."""
-MOST_REPEATED = 0.5  # of the rows
-BACK = 40  # steps by which a row may be late
-ROUGHER = 1.5  # by which rows in the order of their stamps may go further than in that of the file
-GAP = 20  # times the median step: a spline through samples beside it says little of what was between them
-SAME = 1.5  # times the largest step beside: positions at one stamp differ by no more
+"""Least stamp of each unit of a second that counts from an epoch."""
+MOST_REPEATED = 0.5  # largest share of repeated stamps
+BACK = 40  # number of steps by which a row may be late
+ROUGHER = 1.5  # largest ratio of the path lengths in the order of stamps and in that of the file
+GAP = 20  # times the median step, beyond which a spline says little about the motion between two samples
+SAME = 1.5  # times the largest neighboring step, within which positions at one stamp must agree
 
 
 def relative(
@@ -30,24 +30,25 @@ def relative(
     per_second: int = 1,
     unit: str | None = None,
 ) -> tuple[np.ndarray, str]:
-    """Return stamps counted from the first one where they are counted from an epoch, and words about that.
+    """Return stamps, relative to the first one if they are counted from an epoch, and a description of that.
 
-    They are subtracted before they are rounded: a stamp of this century in double precision has 0.2 us.
+    They are subtracted before rounding: in double precision, a stamp of this century has a resolution of 0.2 us.
 
     Parameters
     ----------
     texts : sequence of str
-        As the file has them.
+        Stamps as in the file.
     fail : callable
-        Given a message and a row, returns the error.
+        Returns the error for a message and a row.
     per_second : int, default 1
+        Units of the stamps in a second; see `epoch`.
     unit : str, optional
-        As for `epoch`.
+        Unit of the stamps; see `epoch`.
 
     Raises
     ------
     TrajectoryError
-        If one is no finite number.
+        If a stamp is no finite number.
     """
     values = np.empty(len(texts))
     for k, text in enumerate(texts):
@@ -64,23 +65,23 @@ def relative(
         if known is None:
             return values, ""
         exact = [Decimal(text.strip()) for text in texts]
-    except InvalidOperation:  # what float alone can read
+    except InvalidOperation:  # a form that only float can read
         return values, ""
     digits, words = known
     return np.array([float((stamp - exact[0]).scaleb(-digits)) for stamp in exact]), words
 
 
 def epoch(first: Decimal, per_second: int = 1, unit: str | None = None) -> tuple[int, str] | None:
-    """Return of which power of ten of a second stamps are that are counted from an epoch, and words about that.
+    """Return the digits of the unit of stamps that count from an epoch, and a description; None for other stamps.
 
     Parameters
     ----------
     first : Decimal
-        The first stamp.
+        First stamp.
     per_second : int, default 1
-        Units of the stamps in a second, if they are known to be ns: small ones are those of a simulated clock then.
+        Units of the stamps in a second, if known to be ns: small stamps are then those of a simulated clock.
     unit : str, optional
-        Of the stamps, if the file says one.
+        Unit of the stamps, if the file states one.
 
     Examples
     --------
@@ -101,12 +102,12 @@ def epoch(first: Decimal, per_second: int = 1, unit: str | None = None) -> tuple
 
 
 def in_sequence(recording: Recording) -> Recording:
-    """Return a recording with increasing stamps: rows sorted, and repeated ones merged, which its notes tell.
+    """Return a recording with increasing stamps: rows sorted and repeated ones merged, as its notes state.
 
     Raises
     ------
     TrajectoryError
-        If most stamps repeat, the recording starts again, or positions at one stamp contradict each other.
+        If most stamps are repeated, the recording starts again, or positions at one stamp contradict each other.
     """
     steps = np.diff(recording.times)
     if (steps > 0).all():
@@ -125,7 +126,7 @@ def in_sequence(recording: Recording) -> Recording:
 
 
 def gaps(recording: Recording) -> list[str]:
-    """Return words about the longest gap between the samples of each joint, none for those that have no gap."""
+    """Return descriptions of the longest gap between the samples of each joint; empty if there is no gap."""
     notes: dict[str, list[str]] = {}
     for joint, name in enumerate(recording.names):
         rows = np.flatnonzero(~np.isnan(recording.values[:, 0, joint]))
@@ -166,7 +167,7 @@ def _path_length(positions: np.ndarray) -> float:
 
 
 def _merged(recording: Recording) -> Recording:
-    """Return a recording with one row for each stamp: the mean of rows that differ within a step."""
+    """Return a recording with one row for each stamp: the mean of rows that differ by less than a step."""
     times, positions = recording.times, recording.values[:, 0]
     again = np.flatnonzero(np.diff(times) == 0) + 1
     if not len(again):
@@ -181,7 +182,7 @@ def _merged(recording: Recording) -> Recording:
     differ = np.nan_to_num(differences) > 0
     if differ.any():
         moved = np.abs(np.diff(positions, axis=0))
-        neighbors = np.concatenate([again - 2, again - 1, again])  # steps to and from the two do not tell what is usual
+        neighbors = np.concatenate([again - 2, again - 1, again])  # steps to and from repeated rows are not typical
         moved[neighbors[(neighbors >= 0) & (neighbors < len(moved))]] = 0.0
         usual = SAME * np.nan_to_num(moved).max(axis=0)
         bad = np.argwhere(np.nan_to_num(differences) > usual)

@@ -1,4 +1,4 @@
-"""Which column of a recording holds what of which joint, by the names that tools give them."""
+"""Assignment of the columns of a recording to joints and levels, by the names that tools use."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from jounce.units.dimensions import NUMBER, TIME
 from jounce.units.shown_units import unit_size
 
 TIMES = ("time", "__time", "%time", "timestamp", "Time", "stamp", "t", "TIME", "Timestamp")
-"""Names of columns of times: of results, PlotJuggler, rostopic, controllers."""
+"""Names of columns of times, in results, PlotJuggler, rostopic and controllers."""
 SPARE = (ROW_NUMBER, "seq", "frame_id", "success_rate", "control_command_success_rate", "robot_mode")
 POSITION, VELOCITY, ACCELERATION, OTHER = 0, 1, 2, 3
 WORDS = {
@@ -31,7 +31,7 @@ _NUMBERED = {
 OTHER_QUANTITIES = frozenset(
     "tau torque torques effort efforts force forces current currents voltage voltages temp temperature".split()
 )
-"""Words of names of columns that hold no positions."""
+"""Words in the names of columns that hold no positions."""
 _BETWEEN_WORDS = re.compile(r"[^A-Za-z]+|(?<=[a-z])(?=[A-Z])")
 _WITH_NUMBER = re.compile(r"(?P<word>[A-Za-z_/.]*[A-Za-z])_?(?P<open>\[)?(?P<number>[0-9]+)(?(open)\])$")
 _SUFFIX = re.compile(rf"(?P<joint>.+)[_./ ](?P<word>{'|'.join(WORDS)})$")
@@ -45,17 +45,17 @@ class Columns:
     Parameters
     ----------
     time : int
-        Number of that of the times.
+        Index of the column of times.
     joints : dict of str to dict of int to int
-        By the name of a joint, the column of each level that there is.
+        Column of each available level, by joint.
     unnamed : bool
-        Whether the names of the joints are made up.
+        Whether the names of the joints are invented.
     checked : dict of str to int
-        Columns of velocities that results have beside positions: they are compared with these only.
+        Columns of velocities in results, which are only compared with the positions.
     names : dict of str to int, optional
-        Columns of text that hold the name of a joint, by the name that it has here.
+        Columns of text with the names of joints, by the invented names.
     per_second : int
-        Of which parts of a second the times are.
+        Units of the times in a second.
     """
 
     time: int
@@ -67,7 +67,7 @@ class Columns:
 
 
 def other_quantity(name: str) -> str | None:
-    """Return the word by which the name of a column says that it holds no positions; None where none does.
+    """Return the word in the name of a column that shows that it holds no positions; None if there is none.
 
     Examples
     --------
@@ -81,12 +81,12 @@ def other_quantity(name: str) -> str | None:
 
 
 def take_units(table: Table) -> None:
-    """Take the units that names end in, as ``elbow_deg``, for those that stand in brackets, as ``elbow [deg]``.
+    """Move units from the ends of names, as ``elbow_deg``, to the units of a table, as for ``elbow [deg]``.
 
     Raises
     ------
     JounceError
-        If two columns are the same of one joint.
+        If two columns hold the same quantity of one joint.
     """
     header, units = list(table.header), list(table.units)
     read = [name_and_last_word(x) if unit is None else (x, None) for x, unit in zip(header, units, strict=True)]
@@ -105,12 +105,12 @@ def take_units(table: Table) -> None:
 
 
 def columns_of(header: Sequence[str]) -> Columns | None:
-    """Return what the columns of a header hold; None where nothing tells it.
+    """Return the content of the columns of a header; None if it is unknown.
 
     Raises
     ------
     TrajectoryError
-        If two columns may be the same of one joint.
+        If two columns may hold the same quantity of one joint.
     """
     for known in (_of_rostopic, _of_libfranka, _of_plotjuggler, _of_numbers, _of_names):
         columns = known(header)
@@ -124,7 +124,7 @@ def _time(header: Sequence[str]) -> int | None:
 
 
 def _of_rostopic(header: Sequence[str]) -> Columns | None:
-    """Tell columns of ``rostopic echo -p``: ``field.name0``, ``field.position0``, and stamps in ns."""
+    """Return the columns of ``rostopic echo -p``: ``field.name0``, ``field.position0``, and stamps in ns."""
     if "%time" not in header or not any(name.startswith("field.") for name in header):
         return None
     stamp = header.index("field.header.stamp") if "field.header.stamp" in header else header.index("%time")
@@ -141,7 +141,7 @@ def _of_rostopic(header: Sequence[str]) -> Columns | None:
 
 
 def _of_plotjuggler(header: Sequence[str]) -> Columns | None:
-    """Tell series of PlotJuggler: ``/joint_states/JOINT/position``."""
+    """Return the series of PlotJuggler: ``/joint_states/JOINT/position``."""
     time = _time(header)
     joints: dict[str, dict[int, int]] = {}
     topics: dict[tuple[str, int], str] = {}
@@ -162,7 +162,7 @@ def _of_plotjuggler(header: Sequence[str]) -> Columns | None:
 
 
 def _of_libfranka(header: Sequence[str]) -> Columns | None:
-    """Tell columns of libfranka's ``logToCSV``: ``state.q[0]``, ``state.dq[0]``, and times in ms."""
+    """Return the columns of libfranka's ``logToCSV``: ``state.q[0]``, ``state.dq[0]``, and times in ms."""
     time, joints = _time(header), {}
     while (name := f"state.q[{len(joints)}]") in header:
         rate = f"state.dq[{len(joints)}]"
@@ -172,7 +172,7 @@ def _of_libfranka(header: Sequence[str]) -> Columns | None:
 
 
 def _of_numbers(header: Sequence[str]) -> Columns | None:
-    """Tell numbered columns: ``q_0``, ``dq_0``, ``q[0]``, ``position_0``; one without is a joint's name."""
+    """Return numbered columns: ``q_0``, ``dq_0``, ``q[0]``, ``position_0``; None if a column is named after a joint."""
     time = _time(header)
     columns: dict[int, dict[int, int]] = {}
     for column, name in enumerate(header):
@@ -195,7 +195,7 @@ def _of_numbers(header: Sequence[str]) -> Columns | None:
 
 
 def _of_names(header: Sequence[str]) -> Columns | None:
-    """Tell columns named after joints: ``elbow``, or ``elbow_pos``, with ``elbow_vel`` and ``elbow_acc`` beside."""
+    """Return columns named after joints: ``elbow``, or ``elbow_pos``, with ``elbow_vel`` and ``elbow_acc``."""
     time = _time(header)
     if time is None:
         return None

@@ -18,23 +18,23 @@ from jounce.io.trajectories.table_columns import POSITION, Columns, columns_of, 
 from jounce.units.dimensions import TIME, Dimension
 
 NOTHING = ("", "nan", "NaN", "NAN")
-"""What a table has where a series has no value."""
+"""Entries of a table for missing values of a series."""
 
 
 def read_recording(path: str, joints: Iterable[str] | None = None) -> Recording:
-    """Read a recording from a CSV file.
+    """Return the recording in a CSV file.
 
     Parameters
     ----------
     path : str
-        Of the file.
+        Path of the file.
     joints : iterable of str, optional
-        Names of the joints of a table that names none, in its order.
+        Names of the joints of a table without names, in its order.
 
     Raises
     ------
     TrajectoryError
-        If the file cannot be read or something in it is wrong: the message names the line, the column and the value.
+        If the file cannot be read or contains an error: the message names the line, the column and the value.
     """
     table = Table(path, TrajectoryError)
     line = check_named(table)
@@ -45,7 +45,7 @@ def read_recording(path: str, joints: Iterable[str] | None = None) -> Recording:
     except TrajectoryError as error:
         raise error.located(path=path, line=line) from None
     if columns is None:
-        table.find("time")  # tells that there is none
+        table.find("time")  # raises an error if there is none
         raise table.error("there is no column besides 'time'; give one for each joint", line=line)
     recording = in_sequence(_recording(table, columns, points=known is not None))
     if joints is not None:
@@ -57,7 +57,7 @@ def read_recording(path: str, joints: Iterable[str] | None = None) -> Recording:
 
 
 def _of_controller(table: Table, known: ControllerFormat) -> Columns:
-    """Return the columns of a table that a controller takes; only what is commanded is read."""
+    """Return the columns of a table for a controller; only commanded values are read."""
     levels = [level for level in known.levels if f"{level}_0" in table.header]
     joints = {
         f"joint_{j}": {k: table.find(f"{level}_{j}") for k, level in enumerate(levels)}
@@ -109,7 +109,7 @@ def _is_other(table: Table, levels: Mapping[int, int]) -> bool:
 
 
 def measured(dimension: Dimension | None) -> str | None:
-    """Return which of an angle and a length a coordinate is whose value, or a rate of it, has a dimension."""
+    """Return angle or length, as the kind of coordinate whose value or rate has a dimension; None if unknown."""
     return next((base for base, _ in dimension or () if base in ("angle", "length")), None)
 
 
@@ -118,7 +118,7 @@ def _is_series(name: str) -> bool:
 
 
 def _names(table: Table, columns: Columns) -> tuple[str, ...]:
-    """Return the names of the joints: those that a table holds as text are the same in all rows."""
+    """Return the names of the joints; names in the text of a table must be the same in all rows."""
     names = []
     for joint in columns.joints:
         if (column := columns.names.get(joint)) is None:
@@ -137,7 +137,7 @@ def _names(table: Table, columns: Columns) -> tuple[str, ...]:
 
 
 def _numbers(table: Table, column: int, level: int, *, empty: bool) -> Float[np.ndarray, " row"]:
-    """Return the numbers of a column; where entries may be missing, NaN stands for them."""
+    """Return the numbers of a column; with `empty`, missing entries become NaN."""
     allowed = rates(("angle", "length"), level)
     if table.numbers is not None or not empty:
         return np.array(table.column(column, allowed))
@@ -156,7 +156,7 @@ def _numbers(table: Table, column: int, level: int, *, empty: bool) -> Float[np.
 
 
 def _times(table: Table, columns: Columns) -> tuple[Float[np.ndarray, " row"], str]:
-    """Return the times, s, from the first one where they are counted from an epoch, and words about that."""
+    """Return the times, s, relative to the first if they count from an epoch, and a description of that."""
     name, unit = table.header[columns.time], table.units[columns.time]
     size = table.unit(columns.time, (TIME,))[0]
     if table.numbers is not None:
@@ -177,14 +177,14 @@ def _times(table: Table, columns: Columns) -> tuple[Float[np.ndarray, " row"], s
 
 
 def _units(columns: Columns, stamps: Float[np.ndarray, " row"]) -> int:
-    """Return how many units of the stamps a second has: ns are whole, and others were converted to seconds."""
+    """Return the units of the stamps in a second; stamps in ns that are not whole were converted to seconds."""
     return 1 if columns.per_second == NANO and (stamps != np.rint(stamps)).any() else columns.per_second
 
 
 def _check_rate(
     table: Table, columns: Columns, joint: str, positions: Float[np.ndarray, "row 1"], rate: Float[np.ndarray, " row"]
 ) -> None:
-    """Check that velocities beside positions, which are not read otherwise, are theirs."""
+    """Raise an error if velocities, which are not read otherwise, disagree with the positions."""
     times = np.array(table.column(columns.time))
     if (np.diff(times) <= 0).any() or not np.isfinite(positions).all():
         return

@@ -1,1 +1,1 @@
-"""Trajectories as ROS writes them: messages, recorded joint states, bags."""
+"""Trajectories in the forms of ROS: messages, recorded joint states, bags."""

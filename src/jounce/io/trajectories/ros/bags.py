@@ -23,11 +23,11 @@ STATE, TRAJECTORY = "sensor_msgs/msg/JointState", "trajectory_msgs/msg/JointTraj
 CONTROLLER = "control_msgs/msg/JointTrajectoryControllerState"
 STATES = (STATE, CONTROLLER)
 MOST = 20_000_000
-"""Messages."""
+"""Largest number of messages."""
 
 
 def is_bag(path: str) -> bool:
-    """Return whether a path is that of a bag: its file, or the folder of one of ROS 2."""
+    """Return whether a path is that of a bag: a bag file, or the folder of a ROS 2 bag."""
     place = Path(path)
     try:
         return place.suffix.lower() in SUFFIXES or (place.is_dir() and (place / METADATA).is_file())
@@ -36,12 +36,12 @@ def is_bag(path: str) -> bool:
 
 
 def read_bag(path: str, joints: Sequence[str] | None = None, topic: str | None = None) -> Recording:
-    """Read the recording of a topic of a bag: JointState, JointTrajectoryControllerState, or one JointTrajectory.
+    """Return the recording of a topic of a bag: JointState, JointTrajectoryControllerState, or one JointTrajectory.
 
     Raises
     ------
     TrajectoryError
-        If rosbags is not installed, the bag cannot be read, or has no such topic, or several.
+        If rosbags is not installed, the bag cannot be read, or the topic is missing or ambiguous.
     """
     try:
         highlevel: Any = importlib.import_module("rosbags.highlevel")
@@ -63,7 +63,7 @@ def read_bag(path: str, joints: Sequence[str] | None = None, topic: str | None =
                 recording = _trajectory(reader, connections, path)
     except TrajectoryError:
         raise
-    except Exception as reason:  # noqa: BLE001 - whatever a damaged bag makes of its reader
+    except Exception as reason:  # noqa: BLE001 - any error of the reader about a damaged bag
         words = " ".join(str(reason).split()).encode("ascii", "backslashreplace").decode("ascii")
         message = f"the bag cannot be read: {words or type(reason).__name__}; {_repair_advice(place)}"
         raise TrajectoryError(message, path=path) from None
@@ -72,14 +72,14 @@ def read_bag(path: str, joints: Sequence[str] | None = None, topic: str | None =
 
 
 def _repair_advice(place: Path) -> str:
-    """Word how a bag may be mended whose recording or copy was cut short."""
+    """Return advice about repairing a bag whose recording or copy was cut short."""
     suffixes = {x.suffix.lower() for x in (place, *(place.iterdir() if place.is_dir() else ()))}
     tool = "mcap recover" if ".mcap" in suffixes else "rosbag reindex" if ".bag" in suffixes else "ros2 bag reindex"
     return f"if its recording or its copy was cut short, copy it again, or mend it by `{tool}`"
 
 
 def _chosen(reader: Any, topic: str | None, path: str) -> list[Any]:
-    """Return the connections of one topic of a type that is read."""
+    """Return the connections of one topic of a supported type."""
     fit = [x for x in reader.connections if x.msgtype in (*STATES, TRAJECTORY)]
     topics = list(dict.fromkeys(x.topic for x in fit))
     if topic is not None:
@@ -119,13 +119,13 @@ def _states(reader: Any, connections: list[Any], path: str) -> Recording:
         received.append(Decimal(stamp) / NANO)
     if len(states) < 2:
         raise TrajectoryError("at least two samples are needed", path=path, value=len(states))
-    if not any(state.stamp for state in states):  # no stamps of their own: when they were received
+    if not any(state.stamp for state in states):  # without stamps: the times of reception
         states = [State(stamp, x.names, x.levels) for stamp, x in zip(received, states, strict=True)]
     return recorded_states(path, states)
 
 
 def _measured(message: Any) -> tuple[list[str], np.ndarray, np.ndarray]:
-    """Return names, positions and velocities of a joint state, or of what a controller's state says was measured."""
+    """Return names, positions and velocities of a joint state, or of the measured part of a controller state."""
     if hasattr(message, "joint_names"):
         part = next(getattr(message, key) for key in MEASURED if hasattr(message, key))
         return list(message.joint_names), np.asarray(part.positions, float), np.asarray(part.velocities, float)

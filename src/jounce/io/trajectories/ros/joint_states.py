@@ -16,18 +16,18 @@ from jounce.io.trajectories.stamps import epoch
 
 @dataclasses.dataclass(frozen=True)
 class State:
-    """The positions of some joints at a stamp, and perhaps their velocities.
+    """The positions of some joints at a stamp, with velocities if available.
 
     Parameters
     ----------
     stamp : Decimal
-        s, exactly.
+        Exact stamp, s.
     names : sequence of str
-        Of the joints.
+        Names of the joints.
     levels : sequence of array_like
-        Positions, then velocities where there are such.
+        Positions, then velocities if available.
     line : int, default 0
-        Of a file; 0 where it has none.
+        Line in the file; 0 if there is none.
     """
 
     stamp: Decimal
@@ -37,12 +37,12 @@ class State:
 
 
 def recorded_states(path: str, states: Sequence[State]) -> Recording:
-    """Return the recording of states, of which some may be of other joints than others.
+    """Return the recording of states, which need not all contain the same joints.
 
     Raises
     ------
     TrajectoryError
-        If some have no stamp, zero, and others one that counts from an epoch.
+        If some stamps are zero, and others are counted from an epoch.
     """
     unstamped = [k for k, state in enumerate(states) if not state.stamp]
     if unstamped and epoch(max(state.stamp for state in states)) is not None:

@@ -1,4 +1,4 @@
-"""Messages of ROS as files: trajectories, goals of controllers, and joint states, as tools print and save them."""
+"""ROS messages as files: trajectories, goals of controllers, and joint states, as printed and saved by tools."""
 
 from __future__ import annotations
 
@@ -17,17 +17,17 @@ from jounce.io.trajectories.stamps import in_sequence
 NANO = 1_000_000_000
 STATES = ("position", "velocity")
 MEASURED = ("feedback", "actual")
-"""What a controller's state has of what was measured, in ROS 2 and before."""
+"""Keys of the measured values in a controller state, in newer and older versions."""
 CUT = "..."
-"""What ``ros2 topic echo`` prints in the place of what it leaves out."""
-START = 1e-6  # rad or m: so far may the robot be from where a trajectory starts
+"""Text that ``ros2 topic echo`` prints in place of omitted entries."""
+START = 1e-6  # rad or m, largest distance of the robot from the start of a trajectory
 _POINT = {*LEVELS, "effort", "time_from_start"}
 _INSIDE: tuple[tuple[str, ...], ...] = ((), ("trajectory",), ("joint_trajectory",), ("goal", "trajectory"))
-"""Where messages hold a JointTrajectory: itself, FollowJointTrajectory goals, RobotTrajectory, action goals."""
+"""Locations of a JointTrajectory: itself, FollowJointTrajectory goals, RobotTrajectory, action goals."""
 
 
 def is_message(data: Any) -> bool:
-    """Return whether the data of a file are those of a message of ROS, or of several."""
+    """Return whether the data of a file are those of one or several ROS messages."""
     first = data[0] if isinstance(data, list) and data else data
     if not isinstance(first, dict):
         return False
@@ -55,22 +55,22 @@ def _is_state(data: Any) -> bool:
 
 
 def measured_part(data: Any) -> str | None:
-    """Return under which key the state of a controller holds what was measured; None of anything else."""
+    """Return the key of the measured values in a controller state; None for other data."""
     if not isinstance(data, dict) or "joint_names" not in data or "points" in data:
         return None
     return next((key for key in MEASURED if isinstance(data.get(key), dict)), None)
 
 
 def read_messages(source: Source, joints: Sequence[str] | None = None) -> Recording:
-    """Return the recording of a message of ROS, or of a list of joint states; names given take the place of its own.
+    """Return the recording of a ROS message, or of a list of joint states; `joints` replace the names in it.
 
-    JointTrajectory, FollowJointTrajectory goals, RobotTrajectory and DisplayTrajectory of MoveIt, JointState, and
-    JointTrajectoryControllerState, of which what was measured is read.
+    The message is a JointTrajectory, a FollowJointTrajectory goal, a RobotTrajectory or DisplayTrajectory of MoveIt, a
+    JointState, or a JointTrajectoryControllerState, whose measured values are read.
 
     Raises
     ------
     TrajectoryError
-        If something in it is missing, or is none of the numbers it should be: the message names the line.
+        If something is missing, or is not the required number: the message names the line.
     """
     data = source.data
     if isinstance(data, list) and all(map(_is_state, data)):
@@ -92,7 +92,7 @@ def read_messages(source: Source, joints: Sequence[str] | None = None) -> Record
 
 
 def _trajectories(source: Source) -> Recording:
-    """Return the points of a trajectory, or of several that follow one another."""
+    """Return the points of a trajectory, or of consecutive ones."""
     displayed = source.data.get("trajectory")
     if not isinstance(displayed, list):
         keys = next(keys for keys in _INSIDE if _is_trajectory(_inside(source.data, keys)))
@@ -125,7 +125,7 @@ def _joined(source: Source, place: Location, first: Recording, then: Recording) 
 
 
 def _started(source: Source, recording: Recording) -> Recording:
-    """Check that a robot starts where its trajectory does, where a message tells both."""
+    """Raise an error if a message states that the robot does not start where its trajectory does."""
     at: Location = ("trajectory_start", "joint_state")
     state = _at(source, at)
     if not _is_state(state) or len(state["name"]) != len(state["position"]):
@@ -142,7 +142,7 @@ def _started(source: Source, recording: Recording) -> Recording:
 
 
 def _at(source: Source, location: Location) -> Any:
-    """Return the value at a location, also within lists; None where there is none."""
+    """Return the value at a location, also within lists; None if there is none."""
     entry = source.data
     for step in location:
         if isinstance(step, int):
@@ -184,7 +184,7 @@ def _points(source: Source, at: Location) -> Recording:
 
 
 def _states(source: Source) -> Recording:
-    """Return the recording of joint states, one after another."""
+    """Return the recording of a list of joint states."""
     states = []
     for k, state in enumerate(source.data):
         names = _names(source, (k, "name"), state["name"])
@@ -198,7 +198,7 @@ def _states(source: Source) -> Recording:
 
 
 def _controller_states(source: Source) -> Recording:
-    """Return the recording of what the states of a controller say was measured."""
+    """Return the recording of the measured values in a list of controller states."""
     states, keys = [], set()
     for k, state in enumerate(source.data):
         key = str(measured_part(state))
