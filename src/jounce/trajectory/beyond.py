@@ -1,4 +1,4 @@
-"""What a law is beyond its ends: nothing, the value there, or itself again, from where it began or ended."""
+"""Laws beyond their ends: refused, held at the value of the end, repeated, or advanced by each repetition."""
 
 from collections.abc import Callable
 from typing import Any
@@ -8,21 +8,21 @@ import jax.numpy as jnp
 from jounce.errors import MechanismError
 from jounce.jet import Jet
 
-SLACK = 1e-9  # of the duration: how far rounding may take an instant out of a law
-CLOSED = 1e-9  # of the range of a law: so near to where it began it ends there
+SLACK = 1e-9  # of the duration, by which rounding may move an instant out of a law
+CLOSED = 1e-9  # of the range of a law, within which it ends at its initial value
 
 
 def check_within(first: float, last: float, start: float, stop: float, of: str) -> None:
-    """Raise MechanismError if instants from a first to a last one are not all within a law that ends.
+    """Raise MechanismError if instants from `first` to `last` are not all within a law with ends.
 
     Parameters
     ----------
     first, last : float
-        Requested instants, s.
+        First and last requested instant, s.
     start, stop : float
-        The ends of the law.
+        Ends of the law.
     of : str
-        What the law is given by, in the plural.
+        What determines the law, in the plural, for the message.
     """
     slack = SLACK * (stop - start)
     if first < start - slack or last > stop + slack:
@@ -35,20 +35,20 @@ def check_within(first: float, last: float, start: float, stop: float, of: str) 
 
 
 def continued(within: Callable[[Jet], Jet], time: Jet, start: Any, stop: Any, beyond: str, advance: Any) -> Jet:
-    """Return the jet of a law that is given between two ends, also beyond them.
+    """Return the jet of a law that is given between two ends, continued beyond them.
 
     Parameters
     ----------
     within : callable
         Maps a jet of time between the ends to that of the law.
     time : Jet
-        s, or the coordinate that the law is of.
+        Time, s, or the coordinate on which the law depends.
     start, stop : float or array
-        The ends.
+        Ends of the law.
     beyond : {"refuse", "hold", "repeat", "continue"}
-        NaN, rest at the value of the nearest end, the law again, or what `within` makes of it.
+        NaN, the value of the nearest end at rest, repetition, or the extrapolation by `within`.
     advance : float or array
-        What is added by each repetition.
+        Gain of each repetition.
     """
     if beyond == "continue":
         return within(time)

@@ -1,4 +1,4 @@
-"""Checks of the numbers that motion laws are made of; each raises an error that names the number at fault."""
+"""Checks of the numbers of motion laws; each raises an error that names the wrong number."""
 
 from collections.abc import Callable, Iterable
 from functools import partial
@@ -18,11 +18,11 @@ finite_numbers = partial(inertia.finite_numbers, error=TrajectoryError)
 
 
 Read = Callable[..., np.ndarray]
-"""How numbers are read: as they are, `real_numbers`, or as times, `seconds`."""
+"""Conversion of numbers: `real_numbers`, or `seconds` for times."""
 
 
 def finite(name: str | None, value: Any, read: Read = real_numbers) -> float:
-    """Return a finite number."""
+    """Return a finite number, after a check."""
     number = read(name, value, TrajectoryError, "a finite number")
     if number.ndim or not np.isfinite(number):
         raise TrajectoryError("must be a finite number", name=name, value=value)
@@ -30,7 +30,7 @@ def finite(name: str | None, value: Any, read: Read = real_numbers) -> float:
 
 
 def positive(name: str, value: Any, read: Read = real_numbers) -> float:
-    """Return a finite number greater than zero."""
+    """Return a finite number greater than zero, after a check."""
     number = finite(name, value, read)
     if number <= 0:
         raise TrajectoryError("must be greater than zero", name=name, value=value)
@@ -38,7 +38,7 @@ def positive(name: str, value: Any, read: Read = real_numbers) -> float:
 
 
 def finite_row(name: str, values: ArrayLike, read: Read = real_numbers) -> Float[np.ndarray, " number"]:
-    """Return finite numbers along one axis, at least one."""
+    """Return finite numbers along one axis, at least one, after a check."""
     row = finite_numbers(name, values, read=read)
     if row.ndim != 1 or not row.size:
         raise TrajectoryError(f"must have one axis of at least one number, not the shape {row.shape}", name=name)
@@ -48,7 +48,7 @@ def finite_row(name: str, values: ArrayLike, read: Read = real_numbers) -> Float
 def check_samples(
     times: ArrayLike, values: ArrayLike, error: type[JounceError] = TrajectoryError
 ) -> tuple[Float[np.ndarray, " samples"], Float[np.ndarray, "samples *columns"]]:
-    """Return times and values of samples: finite, two at least, a value or row for each time, times that increase."""
+    """Return times and values of samples after a check: finite, at least two, one row per time, increasing times."""
     check_rows("values", times, values, error)
     times, values = seconds("times", times, error), real_numbers("values", values, error)
     if times.ndim != 1 or values.ndim < 1 or len(times) != len(values):
@@ -71,7 +71,7 @@ def check_samples(
 
 
 def names_of_joints(names: Iterable[str]) -> tuple[str, ...]:
-    """Return names of joints, at least one and each once."""
+    """Return names of joints, after a check that they are text and differ."""
     result = (names,) if isinstance(names, str) else tuple(names)
     if not result or not all(isinstance(name, str) for name in result):
         raise TrajectoryError("names of joints are needed, as a list of text", name="names", value=list(result))

@@ -1,4 +1,4 @@
-"""Whether a curve is smooth: corners, gaps, jumps of curvature and cusps are reported with their locations."""
+"""Checks of the smoothness of curves: corners, gaps, jumps of curvature and cusps are reported with locations."""
 
 import re
 from collections.abc import Callable, Sequence
@@ -14,25 +14,25 @@ from jounce.jet import Jet
 Parameters = Float[np.ndarray, " place"]
 Values = Float[np.ndarray, "level component place"]
 
-LANES = 1024  # places that are evaluated together, whatever is asked: nothing is compiled for other numbers
-SAMPLES = 801  # of a curve that are looked at
-HALVINGS = 45  # of an interval, until nothing but a jump is left in it
-LEVELS = 4  # derivatives by the parameter that may not jump
-JUMP = 1e-6  # of the largest value: what is no rounding
-CUSP = 1e-6  # of the median of the tangents
-SLOW = 0.3  # of it: a tangent that may go on to vanish
-NARROWINGS = 70  # of an interval, for the place where a tangent is least
-SHARPEST = 50.0  # deg between chords
-SHARP = 10.0  # deg between chords, of a corner where those beside it turn by little
-SINGLE = 6.0  # times as much as those beside it
-WIDEST = 8.0  # times the median of the chords
+LANES = 1024  # parameters evaluated together, always the same number, so that nothing is compiled for others
+SAMPLES = 801  # samples of a curve
+HALVINGS = 45  # of an interval, after which only a jump remains in it
+LEVELS = 4  # derivatives by the parameter that must be continuous
+JUMP = 1e-6  # of the largest value; smaller changes are rounding
+CUSP = 1e-6  # of the median of the tangents, below which a tangent vanishes
+SLOW = 0.3  # of this median, below which a minimum is refined
+NARROWINGS = 70  # of an interval around a minimum of the tangent
+SHARPEST = 50.0  # deg between chords at a corner
+SHARP = 10.0  # deg between chords at a corner with smaller turns beside it
+SINGLE = 6.0  # least ratio of the turn at such a corner to those beside it
+WIDEST = 8.0  # largest ratio of a chord to the median of the chords
 SMOOTH = {"sin", "cos", "tan", "exp", "sinh", "cosh", "tanh", "atan", "asinh", "erf", "expm1"}
-_POWER = re.compile(r"\*\*\s*[0-9]+(?![0-9.eE])")  # a whole number
+_POWER = re.compile(r"\*\*\s*[0-9]+(?![0-9.eE])")  # an integer exponent
 _FUNCTION = re.compile(r"([A-Za-z_]\w*)\s*\(")
 
 
 def refuses_without_ends(formulas: Sequence[Any]) -> str:
-    """Return the function in the expressions of a curve that is not smooth everywhere: a range must say where it is."""
+    """Return the function in the expressions of a curve that requires a range, as it is not smooth; empty if none."""
     texts = [f.expression.text for f in formulas]
     words = {word for text in texts for word in _FUNCTION.findall(text)} - SMOOTH
     if words:
@@ -41,18 +41,18 @@ def refuses_without_ends(formulas: Sequence[Any]) -> str:
 
 
 def check_curve(formulas: Sequence[Any], window: Sequence[float], *, stated: bool, closed: bool) -> None:
-    """Raise MechanismError for a corner, a gap or a cusp between two values of the parameter of a curve.
+    """Raise MechanismError for a corner, a gap or a cusp of a curve within a window of its parameter.
 
     Parameters
     ----------
     formulas : sequence of callable
-        Coordinates on jets of the parameter.
+        Coordinates as functions on jets of the parameter.
     window : sequence of two float
-        Where to look.
+        First and last value of the parameter.
     stated : bool
-        Whether the curve is to be defined all along.
+        Whether the curve must be defined in the whole window.
     closed : bool
-        Whether its end is its beginning.
+        Whether the curve is closed.
     """
 
     def at(parameters: Parameters) -> Values:
@@ -76,7 +76,7 @@ def check_curve(formulas: Sequence[Any], window: Sequence[float], *, stated: boo
 
 
 def derivatives_at(formulas: Sequence[Any], parameters: Parameters, *others: Parameters) -> Values:
-    """Return coordinates of a curve, or of a surface along its first parameter, with their derivatives by it."""
+    """Return coordinates of a curve, or of a surface along its first parameter, and their derivatives by it."""
     derivatives = []
     for first in range(0, len(parameters), LANES):
         given = [np.resize(x[first : first + LANES], LANES) for x in (parameters, *others)]
@@ -103,7 +103,7 @@ def _check_cusps(at: Callable[[Parameters], Values], parameters: Parameters, val
     if not least.size:
         return
     low, high = parameters[np.maximum(least - 1, 0)], parameters[np.minimum(least + 1, len(parameters) - 1)]
-    for _ in range(NARROWINGS):  # by thirds, where the tangent is longer
+    for _ in range(NARROWINGS):  # ternary search for the shortest tangent
         near, far = low + (high - low) / 3, high - (high - low) / 3
         sizes = np.split(np.linalg.norm(at(np.concatenate([near, far]))[1], axis=0), 2)
         nearer = sizes[0] < sizes[1]
@@ -118,7 +118,7 @@ def _check_cusps(at: Callable[[Parameters], Values], parameters: Parameters, val
 
 
 def _check_jumps(at: Callable[[Parameters], Values], parameters: Parameters, values: Values) -> None:
-    """Halve every interval between places, keeping the half in which values change more: a jump is what stays."""
+    """Raise MechanismError for a jump, found by bisection of the half of each interval in which values change more."""
     sizes = np.max(np.where(np.isfinite(values), np.abs(values), 0.0), axis=(1, 2))
 
     def change(a: Values, b: Values) -> Float[np.ndarray, "level place"]:
@@ -151,7 +151,7 @@ _ADVICE = "it must be smooth where a point moves along it: round it off, or leav
 
 
 def _check_seam(at: Callable[[Parameters], Values], low: float, high: float, values: Values) -> None:
-    """Compare what follows the end of a closed curve with what follows its beginning."""
+    """Raise MechanismError unless a closed curve continues beyond its end as at its beginning."""
     since = np.linspace(0.0, 0.3 * (high - low), 7)
     begins, ends = at(low + since), at(high + since)
     sizes = np.abs(values).max(axis=(1, 2))
@@ -169,7 +169,7 @@ def _check_seam(at: Callable[[Parameters], Values], low: float, high: float, val
 
 
 def check_points(points: np.ndarray, *, closed: bool, least: int) -> Float[np.ndarray, "point component"]:
-    """Return points of a curve, the first once more at the end of a closed one; raise MechanismError if not smooth."""
+    """Return points of a curve after a check of its smoothness; a closed one repeats its first point at the end."""
     if points.ndim != 2 or points.shape[1] not in (2, 3):
         raise MechanismError("points of a curve are rows of two or three numbers", name="points", value=points.shape)
     bad = np.argwhere(~np.isfinite(points))

@@ -1,4 +1,4 @@
-"""Curves and surfaces fixed in a body, by expressions of parameters or through samples, as functions on jets."""
+"""Curves and surfaces fixed in a body, by expressions or through samples, as functions on jets of parameters."""
 
 import dataclasses
 from collections.abc import Mapping, Sequence
@@ -19,23 +19,23 @@ from jounce.trajectory.curve_checks import check_curve, check_points, derivative
 from jounce.trajectory.motion import SplineMotion
 from jounce.units.expression import Expression
 
-HALF_WINDOW = 2 * np.pi  # of a parameter, on either side of the start, where a curve is looked at that states no range
-LOOKS = 65  # places of a curve by which its size is measured
+HALF_WINDOW = 2 * np.pi  # of a parameter, checked on either side of the start if no range is given
+LOOKS = 65  # samples of a curve for its speed
 
 
 @dataclasses.dataclass(frozen=True)
 class ParametricCurve:
-    """A curve given by expressions of its parameter ``s``, or a surface by those of ``u`` and ``v``.
+    """A curve given by expressions of its parameter ``s``, or a surface by expressions of ``u`` and ``v``.
 
     Parameters
     ----------
     expressions : sequence of str or Expression
         One for each coordinate in the frame of the body, m; they may contain parameters of the mechanism.
     range : sequence of two numbers, optional
-        First and last value of the parameter: the ends of the curve, or one lap where it is closed; of a surface two
-        pairs. Without it the curve goes on as far as its expressions do.
+        First and last value of the parameter: the ends of the curve, or one lap of a closed curve; two pairs for a
+        surface. Without it, the curve is as long as its expressions are defined.
     closed : bool, default False
-        Whether the curve comes back to its beginning and goes on smoothly there.
+        Whether the curve returns to its beginning and continues smoothly there.
 
     Raises
     ------
@@ -49,7 +49,7 @@ class ParametricCurve:
     True
     """
 
-    expressions: Any  # a tuple of them
+    expressions: Any  # a tuple
     range: Any = None
     closed: bool = False
 
@@ -68,22 +68,22 @@ class ParametricCurve:
 
 
 class SampledCurve(Module):
-    """A smooth curve through points, its parameter the length along their chords, m.
+    """A smooth curve through points; its parameter is the length along their chords, m.
 
     Parameters
     ----------
     points : array_like of shape (points, components)
-        In the frame of the body, m, in their order along the curve; the first need not be repeated at the end of a
-        closed one.
+        Points in the frame of the body, m, in order along the curve; a closed curve need not repeat the first one at
+        the end.
     closed : bool, default False
-        Whether the curve goes on from the last point to the first.
+        Whether the curve continues from the last point to the first.
     degree : int, default 5
-        Of the spline, odd; derivatives by the parameter are continuous up to that below it.
+        Degree of the spline, odd; derivatives by the parameter are continuous up to the order below it.
 
     Raises
     ------
     MechanismError
-        If the points are too few, are not finite, repeat, or make a corner or a gap.
+        If the points are too few, are not finite, are repeated, or form a corner or a gap.
 
     Examples
     --------
@@ -113,23 +113,23 @@ class SampledCurve(Module):
 
     @property
     def length(self) -> float:
-        """Length of all chords, m: where the parameter ends, or begins again."""
+        """Length of all chords, m: the end of the parameter, or its period."""
         return float(self.parameter[-1])
 
 
 class CurveLaw(Module):
-    """A curve or a surface in numbers: maps jets of its parameters to the jet of a point, (components, ...), m.
+    """A curve or a surface in numbers, which maps jets of its parameters to the jet of a point, (components, ...), m.
 
     Parameters
     ----------
     components : tuple
-        Functions of the parameters, one for each coordinate.
+        Coordinates as functions of the parameters.
     ends : tuple of numbers, optional
-        Least and greatest value of each parameter, in turn; None where there is no end.
+        Least and greatest value of each parameter, in turn; None without ends.
     unit : float
-        A length, m, by which the point moves with a unit of the parameters: that of a carriage.
+        Length, m, by which the point moves per unit of the parameters, for the scale of carriages.
     lap : float, optional
-        How much of the parameter is a lap of a closed curve.
+        Period of the parameter of a closed curve.
     """
 
     components: tuple[Any, ...]
@@ -138,12 +138,12 @@ class CurveLaw(Module):
     lap: Any = None
 
     def __call__(self, *parameters: Jet) -> Float[Jet, "component *batch"]:
-        """Return the point."""
+        """Return the point on the curve or surface."""
         return stack([component(*parameters) for component in self.components])
 
 
 class _Formula(Module):
-    """One coordinate by an expression."""
+    """A coordinate as an expression of the parameters."""
 
     expression: Expression = field(static=True)
     names: tuple[str, ...] = field(static=True)
@@ -160,25 +160,25 @@ class _Formula(Module):
 def resolve_curve(
     given: Any, names: tuple[str, ...], components: int, start: Any, parameters: Mapping[str, Any]
 ) -> CurveLaw:
-    """Return the curve or surface that a list of expressions, or a curve, stands for, checked unless JAX traces it.
+    """Return the curve or surface of a list of expressions or a curve, checked unless values are traced.
 
     Parameters
     ----------
     given : ParametricCurve, SampledCurve or sequence
-        As a user gives it.
+        Curve as a user gives it.
     names : tuple of str
-        Of the parameters of the curve: ``("s",)``, of a surface ``("u", "v")``.
+        Names of its parameters: ``("s",)`` for a curve, ``("u", "v")`` for a surface.
     components : int
         2 in the plane, 3 in space.
     start : array, or None
-        Where the parameters are guessed to start.
+        Guess of the parameters.
     parameters : mapping
         Values of the other names in expressions.
 
     Raises
     ------
     MechanismError
-        If it is neither, or is not smooth: a corner, a gap, a cusp, with where it is.
+        If it is neither, or is not smooth: a corner, a gap or a cusp, with its location.
     """
     if isinstance(given, SampledCurve):
         return _through_points(given, names, components)
@@ -250,7 +250,7 @@ def _checked_once(formulas: Any, window: tuple[float, ...], stated: bool, closed
 
 
 def _checked(formulas: tuple[_Formula, ...], window: tuple[float, ...], stated: bool, closed: bool, count: int) -> None:
-    """Check the smoothness of curves; those of the same numbers were checked before."""
+    """Check the smoothness of a curve, once for the same numbers; surfaces are not checked."""
     if count > 1:
         return
     parts = tuple((f.expression, tuple((k, float(v)) for k, v in f.known.items())) for f in formulas)
@@ -258,7 +258,7 @@ def _checked(formulas: tuple[_Formula, ...], window: tuple[float, ...], stated: 
 
 
 def _unit(formulas: tuple[_Formula, ...], window: tuple[Any, ...]) -> Any:
-    """Return how far a point moves for a unit of the parameters, of several in the geometric mean, m."""
+    """Return the distance that a point moves per unit of the parameters, m; the geometric mean of two."""
     count, shares, lengths = len(window) // 2, np.linspace(0.05, 0.95, LOOKS), []
     traced = any(isinstance(x, Tracer) for x in jax.tree.leaves((formulas, window)))
     for varied in range(count):
@@ -282,7 +282,7 @@ def _unit(formulas: tuple[_Formula, ...], window: tuple[Any, ...]) -> Any:
 
 
 def _turned(formula: _Formula, turn: tuple[int, ...], *jets: Jet) -> Jet:
-    """Return a coordinate from jets of its parameters, the one that moves first."""
+    """Return a coordinate from jets of its parameters in another order."""
     return formula(*(jets[k] for k in turn))
 
 

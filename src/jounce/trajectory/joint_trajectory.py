@@ -1,4 +1,4 @@
-"""Trajectories: one motion law for each named joint of a robot, evaluated together to any order."""
+"""Trajectories: a motion law for each named joint of a robot, evaluated together to any order."""
 
 import warnings
 from collections.abc import Iterable, Mapping, Sequence
@@ -45,14 +45,14 @@ class JointTrajectory(Displayed):
     start, stop : float
         First and last instant, s.
     times : array_like of shape (samples,), optional
-        Instants at which the trajectory is meant to be looked at; 201 evenly spaced ones when not given.
+        Sampling instants of the trajectory; 201 evenly spaced ones by default.
     measures : dict of str to {"angle", "length"}, optional
-        What joints move by, where it is known, as from the units of a file: a robot whose joint does not is refused.
+        Kinds of the coordinates, if known, as from the units of a file; a robot with other joints is refused.
 
     Raises
     ------
     TrajectoryError
-        If there is no joint, a law is none or ends within the trajectory, `stop` does not come after `start`, or the
+        If there is no joint, a law is invalid or ends within the trajectory, `stop` does not come after `start`, or the
         times do not increase or leave the trajectory.
 
     Examples
@@ -95,12 +95,12 @@ class JointTrajectory(Displayed):
         self.measures = MappingProxyType(dict(measures or {}))
 
     def part(self, names: Sequence[str]) -> "JointTrajectory":
-        """Return the trajectory of some of the joints alone.
+        """Return the trajectory of some of the joints.
 
         Parameters
         ----------
         names : sequence of str
-            Of its joints.
+            Names of the joints.
 
         Examples
         --------
@@ -117,7 +117,7 @@ class JointTrajectory(Displayed):
     def from_samples(
         cls, times: ArrayLike, positions: ArrayLike, names: Sequence[str], degree: int = 5
     ) -> "JointTrajectory":
-        """Return the trajectory of splines through samples of the positions.
+        """Return the trajectory of splines through samples of positions.
 
         Parameters
         ----------
@@ -133,7 +133,7 @@ class JointTrajectory(Displayed):
         Returns
         -------
         JointTrajectory
-            Its `times` are those of the samples.
+            Trajectory whose `times` are those of the samples.
 
         Raises
         ------
@@ -172,27 +172,27 @@ class JointTrajectory(Displayed):
         start_time: float = 0.0,
         limits: ArrayLike | None = None,
     ) -> "JointTrajectory":
-        """Return the trajectory from one position to another, all joints starting and stopping together.
+        """Return the trajectory from one position to another in which all joints start and stop together.
 
         Parameters
         ----------
         names : sequence of str
             Names of the joints.
         start, end : array_like of shape (joints,)
-            Positions at the beginning and at the end, m or rad.
+            Initial and final positions, m or rad.
         profile : str, default "minimum_jerk"
             cycloidal, polynomial_3_4_5 (or minimum_jerk), polynomial_4_5_6_7 (or minimum_snap), trapezoidal.
         duration : float, optional
-            Time from the beginning to the end, s; without it the trajectory is the quickest within the limits.
+            Duration of the motion, s; by default the shortest within the limits.
         start_time : float, default 0
-            The instant of the beginning, s.
+            Initial instant, s.
         limits : array_like of shape (3,) or (3, joints), optional
             Largest velocity, acceleration and jerk.
 
         Returns
         -------
         JointTrajectory
-            From the beginning to the end of the motion.
+            Trajectory from the beginning to the end of the motion.
 
         Raises
         ------
@@ -242,14 +242,14 @@ class JointTrajectory(Displayed):
         return f"JointTrajectory({', '.join(self.names)}; {self.start:g} to {self.stop:g} s)"
 
     def __call__(self, time: Jet, names: Iterable[str] | None = None) -> Jet:
-        """Return the jet of the positions, joints first; traceable, and without checks of the instants.
+        """Return the jet of the positions, joints first; it can be traced, and instants are not checked.
 
         Parameters
         ----------
         time : Jet
             The time, s, with batch axes of any shape.
         names : iterable of str, optional
-            The joints, in the order requested; all of them when not given.
+            The joints, in this order; all joints by default.
 
         Returns
         -------
@@ -270,7 +270,7 @@ class JointTrajectory(Displayed):
         order : int
             Highest derivative.
         names : iterable of str, optional
-            The joints, in the order requested; all of them when not given.
+            The joints, in this order; all joints by default.
 
         Returns
         -------
@@ -280,7 +280,7 @@ class JointTrajectory(Displayed):
         Raises
         ------
         TrajectoryError
-            If there is no such joint, an instant is outside the trajectory, or a law is not defined or smooth there.
+            If there is no such joint, an instant is outside the trajectory, or a law is undefined or not smooth at it.
 
         Warns
         -----
@@ -300,24 +300,25 @@ class JointTrajectory(Displayed):
         return result
 
     def estimate_error(self, order: int, names: Iterable[str] | None = None) -> Array[np.ndarray, "derivative joint"]:
-        """Estimate the errors of the derivatives that come from samples, relative to their peaks.
+        """Return estimated relative errors of the derivatives of joints that come from samples.
 
-        The error of interpolation is estimated from splines through every second sample; to it three
-        standard deviations of the noise of the samples are added (rounding and quantization are noise too), as the
-        splines amplify it. Meant to be on the safe side: 1 to 10 times the true error for the degrees 3 and 5, up to 30
-        times for 7, measured on sines and Gaussians.
+        The error of interpolation is estimated from splines through every second sample. Three standard deviations of
+        the noise of the samples (including rounding and quantization), as amplified by the splines, are added. The
+        estimate is conservative: 1 to 10 times the true error for the degrees 3 and 5, up to 30 times for 7, measured
+        on sines and Gaussians.
 
         Parameters
         ----------
         order : int
             Highest derivative.
         names : iterable of str, optional
-            The joints, in the order requested; all of them when not given.
+            The joints, in this order; all joints by default.
 
         Returns
         -------
         ndarray of shape (order + 1, joints)
-            1 is an error as large as the derivative itself, or nothing known; 0 for a law that is not from samples.
+            Errors relative to the peaks. 1 is as large as the derivative itself, or unknown; 0 for a law not from
+            samples.
 
         Examples
         --------
@@ -334,7 +335,7 @@ class JointTrajectory(Displayed):
             law = self.laws[name]
             if isinstance(law, SplineMotion):
                 known = law.errors[: order + 1]
-                errors[:, column] = 1.0 if known.any() else 0.0  # above the degree nothing is known
+                errors[:, column] = 1.0 if known.any() else 0.0  # nothing is known above the degree
                 errors[: len(known), column] = known
         return errors
 
@@ -344,14 +345,14 @@ class JointTrajectory(Displayed):
         Parameters
         ----------
         tolerance : float, default 0.1
-            Of the error relative to the peak of the derivative.
+            Largest error relative to the peak of the derivative.
         names : iterable of str, optional
-            The joints; all of them when not given.
+            The joints; all joints by default.
 
         Returns
         -------
         int
-            -1 when not even the positions are; 30, the highest order there is, for laws that are not from samples.
+            -1 if not even the positions are within the tolerance; 30, the highest order, for laws not from samples.
         """
         supported = (self.estimate_error(MAX_ORDER, names) <= tolerance).all(axis=1)
         return MAX_ORDER if supported.all() else int(np.argmin(supported)) - 1
@@ -374,7 +375,7 @@ class JointTrajectory(Displayed):
         return chosen
 
     def _inside(self, times: Float[np.ndarray, " time"]) -> Float[np.ndarray, " time"]:
-        """Return the instants, none outside; those outside by rounding only are moved to the end."""
+        """Return the instants, clipped to the trajectory; raise TrajectoryError for those outside it."""
         slack = 1e-9 * (self.stop - self.start)
         outside = (times < self.start - slack) | (times > self.stop + slack)
         if outside.any():

@@ -1,4 +1,4 @@
-"""What happens where the pieces of a law meet: by how much its derivatives jump there."""
+"""Jumps of derivatives at the knots where the pieces of a law meet."""
 
 import math
 
@@ -8,17 +8,17 @@ from jaxtyping import Float
 from jounce.jet import Jet
 from jounce.trajectory.motion import AbstractMotion, SplineMotion
 
-SMOOTH = 1e-9  # of the peak of a derivative: a smaller jump is rounding
-INSTANTS = 33  # at a law of which no pieces are known, for these peaks
+SMOOTH = 1e-9  # of the peak of a derivative; smaller jumps are rounding
+INSTANTS = 33  # samples of a law without known pieces, for these peaks
 
 Jumps = tuple[Float[np.ndarray, " knots"], Float[np.ndarray, "levels knots"]]
-"""Where derivatives may jump, and by how much: the value from the right less that from the left, by order."""
+"""Instants at which derivatives may jump, and the jumps: values from the right minus values from the left, by order."""
 
 
 def knot_jumps(law: SplineMotion, order: int) -> Jumps:
-    """Return by how much derivatives jump where pieces of a law meet, and at its ends; rounding is zero.
+    """Return the jumps of derivatives where pieces of a law meet, and at its ends; rounding is zero.
 
-    Of a law that repeats its beginning stands for its end, too. One that ends at its data has no jumps at its ends.
+    For a law that repeats, the beginning represents the end, too. A law that ends at its data has no jumps at its ends.
     """
     begins, stop = np.asarray(law.breakpoints, float), float(law.stop)
     lengths = np.diff(np.append(begins, stop))
@@ -45,9 +45,9 @@ def knot_jumps(law: SplineMotion, order: int) -> Jumps:
 
 
 def derivative_sizes(law: AbstractMotion, first: float, last: float, order: int) -> Float[np.ndarray, " levels"]:
-    """Return the largest derivatives that are seen of a law from a first to a last instant; infinite ones do not count.
+    """Return the largest finite sampled derivatives of a law between two instants.
 
-    The derivatives where two laws meet are no measure of rounding there: one that vanishes is nothing but rounding.
+    Derivatives at the knots are no scale for rounding: one that vanishes is only rounding.
     """
     looks = np.linspace(first, last, INSTANTS)
     derivatives = [np.abs(np.asarray(x, float)) for x in law(Jet.variable(looks, order)).dense().derivatives()]
@@ -60,7 +60,7 @@ def _derivatives(
     at: Float[np.ndarray, " pieces"],
     order: int,
 ) -> Float[np.ndarray, "levels pieces"]:
-    """Return the derivatives of each piece a time after its beginning."""
+    """Return the derivatives of each piece at a time after its beginning."""
     amplitude, frequency, phase = sines
     derivatives = []
     for k in range(order + 1):

@@ -1,4 +1,4 @@
-"""Arrays with labels, of xarray and pandas: what they say of a joint by its name is not taken by its place."""
+"""Labels of xarray and pandas arrays, so that values are assigned to joints by name instead of position."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ import numpy as np
 def in_order(
     name: str, values: Any, labels: Sequence[str], error: Callable[..., Exception], what: str = "joints"
 ) -> Any:
-    """Return values with the labels of their last axis in the order given; as they are where they have no such labels.
+    """Return values with the labels of their last axis in a given order; unchanged if they have no such labels.
 
     Raises
     ------
     Exception
-        That given, if some of their labels are among those given and others are not, or another axis has them; or if
-        derivatives that are labeled are along another axis than the last but one, or are not all from order zero on.
+        Of the given type, if only some of their labels are given ones, or another axis has them; or if labeled
+        derivatives are along another axis than the last but one, or are not those of order zero, one and so on.
 
     Examples
     --------
@@ -58,12 +58,12 @@ def _check_derivatives(name: str, values: Any, error: Callable[..., Exception]) 
 
 
 def check_rows(name: str, times: Any, values: Any, error: Callable[..., Exception]) -> None:
-    """Check the labels of samples, a row for each time, which may have a column for each derivative.
+    """Raise an error unless the labels of samples agree with their times and derivatives.
 
     Raises
     ------
     Exception
-        That given, if the rows have the times as labels, in another order; or if columns that are labeled as
+        Of the given type, if the labels of the rows are the times in another order, or if columns labeled as
         derivatives are not those of order zero, one and so on.
     """
     rows = labels_of_rows(values)
@@ -82,13 +82,13 @@ def check_rows(name: str, times: Any, values: Any, error: Callable[..., Exceptio
 
 
 def labels_of_rows(values: Any) -> list[object]:
-    """Return the labels along the first axis; none where it has no labels."""
+    """Return the labels along the first axis; empty if it has none."""
     if hasattr(values, "isel") and hasattr(values, "indexes"):
         return list(values.indexes.get(values.dims[0], ())) if values.dims else []
     return list(values.index) if hasattr(values, "iloc") else []
 
 
 def _texts(index: Iterable[object] | None) -> list[str]:
-    """Return the labels of an axis, none unless all are text."""
+    """Return the labels of an axis; empty unless all are text."""
     labels = [] if index is None else list(index)
     return [label for label in labels if isinstance(label, str)] if all(isinstance(x, str) for x in labels) else []

@@ -1,4 +1,4 @@
-"""Motion laws: what a driver prescribes, as a function of time that acts on jets."""
+"""Motion laws, which drivers prescribe as functions of time on jets."""
 
 import abc
 from collections.abc import Callable, Mapping
@@ -21,17 +21,17 @@ from jounce.units.expression import Expression
 
 
 class AbstractMotion(Module):
-    """A law ``f(t)``: maps a jet of time, in s, to the jet of the driven quantity, in m or rad."""
+    """A law ``f(t)``, which maps a jet of time, s, to the jet of the driven quantity, m or rad."""
 
     @abc.abstractmethod
     def __call__(self, time: Jet) -> Jet:
         """Return the jet of the law; its batch axes are those of `time`."""
 
     def check_instants(self, first: float, last: float) -> None:
-        """Raise MechanismError if the law says nothing of some instants from a first to a last one, s."""
+        """Raise MechanismError if the law is not defined at some instants between two instants, s."""
 
-    def resolved(self, parameters: Mapping[str, Any]) -> "AbstractMotion":  # noqa: ARG002 - few laws have any
-        """Return the law with numbers in the place of its expressions of parameters."""
+    def resolved(self, parameters: Mapping[str, Any]) -> "AbstractMotion":  # noqa: ARG002 - few laws have parameters
+        """Return the law with numbers in the place of expressions of parameters."""
         return self
 
 
@@ -102,10 +102,10 @@ BEYOND = ("refuse", "hold", "repeat", "advance", "continue")
 
 
 class SplineMotion(AbstractMotion):
-    """A motion law interpolated through samples by a spline of chosen degree.
+    """A motion law through samples, interpolated by a spline of chosen degree.
 
-    Derivatives up to ``degree - 1`` are continuous; the one of order `degree` is a step function, and those above
-    vanish. Ask for a degree above the highest derivative that matters: 5 for a continuous jounce.
+    Derivatives up to ``degree - 1`` are continuous; the derivative of order `degree` is a step function, and those
+    above vanish. Choose a degree above the highest derivative that matters: 5 for a continuous jounce.
 
     Parameters
     ----------
@@ -114,18 +114,18 @@ class SplineMotion(AbstractMotion):
     values : array_like of shape (samples,)
         Samples of the driven quantity, m or rad.
     degree : int, default 5
-        From 1 to 11; odd degrees interpolate best. At least ``degree + 1`` samples are needed.
+        Degree from 1 to 11; odd degrees interpolate best. At least ``degree + 1`` samples are needed.
     beyond : {"refuse", "hold", "repeat", "advance", "continue"}, default "refuse"
-        What the law is before the first and after the last sample: nothing (an error), the value there, at rest; the
-        samples once more, as one period of a smooth motion whose last sample is the first one (or whole turns of 2 pi
-        from it: then the law goes on turning); once more from where they ended; or what the polynomials at the ends
-        make of it.
+        The law before the first and after the last sample: an error; the value there, at rest; a repetition of the
+        samples as one period of a smooth motion whose last sample equals the first one (or differs by whole turns of 2
+        pi: then the law keeps turning); a repetition that advances from where the samples ended; or the polynomials at
+        the ends.
 
     Raises
     ------
     MechanismError
-        If the samples are too few for the degree, not finite, not increasing in time, or of unequal number, or do not
-        close where they are to repeat.
+        If the samples are too few for the degree, not finite, not increasing in time, or of unequal number, or samples
+        to be repeated are not closed.
 
     Examples
     --------
@@ -162,13 +162,13 @@ class SplineMotion(AbstractMotion):
         advance: float | Real = 0.0,
         samples: tuple[Float[np.ndarray, " samples"], Float[np.ndarray, " samples"]] | None = None,
     ) -> None:
-        """Fill in the fields: of the pieces, and of the samples that they go through, if there are any."""
+        """Set the fields of the pieces, and of the samples through which they go, if any."""
         self.breakpoints, self.coefficients, self.stop, self.advance = breakpoints, coefficients, stop, advance
         self.degree, self.beyond, self.samples = len(coefficients) - 1, beyond, Untraced(samples)
 
     @property
     def joined(self) -> int:
-        """Up to which derivative its pieces are known to meet smoothly, whatever rounding makes of that; -1 if none."""
+        """Order of the highest derivative that is continuous by construction between pieces; -1 if none is."""
         return self.degree - 1 if self.samples.value is not None else -1
 
     @property
@@ -182,7 +182,7 @@ class SplineMotion(AbstractMotion):
         return self.samples.derived
 
     def check_instants(self, first: float, last: float) -> None:
-        """Raise MechanismError if the law says nothing of some instants from a first to a last one, s."""
+        """Raise MechanismError if the law is not defined at some instants between two instants, s."""
         if self.beyond == "refuse":
             check_within(first, last, float(self.breakpoints[0]), float(self.stop), "samples")
 
@@ -192,22 +192,22 @@ class SplineMotion(AbstractMotion):
         Raises
         ------
         MechanismError
-            If an instant is beyond the samples and the law has no rule for it there; in what JAX traces, where
-            nothing can be raised, it is NaN.
+            If an instant is beyond the samples and `beyond` is ``"refuse"``; for traced values, which cannot raise
+            errors, the law is NaN there.
         """
         where = self.breakpoints, self.stop, time.coefficients[0]
         if self.beyond == "refuse" and np.ndim(self.stop) == 0 and not is_traced(where) and np.size(where[2]):
             self.check_instants(float(np.min(where[2])), float(np.max(where[2])))
-        # one program where the law is called alone; within a program it is a part of that
+        # one program for a call outside of other programs
         return (SplineMotion._evaluated if is_traced((self, time)) else _compiled_evaluation)(self, time)
 
     def _evaluated(self, time: Jet) -> Jet:
-        """Return the jet of the law, NaN at instants that it refuses."""
+        """Return the jet of the law; NaN at instants that it refuses."""
         first, stop = jnp.asarray(self.breakpoints)[0], jnp.asarray(self.stop)
         return continued(self._within, time, first, stop, self.beyond, self.advance)
 
     def _within(self, time: Jet) -> Jet:
-        """Return the jet of the polynomials at the instants; outside, those at the ends go on."""
+        """Return the jet of the polynomials at given instants; outside, those at the ends are extrapolated."""
         start, powers = self._chosen(time.coefficients[0], jnp.asarray(self.coefficients))
         local = time - start
         value = Jet.constant(powers[-1], time.order)
@@ -216,13 +216,13 @@ class SplineMotion(AbstractMotion):
         return value
 
     def _chosen(self, instants: Any, table: Any) -> tuple[Any, Any]:
-        """Return where the pieces at some instants begin, and their columns of a table of shape (rows, pieces)."""
+        """Return the beginnings of the pieces at given instants, and their columns of a table, (rows, pieces)."""
         breakpoints = jnp.asarray(self.breakpoints)
         if breakpoints.ndim == 1:
             piece = last_begun(breakpoints, instants)
             start, columns = (x.at[..., piece].get(mode="promise_in_bounds") for x in (breakpoints, table))
             return start, columns
-        # several drivers of one kind, stacked along an axis before the batch: (samples, drivers, 1)
+        # several stacked drivers of one kind, along an axis before the batch: (samples, drivers, 1)
         rows = jnp.broadcast_to(instants, (breakpoints.shape[1], instants.shape[-1]))
         piece = jax.vmap(last_begun, in_axes=(1, 0))(breakpoints[..., 0], rows)
         start = jnp.take_along_axis(breakpoints[..., 0], piece.T, axis=0).T

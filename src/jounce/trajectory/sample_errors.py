@@ -1,4 +1,4 @@
-"""What derivatives samples of a motion support: the errors of those of a spline through them."""
+"""Estimated errors of the derivatives of a spline through samples of a motion."""
 
 import math
 from typing import Any
@@ -8,36 +8,36 @@ from jaxtyping import Float
 
 INTERPOLATION_SAFETY, NOISE_SAFETY = 2.0, 3.0
 TOLERANCE = 0.1  # of an error relative to the peak of its derivative
-BLOCKS, BLOCK = 8, 2500  # stretches of very many samples, and samples in each
+BLOCKS, BLOCK = 8, 2500  # parts of very many samples, and samples in each
 
 
 def derivative_errors(
     times: Float[np.ndarray, " samples"], values: Float[np.ndarray, " samples"], degree: int
 ) -> Float[np.ndarray, " derivative"]:
-    """Estimate the error of the derivatives of a spline through samples, relative to their peaks.
+    """Return estimated errors of the derivatives of a spline through samples, relative to their peaks.
 
-    Two errors are added. The one of interpolation is the largest difference between the spline and another through
-    every second sample, divided by the ``2^(degree + 1 - k) - 1`` by which derivative k of the finer one is better. The
-    one of noise (rounding and quantization too) is the standard deviation of the noise, which is what the divided
-    differences of the samples do not explain by a smooth function, times what the spline makes of it at the worst
-    place. To be on the safe side the first is doubled and the second taken threefold. Measured on sines and Gaussians,
-    their sum is 1 to 10 times the largest true error for the degrees 3 and 5, and up to 30 times for 7; more for higher
-    degrees, where the coarse spline is worst at the ends.
+    The estimate is the sum of two errors. The error of interpolation is the largest difference between the spline and
+    another through every second sample, divided by ``2^(degree + 1 - k) - 1``, the ratio by which derivative k of the
+    finer one is better. The error of noise (including rounding and quantization) is the standard deviation of the
+    noise, which follows from the divided differences of the samples that no smooth function explains, times its
+    amplification by the spline at the worst instant. As a safety margin, the first is doubled and the second tripled.
+    Measured on sines and Gaussians, the sum is 1 to 10 times the largest true error for the degrees 3 and 5, and up to
+    30 times for 7; more for higher degrees, for which the coarse spline is worst at the ends.
 
     Parameters
     ----------
     times : ndarray of shape (samples,)
         Increasing instants, s.
     values : ndarray of shape (samples,)
-        The samples.
+        Samples.
     degree : int
         Odd degree of the spline, with not-a-knot ends.
 
     Returns
     -------
     ndarray of shape (degree + 1,)
-        1 is an error as large as the derivative itself, or nothing known. The peak counts as no less than that of a
-        sine of the same range and one period in the duration; samples that are all alike have no error.
+        Relative errors; 1 is as large as the derivative itself, or unknown. The peak counts as no less than that of a
+        sine of the same range with one period in the duration; constant samples have no error.
     """
     if float(np.ptp(values)) <= 32 * np.finfo(float).eps * np.abs(values).max():
         return np.zeros(degree + 1)
@@ -50,7 +50,7 @@ def derivative_errors(
 
 
 def _blocks(count: int) -> list[slice]:
-    """Return all samples, or of very many some stretches that are looked at in their place."""
+    """Return a slice of all samples, or slices of some parts of very many samples."""
     if count <= BLOCKS * BLOCK:
         return [slice(0, count)]
     return [slice(first, first + BLOCK) for first in np.linspace(0, count - BLOCK, BLOCKS).astype(int)]
@@ -61,10 +61,10 @@ def _absolute(times: np.ndarray, values: np.ndarray, degree: int) -> tuple[np.nd
     half = np.unique(np.append(np.arange(0, len(times), 2), len(times) - 1))
     errors, peaks = np.full(degree + 1, math.inf), np.zeros(degree + 1)
     sigma = noise(times, values)
-    if len(half) <= degree:  # too few samples to compare with
+    if len(half) <= degree:  # too few samples for a comparison
         errors[0] = sigma
         return errors, peaks
-    from scipy.interpolate import make_interp_spline  # here, since importing SciPy takes half a second
+    from scipy.interpolate import make_interp_spline  # local, since the import of SciPy takes half a second
 
     fine = make_interp_spline(times, values, k=degree)
     coarse = make_interp_spline(times[half], values[half], k=degree)
@@ -78,14 +78,14 @@ def _absolute(times: np.ndarray, values: np.ndarray, degree: int) -> tuple[np.nd
 
 
 def unsupported_derivative(errors: Float[np.ndarray, " derivative"], order: int) -> tuple[int, float] | None:
-    """Return the lowest derivative up to an order whose error is above the tolerance, and that error; None if all are.
+    """Return the lowest derivative up to an order whose error exceeds the tolerance, with the error; None if none does.
 
     Parameters
     ----------
     errors : ndarray of shape (degree + 1,)
-        What `derivative_errors` found; above the degree nothing is known, unless the samples are all alike.
+        Errors from `derivative_errors`; above the degree they are unknown, unless the samples are constant.
     order : int
-        Highest derivative that is requested.
+        Highest requested derivative.
     """
     known = np.append(errors, 1.0 if errors.any() else 0.0)[: order + 1]
     if (known <= TOLERANCE).all():
@@ -95,7 +95,7 @@ def unsupported_derivative(errors: Float[np.ndarray, " derivative"], order: int)
 
 
 def unsupported_words(name: str, order: int, error: float, law: Any, by: str = "") -> str:
-    """Word why the samples of a `SplineMotion` do not support a derivative, and what to do."""
+    """Return why the samples of a `SplineMotion` do not support a derivative, with a remedy."""
     size = "cannot be known from them" if error >= 1 else f"is about {100 * error:.0f} %"
     with_rates = law.joined < law.degree - 1
     if order >= law.degree:
@@ -108,10 +108,10 @@ def unsupported_words(name: str, order: int, error: float, law: Any, by: str = "
 
 
 def noise(times: Float[np.ndarray, " samples"], values: Float[np.ndarray, " samples"]) -> float:
-    """Estimate the standard deviation of the noise in samples, at least that of their rounding.
+    """Return the estimated standard deviation of the noise in samples, at least that of their rounding.
 
-    The divided differences of order p of a smooth function soon vanish as p grows, while those of independent noise,
-    scaled to weights of unit norm, keep its standard deviation. The least over the orders is taken.
+    The divided differences of order p of a smooth function vanish quickly as p grows, while those of independent noise,
+    scaled to weights of unit norm, keep its standard deviation. The estimate is the least over the orders.
     """
     floor = float(np.abs(values).max()) * np.finfo(float).eps / 4
     least = math.inf
@@ -126,17 +126,17 @@ def noise(times: Float[np.ndarray, " samples"], values: Float[np.ndarray, " samp
 
 
 def amplification(times: Float[np.ndarray, " samples"], degree: int, order: int) -> Float[np.ndarray, " derivative"]:
-    """Return how much the derivatives of a spline amplify independent noise in the samples, in the worst place.
+    """Return the largest amplification of independent noise in samples by the derivatives of a spline.
 
-    The influence of a sample fades within a few others, so windows tell: one at each end, where the noise is amplified
+    The influence of a sample decays within a few others, so windows suffice: one at each end, where noise is amplified
     most, and one where the samples are densest.
 
     Returns
     -------
     ndarray of shape (order + 1,)
-        Standard deviation of derivative k for a noise of 1, per s to the power of k.
+        Standard deviation of derivative k for noise of 1, per s to the power of k.
     """
-    from scipy.interpolate import make_interp_spline  # here, since importing SciPy takes half a second
+    from scipy.interpolate import make_interp_spline  # local, since the import of SciPy takes half a second
 
     width = min(len(times), 6 * (degree + 1))
     dense = int(np.argmin(np.diff(times))) - width // 2
@@ -146,7 +146,7 @@ def amplification(times: Float[np.ndarray, " samples"], degree: int, order: int)
         origin, step = window[0], (window[-1] - window[0]) / (width - 1)
         influence = make_interp_spline((window - origin) / step, np.eye(width), k=degree)
         at = _between((window - origin) / step)
-        # The ends of a window within the samples are not ends of the spline.
+        # an end of the window within the samples is no end of the spline
         low = 0 if first == 0 else width // 3
         high = width if first + width == len(times) else width - width // 3
         at = at[(at >= (window[low] - origin) / step) & (at <= (window[high - 1] - origin) / step)]

@@ -1,4 +1,4 @@
-"""Splines through samples, as polynomials on the pieces between their breakpoints."""
+"""Splines through samples, as polynomials between their breakpoints."""
 
 import math
 from typing import Any
@@ -26,27 +26,27 @@ def spline_through(
     Parameters
     ----------
     times, values : array_like of shape (samples,)
-        Samples, the times increasing.
+        Samples with increasing times.
     degree : int
-        From 1 to 11; odd where the samples repeat.
+        Degree from 1 to 11; odd for samples that repeat.
     beyond : str, default "refuse"
-        With ``repeat`` and ``advance`` they are one period, at whose end the spline goes on smoothly at its beginning.
+        With ``repeat`` or ``advance``, the samples are one period, and the spline continues smoothly over its end.
 
     Returns
     -------
     samples : tuple of ndarray of shape (samples,)
         Times and values.
     breakpoints : ndarray of shape (pieces + 1,)
-        Where the pieces begin, and where the last one ends.
+        Beginnings of the pieces, and the end of the last one.
     coefficients : ndarray of shape (degree + 1, pieces)
-        Of the powers of the time since the beginning of each piece, lowest first.
+        Coefficients of the powers of the time since the beginning of each piece, lowest first.
     advance : float
-        From one period to the next: 0, whole turns, rad, or with ``advance`` whatever it is.
+        Gain over a period: 0 or whole turns, rad, with ``repeat``; any value with ``advance``.
 
     Raises
     ------
     MechanismError
-        The samples are not valid, too few for the degree, or no spline goes through them.
+        If the samples are not valid, are too few for the degree, or no spline goes through them.
     """
     times, values = check_samples(times, values, MechanismError)
     if values.ndim != 1:
@@ -69,7 +69,7 @@ def spline_through(
 def local_powers(
     spline: Any, beginnings: Float[np.ndarray, " pieces"], degree: int
 ) -> Float[np.ndarray, "powers pieces *columns"]:
-    """Return the coefficients of a spline of SciPy on the pieces that begin at some instants, lowest power first.
+    """Return the coefficients of a spline of SciPy on the pieces with given beginnings, lowest power first.
 
     The derivatives come from the B-splines themselves (de Boor's recursion). SciPy's ``PPoly.from_spline`` calls
     FITPACK's splev, whose arrays end at degree 5: it crashes from degree 9 on.
@@ -85,9 +85,9 @@ def integrated(pieces: _Pieces, lengths: Float[np.ndarray, " pieces"]) -> Float[
 
 
 def _sums_before(terms: list[float]) -> list[float]:
-    """Return the sums of the terms before each, to rounding however many there are.
+    """Return the sums of the terms before each term, by compensated summation.
 
-    What each addition loses is added up beside (the two-sum of Knuth).
+    The rounding error of each addition is added up separately (the two-sum of Knuth).
     """
     sums, total, lost = [], 0.0, 0.0
     for term in terms:
@@ -101,10 +101,10 @@ def _sums_before(terms: list[float]) -> list[float]:
 
 def _interpolated(times: _Samples, values: _Samples, degree: int, **ends: Any) -> tuple[_Breakpoints, _Pieces]:
     """Return the breakpoints and the local Taylor coefficients of a spline through samples."""
-    from scipy.interpolate import make_interp_spline  # here, since importing SciPy takes half a second
+    from scipy.interpolate import make_interp_spline  # local, since the import of SciPy takes half a second
 
-    scale = (times[-1] - times[0]) / (len(times) - 1)  # in steps, so that high powers stay of one size
-    first = values[0]  # through what is added to it: samples that all agree are at rest exactly, not up to rounding
+    scale = (times[-1] - times[0]) / (len(times) - 1)  # time in steps, so that high powers keep one size
+    first = values[0]  # subtracted, so that constant samples are exactly at rest
     with np.errstate(over="ignore", invalid="ignore"):
         spline = make_interp_spline((times - times[0]) / scale, values - first, k=degree, **ends)
         inside = np.unique(spline.t[degree : len(spline.t) - degree])
@@ -120,7 +120,7 @@ def _interpolated(times: _Samples, values: _Samples, degree: int, **ends: Any) -
 
 
 def _periodic(times: _Samples, values: _Samples, degree: int, beyond: str) -> tuple[_Breakpoints, _Pieces, float]:
-    """Return breakpoints, coefficients and advance of a spline that goes on smoothly from its end at its beginning."""
+    """Return breakpoints, coefficients and gain of a spline that continues smoothly from its end to its beginning."""
     if degree % 2 == 0:
         raise MechanismError("samples that repeat need a spline of odd degree", value=degree)
     difference, duration = float(values[-1] - values[0]), float(np.ptp(values)) or 1.0
@@ -141,7 +141,7 @@ def _periodic(times: _Samples, values: _Samples, degree: int, beyond: str) -> tu
 
 
 def check_odd(degree: object) -> None:
-    """Raise TrajectoryError unless a degree of splines through samples is odd, from 3 to 11."""
+    """Raise TrajectoryError unless the degree of splines through samples is odd, from 3 to 11."""
     if isinstance(degree, bool) or degree not in range(3, HIGHEST_DEGREE + 1, 2):
         message = f"the degree of the splines is odd, from 3 to {HIGHEST_DEGREE}"
         raise TrajectoryError(f"{message}; even ones carry errors along undamped", name="degree", value=degree)

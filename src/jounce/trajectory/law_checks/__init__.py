@@ -1,1 +1,1 @@
-"""Where a law of motion has breaks, and how smooth it is; doubts about its unit."""
+"""Breaks and smoothness of motion laws, and doubts about their units."""

@@ -1,4 +1,4 @@
-"""Where derivatives of laws jump or bend, and the instants beside: a largest value may be a one-sided limit there."""
+"""Breaks of laws, at which derivatives jump or bend, and the instants beside them for one-sided limits."""
 
 from collections.abc import Iterable, Iterator
 from typing import Any
@@ -15,9 +15,9 @@ from jounce.trajectory.laws.stacking import law_derivatives
 from jounce.trajectory.motion import AbstractMotion, ExpressionMotion, SplineMotion
 
 BENDING = frozenset({"abs", "sign", "sqrt", "asin", "acos", "atan2"})  # functions that may have kinks or jumps
-LOOKS = 2001  # at a law that may bend anywhere
-SIDE_OFFSET = 2e-11  # of a span of time: how far beside a break its sides are; kinks are found to half of that
-MOST = 1000  # breaks of the derivative above the requested ones; of more, as of a spline through samples, none is used
+LOOKS = 2001  # samples of a law that may bend anywhere
+SIDE_OFFSET = 2e-11  # of a time span: distance of the sides of a break; kinks are found to half of it
+MOST = 1000  # most breaks of the derivative above the requested ones; more, as of a spline through samples, are ignored
 
 Times = Float[np.ndarray, " time"]
 Breaks = Float[np.ndarray, " break"]
@@ -25,19 +25,19 @@ Breaks = Float[np.ndarray, " break"]
 
 @under_own_settings
 def law_breaks(laws: Iterable[AbstractMotion], first: float, last: float, order: int) -> Breaks:
-    """Return the instants at which a derivative up to an order jumps or bends, in the sequence of time, s.
+    """Return the sorted instants at which a derivative up to an order jumps or bends, s.
 
-    Where pieces of a law meet is known, also where they are passed by what leads the law. Kinks of expressions with
-    ``abs`` and the like, and of Python functions, are looked for.
+    Knots between pieces of a law are known, also those that the leader of a law passes. Kinks of expressions with
+    ``abs`` and the like, and of Python functions, are searched.
 
     Parameters
     ----------
     laws : iterable of AbstractMotion
-        With numbers in the place of parameters.
+        Laws with numbers in the place of parameters.
     first, last : float
-        s.
+        Interval of time, s.
     order : int
-        Of the highest derivative that matters.
+        Highest derivative that matters.
 
     Examples
     --------
@@ -63,7 +63,7 @@ def law_breaks(laws: Iterable[AbstractMotion], first: float, last: float, order:
 def both_sides(
     breaks: Breaks, first: float, last: float
 ) -> tuple[Float[np.ndarray, " side"], Int[np.ndarray, " side"]]:
-    """Return the instants just before and just after breaks, within a first and a last instant, and of which they are.
+    """Return the instants just before and just after breaks, within an interval, and the indices of their breaks.
 
     Examples
     --------
@@ -79,12 +79,12 @@ def both_sides(
 
 
 def with_sides(instants: Times, breaks: Breaks) -> Float[np.ndarray, " all"]:
-    """Return a grid with the instants just before and just after breaks."""
+    """Return a grid with the instants just before and just after breaks added."""
     return np.union1d(instants, both_sides(breaks, float(instants[0]), float(instants[-1]))[0])
 
 
 def at_breaks(instants: Times, breaks: Breaks, first: float, last: float) -> Times:
-    """Return instants, a break in the place of each that is just beside it.
+    """Return instants in which those just beside a break are replaced by the break.
 
     Examples
     --------
@@ -104,13 +104,13 @@ def _side_offset(first: float, last: float) -> float:
 
 
 def distinct_instants(instants: Float[np.ndarray, " instant"], first: float, last: float) -> Times:
-    """Return instants in their sequence without those that are others but for rounding."""
+    """Return sorted instants, without those that differ from others by rounding only."""
     instants = np.unique(instants)
     return instants[np.diff(instants, prepend=-np.inf) > 2 * _side_offset(first, last)]
 
 
 def _with_leaders(laws: Iterable[AbstractMotion]) -> Iterator[AbstractMotion]:
-    """Yield laws, and those that lead them or parts of them."""
+    """Yield laws, and the leaders of laws or of their parts."""
     for law in laws:
         yield law
         if isinstance(law, FollowingMotion):
@@ -120,14 +120,14 @@ def _with_leaders(laws: Iterable[AbstractMotion]) -> Iterator[AbstractMotion]:
 
 
 def may_break(law: AbstractMotion) -> bool:
-    """Return whether a law may jump or bend somewhere: all but expressions of smooth functions."""
+    """Return whether a law may jump or bend: True except for expressions of smooth functions."""
     return not isinstance(law, ExpressionMotion) or _may_bend(law)
 
 
 def _may_bend(law: Any) -> bool:
-    """Return whether a law may have a kink that is not known: one that is no spline, profile or smooth expression.
+    """Return whether a law may have unknown kinks: True unless it is a spline, a profile or a smooth expression.
 
-    Kinks of its leader are looked for there.
+    Kinks of its leader are those of another law.
     """
     if parts := getattr(law, "parts", ()):
         return any(map(_may_bend, parts[:1] if isinstance(law, FollowingMotion) else parts))
@@ -139,12 +139,12 @@ def _may_bend(law: Any) -> bool:
 
 
 def _observed_breaks(law: AbstractMotion, first: float, last: float, order: int) -> Times:
-    """Return where derivatives of a law are seen to jump."""
+    """Return the instants at which derivatives of a law jump by their sampled values."""
     level = min(order + 2, HIGHEST + 1)
 
     def evaluate(times: Times) -> Any:
         return np.nan_to_num(np.moveaxis(law_derivatives([law], times, level), -1, 0))
 
     looks = np.linspace(first, last, LOOKS)
-    with np.errstate(over="ignore", invalid="ignore"):  # next to what grows without bound
+    with np.errstate(over="ignore", invalid="ignore"):  # near values that grow without bound
         return seen_jumps(evaluate, looks, evaluate(looks))[0]

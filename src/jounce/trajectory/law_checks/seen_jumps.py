@@ -1,21 +1,21 @@
-"""Jumps of derivatives that show in their values: for laws of which nothing says where they have any."""
+"""Jumps of derivatives, detected by sampled values, for laws without known knots."""
 
 from collections.abc import Callable
 
 import numpy as np
 from jaxtyping import Bool, Float
 
-BENT = 0.2  # of the change over a cell: what the slopes do not account for, where it is a jump
-FAINT = 1e-5  # of the largest value: a smaller jump is none
-CONSTANT = 1e-9  # of the size of the positions, by time to the power of the order: what is smaller is their rounding
-SHORTEST = 1e-11  # of the whole time: cells in which a jump is still one
+BENT = 0.2  # of the change over a cell: part unexplained by slopes, from which it is a jump
+FAINT = 1e-5  # of the largest value; smaller jumps are ignored
+CONSTANT = 1e-9  # of the size of positions over time to the power of the order; smaller values are rounding
+SHORTEST = 1e-11  # of the whole time: length of the last cell around a jump
 HALVINGS = 40
 
 Evaluation = Callable[[Float[np.ndarray, " time"]], Float[np.ndarray, "time level joint"]]
 
 
 def level_sizes(values: Float[np.ndarray, "time level joint"], duration: float) -> Float[np.ndarray, "level joint"]:
-    """Return the size of each derivative: what is small beside a lower one over the whole time is its rounding."""
+    """Return the size of each derivative; one that is small beside a lower one over the whole time is rounding."""
     largest = np.abs(values).max(axis=0)
     sizes = largest.copy()
     for level in range(2, len(sizes)):
@@ -28,40 +28,39 @@ def unexplained(
     values: Float[np.ndarray, "time level joint"],
     sizes: Float[np.ndarray, "level #joint"],
 ) -> Bool[np.ndarray, "cell level-1 joint"]:
-    """Tell in which cells derivatives change by what their slopes at both ends do not account for.
+    """Return in which cells derivatives change by more than their slopes at both ends explain.
 
     Parameters
     ----------
     instants : array of shape (time,)
-        The ends of the cells.
+        Ends of the cells.
     values : array of shape (time, level, joint)
-        Derivatives there; the highest one serves as slope only.
+        Derivatives at the ends; the highest one serves only as slope.
     sizes : array of shape (level, joint) or (level, 1)
-        Of the derivatives, as `level_sizes` gives them.
+        Sizes of the derivatives from `level_sizes`.
     """
     step = np.diff(instants)[:, None, None]
     change, slopes = np.diff(values[:, :-1], axis=0), values[:, 1:]
-    off = np.abs(change - (slopes[1:] + slopes[:-1]) * step / 2)  # what no slope accounts for jumped
-    bends = step * np.abs(np.diff(slopes, axis=0))  # more than that comes of a jump of the slope
+    off = np.abs(change - (slopes[1:] + slopes[:-1]) * step / 2)  # part that no slope explains
+    bends = step * np.abs(np.diff(slopes, axis=0))  # part that a jump of the slope explains
     return (off > BENT * np.abs(change)) & (off > FAINT * sizes[:-1]) & (off > bends)
 
 
 def seen_jumps(
     evaluate: Evaluation, instants: Float[np.ndarray, " time"], values: Float[np.ndarray, "time level joint"]
 ) -> tuple[Float[np.ndarray, " jump"], Float[np.ndarray, "jump level-1 joint"]]:
-    """Return where derivatives jump, by their values, and by how much; zero where one does not.
+    """Return the instants at which derivatives jump by their values, and the jumps; zero for continuous derivatives.
 
-    A cell over which one changes by what its slopes do not account for is halved again and again: what is steep becomes
-    flat, a jump stays.
+    A cell with a change that its slopes do not explain is bisected repeatedly: steep changes become flat, jumps remain.
 
     Parameters
     ----------
     evaluate : callable
         Maps instants, (time,), to derivatives, (time, level, joint).
     instants : array of shape (time,)
-        At which to begin, s.
+        Initial instants, s.
     values : array of shape (time, level, joint)
-        What `evaluate` gives there; the highest derivative serves as slope only.
+        Derivatives at these instants; the highest one serves only as slope.
 
     Examples
     --------
@@ -88,7 +87,7 @@ def seen_jumps(
             break
         middle = (low + high) / 2
         between = evaluate(middle)
-        usable = np.isfinite(between).all(axis=(1, 2))  # beside a kink there may be no derivatives
+        usable = np.isfinite(between).all(axis=(1, 2))  # beside a kink, there may be no derivatives
         first = _unexplained_change(low, middle, left, between, sizes) >= _unexplained_change(
             middle, high, between, right, sizes
         )
@@ -105,7 +104,7 @@ def seen_jumps(
 def _unexplained_change(
     low: np.ndarray, high: np.ndarray, left: np.ndarray, right: np.ndarray, sizes: np.ndarray
 ) -> Float[np.ndarray, " cell"]:
-    """Return the largest change over cells that slopes do not account for, as a share of the sizes."""
+    """Return the largest changes over cells that slopes do not explain, relative to the sizes."""
     step = (high - low)[:, None, None]
     off = np.abs(right[:, :-1] - left[:, :-1] - (right[:, 1:] + left[:, 1:]) * step / 2)
     return np.max(off / np.maximum(sizes[:-1], np.finfo(float).tiny), axis=(1, 2))

@@ -1,4 +1,4 @@
-"""To which derivative motion laws are continuous, and by how much the others jump: what is heard as a ping."""
+"""Continuity of motion laws: the continuous derivatives, and the jumps of the others, which are heard as a ping."""
 
 import dataclasses
 import math
@@ -18,14 +18,14 @@ from jounce.trajectory.laws.profiles import AbstractProfile
 from jounce.trajectory.laws.user_laws import ReadMotion
 from jounce.trajectory.motion import AbstractMotion, ExpressionMotion, FunctionMotion, SplineMotion
 
-HIGHEST = 10  # derivative that is looked at
+HIGHEST = 10  # highest derivative that is examined
 MOST_CROSSINGS = 10_000
-INTERVALS = 4000  # at a leader, for where it passes a knot of the law that follows it
-STEPS = 24  # at most, between two of these, to rounding
-AMONG, CLOSE = np.arange(1, 8) / 8, 10.0 ** -np.arange(2, 16, 2)  # shares of the time between, evaluated together
-SLACK = 1e-6  # of the time between two looks, by which a crossing at an end may be beyond it
-BROKEN = {"abs": "kinks", "sign": "jumps"}  # what functions of expressions have where their argument is zero
-ROUNDING = 1e-9  # of the way of a profile by its duration to the power of the order: a smaller jump is none
+INTERVALS = 4000  # samples of a leader, for its passages of knots of the law that follows it
+STEPS = 24  # most refinements of a passage between two samples, down to rounding
+AMONG, CLOSE = np.arange(1, 8) / 8, 10.0 ** -np.arange(2, 16, 2)  # shares of the interval that are evaluated together
+SLACK = 1e-6  # of the sampling interval, by which a passage may be beyond an end
+BROKEN = {"abs": "kinks", "sign": "jumps"}  # breaks of functions where the argument is zero
+ROUNDING = 1e-9  # of the rise of a profile over its duration to the power of the order; smaller jumps are ignored
 
 
 @dataclasses.dataclass(frozen=True)
@@ -35,11 +35,11 @@ class DerivativeJumps:
     Attributes
     ----------
     order : int
-        Of the derivative.
+        Order of the derivative.
     count : int
-        How many there are in the time looked at.
+        Number of jumps in the interval.
     size, instant : float
-        The largest one, m or rad by s to the power of the order, and where it is, s; NaN where there is none.
+        Largest jump, m or rad per s to the power of the order, and its instant, s; NaN if there is none.
     """
 
     order: int
@@ -50,14 +50,14 @@ class DerivativeJumps:
 
 @dataclasses.dataclass(frozen=True)
 class Continuity:
-    """To which derivative a law is continuous.
+    """The continuity of a law and its derivatives.
 
     Attributes
     ----------
     derivatives : tuple of DerivativeJumps
-        From the law itself up to jounce, or to the first derivative that jumps if that is higher.
+        Jumps of the law itself up to its jounce, or up to the first derivative that jumps if that is higher.
     unknown : str
-        Why that may not be all; empty where it is.
+        Why there may be more jumps; empty if there are none.
     """
 
     derivatives: tuple[DerivativeJumps, ...]
@@ -65,34 +65,34 @@ class Continuity:
 
     @property
     def smoothness(self) -> int | None:
-        """The highest derivative that is continuous, -1 if the law itself jumps; None if none of those known jumps."""
+        """The highest continuous derivative; -1 if the law itself jumps, None if no known derivative jumps."""
         broken = [x.order for x in self.derivatives if x.count]
         return min(broken) - 1 if broken else None
 
 
 def continuity(law: AbstractMotion, first: float, last: float, order: int = 4, *, periodic: bool = False) -> Continuity:
-    """Return to which derivative a law is continuous from a first to a last instant.
+    """Return the continuity of a law and its derivatives between two instants.
 
     Parameters
     ----------
     law : AbstractMotion
-        With numbers in the place of parameters.
+        Law with numbers in the place of parameters.
     first, last : float
-        s.
+        Interval of time, s.
     order : int, default 4
-        Up to which all derivatives are examined.
+        Order up to which all derivatives are examined.
     periodic : bool, default False
-        Whether the law begins again after the last instant, as that of a cam does after a turn.
+        Whether the law begins again after the last instant, as that of a cam after a turn.
 
     Returns
     -------
     Continuity
-        Of what a law through samples is between them, its smoothness is taken as that of its degree.
+        Continuity of the law; between samples, that of its spline.
 
     Raises
     ------
     TrajectoryError
-        If the order is no whole number from 0 to 10, or the law waits for parameters.
+        If the order is no integer from 0 to 10, or the law has parameters without values.
 
     Examples
     --------
@@ -106,7 +106,7 @@ def continuity(law: AbstractMotion, first: float, last: float, order: int = 4, *
     whole_number("order", order, 0, HIGHEST)
     instants, jumps, unknown = _jumps(law, first, last)
     repeats = getattr(law, "beyond", "") in ("repeat", "advance")
-    if periodic:  # its end is its beginning, and counts once; whatever else a law is there, it begins again
+    if periodic:  # the end is the beginning, and counts once, at which the law begins again
         near = SLACK * (last - first)
         inside = (instants < last - near) & ((instants > first + near) | repeats)
         instants, jumps = instants[inside], jumps[:, inside]
@@ -127,14 +127,14 @@ def continuity(law: AbstractMotion, first: float, last: float, order: int = 4, *
 
 
 def knots(law: AbstractMotion, first: float, last: float) -> Float[np.ndarray, " knots"]:
-    """Return the instants from a first to a last one at which a derivative up to the tenth is known to jump.
+    """Return the instants in an interval at which a derivative up to the tenth is known to jump.
 
     Parameters
     ----------
     law : AbstractMotion
-        With numbers in the place of parameters.
+        Law with numbers in the place of parameters.
     first, last : float
-        s.
+        Interval of time, s.
 
     Examples
     --------
@@ -148,7 +148,7 @@ def knots(law: AbstractMotion, first: float, last: float) -> Float[np.ndarray, "
 
 
 class LeaderValues:
-    """Values of leaders that several laws follow, so that each is evaluated but once: while one thing is found."""
+    """Values of leaders that several laws follow, each evaluated only once; kept during one computation."""
 
     def __init__(self) -> None:
         self._values: dict[tuple[int, int, bytes], tuple[AbstractMotion, list[np.ndarray]]] = {}
@@ -166,18 +166,18 @@ class LeaderValues:
 def known_jumps(
     law: AbstractMotion, first: float, last: float, order: int, seen: LeaderValues | None = None
 ) -> tuple[Float[np.ndarray, " knots"], Float[np.ndarray, "levels knots"], bool]:
-    """Return the instants at which derivatives up to an order are known to jump, by how much, and if these are all.
+    """Return the instants of known jumps of derivatives up to an order, the jumps, and whether these are all jumps.
 
     Parameters
     ----------
     law : AbstractMotion
-        With numbers in the place of parameters.
+        Law with numbers in the place of parameters.
     first, last : float
-        s.
+        Interval of time, s.
     order : int
         Highest derivative.
     seen : LeaderValues, optional
-        What is known of leaders, where several laws are asked about.
+        Known values of leaders, for calls with several laws.
 
     Examples
     --------
@@ -191,7 +191,7 @@ def known_jumps(
 
 
 def _is_of_polynomials(law: AbstractMotion) -> bool:
-    """Return whether a law is made of smooth pieces whose ends are known."""
+    """Return whether a law consists of smooth pieces with known ends."""
     if isinstance(law, PiecewiseMotion | IntegratedMotion):
         return all(map(_is_of_polynomials, law.parts))
     return isinstance(law, SplineMotion | AbstractProfile)
@@ -200,7 +200,7 @@ def _is_of_polynomials(law: AbstractMotion) -> bool:
 def _jumps(
     law: AbstractMotion, first: float, last: float, order: int = HIGHEST, seen: LeaderValues | None = None
 ) -> tuple[np.ndarray, Float[np.ndarray, "levels knots"], str]:
-    """Return the instants in a time at which derivatives jump, by how much, and what is not known."""
+    """Return the instants in an interval at which derivatives jump, the jumps, and a description of unknown ones."""
     none, seen = (np.zeros(0), np.zeros((order + 1, 0))), seen or LeaderValues()
     match law:
         case OutputMotion() if law.parts:
@@ -233,7 +233,7 @@ def _jumps(
 def _repeated(
     jumps: Jumps, start: float, stop: float, first: float, last: float, *, repeats: bool
 ) -> tuple[Float[np.ndarray, " all"], Float[np.ndarray, "levels all"]]:
-    """Return the jumps within a time, those of all periods where the law repeats."""
+    """Return the jumps within an interval, those of all periods for a law that repeats."""
     instants, sizes = jumps
     if repeats and len(instants):
         period = stop - start
@@ -251,7 +251,7 @@ def _within(instants: np.ndarray, sizes: np.ndarray, first: float, last: float) 
 
 
 def _profile_jumps(law: AbstractProfile, order: int) -> Jumps:
-    """Return the jumps at the beginning and at the end of a profile, which is the same backward but for the sign."""
+    """Return the jumps at the ends of a profile, which is symmetric up to the sign."""
     begin = np.asarray(law(Jet.variable(np.asarray(law.start_time, float), order)).dense().derivatives(), float)
     least = ROUNDING * abs(law.end - law.start) / law.duration ** np.arange(order + 1)
     begin = np.where(np.abs(begin) <= least, 0.0, begin)
@@ -261,7 +261,7 @@ def _profile_jumps(law: AbstractProfile, order: int) -> Jumps:
 
 
 def _of_pieces(law: PiecewiseMotion, first: float, last: float, order: int) -> tuple[np.ndarray, np.ndarray, str]:
-    """Return the jumps between pieces, and those that pieces have themselves."""
+    """Return the jumps between pieces, and the jumps of the pieces themselves."""
     law_jumps = [(*law.jumps(order), "")]
     bounded = law.beyond != "continue"
     whole = (float(law.start), float(law.until[-1])) if bounded else (first, last)
@@ -282,10 +282,10 @@ def _of_pieces(law: PiecewiseMotion, first: float, last: float, order: int) -> t
 def _followed(
     law: AbstractMotion, leader: AbstractMotion, first: float, last: float, order: int, seen: LeaderValues
 ) -> tuple[np.ndarray, np.ndarray, str]:
-    """Return the jumps of a law of what a leader prescribes, where the leader passes its knots.
+    """Return the jumps of a law of the coordinate of a leader, at the instants at which the leader passes its knots.
 
-    The jump is a polynomial of how far the leader is from the knot, so that its derivatives by time follow from the jet
-    of the leader there.
+    The jump is a polynomial of the distance of the leader from the knot, so that its time derivatives follow from the
+    jet of the leader at the passage.
     """
     none = np.zeros(0), np.zeros((order + 1, 0))
     own, _, unknown = _jumps(leader, first, last, order, seen)
@@ -300,7 +300,7 @@ def _followed(
         return *none, unknown or less
     peaks = [np.abs(c).max(where=np.isfinite(c), initial=0.0) for c in seen.coefficients(leader, looks, order)]
     step = (last - first) / INTERVALS
-    # a knot at which the leader begins or ends is passed on the way there, or from there
+    # the leader may begin or end at a knot, which it then passes outside the interval
     looks = np.concatenate([[first - step], looks, [last + step]])
     values = seen.coefficients(leader, looks)[0]
     jumping = jumps.any(axis=0)
@@ -313,7 +313,7 @@ def _followed(
     sequence = np.flatnonzero(inside)[np.argsort(times[inside])]
     which, crossing, times = which[sequence], crossing[sequence], np.clip(times[sequence], first, last)
     passing = seen.coefficients(leader, times, order)
-    change = _composed(jumps[:, which], np.stack([0 * times, *passing[1:]]))  # at the knot, not near it
+    change = _composed(jumps[:, which], np.stack([0 * times, *passing[1:]]))  # exactly at the knot
     bound = _composed(np.abs(jumps), np.stack([0.0, *peaks[1:]])[:, None])[:, which]
     forward = np.where(values[crossing] < knots[which], 1.0, -1.0)
     return times, np.where(np.abs(change) <= 1e-9 * bound, 0.0, forward * change), unknown or less
@@ -322,7 +322,7 @@ def _followed(
 def _knots_between(
     values: Float[np.ndarray, " look"], knots: Float[np.ndarray, " knot"]
 ) -> tuple[Int[np.ndarray, " crossing"], Int[np.ndarray, " crossing"]]:
-    """Return which knots lie between two values in sequence, and after which value; what is not finite passes none."""
+    """Return the knots between consecutive values, and the index of the value before; non-finite values pass none."""
     sequence = np.argsort(knots)
     low, high = np.minimum(values[:-1], values[1:]), np.maximum(values[:-1], values[1:])
     first, beyond = (np.searchsorted(knots[sequence], x, side="right") for x in (low, high))
@@ -335,7 +335,7 @@ def _knots_between(
 def _composed(
     jump: Float[np.ndarray, "levels crossing"], away: Float[np.ndarray, "levels #crossing"]
 ) -> Float[np.ndarray, "levels crossing"]:
-    """Return the derivatives by time of polynomials, given by their derivatives at zero, of how far a leader is."""
+    """Return time derivatives of polynomials of a leader's distance, given their derivatives at zero and its jet."""
     levels = len(jump)
     change = np.zeros(jump.shape)
     for level in range(levels - 1, -1, -1):
@@ -347,9 +347,9 @@ def _composed(
 def _crossings(
     leader: AbstractMotion, knots: np.ndarray, low: np.ndarray, high: np.ndarray, seen: LeaderValues
 ) -> np.ndarray:
-    """Return when a leader passes values, each between an instant before and one after, to rounding.
+    """Return the instants at which a leader passes values, each within a bracket, to rounding.
 
-    Many instants are looked at together: about the one that a straight line gives, and evenly between both.
+    Many instants are evaluated together: around the secant estimate, and evenly over the bracket.
     """
     every, count = np.arange(len(knots)), len(AMONG) + 2 * len(CLOSE) + 1
 
@@ -369,7 +369,7 @@ def _crossings(
         instants = np.concatenate([low[None], low + shares * width, high[None]])
         values = np.concatenate([under[None], away(instants[1:-1]), over[None]])
         before = (values[1:-1] < 0) == below
-        first = np.where(before.all(axis=0), count, np.argmin(before, axis=0))  # of those after the passing
+        first = np.where(before.all(axis=0), count, np.argmin(before, axis=0))  # last before the passage
         low, high = instants[first, every], instants[first + 1, every]
         under, over = values[first, every], values[first + 1, every]
     return high

@@ -1,8 +1,8 @@
-"""Angles that are likely meant in degrees: recognized by the values that a law takes over a run, whatever its form.
+"""Detection of angles that are likely in degrees, by the values of a law over a run, whatever its form.
 
-No rule can know what was meant. Doubtful are values of many turns, or of more than one turn to a whole or half number,
-that go back and forth, or from rest to rest, as positions in degrees do; a shaft that goes on turning may take any
-value, and so may angles that are round in degrees once they are in rad: they had their unit.
+No rule can know what was meant. Values are doubtful if they are many turns, or a whole or half number of rad above one
+turn, and go back and forth, or from rest to rest, as positions in degrees do. The angle of a shaft that keeps turning
+may take any value, and so may angles in rad that are round in degrees, because they had their unit.
 """
 
 from __future__ import annotations
@@ -24,14 +24,14 @@ from jounce.trajectory.motion import AbstractMotion, ExpressionMotion, FunctionM
 
 INSTANTS = 201
 TURN = 2 * math.pi
-MANY_TURNS = 2 * TURN  # to which a value without a unit is rarely meant in rad
-AT_REST = 0.05  # of the fastest step, the first or the last one
-DWELL = 0.03  # of the run, for which a law stands still at what it was to reach
-ROUND = 1e-7  # of a value
-ENDLESS = 1e300  # beyond it nothing is an angle, and sums overflow
-NEAR = 1e-3  # of a half degree, to which the largest value of a law is known
-OUTSIDE = 2.0  # times the limits of a joint
-SLACK = 0.05  # of a range of degrees, by which limits may be broken
+MANY_TURNS = 2 * TURN  # a larger value without a unit is rarely in rad
+AT_REST = 0.05  # of the fastest step: largest first or last step of a motion from rest to rest
+DWELL = 0.03  # of the run: least duration of rest of a position
+ROUND = 1e-7  # relative tolerance of round values
+ENDLESS = 1e300  # larger values are no angles, and sums overflow
+NEAR = 1e-3  # tolerance of the largest value of a law as a whole or half number
+OUTSIDE = 2.0  # largest plausible ratio to the limits of a joint
+SLACK = 0.05  # of a range of degrees, by which limits may be violated
 
 Values = Float[np.ndarray, " instants"]
 _OPERATIONS: dict[str, Any] = {
@@ -50,7 +50,7 @@ _OPERATIONS: dict[str, Any] = {
 
 
 def looks_like_degrees(value: float) -> bool:
-    """Return whether a number of rad is likely one of degrees: many turns, or a round number of more than one.
+    """Return whether a number in rad is likely in degrees: many turns, or a round number above one turn.
 
     Examples
     --------
@@ -64,21 +64,20 @@ def looks_like_degrees(value: float) -> bool:
 
 
 def values_of(law: AbstractMotion, first: float, last: float) -> Values | None:
-    """Return values that a law takes from a first to a last instant, None if it has none there."""
+    """Return sampled values of a law between two instants; None if they are not defined."""
     grid = np.linspace(first, last, INSTANTS)
     try:
         values = _values(law, grid)
-    except (JounceError, TypeError, ValueError, ArithmeticError):  # the use of the law raises it
+    except (JounceError, TypeError, ValueError, ArithmeticError):  # raised when the law is used
         return None
     return values if values.shape == grid.shape and np.abs(values).max() < ENDLESS else None
 
 
 def _values(law: AbstractMotion, grid: Values) -> Values:
-    """Return values of a law, by NumPy alone where it is a formula or made of polynomials: nothing is compiled.
+    """Return values of a law, without compilation if it is an expression or consists of polynomials.
 
-    A Python function is called once, with all instants where it takes them.
-
-    A profile from rest to rest has those of a cubic with the same ends.
+    A Python function is called once, with all instants if it accepts them. A profile from rest to rest is replaced by a
+    cubic with the same ends.
     """
     if isinstance(law, ExpressionMotion):
         known = {name: float(value) for name, value in law.parameters.items()}
@@ -106,17 +105,17 @@ def _values(law: AbstractMotion, grid: Values) -> Values:
 
 
 def _of_all(function: Callable[[Any], Any], grid: Values) -> Values | None:
-    """Return what a function of one instant is at all of them, None where it does not take them at once."""
+    """Return the values of a function of one instant at all instants; None if it does not accept arrays."""
     try:
         with np.errstate(all="ignore"):
             values = np.asarray(function(grid), float)
-    except Exception:  # noqa: BLE001 - a user's function, of which nothing is known
+    except Exception:  # noqa: BLE001 - any error of a user's function
         return None
     return values if values.shape == grid.shape else None
 
 
 def _operated(word: str, arguments: list[Any]) -> Any:
-    """Apply an operator or a function of expressions to arrays of NumPy."""
+    """Return the result of an operator or a function of expressions for NumPy arrays."""
     return _OPERATIONS[word](*arguments) if word in _OPERATIONS else getattr(np, word)(*arguments)
 
 
@@ -146,14 +145,14 @@ def _spline_values(law: SplineMotion, grid: Values) -> Values:
 
 
 def degrees_meant(values: Values, lower: float | None = None, upper: float | None = None) -> str:
-    """Word why the values of an angle are likely meant in degrees, with what they are; nothing if they are not.
+    """Return why the values of an angle are likely in degrees, with their range; an empty text if they are not.
 
     Parameters
     ----------
     values : array of shape (instants,)
-        In their order, rad.
+        Values in order of time, rad.
     lower, upper : float, optional
-        Between which they should be, rad.
+        Limits of the values, rad.
 
     Examples
     --------
@@ -187,7 +186,7 @@ def _round(value: float) -> str:
 
 
 def _is_round(values: Values) -> bool:
-    """Return whether values go to a whole or half number of more than one turn, at most two; their vertex counts."""
+    """Return whether the peak of values is a whole or half number of rad between one and two turns."""
     sizes = np.abs(values)
     top = int(np.argmax(sizes))
     left, largest, right = sizes[max(top - 1, 0)], sizes[top], sizes[min(top + 1, len(sizes) - 1)]
@@ -197,9 +196,9 @@ def _is_round(values: Values) -> bool:
 
 
 def _is_position(values: Values) -> bool:
-    """Return whether values are those of something that is positioned: back and forth, or from rest to rest.
+    """Return whether values are those of a positioned angle: back and forth, or from rest to rest.
 
-    Where the largest and the least stand side by side, on both sides of zero, they are those beside a pole.
+    Neighboring extremes of opposite signs are values beside a pole.
     """
     if (
         abs(int(np.argmax(values)) - int(np.argmin(values))) == 1
@@ -221,16 +220,16 @@ def _is_position(values: Values) -> bool:
 
 
 def trajectory_doubt(laws: dict[str, Any], first: float, last: float, limits: dict[str, Any]) -> str:
-    """Word which joints of a trajectory are likely given in degrees, nothing if none is.
+    """Return which joints of a trajectory are likely in degrees; an empty text if none is.
 
     Parameters
     ----------
     laws : dict of str to AbstractMotion
-        Of joints that turn.
+        Laws of the joints that turn.
     first, last : float
-        s.
+        Interval of time, s.
     limits : dict of str to Limits
-        Of these joints.
+        Limits of these joints.
     """
     doubts = {}
     for name, law in laws.items():

@@ -1,1 +1,1 @@
-"""Laws of motion: expressions, profiles, pieces, and laws composed of others."""
+"""Motion laws: expressions, profiles, pieces, and laws composed of others."""

@@ -1,4 +1,4 @@
-"""Motion laws made of others: a law of what another prescribes, and the law of an output."""
+"""Motion laws composed of others: a law of the coordinate of another law, and the law of an output."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -11,20 +11,20 @@ from jounce.jet import Jet
 from jounce.trajectory.motion import AbstractMotion, ExpressionMotion, Untraced
 from jounce.units.expression import Expression
 
-LOOKS = 2001  # at the law of a leader, for how far it goes
+LOOKS = 2001  # samples of a leader, for its range
 
 Law = AbstractMotion | Expression | str
 """A law, or an expression of ``t`` and of parameters."""
 
 
 class CompositeLaw(AbstractMotion):
-    """A law whose parts may be expressions of parameters, which have their values from a mechanism."""
+    """A law whose parts may be expressions of parameters, whose values come from a mechanism."""
 
     parts: tuple[AbstractMotion, ...]
     recipe: Untraced = field(static=True)
 
     def _take(self, parts: Sequence[Law], *rest: Any) -> None:
-        """Fill in the fields: the parts where they are known, and how they were given."""
+        """Set the fields: the parts if their values are known, and the recipe."""
         read = [Expression(part) if isinstance(part, str) else part for part in parts]
         for k, part in enumerate(read):
             if not isinstance(part, AbstractMotion | Expression):
@@ -35,7 +35,7 @@ class CompositeLaw(AbstractMotion):
 
     @property
     def is_open(self) -> bool:
-        """Whether something but its parts waits for the values of parameters."""
+        """Whether anything other than the parts lacks the values of parameters."""
         return False
 
     def _resolved_parts(self, parameters: Mapping[str, Any]) -> list[AbstractMotion]:
@@ -48,14 +48,14 @@ class CompositeLaw(AbstractMotion):
 
 
 def _is_known(part: AbstractMotion | Expression) -> bool:
-    """Return whether a part has numbers already, and waits for no parameters."""
+    """Return whether a part has numbers in the place of all parameters."""
     if isinstance(part, CompositeLaw):
         return bool(part.parts) and not part.is_open
     return not getattr(part, "_open", ()) if isinstance(part, AbstractMotion) else part.names <= {"t"}
 
 
 def with_values(part: AbstractMotion | Expression, parameters: Mapping[str, Any]) -> AbstractMotion:
-    """Return a part as a law, with numbers in the place of parameters."""
+    """Return a part as a law with numbers in the place of parameters."""
     if isinstance(part, AbstractMotion):
         return part.resolved(parameters)
     part.check({*parameters, "t"})
@@ -63,20 +63,20 @@ def with_values(part: AbstractMotion | Expression, parameters: Mapping[str, Any]
 
 
 class FollowingMotion(CompositeLaw):
-    """A motion law of what another law prescribes: a cam on a driven shaft, or an electronic cam.
+    """A motion law of the coordinate of another law: a cam on a driven shaft, or an electronic cam.
 
     Parameters
     ----------
     law : AbstractMotion, Expression or str
-        Of the coordinate of the leader in the place of the time: m or rad over rad or m. In an expression ``t`` is that
+        Law of the coordinate of the leader instead of time: m or rad over rad or m. In an expression, ``t`` is that
         coordinate.
     leader : AbstractMotion, Expression or str
-        The law of that coordinate; an expression of ``t`` and of the parameters of a mechanism.
+        Law of the leader; an expression of ``t`` and of the parameters of a mechanism.
 
     Raises
     ------
     TrajectoryError
-        If one of them is no law, or the leader has the law of an output.
+        If one of them is no law, or the leader follows from an output.
 
     Examples
     --------
@@ -105,7 +105,7 @@ class FollowingMotion(CompositeLaw):
         return FollowingMotion(law, leader)
 
     def check_instants(self, first: float, last: float) -> None:
-        """Raise MechanismError if the leader says nothing of some instants, or the law of where the leader is then."""
+        """Raise MechanismError if the leader is not defined at some instants, or the law at its coordinate."""
         if not self.parts:
             return None
         law, leader = self.parts
@@ -113,8 +113,8 @@ class FollowingMotion(CompositeLaw):
             law.check_instants(-np.inf, np.inf)
         except JounceError:
             if not np.isfinite([first, last]).all():
-                raise  # asked whether there are ends, as of a law that follows this one
-        else:  # it has no ends
+                raise  # the caller asks whether there are ends, as for a law that follows this one
+        else:  # without ends
             return leader.check_instants(first, last)
         leader.check_instants(first, last)
         values = np.asarray(leader(Jet([np.linspace(first, last, LOOKS)])).coefficients[0], float)
@@ -136,10 +136,10 @@ class FollowingMotion(CompositeLaw):
 
 
 class OutputMotion(CompositeLaw):
-    """The motion of a driver with which an output of the mechanism has a law: found by inversion, not by a formula.
+    """The motion of a driver for which an output of the mechanism follows a law, found by inversion.
 
-    While such a mechanism is solved, the output is held to the law in the place of the driver, whose coordinate then
-    is a result with all its derivatives: `Motion.driver`, and the outputs `DriverAngleOutput` and
+    While the mechanism is solved, the output is held to its law instead of the driver. The coordinate of the driver is
+    a result with all its derivatives: `Motion.driver`, and the outputs `DriverAngleOutput` and
     `DriverDisplacementOutput`. Forces are those of the driver.
 
     Parameters
@@ -147,12 +147,12 @@ class OutputMotion(CompositeLaw):
     output : str
         Name of an output that is an angle, a distance, a slide, or, with its component, a point: ``"C_y"``.
     law : AbstractMotion, Expression or str
-        That of the output, m or rad; an expression of ``t`` and of the parameters of the mechanism.
+        Law of the output, m or rad; an expression of ``t`` and of the parameters of the mechanism.
 
     Raises
     ------
     TrajectoryError
-        If the law is none.
+        If the law is invalid.
 
     Examples
     --------
@@ -179,7 +179,7 @@ class OutputMotion(CompositeLaw):
 
     @property
     def law(self) -> Law:
-        """The law of the output, as it was given."""
+        """The law of the output, as given."""
         return self.recipe.value[0][0]
 
     def resolved(self, parameters: Mapping[str, Any]) -> "OutputMotion":
@@ -187,12 +187,12 @@ class OutputMotion(CompositeLaw):
         return OutputMotion(self.output, *self._resolved_parts(parameters))
 
     def check_instants(self, first: float, last: float) -> None:
-        """Raise MechanismError if the law of the output says nothing of some instants."""
+        """Raise MechanismError if the law of the output is not defined at some instants."""
         for part in self.parts:
             part.check_instants(first, last)
 
-    def __call__(self, time: Jet) -> Jet:  # noqa: ARG002 - known by solving only
-        """There is no value without a motion.
+    def __call__(self, time: Jet) -> Jet:  # noqa: ARG002 - known only by solving
+        """Raise TrajectoryError: the value is known only from a motion.
 
         Raises
         ------

@@ -1,4 +1,4 @@
-"""Motion laws of which a derivative is given by a formula, such as the speed of a motor that runs up."""
+"""Motion laws given by a derivative, such as the speed of a motor during run-up."""
 
 import functools
 from collections.abc import Mapping, Sequence
@@ -23,15 +23,15 @@ from jounce.trajectory.laws.user_laws import read_laws
 from jounce.trajectory.motion import AbstractMotion, SplineMotion
 from jounce.units.expression import Expression
 
-HIGHEST = 4  # derivative that may be given: jounce
-PANELS = 1200  # on either side of the start, each a polynomial
+HIGHEST = 4  # highest derivative that may be given: jounce
+PANELS = 1200  # number of panels on either side of the start, each with a polynomial
 DEGREE = 15  # of the polynomial through the derivative on a panel
-RESOLVED = 2e-14  # of the largest value so far: by how much the polynomial may miss the derivative
-FIRST, WIDENED = 1e-3, 0.1  # s, the first panel, and by how much of the way so far a panel may be longer
-NARROWED = tuple(2.0**-k for k in range(16))  # lengths that are tried for the next panel
-ROUNDING = 1e-9  # of the largest value: what may be rounding where no shorter panel is better
-STEEPER = 10.0  # times larger is a jump at most on the shortest panel than on the longest; a pole is more
-SHORTEST = 1e-13  # of the way so far: a panel that is taken as it is
+RESOLVED = 2e-14  # of the largest value so far: largest error of the polynomial
+FIRST, WIDENED = 1e-3, 0.1  # s, length of the first panel, and growth of panels relative to the way so far
+NARROWED = tuple(2.0**-k for k in range(16))  # factors of the length that are tried for the next panel
+ROUNDING = 1e-9  # of the largest value: error that may be rounding if no shorter panel is better
+STEEPER = 10.0  # largest ratio of values on the shortest panel to those on the longest at a jump; more at a pole
+SHORTEST = 1e-13  # of the way so far: length of a panel that is accepted unchecked
 
 _NODES = np.cos(np.pi * (np.arange(DEGREE + 1) + 0.5) / (DEGREE + 1))
 _BETWEEN = np.cos(np.pi * np.arange(1, DEGREE + 1) / (DEGREE + 1))
@@ -42,21 +42,21 @@ _RAISED = np.stack([chebyshev.chebint(row, lbnd=-1) for row in np.eye(DEGREE + 1
 
 
 class IntegratedMotion(CompositeLaw):
-    """A motion law one of whose derivatives is another law: of a speed that is known, for example.
+    """A motion law of which a derivative is given as another law, for example a known speed.
 
-    Its derivatives from that one on are those of the law, exactly. What is below follows by integration over panels so
-    short that a polynomial of degree 15 is the law to rounding.
+    Its derivatives from the given one on are exactly those of the law. Lower ones follow by integration over panels so
+    short that a polynomial of degree 15 equals the law to rounding.
 
     Parameters
     ----------
     law : AbstractMotion, Expression or str
-        Of the derivative, m or rad by s to the power of `derivative`; an expression of ``t`` and of parameters.
+        Law of the derivative, m or rad per s to the power of `derivative`; an expression of ``t`` and of parameters.
     derivative : int, default 1
-        Which derivative it is: 1 velocity, 2 acceleration, 3 jerk, 4 jounce.
+        Order of the derivative: 1 velocity, 2 acceleration, 3 jerk, 4 jounce.
     initial : sequence of float, str or Expression, optional
-        The law and its derivatives below `derivative` at the start, lowest first; zero where not given.
+        The law and its derivatives below `derivative` at the start, lowest first; zero by default.
     start : float, str or Expression, default 0
-        The instant at which they are known, s.
+        Instant of the initial values, s.
 
     Raises
     ------
@@ -97,11 +97,11 @@ class IntegratedMotion(CompositeLaw):
         begin = jnp.asarray(begin, float)
         begins, halves, powers = _panels(read_laws(self.parts[0]), jax.lax.stop_gradient(begin))
         self.breakpoints, self.halves, self.coefficients = begins, halves, powers
-        self.initial = given[0] - _at(begins, halves, powers, begin)  # nothing, but for its slope by the start
+        self.initial = given[0] - _at(begins, halves, powers, begin)  # zero but for its slope by the start
 
     @property
     def is_open(self) -> bool:
-        """Whether the start or a value there is an expression of parameters, which have no values yet."""
+        """Whether the start or an initial value is an expression of parameters without values."""
         return self.initial is None
 
     def resolved(self, parameters: Mapping[str, Any]) -> "IntegratedMotion":
@@ -117,7 +117,7 @@ class IntegratedMotion(CompositeLaw):
         return IntegratedMotion(law, self.derivative, numbers[:-1], numbers[-1])
 
     def check_instants(self, first: float, last: float) -> None:
-        """Raise MechanismError if the derivative says nothing of instants between the start and the requested ones."""
+        """Raise MechanismError if the derivative is not defined between the start and the requested instants."""
         if self.is_open:
             return
         start = float(self.start)
@@ -133,7 +133,7 @@ class IntegratedMotion(CompositeLaw):
                 raise TrajectoryError(message, value=instant)
 
     def __call__(self, time: Jet) -> Jet:
-        """Return the jet of the law at the instants of the time jet; parameters need their values, see `resolved`."""
+        """Return the jet of the law at the instants of the time jet; parameters need values, see `resolved`."""
         (law,) = self._known_parts()
         value = self._integral(time.coefficients[0]) + self.initial
         if time.order == 0:
@@ -142,9 +142,9 @@ class IntegratedMotion(CompositeLaw):
         return rate.integrate(value)
 
     def _integral(self, instants: Any) -> Any:
-        """Return the integral from the start to some instants; NaN beyond the panels."""
+        """Return the integral from the start to given instants; NaN beyond the panels."""
         begins, halves, table = self.breakpoints, self.halves, self.coefficients
-        if np.ndim(begins) > 1:  # several laws of one kind, stacked along an axis before the batch
+        if np.ndim(begins) > 1:  # several stacked laws of one kind, along an axis before the batch
             rows = jnp.broadcast_to(instants, (begins.shape[1], jnp.shape(instants)[-1]))
             return jax.vmap(_at, in_axes=(1, 1, 2, 0))(begins[..., 0], halves[..., 0], table[..., 0], rows)
         return _at(begins, halves, table, instants)
@@ -154,7 +154,7 @@ def _at(begins: Any, halves: Any, table: Any, instants: Any) -> Any:
     piece = last_begun(begins, instants)
     begin, half, powers = (x.at[..., piece].get(mode="promise_in_bounds") for x in (begins, halves, table))
     u = (instants - begin) / half - 1.0
-    ahead = behind = jnp.zeros_like(u)  # the recurrence of Clenshaw
+    ahead = behind = jnp.zeros_like(u)  # Clenshaw recurrence
     for c in powers[:0:-1]:
         ahead, behind = c + 2.0 * u * ahead - behind, ahead
     inside = jnp.abs(u) <= 1.0 + 1e-6
@@ -163,16 +163,16 @@ def _at(begins: Any, halves: Any, table: Any, instants: Any) -> Any:
 
 @jax.jit
 def _panels(law: AbstractMotion, start: Any) -> tuple[Numbers, Numbers, Numbers]:
-    """Return panels to both sides of a start, and the integral of a law from there on each of them.
+    """Return panels on both sides of a start, and the integral of a law from the start on each panel.
 
     Returns
     -------
     begins : array of shape (panels,)
-        s, not decreasing.
+        Beginnings of the panels, s, not decreasing.
     halves : array of shape (panels,)
-        Half of their lengths, s.
+        Half lengths of the panels, s.
     coefficients : array of shape (degree + 2, panels)
-        Of Chebyshev polynomials over the panel.
+        Coefficients of Chebyshev polynomials on the panels.
     """
     lengths, fixed = jnp.asarray(NARROWED), jax.tree.map(jax.lax.stop_gradient, law)
 
@@ -195,17 +195,17 @@ def _panels(law: AbstractMotion, start: Any) -> tuple[Numbers, Numbers, Numbers]
         sizes = jnp.maximum(largest, jnp.max(jnp.abs(samples), axis=1))
         off = jnp.max(jnp.abs(samples[:, DEGREE + 1 :] - fitted @ _SEEN.T), axis=1)
         known = jnp.isfinite(off)
-        noise = 4.0 * jnp.min(jnp.where(known, off, jnp.inf))  # what shorter panels do not resolve, either
+        noise = 4.0 * jnp.min(jnp.where(known, off, jnp.inf))  # not resolved by shorter panels, either
         fine = off <= jnp.maximum(RESOLVED * sizes, jnp.minimum(noise, ROUNDING * sizes))
         own = jnp.max(jnp.abs(samples), axis=1)
-        jumps = (tried <= shortest) & known & (own <= STEEPER * jnp.maximum(own[0], largest))  # and no pole
+        jumps = (tried <= shortest) & known & (own <= STEEPER * jnp.maximum(own[0], largest))  # not a pole
         fine = known & (fine | jumps)
         any_fine = jnp.any(fine)
         pick = jnp.where(any_fine, jnp.argmax(fine), len(NARROWED) - 1)
-        # the panel that is taken alone has slopes by parameters: others may have values without bounds
+        # only the accepted panel has slopes by parameters: others may have unbounded values
         chosen = values(law, jnp.where(any_fine, nodes[pick, : DEGREE + 1], start))
         raised = (_FITTED @ chosen) @ _RAISED.T * half[pick]
-        gain = jnp.sum(raised)  # at its right end, every polynomial being one there
+        gain = jnp.sum(raised)  # at the right end, where every polynomial is 1
         begin = jnp.where(sign > 0, at, at - tried[pick])
         before = jnp.where(sign > 0, total, total - gain)
         end = jnp.where(any_fine, at + sign * tried[pick], at)
@@ -225,7 +225,7 @@ def _panels(law: AbstractMotion, start: Any) -> tuple[Numbers, Numbers, Numbers]
 
 
 def _next_border(law: AbstractMotion, at: Any, sign: Any, least: Any) -> Any:
-    """Return the next instant at which pieces of a law meet, infinite where nothing is known of any."""
+    """Return the next instant at which pieces of a law meet; infinite if none is known."""
     if isinstance(law, IntegratedMotion):
         return _next_border(law.parts[0], at, sign, least)
     if isinstance(law, PiecewiseMotion):

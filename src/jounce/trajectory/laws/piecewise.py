@@ -1,4 +1,4 @@
-"""Motion laws that are one law after another, once or again and again."""
+"""Motion laws that consist of consecutive laws, possibly repeated."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -22,27 +22,27 @@ BEYOND = ("refuse", "hold", "repeat", "advance")
 
 
 class PiecewiseMotion(CompositeLaw):
-    """A motion law that is one law until an instant, another until the next, and so on.
+    """A motion law that consists of consecutive laws, each until a given instant.
 
-    Where two of them meet, derivatives are those from the right; `jumps` tells which are not continuous.
+    Where two laws meet, derivatives are those from the right; `jumps` returns the discontinuous ones.
 
     Parameters
     ----------
     laws : sequence of AbstractMotion, Expression or str
-        In their order; expressions are of ``t``, the time since zero, and of the parameters of a mechanism.
+        Laws in order; expressions of ``t``, the time since zero, and of the parameters of a mechanism.
     until : sequence of float, str or Expression
-        Increasing instants at which the laws end, s, which may be expressions of parameters. If the last law has none,
-        it goes on for ever, and so does the first one backward.
+        Increasing instants at which the laws end, s, possibly expressions of parameters. If the last law has no end, it
+        continues forever, and the first one continues backward.
     start : float, str or Expression, optional
-        Where the first law begins, s, if the last one ends; 0 unless given.
+        Beginning of the first law, s, if the last one ends; 0 by default.
     beyond : {"refuse", "hold", "repeat", "advance"}, default "refuse"
-        What the law is before its beginning and after its end: nothing (an error); the value there, at rest; the laws
-        again, which must end where they began; or the laws again, each time from where they ended.
+        The law before its beginning and after its end: an error; the value of the end, at rest; a repetition, for laws
+        that end where they began; or a repetition that advances from where the laws ended.
 
     Raises
     ------
     TrajectoryError
-        If the instants do not increase, are too few or too many, or laws that are to repeat do not close.
+        If the instants do not increase, are too few or too many, or laws to be repeated are not closed.
 
     Examples
     --------
@@ -91,7 +91,7 @@ class PiecewiseMotion(CompositeLaw):
         self.advance = self._gain() if bounded and self.parts and beyond in ("repeat", "advance") else None
 
     def _gain(self) -> Any:
-        """Return by how much the law goes on from one repetition to the next."""
+        """Return the gain of the law over a repetition."""
         first, last = (
             part(Jet([jnp.asarray(at, float)])).coefficients[0]
             for part, at in ((self.parts[0], self.start), (self.parts[-1], self.until[-1]))
@@ -108,7 +108,7 @@ class PiecewiseMotion(CompositeLaw):
 
     @property
     def is_open(self) -> bool:
-        """Whether instants are expressions of parameters, which have no values yet."""
+        """Whether instants are expressions of parameters without values."""
         return any(isinstance(x, Expression) for x in (*self.recipe.value[1], parsed_value(self.recipe.value[2])))
 
     def resolved(self, parameters: Mapping[str, Any]) -> "PiecewiseMotion":
@@ -118,7 +118,7 @@ class PiecewiseMotion(CompositeLaw):
         return PiecewiseMotion(self._resolved_parts(parameters), numbers[:-1], numbers[-1], beyond)
 
     def check_instants(self, first: float, last: float) -> None:
-        """Raise MechanismError if one of the laws says nothing of instants that are its own, or none has them."""
+        """Raise MechanismError if a law is not defined at the requested instants within its piece, or no law is."""
         if not self.parts:
             return
         if self.beyond != "continue":
@@ -133,12 +133,12 @@ class PiecewiseMotion(CompositeLaw):
                 part.check_instants(max(first, begin), min(last, end))
 
     def _borders(self) -> tuple[tuple[Any, ...], tuple[Any, ...]]:
-        """Return where each law begins and ends; the first and the last go on as far as they are requested."""
+        """Return the beginning and the end of each law; the first and the last are unbounded."""
         inner = self.until[: len(self.parts) - 1]
         return (-np.inf, *inner), (*inner, np.inf)
 
     def __call__(self, time: Jet) -> Jet:
-        """Return the jet of the law at the instants of the time jet; parameters need their values, see `resolved`."""
+        """Return the jet of the law at the instants of the time jet; parameters need values, see `resolved`."""
         self._known_parts()
         where = self.until, self.start, time.coefficients[0]
         if self.beyond == "refuse" and np.ndim(self.start) == 0 and not is_traced(where) and np.size(where[2]):
@@ -153,26 +153,26 @@ class PiecewiseMotion(CompositeLaw):
         value: tuple[Any, ...] = ()
         for part, begin, end in zip(self.parts, begins, ends, strict=True):
             own = (instants >= begin) & (instants < end)
-            # elsewhere a law may have no value: it is asked for an instant of its own
+            # outside its piece, a law may be undefined: it is evaluated at an instant of the piece
             some = jnp.clip(instants, begin, jnp.where(jnp.isinf(begin), end, begin))
             coefficients = part(Jet((jnp.where(own, instants, some), *time.coefficients[1:]))).dense().coefficients
             value = tuple(jnp.where(own, f, v) for f, v in zip(coefficients, value or coefficients, strict=True))
         return Jet(value)
 
     def jumps(self, order: int = 4) -> tuple[Float[np.ndarray, " knots"], Float[np.ndarray, "{order}+1 knots"]]:
-        """Return where laws meet, and the ends where there are some, and by how much derivatives jump there.
+        """Return the instants at which laws meet, with the ends if there are any, and the jumps of derivatives there.
 
         Parameters
         ----------
         order : int, default 4
-            The highest derivative that is looked at.
+            Highest derivative.
 
         Returns
         -------
         instants : ndarray of shape (knots,)
-            s; of laws that repeat their beginning stands for their end, too.
+            Instants, s; for laws that repeat, the beginning represents the end, too.
         jumps : ndarray of shape (order + 1, knots)
-            The value from the right less that from the left, m or rad by s to the power of the order; rounding is zero.
+            Values from the right minus those from the left, m or rad per s to the power of the order; rounding is zero.
 
         Examples
         --------
@@ -204,7 +204,7 @@ class PiecewiseMotion(CompositeLaw):
         return np.array(instants, float), np.stack(jumps, axis=-1) if jumps else np.zeros((order + 1, 0))
 
     def _sizes(self, order: int) -> list[Float[np.ndarray, " levels"]]:
-        """Return how large the derivatives of each law are; the first and the last go as far as their neighbors."""
+        """Return the size of the derivatives of each law; unbounded laws count for the length of their neighbors."""
         known = [float(x) for x in self.until]
         if self.beyond != "continue":
             borders = [float(self.start), *known]
@@ -215,7 +215,7 @@ class PiecewiseMotion(CompositeLaw):
         for part, begin, end in zip(self._known_parts(), borders, borders[1:], strict=False):
             try:
                 sizes.append(derivative_sizes(part, begin, end, order))
-            except MechanismError:  # samples that end before: what they are where laws meet is known
+            except MechanismError:  # samples that end before: the derivatives at the knot are known
                 instant = begin if begin == known[-1] else end
                 sizes.append(derivative_sizes(part, instant, instant, order))
         return sizes
@@ -226,6 +226,6 @@ def _derivatives(law: Any, instant: Any, order: int) -> Float[np.ndarray, " leve
 
 
 def _jump(left: np.ndarray, right: np.ndarray, sizes: np.ndarray) -> Float[np.ndarray, " levels"]:
-    """Return right less left; what is rounding beside the sizes of the derivatives is zero."""
+    """Return right minus left; zero if it is rounding relative to the sizes of the derivatives."""
     change = right - left
     return np.where(np.abs(change) <= SMOOTH * sizes, 0.0, change)

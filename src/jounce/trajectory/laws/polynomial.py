@@ -1,4 +1,4 @@
-"""Polynomial motion functions of any degree: splines through knots that carry positions, accelerations or others."""
+"""Polynomial motion functions of any degree: splines through knots of positions, accelerations or others."""
 
 import math
 from collections.abc import Mapping
@@ -16,9 +16,9 @@ from jounce.trajectory.splines import integrated, local_powers
 MAX_CONTINUITY = 10
 ENDS = ("not-a-knot", "natural", "clamped")
 BEYOND = ("refuse", "hold", "continue")
-LARGEST_GROWTH = 1e3  # of what is interpolated, between the knots: by an ill-conditioned system, not by a law
+LARGEST_GROWTH = 1e3  # largest growth of a law between its knots; more comes from an ill-conditioned system
 AT_KNOTS = 1e-6  # of the largest value, by which a law may miss its own knots
-SAMPLES = 4  # in each segment at which the growth is looked at
+SAMPLES = 4  # in each segment, to measure the growth
 
 _Conditions = Mapping[int, float]
 
@@ -27,46 +27,46 @@ class PolynomialMotion(SplineMotion):
     """A motion law of polynomials of degree ``m + 1`` on the segments between knots, continuous to order m.
 
     The knots carry values of the law or of one of its derivatives: positions, measured accelerations, or values of the
-    m-th derivative, which is linear on each segment. Solved for by SciPy's B-splines in a scaled time.
+    m-th derivative, which is linear on each segment. SciPy's B-splines in a scaled time solve for the law.
 
-    A law of s segments has ``s + 1 + m`` free numbers, and the knots fix ``s + 1`` of them. The other m are fixed by
-    conditions at the first and the last knot. Those on derivatives lower than what the knots carry are the constants
-    of its integration; as many are needed as integrations. Those on higher derivatives are either named by `ends`, or
-    given: as many as are left, shared between start and end evenly, or but for one where their number is odd. With more
-    at one end, an error there, of rounding as well, grows by a factor at every knot; such shares are refused unless
-    there is only one segment. With an odd number it does not fade along the knots; prefer `derivative` and m both even
-    or both odd.
+    A law of s segments has ``s + 1 + m`` free numbers, of which the knots determine ``s + 1``. The other m follow from
+    conditions at the first and the last knot. Conditions on derivatives below that of the knots are the constants of
+    integration; as many are needed as integrations. Conditions on derivatives above it are either named by `ends`, or
+    given: as many as are left, shared between start and end evenly, or but for one if their number is odd. With more
+    conditions at one end, an error at that end, also of rounding, grows by a factor at every knot; such shares are
+    refused unless there is only one segment. With an odd number, the error does not decay along the knots: prefer
+    `derivative` and m both even or both odd.
 
     Parameters
     ----------
     times : array_like of shape (knots,)
         Strictly increasing instants, s.
     values : array_like of shape (knots,)
-        What the knots carry: m or rad, per s to the power of `derivative`.
+        Values at the knots: m or rad, per s to the power of `derivative`.
     continuity : int, default 4
         Order m of the highest continuous derivative, from 1 to 10; 2 is the cubic spline.
     derivative : int, default 0
         Order of the derivative that the knots carry, from 0 (positions) to m.
     start, end : dict of int to float, optional
-        Conditions at the first and the last knot: the value of the derivative of each order named, 0 for the position.
-        Without any on the derivatives below `derivative`, these are zero at the start.
+        Conditions at the first and the last knot: values of derivatives by order, 0 for the position. By default, the
+        derivatives below `derivative` are zero at the start.
     ends : {"not-a-knot", "natural", "clamped"}, default "not-a-knot"
-        Conditions on the derivatives above `derivative`, when `start` and `end` give none. With c of them needed, the
-        start takes ``ceil(c / 2)`` and the end ``floor(c / 2)``: not-a-knot has the polynomials next to the ends go on
-        over as many knots, natural has the highest of the continuous derivatives vanish, and clamped the lowest (rest).
+        Conditions on the derivatives above `derivative`, if `start` and `end` give none. Of c conditions, the start
+        takes ``ceil(c / 2)`` and the end ``floor(c / 2)``: with not-a-knot, the polynomials at the ends continue over
+        as many knots; with natural, the highest continuous derivatives vanish; with clamped, the lowest (rest).
     beyond : {"refuse", "hold", "continue"}, default "refuse"
-        What the law is outside of the knots: nothing (an error), the value of the nearest knot, at rest, or what the
-        polynomials of the end segments make of it.
+        The law outside of the knots: an error, the value of the nearest knot, at rest, or the polynomials of the end
+        segments.
 
     Raises
     ------
     TrajectoryError
         If the knots are too few, not finite or do not increase, the conditions do not close the system or are shared
-        unevenly between start and end, or what they determine does not stay near what is given.
+        unevenly between start and end, or the law does not stay near the given values.
 
     Notes
     -----
-    The formulas are Negrean 2025, equations 61-64. Equation 64 names all derivatives at the first knot and two at the
+    The formulas are Negrean 2025, equations 61-64. Equation 64 states all derivatives at the first knot and two at the
     last, one more condition than there are unknowns, and its spline would grow by a factor at every knot.
 
     Examples
@@ -139,12 +139,12 @@ class PolynomialMotion(SplineMotion):
         continuity : int, default 4
             Order m of the highest continuous derivative of the position, at least 2; 4 gives quintic segments.
         start, end : dict of int to float, optional
-            Two conditions on the position (0) and the velocity (1), one at least on the position: by default
-            ``start={0: 0.0, 1: 0.0}``. And either none or ``m - 2`` on the derivatives from the third on.
+            Two conditions on the position (0) and the velocity (1), at least one of them on the position; by default
+            ``start={0: 0.0, 1: 0.0}``. Also, either none or ``m - 2`` on the derivatives from the third on.
         ends : {"not-a-knot", "natural", "clamped"}, default "not-a-knot"
-            Conditions on the derivatives from the third on, when none are given.
+            Conditions on the derivatives from the third on, if none are given.
         beyond : {"refuse", "hold", "continue"}, default "refuse"
-            What the law is outside of the knots.
+            The law outside of the knots, as for the class.
 
         Returns
         -------
@@ -215,18 +215,18 @@ class PolynomialMotion(SplineMotion):
         m, knots, highest = self.continuity, self.knots, self.knot_values
         length, beginning = np.diff(knots), knots[:-1] - origin
         rest = []
-        for k in range(m):  # what the term of the left knot value does not hold of each power of the local time
+        for k in range(m):  # part of each power of the local time that is not in the term of the left knot value
             known = (-1) ** (m + k) * math.comb(m + 1, k) / math.factorial(m + 1) * length ** (m - k) * highest[:-1]
             rest.append(self.coefficients[k] - known)
         constants = []
-        for power in range(m - 1, -1, -1):  # the local time is tau - beginning: the powers of tau by the binomial sum
+        for power in range(m - 1, -1, -1):  # with local time tau - beginning, powers of tau by the binomial sum
             shifted = [rest[k] * math.comb(k, power) * (-beginning) ** (k - power) for k in range(power, m)]
             constants.append(math.factorial(power) * sum(shifted[1:], shifted[0]))
         return np.stack(constants)
 
 
 def _checked(conditions: Any, continuity: int, name: str) -> dict[int, float]:
-    """Return the conditions at one end, refusing orders that are not continuous and values that are no numbers."""
+    """Return the conditions at one end, after a check of their orders and values."""
     if conditions is None:
         return {}
     if not isinstance(conditions, Mapping):
@@ -272,7 +272,7 @@ def _spline(
     knots: Float[np.ndarray, " knots"], values: Float[np.ndarray, " knots"], degree: int, conditions: _Ends, ends: str
 ) -> _Pieces:
     """Return the local Taylor coefficients, shape (degree + 1, segments), of a spline through values at knots."""
-    from scipy.interpolate import make_interp_spline  # here, since importing SciPy takes half a second
+    from scipy.interpolate import make_interp_spline  # local, since the import of SciPy takes half a second
 
     needed, given = degree - 1, len(conditions[0]) + len(conditions[1])
     if given not in (0, needed):
@@ -309,7 +309,7 @@ def _spline(
 
 
 def _check_shares(conditions: _Ends, segments: int, shares: tuple[int, int]) -> None:
-    """Raise an error where one end has more conditions than the other, by more than one."""
+    """Raise TrajectoryError if one end has more conditions than the other, by more than one."""
     start, end = (len(given) for given in conditions)
     if segments == 1 or abs(start - end) <= 1:
         return
@@ -325,7 +325,7 @@ def _check_shares(conditions: _Ends, segments: int, shares: tuple[int, int]) -> 
 def _check_growth(
     pieces: _Pieces, knots: Float[np.ndarray, " knots"], values: Float[np.ndarray, " knots"], conditions: _Ends
 ) -> None:
-    """Raise an error unless a spline goes through its own knots and stays near them, as far as rounding tells."""
+    """Raise TrajectoryError unless a spline passes through its own knots and stays near them."""
     given = [abs(value) for end in conditions for value in end.values()]
     size = max(float(np.max(np.abs(values))), *given, 0.0)
     local = np.diff(knots) * (np.arange(1, SAMPLES + 1) / SAMPLES)[:, None]

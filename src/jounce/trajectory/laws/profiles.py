@@ -22,7 +22,7 @@ MAX_REST = 8
 class AbstractProfile(AbstractMotion):
     """A law from rest to rest that is symmetric about its middle, and holds its ends before and after.
 
-    A subclass gives the first half, as a share of the way for a share of the time; the second half mirrors it.
+    A subclass gives the first half, as a share of the rise for a share of the duration; the second half mirrors it.
     Derivatives are one-sided from the right at the beginning and at the end.
     """
 
@@ -40,16 +40,16 @@ class AbstractProfile(AbstractMotion):
 
     @abc.abstractmethod
     def first_half(self, share: Jet) -> Jet:
-        """Return the share of the way done after a share of the time from 0 to 1/2."""
+        """Return the share of the rise after a share of the duration from 0 to 1/2."""
 
     @property
     @abc.abstractmethod
     def peaks(self) -> tuple[float, float, float]:
-        """Largest velocity, acceleration and jerk over a way and a time of 1."""
+        """Largest velocity, acceleration and jerk for a rise and a duration of 1."""
 
     @property
     def stop_time(self) -> Any:
-        """The instant from which the law is at rest again, s."""
+        """Instant from which the law is at rest again, s."""
         return self.start_time + self.duration
 
     def __call__(self, time: Jet) -> Jet:
@@ -57,7 +57,7 @@ class AbstractProfile(AbstractMotion):
         instants = time.coefficients[0]
         late = 2 * (instants - self.start_time) >= self.duration
         moving = (instants >= self.start_time) & (instants < self.stop_time)
-        # Time counts from the nearer end, so that rest is exact at both; outside, from that end itself.
+        # time counts from the nearer end, so that rest is exact at both; outside, from that end itself
         forward, backward = (time - self.start_time) / self.duration, (self.stop_time - time) / self.duration
         both = zip(forward.dense().coefficients, backward.dense().coefficients, strict=True)
         near = Jet(jnp.where(late, b, f) for f, b in both)
@@ -72,9 +72,9 @@ class AbstractProfile(AbstractMotion):
 class RestToRestMotion(AbstractProfile):
     """A point-to-point polynomial of degree ``2 r + 1``, at rest to the derivative of order r at both ends.
 
-    The share of the way after the share u of the time is ``u^(r+1) sum_k C(r+k, k) (1 - u)^k``, k from 0 to r. With
-    r = 2 it is the 3-4-5 polynomial, the law of minimum jerk (of the least integral of the square of jerk), with r = 3
-    the 4-5-6-7 polynomial, that of minimum snap (jounce). Before and after, the law holds its ends.
+    The share of the rise after the share u of the duration is ``u^(r+1) sum_k C(r+k, k) (1 - u)^k``, k from 0 to r.
+    With r = 2 it is the 3-4-5 polynomial, the law of minimum jerk (of the least integral of the square of jerk), with r
+    = 3 the 4-5-6-7 polynomial, the law of minimum snap (jounce). Before and after, the law holds its ends.
 
     Parameters
     ----------
@@ -83,7 +83,7 @@ class RestToRestMotion(AbstractProfile):
     duration : float, default 1
         Time from the beginning to the end, s.
     start_time : float, default 0
-        The instant of the beginning, s.
+        Initial instant, s.
     rest : int, default 2
         Order r up to which the derivatives vanish at both ends, from 1 to 8.
 
@@ -109,7 +109,7 @@ class RestToRestMotion(AbstractProfile):
         self.rest = whole_number("rest", rest, 1, MAX_REST)
 
     def first_half(self, share: Jet) -> Jet:
-        """Return the share of the way done after a share of the time."""
+        """Return the share of the rise after a share of the duration."""
         *lower, top = rest_to_rest_powers(self.rest)[self.rest + 1 :]
         value = share * top
         for coefficient in reversed(lower):
@@ -118,20 +118,20 @@ class RestToRestMotion(AbstractProfile):
 
     @property
     def peaks(self) -> tuple[float, float, float]:
-        """Largest velocity, acceleration and jerk over a way and a time of 1."""
+        """Largest velocity, acceleration and jerk for a rise and a duration of 1."""
         law = np.polynomial.Polynomial(rest_to_rest_powers(self.rest))
         first, second, third = (_largest(law.deriv(k)) for k in (1, 2, 3))
         return first, second, third
 
 
 def rest_to_rest_powers(rest: int) -> list[float]:
-    """Return the coefficients of the powers from 0 to ``2 rest + 1`` of a way of 1 in a time of 1."""
+    """Return the coefficients of the powers from 0 to ``2 rest + 1`` for a rise and a duration of 1."""
     powers = [(-1) ** j * math.comb(rest + j, j) * math.comb(2 * rest + 1, rest - j) for j in range(rest + 1)]
     return [0.0] * (rest + 1) + [float(c) for c in powers]
 
 
 def _largest(law: np.polynomial.Polynomial) -> float:
-    """Return the largest absolute value on [0, 1/2]; symmetry does the rest."""
+    """Return the largest absolute value on [0, 1/2], which suffices by symmetry."""
     roots = law.deriv().roots()
     inside = roots.real[(np.abs(roots.imag) < 1e-9) & (roots.real > 0) & (roots.real < 0.5)]
     return float(np.abs(law(np.concatenate([inside, [0.0, 0.5]]))).max())
@@ -140,8 +140,8 @@ def _largest(law: np.polynomial.Polynomial) -> float:
 class CycloidalMotion(AbstractProfile):
     """A point-to-point law along a cycloid: the acceleration is one full wave of a sine.
 
-    The share of the way after the share u of the time is ``u - sin(2 pi u) / (2 pi)``. Acceleration is continuous and
-    zero at both ends, jerk jumps there. Before and after, the law holds its ends.
+    The share of the rise after the share u of the duration is ``u - sin(2 pi u) / (2 pi)``. Acceleration is continuous
+    and zero at both ends, where jerk jumps. Before and after, the law holds its ends.
 
     Parameters
     ----------
@@ -150,7 +150,7 @@ class CycloidalMotion(AbstractProfile):
     duration : float, default 1
         Time from the beginning to the end, s.
     start_time : float, default 0
-        The instant of the beginning, s.
+        Initial instant, s.
 
     Raises
     ------
@@ -166,18 +166,18 @@ class CycloidalMotion(AbstractProfile):
     """
 
     def first_half(self, share: Jet) -> Jet:
-        """Return the share of the way done after a share of the time."""
+        """Return the share of the rise after a share of the duration."""
         angle = share * (2 * math.pi)
-        return (angle - sin(angle)) / (2 * math.pi)  # exactly at rest where it begins
+        return (angle - sin(angle)) / (2 * math.pi)  # exactly at rest at its beginning
 
     @property
     def peaks(self) -> tuple[float, float, float]:
-        """Largest velocity, acceleration and jerk over a way and a time of 1."""
+        """Largest velocity, acceleration and jerk for a rise and a duration of 1."""
         return 2.0, 2 * math.pi, 4 * math.pi**2
 
 
 RESTS = {"polynomial_3_4_5": 2, "polynomial_4_5_6_7": 3, "minimum_jerk": 2, "minimum_snap": 3}
-"""The orders up to which the polynomials are at rest at both ends."""
+"""Orders up to which the polynomials are at rest at both ends."""
 PROFILES = ("cycloidal", *RESTS, "trapezoidal")
 """Names of the profiles."""
 
@@ -199,11 +199,11 @@ def motion_profile(
     start, end : float
         Values at the beginning and at the end, m or rad.
     duration : float, optional
-        Time from the beginning to the end, s; without it the limits decide.
+        Time from the beginning to the end, s; by default the shortest within the limits.
     start_time : float, default 0
-        The instant of the beginning, s.
+        Initial instant, s.
     limits : sequence of 3 float, optional
-        Largest velocity, acceleration and jerk; without a duration the law is the quickest within them.
+        Largest velocity, acceleration and jerk; without a duration, the law is the quickest within them.
 
     Returns
     -------
@@ -213,7 +213,7 @@ def motion_profile(
     Raises
     ------
     TrajectoryError
-        If no profile has the name, neither a duration nor limits are given, or the limits do not allow the duration.
+        If the profile does not exist, neither a duration nor limits are given, or the limits do not allow the duration.
 
     Examples
     --------

@@ -1,7 +1,7 @@
-"""Segments of motion laws, and the polynomials and sines that they are made of: the profiles of cam design.
+"""Segments of motion laws, and the polynomials and sines of their pieces: the profiles of cam design.
 
-The shapes of harmonic, cycloidal, modified trapezoidal and modified sine laws are given by accelerations, parts of
-sines and constants, which are integrated exactly.
+Harmonic, cycloidal, modified trapezoidal and modified sine laws are given by their accelerations, which consist of
+sines and constants, and are integrated exactly.
 """
 
 import dataclasses
@@ -20,12 +20,12 @@ from jounce.trajectory.laws.trapezoid import LIMITS, TrapezoidalMotion
 from jounce.units.expression import Expression
 
 Value = Any
-"""A number, an expression of parameters, or what JAX traces."""
+"""A number, an expression of parameters, or a traced value."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Segment:
-    """A part of a `SegmentedMotion`: how the law goes on, and for how long.
+    """A part of a `SegmentedMotion`: its profile, duration and rise.
 
     Parameters
     ----------
@@ -34,15 +34,15 @@ class Segment:
         ``polynomial_4_5_6_7`` (or ``minimum_snap``), ``modified_trapezoid``, ``modified_sine``, ``trapezoidal`` (seven
         phases of limited jerk), or ``polynomial``, which meets given derivatives at its ends.
     duration : number or expression, optional
-        s, or rad or m where the law is one of another coordinate. Only a trapezoidal segment with limits needs none.
+        Duration, s, or rad or m for a law of another coordinate; only a trapezoidal segment with limits needs none.
     to, by : number or expression, optional
-        The value at the end of the segment, or how far that is from the value at its beginning, m or rad. One of them,
-        or none in a dwell.
+        Value at the end of the segment, or its difference from the value at the beginning, m or rad. One of them, or
+        none for a dwell.
     begin, end : sequence of number or expression, optional
-        Of a polynomial: its derivatives at the beginning and at the end, the velocity first. Unless given, it begins
-        with the velocity and the acceleration with which the segment before ends, and ends at rest.
+        Derivatives of a polynomial at the beginning and at the end, the velocity first. By default, it begins with the
+        velocity and the acceleration at the end of the previous segment, and ends at rest.
     limits : sequence of 3 numbers or expressions, optional
-        Of a trapezoidal segment: largest velocity, acceleration and jerk.
+        Largest velocity, acceleration and jerk of a trapezoidal segment.
 
     Examples
     --------
@@ -69,7 +69,7 @@ class Piece:
     length: Value = 0.0
 
     def stretched(self, rise: Value, duration: Value) -> "Piece":
-        """Return the piece over a way and a duration other than one."""
+        """Return the piece for another rise and duration."""
         amplitude, frequency, phase = self.sine
         powers = [c * rise / duration**k for k, c in enumerate(self.powers)]
         return Piece(powers, (amplitude * rise, frequency / duration, phase), self.length * duration)
@@ -80,7 +80,7 @@ class Piece:
 
 
 def joined_pieces(segments: Sequence[Segment], value: Value) -> tuple[list[Piece], list[Value], list[Value]]:
-    """Return the pieces of all segments, where each begins and the last one ends, and the values between segments."""
+    """Return the pieces of all segments, their beginnings with the final end, and the values between segments."""
     pieces: list[Piece] = []
     values = [value]
     ends: list[Value] = [0.0]
@@ -117,7 +117,7 @@ def _of_segment(
             for key, x, default in (("begin", segment.begin, derivatives), ("end", segment.end, rest))
         ]
         powers = _meeting([value, *given[0]], [target, *given[1]], duration)
-        # what is not given at the end is what the polynomial makes of it, and the next one begins with that
+        # derivatives without a condition follow from the polynomial, and the next segment begins with them
         free = [_derivative(powers, order, duration) for order in range(len(given[1]) + 1, len(rest) + 1)]
         return [Piece(powers, length=duration)], target, [*given[1], *free][: len(rest)]
     pieces = [piece.stretched(rise, duration).lifted(value) for piece in _shape(segment.profile)]
@@ -150,7 +150,7 @@ def _within_limits(segment: Segment, name: str, value: Value, target: Value) -> 
 
 
 def _meeting(begin: list[Value], end: list[Value], duration: Value) -> list[Value]:
-    """Return the powers of the polynomial of least degree that has values and derivatives at both ends."""
+    """Return the powers of the polynomial of least degree with given values and derivatives at both ends."""
     lower, count = len(begin), len(begin) + len(end)
     first = [x * duration**k / math.factorial(k) for k, x in enumerate(begin)]  # in units of the duration
     matrix = np.array([[math.perm(k, j) for k in range(lower, count)] for j in range(len(end))], float)
@@ -185,7 +185,7 @@ SEGMENT_PROFILES = ("dwell", "constant_velocity", *ACCELERATIONS, *RESTS, "trape
 
 @lru_cache
 def _shape(profile: str) -> tuple[Piece, ...]:
-    """Return the pieces of a profile over a way and a duration of one."""
+    """Return the pieces of a profile for a rise and a duration of one."""
     if profile in RESTS:
         return (Piece(rest_to_rest_powers(RESTS[profile]), length=1.0),)
     if profile == "trapezoidal":
@@ -214,18 +214,18 @@ def _whole(piece: Piece, rise: float) -> Piece:
 
 
 def parsed_value(value: Value) -> Value:
-    """Return a value with a text read as an expression."""
+    """Return a value, with text parsed as an expression."""
     return Expression(value) if isinstance(value, str) else value
 
 
 def number_of_value(name: str, value: Value, check: Callable[[str, Any], float] = finite) -> Value:
-    """Return a checked number; what JAX traces, and an expression without names, is taken as it is."""
+    """Return a checked number, with an expression without names evaluated; a traced value is returned unchanged."""
     value = parsed_value(value)
     value = value.evaluate() if isinstance(value, Expression) else value
     return value if isinstance(value, Tracer) else check(name, value)
 
 
 def number_or_expression(name: str, value: Value) -> Value:
-    """Return a checked number; an expression of parameters, and what JAX traces, is taken as it is."""
+    """Return a checked number; an expression of parameters or a traced value is returned unchanged."""
     value = parsed_value(value)
     return value if isinstance(value, Expression) and value.names else number_of_value(name, value)

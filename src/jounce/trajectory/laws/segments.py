@@ -1,4 +1,4 @@
-"""Motion laws made of segments: dwells, rises and returns by the profiles of cam design, once or again and again."""
+"""Motion laws of segments: dwells, rises and returns by the profiles of cam design, possibly repeated."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -27,32 +27,32 @@ from jounce.trajectory.motion import SplineMotion, Untraced
 from jounce.units.expression import Expression
 
 BEYOND = ("hold", "repeat", "advance")
-MOST_CONDITIONS = 10  # derivatives that a polynomial is given at an end
+MOST_CONDITIONS = 10  # derivatives of a polynomial at an end
 
 
 class SegmentedMotion(SplineMotion):
-    """A motion law of segments that follow each other, as those of cams do: dwell, rise, dwell, return.
+    """A motion law of consecutive segments, as in cam design: dwell, rise, dwell, return.
 
-    Every segment begins where the one before it ends. Where they meet, derivatives are those from the right; `jumps`
-    tells which are not continuous.
+    Every segment begins where the one before it ends. At the joins, derivatives are those from the right; `jumps`
+    returns the discontinuous ones.
 
     Parameters
     ----------
     segments : sequence of Segment
-        In their order.
+        Segments in order.
     initial : number or expression, default 0
-        The value at the beginning, m or rad.
+        Initial value, m or rad.
     start : number or expression, default 0
-        The instant of the beginning, s (or the coordinate there, where the law is one of another coordinate).
+        Initial instant, s (or the coordinate, for a law of another coordinate).
     beyond : {"hold", "repeat", "advance"}, default "hold"
-        What the law is before and after: the value at the nearest end; the segments again, which must end where they
-        begin; or the segments again, each time from where they ended, as an indexing table does.
+        The law before and after the segments: the value of the nearest end; a repetition, for segments that end where
+        they begin; or a repetition that advances from where the segments ended, as for an indexing table.
 
     Raises
     ------
     TrajectoryError
-        If a profile does not exist, something of a segment is missing, too much or no number, or segments that are to
-        repeat do not close.
+        If a profile does not exist, an entry of a segment is missing, superfluous or no number, or segments to be
+        repeated are not closed.
 
     Examples
     --------
@@ -79,7 +79,7 @@ class SegmentedMotion(SplineMotion):
             _check_segment(segment, f"segments[{k}]")
         self.recipe = Untraced((tuple(segments), initial, start, beyond))
         if self._open:
-            self._set(np.zeros(1), np.full((1, 1), np.inf), np.zeros(()), "continue")  # equal to itself, and no number
+            self._set(np.zeros(1), np.full((1, 1), np.inf), np.zeros(()), "continue")  # equal to itself, but no number
             self.sines = np.zeros((3, 1))
             return
         pieces, ends, values = joined_pieces(segments, number_of_value("initial", initial))
@@ -88,7 +88,7 @@ class SegmentedMotion(SplineMotion):
         if beyond == "repeat":
             _check_closed(values)
             advance = 0.0
-        if beyond == "hold":  # at rest, exactly, before and after
+        if beyond == "hold":  # exactly at rest before and after
             pieces, begins = [Piece([values[0]]), *pieces, Piece([values[-1]])], [begins[0] - 1.0, *begins]
         height = max(len(piece.powers) for piece in pieces)
         padded = [piece.powers + [0.0] * (height - len(piece.powers)) for piece in pieces]
@@ -105,35 +105,35 @@ class SegmentedMotion(SplineMotion):
 
     @property
     def segments(self) -> tuple[Segment, ...]:
-        """The segments as they were given."""
+        """The segments as given."""
         return self.recipe.value[0]
 
     def lasts(self, duration: float) -> bool:
-        """Return whether the segments go from zero to a duration, s, or an angle."""
-        first = 1 if self.beyond == "continue" else 0  # the first and the last piece rest
+        """Return whether the segments extend from zero to a duration, s, or an angle."""
+        first = 1 if self.beyond == "continue" else 0  # the first and the last piece are at rest
         begin = float(np.asarray(self.breakpoints)[first])
         return abs(begin) <= CLOSED * duration and abs(float(self.stop) - duration) <= CLOSED * duration
 
     def repeated(self) -> "SegmentedMotion":
-        """Return the law with its segments again and again.
+        """Return the law with repeated segments.
 
         Raises
         ------
         TrajectoryError
-            If they do not end where they begin.
+            If the segments do not end where they begin.
         """
         segments, initial, start, _ = self.recipe.value
         return SegmentedMotion(segments, initial, start, "repeat")
 
     @property
     def _open(self) -> list[str]:
-        """Names of the parameters without which the law is not known."""
+        """Names of the parameters that lack values."""
         segments, initial, start, _ = self.recipe.value
         values = [initial, start, *(value for segment in segments for value in _values(segment))]
         return sorted({name for x in map(parsed_value, values) if isinstance(x, Expression) for name in x.names})
 
     def resolved(self, parameters: Mapping[str, Any]) -> "SegmentedMotion":
-        """Return the law with numbers in the place of its expressions of parameters."""
+        """Return the law with numbers in the place of expressions of parameters."""
         if not self._open:
             return self
 
@@ -151,35 +151,35 @@ class SegmentedMotion(SplineMotion):
         ]
         try:
             return SegmentedMotion(known_segments, known(initial), known(start), beyond)
-        except TrajectoryError as error:  # its location is known to the mechanism, which names the law
+        except TrajectoryError as error:  # the mechanism knows the location of the law
             raise TrajectoryError(f"{error.name}: {error.message}", value=error.value) from None
 
     def __call__(self, time: Jet) -> Jet:
-        """Return the jet of the law at the instants of the time jet; parameters need their values, see `resolved`."""
+        """Return the jet of the law at the instants of the time jet; parameters need values, see `resolved`."""
         if self._open:
             message = "depends on parameters, whose values a mechanism knows; give numbers"
             raise TrajectoryError(message, name="segments", value=self._open)
         return super().__call__(time)
 
     def _within(self, time: Jet) -> Jet:
-        """Return the jet of the polynomials and the sines at the instants."""
+        """Return the jet of the polynomials and the sines at given instants."""
         start, (amplitude, frequency, phase) = self._chosen(time.coefficients[0], jnp.asarray(self.sines))
         return super()._within(time) + sin((time - start) * frequency + phase) * amplitude
 
     def jumps(self, order: int = 4) -> tuple[Float[np.ndarray, " knots"], Float[np.ndarray, "{order}+1 knots"]]:
-        """Return by how much derivatives jump where segments meet, and at the ends.
+        """Return the jumps of derivatives where segments meet, and at the ends.
 
         Parameters
         ----------
         order : int, default 4
-            The highest derivative that is looked at.
+            Highest derivative.
 
         Returns
         -------
         instants : ndarray of shape (knots,)
-            Where pieces meet, s; of a law that repeats its beginning stands for its end, too.
+            Instants at which pieces meet, s; for a law that repeats, the beginning represents the end, too.
         jumps : ndarray of shape (order + 1, knots)
-            The value from the right less that from the left, m or rad by s to the power of the order; rounding is zero.
+            Values from the right minus those from the left, m or rad per s to the power of the order; rounding is zero.
 
         Examples
         --------
@@ -193,14 +193,14 @@ class SegmentedMotion(SplineMotion):
 
     @property
     def smoothness(self) -> int:
-        """The highest derivative to which the law is continuous everywhere, at most 10; -1 if the law itself jumps."""
+        """Order of the highest derivative that is continuous everywhere, at most 10; -1 if the law itself jumps."""
         _, jumps = self.jumps(MOST_CONDITIONS)
         broken = np.flatnonzero(np.any(jumps != 0, axis=1))
         return int(broken[0]) - 1 if len(broken) else MOST_CONDITIONS
 
 
 def _check_closed(values: list[Value]) -> None:
-    """Raise TrajectoryError unless a law that is to repeat ends where it begins."""
+    """Raise TrajectoryError unless a law to be repeated ends where it begins."""
     if is_traced(values):
         return
     away = values[-1] - values[0]
@@ -215,13 +215,13 @@ def _values(segment: Segment) -> list[Value]:
 
 
 def _array(values: Any) -> Numbers:
-    """Return an array of nested lists of numbers, or of what JAX traces among them."""
+    """Return an array of nested lists of numbers, of which some may be traced."""
     traced = is_traced(values)
     return jnp.array(values, float) if traced else np.array(values, float)
 
 
 def _check_segment(segment: Any, name: str) -> None:
-    """Raise TrajectoryError for what a segment lacks, or has too much."""
+    """Raise TrajectoryError for missing or superfluous entries of a segment."""
     if not isinstance(segment, Segment):
         raise TrajectoryError("must be a jn.laws.Segment", name=name, value=segment)
     check_name("profile", segment.profile, SEGMENT_PROFILES, TrajectoryError, name=f"{name}.profile")

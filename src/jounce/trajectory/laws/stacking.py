@@ -1,4 +1,4 @@
-"""Laws of several joints evaluated together: those of the same structure as one law with an axis of joints."""
+"""Laws of several joints evaluated together: those of one structure are stacked along an axis of joints."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -15,18 +15,18 @@ from jounce.trajectory.laws.user_laws import read_laws
 from jounce.trajectory.motion import AbstractMotion
 
 Members = tuple[tuple[int, ...], ...]
-"""The places of the laws that each law with an axis of joints stands for."""
+"""Indices of the laws in each stacked law."""
 
 
 def evaluate_laws(laws: Sequence[AbstractMotion], time: Jet) -> Jet:
-    """Evaluate laws of the same structure as one, stacked along the axis of joints; put all in order."""
+    """Return the jet of several laws, joints first; laws of one structure are stacked and evaluated together."""
     return _evaluated(*_stacked(laws), time)
 
 
 def law_derivatives(
     laws: list[AbstractMotion], times: Float[np.ndarray, " time"], order: int
 ) -> Float[np.ndarray, "order joint time"]:
-    """Return the plain derivatives of laws at instants."""
+    """Return the derivatives of laws at instants."""
     stacked, members = _stacked(read_laws(laws))
     how: Any = {"members": members, "order": order}
     return np.asarray(_derivatives.at_instants(stacked, lambda some: times[some], len(times), **how)[0])
@@ -38,7 +38,7 @@ def _derivatives(laws: list[AbstractMotion], times: Any, *, members: Members, or
 
 
 def _stacked(laws: Sequence[AbstractMotion]) -> tuple[list[AbstractMotion], Members]:
-    """Return one law for all of the same structure, with the joints along an axis before that of the instants."""
+    """Return laws stacked by structure, with joints along an axis before that of instants, and their members."""
     groups: dict[Any, list[int]] = {}
     for index, law in enumerate(laws):
         leaves, structure = jax.tree.flatten(law)

@@ -1,4 +1,4 @@
-"""Point-to-point laws with a trapezium of velocity and limited jerk."""
+"""Point-to-point laws with a trapezoidal velocity and limited jerk."""
 
 import math
 
@@ -14,10 +14,10 @@ LIMITS = ("velocity", "acceleration", "jerk")
 
 
 class TrapezoidalMotion(SplineMotion):
-    """A point-to-point law with a trapezium of velocity and limited jerk: the double S of seven phases.
+    """A point-to-point law with a trapezoidal velocity and limited jerk: the double S of seven phases.
 
     The phases are: jerk up, constant acceleration, jerk down, constant velocity, jerk down, constant deceleration, jerk
-    up; a phase that the way is too short for has no length. Derivatives are one-sided from the right where the phases
+    up; a phase has no length if the rise is too short for it. Derivatives are one-sided from the right where phases
     meet; those above the third vanish. Before and after, the law holds its ends.
 
     Parameters
@@ -25,12 +25,12 @@ class TrapezoidalMotion(SplineMotion):
     start, end : float
         Values at the beginning and at the end, m or rad.
     velocity, acceleration, jerk : float, optional
-        Limits, all three or none: the law is the quickest one that keeps them, m or rad per s, s^2 and s^3.
+        Limits, all three or none, m or rad per s, s^2 and s^3: the law is the quickest within them.
     duration : float, optional
-        Time from the beginning to the end, s: the quickest law is stretched to it. Without limits, the seven phases
-        are equally long.
+        Time from the beginning to the end, s, to which the quickest law is stretched. Without limits, the seven phases
+        have equal length.
     start_time : float, default 0
-        The instant of the beginning, s.
+        Initial instant, s.
 
     Raises
     ------
@@ -82,7 +82,7 @@ class TrapezoidalMotion(SplineMotion):
         pieces = _phases(lengths, start, end)
         moving = np.concatenate([[0.0], np.cumsum(lengths)[:-1], [total]])
         begins = start_time + np.concatenate([[-1.0], moving])
-        self._set(begins, pieces, begins[-1], "continue")  # of which the first and the last rest
+        self._set(begins, pieces, begins[-1], "continue")  # the first and the last piece are at rest
 
     @property
     def switches(self) -> Float[np.ndarray, "8"]:
@@ -97,12 +97,12 @@ class TrapezoidalMotion(SplineMotion):
 
 def _quickest(distance: float, velocity: float, acceleration: float, jerk: float) -> tuple[float, ...]:
     """Return the lengths of the seven phases of the quickest law from rest to rest within limits."""
-    ramp = min(acceleration / jerk, math.sqrt(velocity / jerk))  # of a phase of jerk
-    steady = max(velocity / (jerk * ramp) - ramp, 0.0)  # of a phase of constant acceleration
+    ramp = min(acceleration / jerk, math.sqrt(velocity / jerk))  # duration of a phase of jerk
+    steady = max(velocity / (jerk * ramp) - ramp, 0.0)  # duration of a phase of constant acceleration
     if steady < 1e-12 * ramp:
         steady = 0.0
     cruise = distance / velocity - (2 * ramp + steady)
-    if cruise < 0:  # the way is too short for the velocity
+    if cruise < 0:  # the rise is too short for the velocity
         cruise = 0.0
         ramp = min(acceleration / jerk, math.cbrt(distance / (2 * jerk)))
         rising = ramp / 2 + math.sqrt(ramp**2 / 4 + distance / (jerk * ramp)) if ramp > 0 else 0.0
@@ -120,7 +120,7 @@ def _phases(lengths: Float[np.ndarray, "7"], start: float, end: float) -> Float[
         position += length * (velocity + length * (acceleration / 2 + length * sign / 6))
         velocity += length * (acceleration + length * sign / 2)
         acceleration += length * sign
-    scale = (end - start) / position if position > 0 else 0.0  # the jerk that makes the way
+    scale = (end - start) / position if position > 0 else 0.0  # the jerk that makes the rise
     moving = np.array(states).T * scale
     moving[0] += start
     rest = np.zeros((4, 2))

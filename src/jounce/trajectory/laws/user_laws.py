@@ -1,4 +1,4 @@
-"""Motion laws of users, functions and classes of their own: what they compute is read off whenever they are used."""
+"""User-defined motion laws, functions or classes, read as programs whenever they are used."""
 
 from collections.abc import Callable
 from typing import Any
@@ -18,16 +18,16 @@ from jounce.trajectory.sampled.deferred import SampledLaw
 from jounce.units.expression import Expression
 
 GIVEN = (str, int, float, np.integer, np.floating, Expression)
-ORDER = 2  # to which laws are compared with what was read off
+ORDER = 2  # of the comparison of laws with their programs
 
 
 class ReadMotion(AbstractMotion):
-    """A motion law of a user as what it computed when it was read off.
+    """A user's motion law as the program read from it.
 
     Parameters
     ----------
     computes : Composed or ReadObject
-        Of time.
+        Program, as a function of time.
     """
 
     computes: Composed | ReadObject
@@ -41,13 +41,13 @@ class ReadMotion(AbstractMotion):
         return values if wide is time else values.map(lambda c: jnp.reshape(c, time.shape))
 
     def check_instants(self, first: float, last: float) -> None:
-        """Raise MechanismError if the law says nothing of some instants from a first to a last one, s."""
+        """Raise MechanismError if the law is not defined at some instants between two instants, s."""
         if isinstance(self.computes, ReadObject):
             self.computes.source.value.check_instants(first, last)
 
 
 def shape_of_result(what: str, advice: str, function: Callable[..., Any], *arguments: np.ndarray) -> tuple[int, ...]:
-    """Return the shape of the array that a function of arrays returns; raise MechanismError where it cannot be used."""
+    """Return the shape of the result of a function of arrays; raise MechanismError if the function cannot be used."""
     try:
         return jax.eval_shape(function, *arguments).shape
     except JounceError:
@@ -58,12 +58,12 @@ def shape_of_result(what: str, advice: str, function: Callable[..., Any], *argum
 
 
 def tried_law(law: AbstractMotion | Callable[..., Any]) -> AbstractMotion:
-    """Return a law, or that of a function of time, after trying it on shapes: functions can fail in ways to explain.
+    """Return a law, or the law of a function of time, after a trial on shapes, which explains failures.
 
     Raises
     ------
     MechanismError
-        If it cannot be used.
+        If the law cannot be used.
     """
     motion = law if isinstance(law, AbstractMotion) else FunctionMotion(law)
     advice = "it must map a scalar time to a scalar with functions of jax.numpy"
@@ -74,23 +74,23 @@ def tried_law(law: AbstractMotion | Callable[..., Any]) -> AbstractMotion:
 def law_or_number(
     what: str, name: Any, law: Any, error: type[JounceError] = TrajectoryError
 ) -> AbstractMotion | SampledLaw | float:
-    """Return the law of time, or the number, that a motion, an expression, a function of time or a number stands for.
+    """Return the law of time or the number given by a motion, an expression, a function of time or a number.
 
     Parameters
     ----------
     what : str
         Name of the argument, for messages.
     name : str
-        What the law is of, such as a joint.
+        Name of the object with the law, such as a joint.
     law : AbstractMotion, SampledLaw, str, callable or number
-        What a user gives.
+        Law as a user gives it.
     error : class of JounceError, default TrajectoryError
-        What is raised.
+        Type of the exceptions.
 
     Raises
     ------
     JounceError
-        Of the class given, if it is none of these, or cannot be used.
+        Of the given class, if it is none of these, or cannot be used.
     """
     where = f"{what}.{name}"
     if isinstance(law, AbstractMotion | SampledLaw) and not isinstance(law, FunctionMotion):
@@ -116,7 +116,7 @@ def given_law(name: Any, law: Any) -> AbstractMotion | SampledLaw:
 
 
 def read_laws(tree: Any) -> Any:
-    """Return a law, or any pytree of laws, with those of users in it as what they compute now.
+    """Return a law, or a pytree of laws, in which user-defined laws are replaced by programs of what they compute now.
 
     Examples
     --------
@@ -136,7 +136,7 @@ def read_laws(tree: Any) -> Any:
 
 
 def is_users(law: Any) -> bool:
-    """Return whether a law is a user's own."""
+    """Return whether a law is user-defined."""
     if not isinstance(law, AbstractMotion):
         return False
     kind = type(law)

@@ -1,1 +1,1 @@
-"""Laws of motion through samples."""
+"""Motion laws through samples."""

@@ -1,4 +1,4 @@
-"""Laws through very many samples, which are fitted when they are used: smoothing needs the samples alone."""
+"""Laws through very many samples, which are fitted when used: smoothing needs the samples only."""
 
 import dataclasses
 from collections.abc import Iterator, Mapping
@@ -10,19 +10,19 @@ from jounce.errors import MechanismError, TrajectoryError
 from jounce.trajectory.motion import AbstractMotion, SplineMotion
 from jounce.trajectory.sampled.hermite import HermiteMotion
 
-LONG = 100_000  # samples from which on a law is fitted when it is used
+LONG = 100_000  # number of samples from which a law is fitted when used
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class SampledLaw:
-    """The samples of a law, checked.
+    """The checked samples of a law.
 
     Parameters
     ----------
     times, values : array of shape (sample,)
-        s, rad or m.
+        Instants, s, and values, rad or m.
     degree : int
-        Of the spline through them; of degree 1 it is a polygon.
+        Degree of the spline through them; 1 for a polygon.
     """
 
     times: Float[np.ndarray, " sample"]
@@ -30,7 +30,7 @@ class SampledLaw:
     degree: int
 
     def fitted(self) -> AbstractMotion:
-        """Return the law.
+        """Return the law through the samples.
 
         Raises
         ------
@@ -43,18 +43,18 @@ class SampledLaw:
 
 
 def law_through(times: np.ndarray, values: np.ndarray, degree: int) -> AbstractMotion | SampledLaw:
-    """Return the law through checked samples; of very many, what fits it when it is used."""
+    """Return the law through checked samples; for very many, the samples, which are fitted when used."""
     law = SampledLaw(times, values, degree)
     return law if len(times) > LONG else law.fitted()
 
 
 class Laws(Mapping[str, AbstractMotion]):
-    """Laws by name, those through very many samples fitted when they are first used.
+    """Laws by name; those through very many samples are fitted when first used.
 
     Parameters
     ----------
     given : dict of str to AbstractMotion or SampledLaw
-        What they are made of.
+        Laws, or samples to be fitted.
     """
 
     def __init__(self, given: Mapping[str, AbstractMotion | SampledLaw]):
@@ -76,5 +76,5 @@ class Laws(Mapping[str, AbstractMotion]):
         return len(self._given)
 
     def given(self) -> dict[str, AbstractMotion | SampledLaw]:
-        """Return what the laws are made of, by name, as it is."""
+        """Return the laws, or the samples that are not yet fitted, by name."""
         return dict(self._given)

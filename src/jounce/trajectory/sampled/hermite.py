@@ -1,4 +1,4 @@
-"""Motion laws through instants at which derivatives are known, too."""
+"""Motion laws through instants with known derivatives."""
 
 import math
 
@@ -13,28 +13,28 @@ from jounce.trajectory.labels import check_rows
 from jounce.trajectory.motion import SplineMotion
 
 BEYOND = ("refuse", "hold", "continue")
-MET = 6  # values and derivatives that a piece meets at its end, at most: more lose digits
+MET = 6  # most values and derivatives that a piece meets at its end: more lose digits
 
 
 class HermiteMotion(SplineMotion):
-    """A motion law through instants with the value and the derivatives at each.
+    """A motion law through instants with given values and derivatives.
 
-    At an instant it has the derivatives given there. In between it is a polynomial, which begins with all
-    derivatives of the instant before and meets the first five of the instant after it. An instant that is given twice
-    has the derivatives of the first row from the left and those of the second from the right, which `jumps` tells.
+    Between instants it is a polynomial with all derivatives of the instant before, and the first five of the instant
+    after. An instant that is given twice has the derivatives of the first row from the left and those of the second
+    from the right; `jumps` returns the differences.
 
     Parameters
     ----------
     times : array_like of shape (instants,)
-        Increasing, s; an instant within may be given twice.
+        Increasing instants, s; an inner instant may be given twice.
     derivatives : array_like of shape (instants, order + 1)
-        The law and its time derivatives, lowest first: m or rad by s to the power of the order.
+        The law and its time derivatives, lowest first: m or rad per s to the power of the order.
     beyond : {"refuse", "hold", "continue"}, default "refuse"
-        What the law is before the first and after the last instant, as for `SplineMotion`.
+        The law before the first and after the last instant, as for `SplineMotion`.
     incomplete : bool, default False
-        Whether a derivative may be NaN where it is not known, and then those above it, too. Each piece takes what both
-        of its ends know, as joint_trajectory_controller of ros2_control does: it is linear between positions alone, a
-        cubic where velocities are known, and a quintic where accelerations are.
+        Whether unknown derivatives may be NaN, together with those above them. Each piece uses the derivatives that
+        both of its ends have, as joint_trajectory_controller of ros2_control does: it is linear between positions only,
+        a cubic with velocities, and a quintic with accelerations.
 
     Raises
     ------
@@ -66,12 +66,12 @@ class HermiteMotion(SplineMotion):
         twice = steps == 0
         if (steps < 0).any() or (twice[1:] & twice[:-1]).any() or twice[:1].any() or twice[-1:].any():
             raise TrajectoryError("must increase", name="times", value=instants.tolist()[:5])
-        begins = np.append(~twice, True)  # of an instant that is given twice the second row begins a piece
+        begins = np.append(~twice, True)  # at a repeated instant, the second row begins a piece
         pieces = hermite_pieces(instants, table) if known.all() else _mixed_pieces(instants, table, known)
         self._set(instants[begins], pieces[:, begins], instants[-1], beyond)
 
     def jumps(self, order: int = 4) -> Jumps:
-        """Return the instants, and by how much derivatives to an order jump there, as for `SegmentedMotion`."""
+        """Return the instants, and the jumps of derivatives up to an order, as for `SegmentedMotion`."""
         return knot_jumps(self, order)
 
 
@@ -98,7 +98,7 @@ def _mixed_pieces(
     derivatives: Float[np.ndarray, "instants levels"],
     known: Bool[np.ndarray, "instants levels"],
 ) -> Float[np.ndarray, "powers instants"]:
-    """Return the powers of pieces between instants of which some have fewer derivatives than others."""
+    """Return the powers of pieces between instants with different numbers of derivatives."""
     levels = np.minimum(known[:-1].sum(axis=1), known[1:].sum(axis=1))
     top = int(levels.max())
     result = np.zeros((top + min(top, MET), len(times)))
@@ -113,5 +113,5 @@ def _mixed_pieces(
 
 
 def _binomials(orders: int, powers: np.ndarray) -> Float[np.ndarray, "orders powers"]:
-    """Return the Taylor coefficients at one of the powers of a variable."""
+    """Return the Taylor coefficients of powers of a variable at one."""
     return np.array([[math.comb(int(p), j) for p in powers] for j in range(orders)], float)

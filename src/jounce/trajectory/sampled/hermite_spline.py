@@ -1,4 +1,4 @@
-"""Splines through samples of positions with their velocities, and accelerations, at the same instants."""
+"""Splines through samples of positions with velocities, and possibly accelerations, at the same instants."""
 
 import math
 
@@ -13,24 +13,25 @@ from jounce.trajectory.sample_errors import INTERPOLATION_SAFETY, NOISE_SAFETY, 
 from jounce.trajectory.sampled.hermite import HermiteMotion
 
 MOST = 3  # levels: positions, velocities, accelerations
-WINDOW = 24  # instants in which a sample has influence, on both sides of it
-LOOKS = 4  # in each piece
-LONGEST = 20_000  # samples in which errors are estimated
+WINDOW = 24  # instants over which a sample has influence
+LOOKS = 4  # samples of each piece
+LONGEST = 20_000  # most samples for the estimate of errors
 
 
 class HermiteSplineMotion(SplineMotion):
     """The smoothest spline through samples of a law and of its first derivatives.
 
-    Of positions and velocities the spline has the degree 5 and continuous derivatives to jerk, with accelerations the
-    degree 7, and to jounce: the next derivative at each instant follows from that, by one linear system with three
-    diagonals. Polynomials of a controller between points (`HermiteMotion`) jump there in the next derivative.
+    Through positions and velocities the spline has degree 5 and continuous derivatives up to jerk, with accelerations
+    degree 7, and up to jounce. The next derivative at each instant follows from this continuity, by a tridiagonal
+    linear system. In contrast, the polynomials of a controller (`HermiteMotion`) jump in the next derivative at the
+    instants.
 
     Parameters
     ----------
     times : array_like of shape (samples,)
-        Strictly increasing instants, s, three or more.
+        Strictly increasing instants, s, at least three.
     derivatives : array_like of shape (samples, levels)
-        The law, its velocity, and perhaps its acceleration: m or rad by s to the power of the order.
+        The law, its velocity, and possibly its acceleration: m or rad per s to the power of the order.
 
     Raises
     ------
@@ -61,21 +62,21 @@ class HermiteSplineMotion(SplineMotion):
 
     @property
     def joined(self) -> int:
-        """Up to which derivative its pieces meet smoothly: one more than is given, and the next."""
+        """Order of the highest derivative that is continuous between pieces, two above the given ones."""
         return self.degree // 2 + 1
 
     def at(self, instants: Float[np.ndarray, " instants"], order: int) -> Float[np.ndarray, " instants"]:
-        """Return a derivative at instants, without a program of its own."""
+        """Return a derivative at instants, by NumPy only."""
         return _derivative(self, instants, order)
 
 
 def _spline(times: np.ndarray, table: np.ndarray) -> HermiteMotion:
-    """Return the law through samples, the next derivative of which makes the one above it continuous."""
-    from scipy.linalg import solve_banded  # here, since importing SciPy takes half a second
+    """Return the law through samples whose next derivative makes the one above it continuous."""
+    from scipy.linalg import solve_banded  # local, since the import of SciPy takes half a second
 
     levels, count = table.shape[1], len(times)
     steps = np.diff(times)
-    begin, end = _at_ends(levels)  # of derivative levels + 1 of a piece of length 1, by what its ends are
+    begin, end = _at_ends(levels)  # derivative levels + 1 of a piece of length 1, for each value at its ends
     powers = steps[:, None] ** np.arange(levels + 1)
     known = np.concatenate([table[:-1] * powers[:, :levels], table[1:] * powers[:, :levels]], axis=1)
     columns = [*range(levels), *range(levels + 1, 2 * levels + 1)]
@@ -83,12 +84,12 @@ def _spline(times: np.ndarray, table: np.ndarray) -> HermiteMotion:
     left, right = (known @ row[columns] / scale for row in (begin, end))  # at the beginning, at the end of each piece
     own = steps**levels / scale
     bands, right_side = np.zeros((3, count)), np.zeros(count)
-    # inside: what the piece before ends with is what the next one begins with
+    # inside: the derivative is continuous between pieces
     bands[1, 1:-1] = end[2 * levels + 1] * own[:-1] - begin[levels] * own[1:]
     bands[2, :-2] = end[levels] * own[:-1]
     bands[0, 2:] = -begin[2 * levels + 1] * own[1:]
     right_side[1:-1] = left[1:] - right[:-1]
-    top = _end_condition(levels)  # at the ends: the first and the last piece have no highest power
+    top = _end_condition(levels)  # at the ends: the highest power of the first and of the last piece vanishes
     for row, piece, neighbor in ((0, 0, 1), (count - 1, -1, -2)):
         mine, other = (levels, 2 * levels + 1) if row == 0 else (2 * levels + 1, levels)
         bands[1, row] = top[mine] * own[piece]
@@ -99,7 +100,7 @@ def _spline(times: np.ndarray, table: np.ndarray) -> HermiteMotion:
 
 
 def _basis(levels: int) -> Float[np.ndarray, "powers given"]:
-    """Return powers of a piece of length 1 by what its beginning and its end are, with one level more than is given."""
+    """Return the powers of a piece of length 1 for each value at its ends, with one more level than is given."""
     given = levels + 1
     columns = []
     for k in range(2 * given):
@@ -128,10 +129,11 @@ def _derivative(law: SplineMotion, instants: np.ndarray, order: int) -> Float[np
 
 
 def _errors(times: np.ndarray, table: np.ndarray) -> Float[np.ndarray, " derivative"]:
-    """Estimate errors of the derivatives relative to their peaks, as `derivative_errors` does for positions alone.
+    """Return estimated relative errors of the derivatives, like `derivative_errors` for positions only.
 
-    The error of interpolation is the difference to the spline through every second sample, that of noise the deviation
-    that noise of the positions, and of what is given of their derivatives, makes in the worst place of an even grid.
+    The error of interpolation is the difference to the spline through every second sample. The error of noise is the
+    standard deviation that noise of the positions and their given derivatives causes at the worst instant of an even
+    grid.
     """
     if len(times) > LONGEST:
         times, table = times[:LONGEST], table[:LONGEST]
@@ -162,7 +164,7 @@ def _errors(times: np.ndarray, table: np.ndarray) -> Float[np.ndarray, " derivat
 
 
 def _influence(grid: np.ndarray, inside: np.ndarray, levels: int, level: int, degree: int) -> list[float]:
-    """Return the deviation of each derivative that independent noise of 1 in one level makes on a grid of step 1."""
+    """Return the deviation of each derivative caused by independent noise of 1 in one level, on a grid of step 1."""
     squares = np.zeros((degree + 1, len(inside)))
     for k in range(len(grid)):
         table = np.zeros((len(grid), levels))

@@ -1,4 +1,4 @@
-"""Motion laws of which a derivative was measured: splines through its samples, integrated exactly."""
+"""Motion laws with a measured derivative: splines through its samples, integrated exactly."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -21,34 +21,34 @@ from jounce.trajectory.sample_errors import derivative_errors
 from jounce.trajectory.splines import integrated, spline_through
 from jounce.units.expression import Expression
 
-HIGHEST = 4  # derivative that can be measured: jounce
+HIGHEST = 4  # highest derivative that can be measured: jounce
 BEYOND = ("refuse", "hold", "repeat", "advance", "continue")
 
 InitialValue = float | str | Expression | jax.Array
 
 
 class MeasuredMotion(SplineMotion):
-    """A motion law one of whose derivatives goes through samples, such as measured accelerations.
+    """A motion law of which a derivative goes through samples, such as measured accelerations.
 
-    The spline through the samples is integrated exactly; what the samples do not say is given at the first of them.
-    Negrean 2025, section 4, drives a robot so.
+    The spline through the samples is integrated exactly; the constants of integration are given at the first sample, as
+    in Negrean 2025, section 4.
 
     Parameters
     ----------
     times : array_like of shape (samples,)
         Strictly increasing instants, s.
     values : array_like of shape (samples,)
-        Samples of the derivative, m or rad by s to the power of `derivative`.
+        Samples of the derivative, m or rad per s to the power of `derivative`.
     derivative : int, default 2
-        Which derivative was measured: 1 velocity, 2 acceleration, 3 jerk, 4 jounce.
+        Order of the measured derivative: 1 velocity, 2 acceleration, 3 jerk, 4 jounce.
     initial : sequence of float, str or Expression, optional
-        The law and its derivatives below `derivative` at the first sample, lowest first; zero where not given. Those
-        that are expressions of parameters have their values from the mechanism that the law belongs to.
+        The law and its derivatives below `derivative` at the first sample, lowest first; zero by default. Expressions
+        of parameters get values from the mechanism of the law.
     degree : int, default 5
-        Of the spline through the samples, from 1 to 11; that of the law is higher by `derivative`.
+        Degree of the spline through the samples, from 1 to 11; that of the law is higher by `derivative`.
     beyond : {"refuse", "hold", "repeat", "advance", "continue"}, default "refuse"
-        What the law is before the first and after the last sample, as for `SplineMotion`. Where it is to repeat or to
-        advance, its derivatives must be at the last sample what they are at the first.
+        The law before the first and after the last sample, as for `SplineMotion`. With repeat or advance, its
+        derivatives must be the same at the last sample as at the first.
 
     Raises
     ------
@@ -99,7 +99,7 @@ class MeasuredMotion(SplineMotion):
         self.extrapolation = beyond
 
     def resolved(self, parameters: Mapping[str, Any]) -> "MeasuredMotion":
-        """Return the law with numbers in the place of its expressions of parameters."""
+        """Return the law with numbers in the place of expressions of parameters."""
         if not self._open:
             return self
         known = [x.evaluate(parameters) if isinstance(x, Expression) else x for x in self.initial.value]
@@ -109,11 +109,11 @@ class MeasuredMotion(SplineMotion):
 
     @property
     def _open(self) -> list[str]:
-        """Names of the parameters without which the law is not known."""
+        """Names of the parameters that lack values."""
         return sorted({name for x in self.initial.value if isinstance(x, Expression) for name in x.names})
 
     def __call__(self, time: Jet) -> Jet:
-        """Return the jet of the law at the instants of the time jet; parameters need their values, see `resolved`."""
+        """Return the jet of the law at the instants of the time jet; parameters need values, see `resolved`."""
         if self._open:
             message = "depends on parameters, whose values a mechanism knows; give numbers"
             raise MechanismError(message, name="initial", value=self._open)
@@ -132,7 +132,7 @@ class MeasuredMotion(SplineMotion):
 def _started(
     pieces: Float[np.ndarray, "powers pieces"], ends: Float[np.ndarray, " breakpoints"], initial: Sequence[Any]
 ) -> Any:
-    """Return pieces to which the polynomial of the values at the beginning was added."""
+    """Return pieces with the polynomial of the initial values added."""
     since = ends[:-1] - ends[0]
     added = [
         sum(x / math.factorial(n) * math.comb(n, k) * since ** (n - k) for n, x in enumerate(initial) if n >= k)
@@ -143,7 +143,7 @@ def _started(
 
 
 def _advance(pieces: Any, ends: Float[np.ndarray, " breakpoints"], derivative: int, beyond: str) -> Any:
-    """Return by how much a law goes on from one period to the next, whose derivatives must begin as they end."""
+    """Return the gain of a law over a period; raise MechanismError unless its derivatives end as they begin."""
     length = ends[-1] - ends[-2]
     gains = []
     for level in range(derivative):
@@ -164,7 +164,7 @@ def _advance(pieces: Any, ends: Float[np.ndarray, " breakpoints"], derivative: i
 
 
 def _checked(initial: Any, derivative: int) -> tuple[Any, ...]:
-    """Return the values at the first sample, zeros added."""
+    """Return the values at the first sample after a check, padded by zeros."""
     try:
         known = [Expression(x) if isinstance(x, str) else x for x in initial]
         known = [x.evaluate() if isinstance(x, Expression) and not x.names else x for x in known]
