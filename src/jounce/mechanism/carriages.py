@@ -101,8 +101,8 @@ def _nearest(curve: CurveLaw, point: Any) -> Any:
         far = jnp.sum((points - jnp.asarray(point)[:, None]) ** 2, axis=0)
         return jnp.asarray(grid)[jnp.nanargmin(far)]
 
-    away = partial(derivatives_at, curve.components)
-    points = away(grid)[0]
+    derivatives = partial(derivatives_at, curve.components)
+    points = derivatives(grid)[0]
     size = float(np.ptp(np.where(np.isfinite(points), points, 0.0), axis=1).max()) or 1.0
     far = np.linalg.norm(points - np.asarray(point)[:, None], axis=0)
     far = np.where(np.isfinite(far), far, np.inf)
@@ -112,11 +112,11 @@ def _nearest(curve: CurveLaw, point: Any) -> Any:
     lower, upper = np.maximum(grid[near] - step, low), np.minimum(grid[near] + step, high)
     for _ in range(STEPS):  # ternary search
         a, b = lower + (upper - lower) / 3, upper - (upper - lower) / 3
-        sizes = np.split(np.linalg.norm(away(np.concatenate([a, b]))[0] - np.asarray(point)[:, None], axis=0), 2)
+        sizes = np.split(np.linalg.norm(derivatives(np.concatenate([a, b]))[0] - np.asarray(point)[:, None], axis=0), 2)
         nearer = sizes[0] < sizes[1]
         lower, upper = np.where(nearer, lower, a), np.where(nearer, b, upper)
     parameter = 0.5 * (lower + upper)
-    points = away(parameter)[0]
+    points = derivatives(parameter)[0]
     distances = np.linalg.norm(points - np.asarray(point)[:, None], axis=0)
     ranked = np.lexsort((np.abs(parameter), np.round(distances / (SLIGHT * size))))
     best = int(ranked[0])
@@ -125,7 +125,7 @@ def _nearest(curve: CurveLaw, point: Any) -> Any:
         crossing = (
             not elsewhere
             and distances[best] < SLIGHT * size
-            and _turned(away, float(parameter[best]), float(parameter[k]))
+            and _turned(derivatives, float(parameter[best]), float(parameter[k]))
         )
         if (elsewhere or crossing) and distances[k] <= ALIKE * distances[best] + SLIGHT * size:
             names = " and ".join(f"s = {parameter[j]:.4g}" for j in sorted((best, int(k)), key=lambda j: parameter[j]))
@@ -138,9 +138,9 @@ def _plain(values: Any) -> list[Any]:
     return [x if isinstance(x, Tracer) else float(x) for x in values]
 
 
-def _turned(away: Any, first: float, second: float) -> bool:
+def _turned(derivatives: Any, first: float, second: float) -> bool:
     """Return whether the tangents at two values of a parameter have different directions."""
-    tangents = away(np.array([first, second]))[1]
+    tangents = derivatives(np.array([first, second]))[1]
     tangents = tangents / np.linalg.norm(tangents, axis=0)
     return abs(float(tangents[:, 0] @ tangents[:, 1])) < 1 - 1e-6
 

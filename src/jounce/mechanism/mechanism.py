@@ -356,10 +356,10 @@ class Mechanism(Displayed):
 
     def _read(self, name: str, text: str, known: Mapping[str, Dimension]) -> Any:
         """Return the value of a parameter given as text, checked against the dimensions that it may have."""
-        others = [other for other in self.parameters if other != name]
+        other_names = [other for other in self.parameters if other != name]
         allowed = self.dimensions.get(name, ())
         try:
-            given = parse_value(text, "any", others, known)
+            given = parse_value(text, "any", other_names, known)
             if allowed and given.dimension is not None:
                 check_one_of(given.dimension, allowed, exactly=not isinstance(given.value, Expression))
         except JounceError as error:

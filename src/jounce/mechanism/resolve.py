@@ -84,8 +84,8 @@ def resolve_motion(motion: Any, parameters: Mapping[str, Any]) -> AbstractMotion
         motion = expression_in_si(motion)
     if isinstance(motion, Expression):
         _check_names(motion, {"t"}, parameters)
-        known = {name: parameters[name] for name in sorted(motion.names - {"t"})}
-        return unchecked(ExpressionMotion, {"expression": motion, "parameters": known})
+        values = {name: parameters[name] for name in sorted(motion.names - {"t"})}
+        return unchecked(ExpressionMotion, {"expression": motion, "parameters": values})
     if callable(motion):
         return read_laws(tried_law(motion))
     raise MechanismError("a motion is an expression, a function of time or a motion law", value=motion)
@@ -352,13 +352,13 @@ def stack_elements(elements: Sequence[Element], values: Sequence[Mapping[str, An
     static = static_fields(kind)
     stacked: dict[str, Any] = {"bodies": (), **_found_later(kind)}
     for name in value_fields(kind):  # fields without `init` are set later, from the poses of the bodies
-        its = [v[name] for v in values]
-        if name in static or its[0] is None:
-            stacked[name] = its[0]
-        elif isinstance(its[0], float | np.ndarray):
-            stacked[name] = along_instances(*its)
+        field_values = [v[name] for v in values]
+        if name in static or field_values[0] is None:
+            stacked[name] = field_values[0]
+        elif isinstance(field_values[0], float | np.ndarray):
+            stacked[name] = along_instances(*field_values)
         else:
-            stacked[name] = jax.tree.map(along_instances, *its)
+            stacked[name] = jax.tree.map(along_instances, *field_values)
     return unchecked(kind, stacked)  # each instance was checked
 
 

@@ -115,14 +115,14 @@ def users_class(kind: type) -> type:
 
 def _read_methods(kind: type) -> tuple[str, ...]:
     """Return the names of the methods of a class that a user may have written, or that call such methods."""
-    known = [(name, method) for name in _methods_of(kind) if (method := getattr(kind, name, None)) is not None]
+    methods = [(name, method) for name in _methods_of(kind) if (method := getattr(kind, name, None)) is not None]
     if (
-        known
+        methods
         and not belongs_to_package(kind)
-        and changes_parts(kind, tuple(_METHODS), names := [name for name, _ in known])
+        and changes_parts(kind, tuple(_METHODS), names := [name for name, _ in methods])
     ):
         return tuple(names)
-    return tuple([name for name, method in known if not belongs_to_package(method)])
+    return tuple([name for name, method in methods if not belongs_to_package(method)])
 
 
 @lru_cache(maxsize=1000)
@@ -289,10 +289,10 @@ class _Reader:
     def reading(self, name: str) -> Reading:
         written, arguments = getattr(self.kind, name), self._arguments(name)
         of_time = [name for name in self.laws if isinstance(arguments[-1], Jet)]
-        its = {law: _series((), ORDER) for law in of_time}
+        law_series = {law: _series((), ORDER) for law in of_time}
         fields = _fields_with_numbers(self.kind, self.laws)
         held, tree = jax.tree.flatten([getattr(self.element, n) for n in fields])
-        jets = [*(x for argument in arguments for x in _jets(argument)), *its.values(), *held]
+        jets = [*(x for argument in arguments for x in _jets(argument)), *law_series.values(), *held]
         rates = [a.angular_velocity for a in arguments if isinstance(a, SpatialPose)]
 
         def called(given: Sequence[Any], rates: Iterator[Any]) -> Any:

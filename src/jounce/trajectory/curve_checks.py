@@ -65,10 +65,10 @@ def check_curve(formulas: Sequence[Any], window: Sequence[float], *, stated: boo
     if stated and not finite.all():
         where = float(parameters[np.argmin(finite)])
         raise MechanismError(f"the curve or its tangent is not finite at s = {where:.6g}; state a range where they are")
-    known = np.where(finite)[0]
-    if not known.size:
+    defined = np.where(finite)[0]
+    if not defined.size:
         return
-    _check_cusps(at, parameters[known], values[:, :, known])
+    _check_cusps(at, parameters[defined], values[:, :, defined])
     if any(_may_break(f.expression.text) for f in formulas):
         _check_jumps(at, parameters, values)
     if closed:
@@ -156,9 +156,9 @@ def _check_seam(at: Callable[[Parameters], Values], low: float, high: float, val
     begins, ends = at(low + since), at(high + since)
     sizes = np.abs(values).max(axis=(1, 2))
     sizes[0] = max(np.ptp(values[0], axis=1))
-    if (away := np.linalg.norm(ends[0, :, 0] - begins[0, :, 0])) > JUMP * sizes[0]:
+    if (gap := np.linalg.norm(ends[0, :, 0] - begins[0, :, 0])) > JUMP * sizes[0]:
         raise MechanismError(
-            f"the curve does not close: there is a gap of {away:.3g} m between its end and its beginning"
+            f"the curve does not close: there is a gap of {gap:.3g} m between its end and its beginning"
         )
     for level in range(1, LEVELS + 1):
         if np.abs(ends[level, :, 0] - begins[level, :, 0]).max() > JUMP * max(sizes[level], sizes[1]):

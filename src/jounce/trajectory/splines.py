@@ -123,9 +123,9 @@ def _periodic(times: _Samples, values: _Samples, degree: int, beyond: str) -> tu
     """Return breakpoints, coefficients and gain of a spline that continues smoothly from its end to its beginning."""
     if degree % 2 == 0:
         raise MechanismError("samples that repeat need a spline of odd degree", value=degree)
-    difference, duration = float(values[-1] - values[0]), float(np.ptp(values)) or 1.0
+    difference, spread = float(values[-1] - values[0]), float(np.ptp(values)) or 1.0
     advance = float(whole_periods(difference)) if beyond == "repeat" else difference
-    if abs(difference - advance) > CLOSED * duration:
+    if abs(difference - advance) > CLOSED * spread:
         message = (
             "samples that repeat must end at the value they begin with, or whole turns of 2 pi from it; the last one "
             f"is {difference:g} (SI) from the first: close them, or choose beyond: advance"

@@ -257,8 +257,8 @@ class Table:
             return
         first = [row[0] for _, row in self.rows] if self.numbers is None else self.numbers.values[:, 0].tolist()
         numbers = [_number(str(entry)) for entry in first]
-        begin = numbers[0]
-        if begin in (0.0, 1.0) and all(number == begin + k for k, number in enumerate(numbers)):
+        first_number = numbers[0]
+        if first_number in (0.0, 1.0) and all(number == first_number + k for k, number in enumerate(numbers)):
             self.header[0] = ROW_NUMBER
         elif "time" not in self.header:
             self.header[0] = "time"

@@ -68,21 +68,25 @@ def converted(
 
 
 def _move_samples(
-    node: Any, path: str | PathLike[str], there: Path, allow: Iterable[str | PathLike[str]], copies: dict[Path, str]
+    node: Any,
+    path: str | PathLike[str],
+    target_folder: Path,
+    allow: Iterable[str | PathLike[str]],
+    copies: dict[Path, str],
 ) -> None:
     """Rename sample files relative to another folder, and record those to be copied."""
-    folders = [Path(os.path.realpath(folder)) for folder in (there, *allow)]
+    folders = [Path(os.path.realpath(folder)) for folder in (target_folder, *allow)]
     for entry in node.values() if isinstance(node, dict) else node if isinstance(node, list) else ():
         if isinstance(entry, dict) and isinstance(entry.get("samples"), str):
             file = named_file(entry["samples"], path, allow)
             if any(Path(file).is_relative_to(folder) for folder in folders):
                 entry["samples"] = Path(os.path.relpath(file, folders[0])).as_posix()
             else:
-                target = there / Path(file).name
+                target = target_folder / Path(file).name
                 while copies.setdefault(target, file) != file:  # a different file of the same name
                     target = target.with_name(f"{target.stem}_{target.suffix}")
                 entry["samples"] = target.name
-        _move_samples(entry, path, there, allow, copies)
+        _move_samples(entry, path, target_folder, allow, copies)
 
 
 def assigned(robot: Robot, texts: Iterable[str], option: str, *, law: bool) -> dict[str, Any]:

@@ -127,7 +127,7 @@ def _outliers(times: np.ndarray, below: np.ndarray, rate: np.ndarray) -> tuple[i
     middle = (slopes[:-1] * after + slopes[1:] * before) / (before + after)  # slope of the parabola
     sigmas = [float(np.median([noise(times[b], x[b]) for b in _blocks(len(times))])) for x in (below, rate)]
     by_noise = NOISES * (sigmas[1] + 2 * sigmas[0] / np.minimum(before, after))
-    away = np.abs(rate[1:-1] - middle) - by_noise  # of all samples but the first and the last
+    deviation = np.abs(rate[1:-1] - middle) - by_noise  # of all samples but the first and the last
     best = None
     for count in range(1, MOST + 1):
         groups = len(times) - count - 3  # number of groups with two neighbors on each side
@@ -141,7 +141,7 @@ def _outliers(times: np.ndarray, below: np.ndarray, rate: np.ndarray) -> tuple[i
             share = (times[own] - times[left]) / (times[right] - times[left])
             noisy = by_noise[k - 1 : k - 1 + groups]
             by_neighbors = np.abs(rate[own] - rate[left] - share * turn) - noisy
-            far = np.minimum(far, np.minimum(away[k - 1 : k - 1 + groups], by_neighbors))
+            far = np.minimum(far, np.minimum(deviation[k - 1 : k - 1 + groups], by_neighbors))
         far -= change
         worst = int(np.argmax(far))
         if best is None or far[worst] > best[0]:

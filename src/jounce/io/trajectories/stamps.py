@@ -61,13 +61,13 @@ def relative(
         raise fail("must be a finite number", int(bad[0]))
     try:
         exact = [Decimal(text.strip()) for text in texts[:1]]
-        known = epoch(exact[0], per_second, unit) if exact else None
-        if known is None:
+        epoch_unit = epoch(exact[0], per_second, unit) if exact else None
+        if epoch_unit is None:
             return values, ""
         exact = [Decimal(text.strip()) for text in texts]
     except InvalidOperation:  # a form that only float can read
         return values, ""
-    digits, words = known
+    digits, words = epoch_unit
     return np.array([float((stamp - exact[0]).scaleb(-digits)) for stamp in exact]), words
 
 

@@ -161,10 +161,10 @@ def _times(table: Table, columns: Columns) -> tuple[Float[np.ndarray, " row"], s
     size = table.unit(columns.time, (TIME,))[0]
     if table.numbers is not None:
         values, origin = np.array(table.column(columns.time)), table.numbers.offsets.get(columns.time)
-        known = None if origin is None else epoch(origin, _units(columns, values), unit)
-        if known is None:
+        epoch_unit = None if origin is None else epoch(origin, _units(columns, values), unit)
+        if epoch_unit is None:
             return (values / _units(columns, values) if unit is None else values), ""
-        digits, words = known
+        digits, words = epoch_unit
         return table.numbers.values[:, columns.time] / 10**digits, words
 
     def fail(message: str, row: int) -> TrajectoryError:

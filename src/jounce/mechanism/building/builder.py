@@ -164,8 +164,8 @@ def _built(mechanism: Mechanism, like: Model | None, *, initial: bool) -> Model:
     (groups, names), (forces, force_names), (outputs, output_names) = grouped_elements(mechanism, initial=initial)
     if like is not None:
         parts = {"groups": groups, "forces": forces, "outputs": outputs}
-        known = {name: tuple(map(with_derived_of, part, getattr(like.system, name))) for name, part in parts.items()}
-        return dataclasses.replace(like, system=with_fields(like.system, **known))
+        derived = {name: tuple(map(with_derived_of, part, getattr(like.system, name))) for name, part in parts.items()}
+        return dataclasses.replace(like, system=with_fields(like.system, **derived))
 
     pose_type = PlanarPose if components == 2 else SpatialPose
     guess = starting_guess(mechanism, parameters, components)
@@ -182,14 +182,14 @@ def _built(mechanism: Mechanism, like: Model | None, *, initial: bool) -> Model:
 
 def _released(model: Model) -> Model:
     system, groups, names = model.system, [], []
-    for group, its in named_groups(model):
-        stay = [k for k, name in enumerate(its) if not name.startswith("initial.")]
-        if len(stay) < len(its):  # drivers of the same kind may be among them
+    for group, members in named_groups(model):
+        stay = [k for k, name in enumerate(members) if not name.startswith("initial.")]
+        if len(stay) < len(members):  # drivers of the same kind may be among them
             element = jax.tree.map(lambda values, stay=stay: values[..., stay, :], group.element)
             group = with_fields(group, element=element, bodies=tuple(tuple(s[k] for k in stay) for s in group.bodies))
         if stay:
             groups.append(group)
-            names.append(tuple(its[k] for k in stay))
+            names.append(tuple(members[k] for k in stay))
     parts = ((tuple(groups), tuple(names)), ((), ()), ((), ()))
     own = sum(not name.endswith(ENDING) for name in model.bodies) + 1  # carriages follow the bodies
     length = _size(tuple(groups), model.guess["position"][:, :own])
@@ -289,8 +289,8 @@ def with_reference(
     prescribed = (*prescribed_angles(groups, coordinates, laws), *prescribed)
     forces, outputs = (with_datums(part, coordinates, prescribed) for part in (system.forces, system.outputs))
     system = with_fields(system, groups=groups, forces=forces, outputs=outputs)
-    away = departure(model.system.groups, groups)
-    return with_fields(model, system=system, reference=coordinates, prescribed=prescribed), away
+    driver_error = departure(model.system.groups, groups)
+    return with_fields(model, system=system, reference=coordinates, prescribed=prescribed), driver_error
 
 
 def counted_as_in(groups: tuple[Group, ...], model: Model) -> tuple[Group, ...]:
@@ -324,7 +324,7 @@ def _layout(
     bodies: tuple[tuple[tuple[int, ...], ...], ...], row_counts: tuple[int, ...], width: int, body_count: int
 ) -> tuple[Pattern, Fronts | None]:
     """Return the sparsity pattern of the Jacobian and its elimination order, which are the same for all values."""
-    pattern = Pattern.of([Group(None, its) for its in bodies], row_counts, width, body_count)
+    pattern = Pattern.of([Group(None, slots) for slots in bodies], row_counts, width, body_count)
     fronts = elimination(pattern)
     for array in jax.tree.leaves((pattern, fronts)):
         array.setflags(write=False)  # many models share it

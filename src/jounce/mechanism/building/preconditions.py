@@ -54,8 +54,8 @@ def concrete(
         check_process()
         given = dict(zip(names, arguments, strict=False)) | keywords
         if (location := _traced(given)) is not None and traced is not None:
-            others = {name: value for name, value in given.items() if name != names[0]}
-            if (location := _traced(others)) is None:
+            other_arguments = {name: value for name, value in given.items() if name != names[0]}
+            if (location := _traced(other_arguments)) is None:
                 return traced(wrapper, given)
             raise UnsupportedError(WHAT_IS_NOT_TRACED.format(function.__name__), name=location)
         if location is not None:

@@ -175,11 +175,11 @@ def _depends(orientation: Any, values: Mapping[str, Any]) -> bool:
 
 def _counted(groups: tuple[Group, ...], angles: Part, near: Part, pose: Any) -> tuple[Group, ...]:
     """Return groups whose angles about axes are counted from a pose, with known whole turns."""
-    known = zip(angles, near, strict=True)
-    return tuple(_with_datum(group, pose, *next(known)) if measures_angle(group) else group for group in groups)
+    counts = zip(angles, near, strict=True)
+    return tuple(_with_datum(group, pose, *next(counts)) if measures_angle(group) else group for group in groups)
 
 
-def _with_datum(group: Group, pose: SpatialPose, known: Any, near: Any) -> Group:
+def _with_datum(group: Group, pose: SpatialPose, counted_angle: Any, near: Any) -> Group:
     element, (body_i, body_j) = group.element, (pose.take(indices) for indices in group.bodies)
     e0, e = (jet.coefficients[0] for jet in body_i.relative_quaternion(body_j.quaternion))
     attitude = jnp.concatenate([e0[None], e])
@@ -188,14 +188,16 @@ def _with_datum(group: Group, pose: SpatialPose, known: Any, near: Any) -> Group
     if element.vector_i is None:
         angle, is_defined = angle_of(attitude, axis)
         return with_field(
-            group, "datum", Datum(attitude, jnp.where(is_defined, shifted_by_turns(angle, known), known), near)
+            group,
+            "datum",
+            Datum(attitude, jnp.where(is_defined, shifted_by_turns(angle, counted_angle), counted_angle), near),
         )
     across = None
     if hasattr(element, "role"):  # a driver or a force acts about the axis: see `axis_angles`
         second = jnp.asarray(element.vector_j)
         along = body_j.to_body(body_i.direction(axis)).coefficients[0]
         across = second - (second * along).sum(axis=0, keepdims=True) * along
-    return with_field(group, "datum", Datum(attitude, known, near, across))
+    return with_field(group, "datum", Datum(attitude, counted_angle, near, across))
 
 
 def angles_of(model: Model, counted: tuple[tuple[Group, ...], tuple[Group, ...]]) -> Angles:

@@ -45,10 +45,10 @@ def check_laws(mechanism: Mechanism, instants: np.ndarray, order: int, *, forces
     """
     first, last = float(np.min(instants)), float(np.max(instants))
     warn_of_degrees(mechanism, first, last)
-    begin = float(instants[0])
+    start = float(instants[0])
     parts = [("drivers", first, last, order)]
     if forces:
-        parts += [("initial", begin, begin, 1), ("forces", first, last, order - 2)]
+        parts += [("initial", start, start, 1), ("forces", first, last, order - 2)]
     for kind, since, until, orders in parts:
         for name, element in getattr(mechanism, kind).items():
             for field, law in _motions(element):

@@ -69,7 +69,7 @@ def with_output_drivers(mechanism: Mechanism) -> Mechanism:
         if not hasattr(mechanism.drivers[name], "evaluate"):
             message = "the class of this driver does not define its coordinate; give it a method evaluate"
             raise MechanismError(message, name=location, value=type(mechanism.drivers[name]).__name__)
-        twice = [other for other, its in led.items() if its.output == motion.output and other != name]
+        twice = [other for other, other_motion in led.items() if other_motion.output == motion.output and other != name]
         if twice:
             raise MechanismError(
                 f"the driver '{twice[0]}' follows from this output already",

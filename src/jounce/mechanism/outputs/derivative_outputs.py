@@ -255,8 +255,8 @@ def _operand(key: str, name: str, outputs: Mapping[str, AbstractQuantity], mecha
     stem = _base_output(name, outputs, mechanism)
     if not stem:
         labels = {other: output.component_labels(mechanism) for other, output in outputs.items()}
-        known = [each for other, its in labels.items() for each in ([f"{other}_{x}" for x in its] or [other])]
-        raise MechanismError(no_such("output", name, known), name=key, value=name)
+        valid_names = [each for other, its in labels.items() for each in ([f"{other}_{x}" for x in its] or [other])]
+        raise MechanismError(no_such("output", name, valid_names), name=key, value=name)
     labels = outputs[stem].component_labels(mechanism)
     if labels and stem == name:
         raise MechanismError(f"this output has components; name one, such as {name}_{labels[0]}", name=key, value=name)

@@ -70,18 +70,18 @@ class AttitudeHistory(NamedTuple):
         measure : callable
             Returns the angles, rad, of attitudes of all bodies, (4, bodies, samples).
         """
-        between, known = self.between, measure(self.quaternion)
+        between, angles = self.between, measure(self.quaternion)
         if between is None:
-            return self.time, known
+            return self.time, angles
         whole = np.zeros(len(self.time), int)  # a single path, with time as its parameter
-        samples = refined_samples(lambda _, instants: measure(between(instants)), whole, self.time, known)
+        samples = refined_samples(lambda _, instants: measure(between(instants)), whole, self.time, angles)
         return samples.share, samples.angle
 
     def angles(self, group: Group) -> tuple[Float[np.ndarray, " sample"], Float[np.ndarray, "instance sample"]]:
         """Return instants, and the angles of a group about axes at these instants, counted from its datum."""
         time, raw = self.sampled(lambda quaternion: raw_angles([group], {"quaternion": quaternion})[0])
-        begun = np.asarray(group.element.datum.near)[..., 0]
-        return time, counted_on(np.column_stack([begun, raw]))[:, 1:]
+        initial = np.asarray(group.element.datum.near)[..., 0]
+        return time, counted_on(np.column_stack([initial, raw]))[:, 1:]
 
     def last_angles(self, groups: Sequence[Group]) -> list[np.ndarray]:
         """Return the angles at the end, (instances, 1) each, including the repeated turns."""
@@ -96,8 +96,8 @@ class AttitudeHistory(NamedTuple):
         counted = []
         for time, angles in (self.angles(group) for group in groups if measures_angle(group)):
             backward = time[-1] < time[0]
-            known, angles = (time[::-1], angles[:, ::-1]) if backward else (time, angles)
-            counted.append(angles[:, nearest_instants(known, instants)])
+            sample_times, angles = (time[::-1], angles[:, ::-1]) if backward else (time, angles)
+            counted.append(angles[:, nearest_instants(sample_times, instants)])
         return with_turns(groups, counted)
 
 
@@ -183,8 +183,8 @@ def of_one_lane(groups: Sequence[Group], lane: int = 0) -> tuple[Group, ...]:
 
 def _with_datum(group: Group, coordinates: Coordinates, prescribed: Sequence[PrescribedAngle], *, keep: bool) -> Group:
     element, attitude = group.element, relative_attitude(group, coordinates)
-    axis, known = axis_of(group), element.datum
-    before = np.zeros(attitude.shape[1:]) if known is None else since(known, attitude, axis)
+    axis, datum = axis_of(group), element.datum
+    before = np.zeros(attitude.shape[1:]) if datum is None else since(datum, attitude, axis)
     if element.vector_i is not None:
         angle = _between(attitude, axis, np.asarray(element.vector_i), np.asarray(element.vector_j))
     elif keep:
@@ -192,7 +192,7 @@ def _with_datum(group: Group, coordinates: Coordinates, prescribed: Sequence[Pre
     else:
         angle, is_defined = angle_of(attitude, axis)
         angle = np.where(is_defined, angle, before)
-    angle = before + principal(angle - before) if known is not None else principal(angle)
+    angle = before + principal(angle - before) if datum is not None else principal(angle)
     for k, bodies in enumerate(zip(*group.bodies, strict=True)):
         for given in prescribed:
             sign = _relative_sign(bodies, turned(coordinates["quaternion"][:, bodies[0], 0], axis[:, k, 0]), given)
@@ -206,11 +206,11 @@ def _with_datum(group: Group, coordinates: Coordinates, prescribed: Sequence[Pre
     return with_field(group, "datum", unchecked(Datum, values))
 
 
-def with_datum_of(group: Group, known: Group) -> Group:
+def with_datum_of(group: Group, reference: Group) -> Group:
     """Return a group whose angles are counted from the datum of another group; its vectors may be traced by JAX."""
-    datum = known.element.datum
+    datum = reference.element.datum
     if datum.across is not None:
-        across = _across(group.element.vector_j, np.asarray(datum.attitude), axis_of(known))
+        across = _across(group.element.vector_j, np.asarray(datum.attitude), axis_of(reference))
         datum = with_fields(datum, across=across)
     return with_field(group, "datum", datum)
 

@@ -240,13 +240,13 @@ def _on_frames(group: Group, gears: Sequence[spatial.Gear], mechanism: Mechanism
         data = []
         for gear in gears:
             axis = body_vector(gear.bodies[slot], (gear.axis_i, gear.axis_j)[slot], parameters)
-            there = on_joined_bodies(axis, hinges, parallel).get(gear.bodies[2])
-            if there is None:
+            frame_axis = on_joined_bodies(axis, hinges, parallel).get(gear.bodies[2])
+            if frame_axis is None:
                 break
-            data.append((as_array(axis.value), as_array(there.value)))
+            data.append((as_array(axis.value), as_array(frame_axis.value)))
         if len(data) == len(gears):
-            axis, there = (along_instances(*vectors) for vectors in zip(*data, strict=True))
-            group = with_field(group, field, _coaxial(axis, there))
+            axis, frame_axis = (along_instances(*vectors) for vectors in zip(*data, strict=True))
+            group = with_field(group, field, _coaxial(axis, frame_axis))
     return with_field(group, "whole", _whole_multiples(group.element.ratio))
 
 
@@ -267,18 +267,19 @@ def _check_points_on_axes(gears: Mapping[str, spatial.Gear], mechanism: Mechanis
             values = [[body_vector(body, vector, parameters).value for vector in line] for line in (given, *lines)]
             if any(isinstance(x, Tracer) for line in values for vector in line for x in vector):
                 continue
-            (axis, point), *others = np.asarray(values, float)
+            (axis, point), *hinge_lines = np.asarray(values, float)
             axis = axis / np.linalg.norm(axis)
             offsets = [
-                there - point
-                for other, there in others
-                if np.linalg.norm(np.cross(axis, other)) <= ACROSS * np.linalg.norm(other)
+                hinge_point - point
+                for hinge_axis, hinge_point in hinge_lines
+                if np.linalg.norm(np.cross(axis, hinge_axis)) <= ACROSS * np.linalg.norm(hinge_axis)
             ]
             sizes = [np.linalg.norm(x) + np.linalg.norm(point) for x in offsets]
-            away = [np.linalg.norm(np.cross(axis, x)) for x in offsets]
-            if away and all(a > LARGEST_GAP * size for a, size in zip(away, sizes, strict=True)):
+            distances = [np.linalg.norm(np.cross(axis, x)) for x in offsets]
+            if distances and all(a > LARGEST_GAP * size for a, size in zip(distances, sizes, strict=True)):
                 message = (
-                    f"this point of '{body}' is {min(away):.6g} m from the axis of its hinge: give one that is on it"
+                    f"this point of '{body}' is {min(distances):.6g} m from the axis of its hinge: "
+                    "give one that is on it"
                 )
                 raise MechanismError(message, name=f"{name}.points", value=point.tolist())
 
@@ -309,14 +310,14 @@ def _check_racks(racks: Mapping[str, spatial.Rolling], mechanism: Mechanism) -> 
                 "right angles to the vector, both on the first body"
             )
             raise MechanismError(message, name=f"{name}.axes", value=[float(x) for x in u])
-        there = on_joined_bodies(own, hinges, parallel, constant_attitudes(mechanism)).get(rack.bodies[0])
-        if there is None or not _same_direction(np.asarray(there.value, float), u):
+        rack_axis = on_joined_bodies(own, hinges, parallel, constant_attitudes(mechanism)).get(rack.bodies[0])
+        if rack_axis is None or not _same_direction(np.asarray(rack_axis.value, float), u):
             message = (
                 "the pinion does not turn about this axis on the rack: hinge it, and guide the rack so that it keeps "
                 "its attitude, by joints that have the axes, such as a revolute and a prismatic joint to one body"
             )
-            if there is not None:
-                components = ", ".join(f"{float(x):.6g}" for x in there.value)
+            if rack_axis is not None:
+                components = ", ".join(f"{float(x):.6g}" for x in rack_axis.value)
                 message = (
                     f"by the joints between them, the axis of the pinion is [{components}] on the rack: give that "
                     "one, or the opposite on both bodies"
@@ -341,7 +342,7 @@ def _on_hinges(group: Group, cams: Sequence[Cam], mechanism: Mechanism) -> Group
         other_axes = [
             on_joined_bodies(axis, hinges, parallel).get(part.bodies[1]) for axis, part in zip(axes, parts, strict=True)
         ]
-        if any(there is None for there in other_axes):
+        if any(other is None for other in other_axes):
             continue
         first, second = (along_instances(*(as_array(x.value) for x in its if x)) for its in (axes, other_axes))
         part, datum = getattr(group.element, field), _coaxial(first, second)
@@ -359,8 +360,8 @@ def _across(vector: Any, axis: Any) -> Any:
 _coaxial_of = compiled(brief=True)(coaxial)
 
 
-def _coaxial(axis: Any, there: Any) -> Datum:
-    datum = _coaxial_of(axis, there)
+def _coaxial(axis: Any, other_axis: Any) -> Datum:
+    datum = _coaxial_of(axis, other_axis)
     if isinstance(datum.attitude, Tracer):  # the call is inside a function that JAX compiles
         return datum
     return Datum(*(np.asarray(x) for x in (datum.attitude, datum.angle, datum.near)))

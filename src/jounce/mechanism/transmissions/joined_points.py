@@ -142,20 +142,20 @@ def on_joined_bodies(
     """
     reached, waiting = {start.body: start}, [start]
     while waiting:
-        here = waiting.pop(0)
+        vector = waiting.pop(0)
         for pair in joined:
             for near, far in (pair, pair[::-1]):
-                if near.body != here.body or far.body in reached:
+                if near.body != vector.body or far.body in reached:
                     continue
-                if sign := int(alike(here, near)):
-                    there = far if sign > 0 else BodyVector(far.body, tuple(-x for x in far.value), far.given)
-                    reached[far.body] = there
-                    waiting.append(there)
-        for first, second in () if any(isinstance(x, Tracer) for x in here.value) else fixed:
+                if sign := int(alike(vector, near)):
+                    image = far if sign > 0 else BodyVector(far.body, tuple(-x for x in far.value), far.given)
+                    reached[far.body] = image
+                    waiting.append(image)
+        for first, second in () if any(isinstance(x, Tracer) for x in vector.value) else fixed:
             for near, far in ((first, second), (second, first)):
-                if near.body == here.body and far.body not in reached:
-                    there = far.triad.T @ (near.triad @ np.asarray(here.value, float))
-                    reached[far.body] = BodyVector(far.body, tuple(there.tolist()), tuple(there.tolist()))
+                if near.body == vector.body and far.body not in reached:
+                    image = far.triad.T @ (near.triad @ np.asarray(vector.value, float))
+                    reached[far.body] = BodyVector(far.body, tuple(image.tolist()), tuple(image.tolist()))
                     waiting.append(reached[far.body])
     return reached
 

@@ -32,7 +32,7 @@ def check_ropes(groups: Sequence[Any], names: Sequence[Sequence[str]]) -> None:
     names : sequence of sequence of str
         Names of the elements of each group, with their kinds as prefixes.
     """
-    ropes = [(group, its) for group, its in zip(groups, names, strict=True) if isinstance(group.element, Rope)]
+    ropes = [(group, members) for group, members in zip(groups, names, strict=True) if isinstance(group.element, Rope)]
     if not ropes:
         return
     points = _Points()
@@ -40,10 +40,10 @@ def check_ropes(groups: Sequence[Any], names: Sequence[Sequence[str]]) -> None:
         distance = _fixed_distance(group.element)
         if distance is not None and not _is_traced((group.element.point_i, group.element.point_j, distance)):
             points.hold(group, distance)
-    for group, its in ropes:
+    for group, members in ropes:
         if not _is_traced(group.element):
             for k in range(group.instances):
-                _check(group, k, its[k], points)
+                _check(group, k, members[k], points)
 
 
 def _is_traced(values: Any) -> bool:
@@ -72,8 +72,8 @@ class _Points:
         """Return lower and upper bounds of the distances of given points, which come first, and stored ones, m."""
         whole, points = np.array([*bodies, *self.bodies]), np.stack([*positions, *self.positions])
         same = whole[:, None] == whole[None]
-        known = np.linalg.norm(points[:, None] - points[None], axis=-1)
-        least, largest = np.where(same, known, 0.0), np.where(same, known, np.inf)
+        distances = np.linalg.norm(points[:, None] - points[None], axis=-1)
+        least, largest = np.where(same, distances, 0.0), np.where(same, distances, np.inf)
         for i, j, distance in self.distances:
             pair = len(positions) + i, len(positions) + j
             for at in (pair, pair[::-1]):

@@ -90,5 +90,7 @@ def counted_along(
     begins = np.append(True, np.diff(run[step]) != 0)
     rise = np.where(begins, 0.0, np.nan_to_num(principal(np.diff(angle, axis=1, prepend=angle[:, :1]))))
     first = np.flatnonzero(begins)[np.cumsum(begins) - 1]  # first sample of the run of each sample
-    counted, known = np.cumsum(rise, axis=1), begun[:, step]
-    return PathSamples(step, share, known + principal(angle[:, first] - known) + counted - counted[:, first])
+    counted, initial_angles = np.cumsum(rise, axis=1), begun[:, step]
+    return PathSamples(
+        step, share, initial_angles + principal(angle[:, first] - initial_angles) + counted - counted[:, first]
+    )

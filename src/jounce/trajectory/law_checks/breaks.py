@@ -71,8 +71,8 @@ def both_sides(
     >>> instants.round(9).tolist(), which.tolist()
     ([0.5, 0.5, 1.0], [0, 0, 1])
     """
-    away = _side_offset(first, last)
-    instants = (breaks[:, None] + away * np.array([-1.0, 1.0])).ravel()
+    offset = _side_offset(first, last)
+    instants = (breaks[:, None] + offset * np.array([-1.0, 1.0])).ravel()
     which = np.repeat(np.arange(len(breaks)), 2)
     inside = (instants > first) & (instants < last)
     return instants[inside], which[inside]

@@ -252,12 +252,12 @@ def _within(instants: np.ndarray, sizes: np.ndarray, first: float, last: float) 
 
 def _profile_jumps(law: AbstractProfile, order: int) -> Jumps:
     """Return the jumps at the ends of a profile, which is symmetric up to the sign."""
-    begin = np.asarray(law(Jet.variable(np.asarray(law.start_time, float), order)).dense().derivatives(), float)
+    initial = np.asarray(law(Jet.variable(np.asarray(law.start_time, float), order)).dense().derivatives(), float)
     least = ROUNDING * abs(law.end - law.start) / law.duration ** np.arange(order + 1)
-    begin = np.where(np.abs(begin) <= least, 0.0, begin)
-    begin[0] = 0.0
+    initial = np.where(np.abs(initial) <= least, 0.0, initial)
+    initial[0] = 0.0
     ends = np.array([law.start_time, law.stop_time], float)
-    return ends, np.stack([begin, begin * (-1.0) ** np.arange(order + 1)], axis=1)
+    return ends, np.stack([initial, initial * (-1.0) ** np.arange(order + 1)], axis=1)
 
 
 def _of_pieces(law: PiecewiseMotion, first: float, last: float, order: int) -> tuple[np.ndarray, np.ndarray, str]:
@@ -333,13 +333,13 @@ def _knots_between(
 
 
 def _composed(
-    jump: Float[np.ndarray, "levels crossing"], away: Float[np.ndarray, "levels #crossing"]
+    jump: Float[np.ndarray, "levels crossing"], distance: Float[np.ndarray, "levels #crossing"]
 ) -> Float[np.ndarray, "levels crossing"]:
     """Return time derivatives of polynomials of a leader's distance, given their derivatives at zero and its jet."""
     levels = len(jump)
     change = np.zeros(jump.shape)
     for level in range(levels - 1, -1, -1):
-        change = np.stack([sum(away[k - j] * change[j] for j in range(k + 1)) for k in range(levels)])
+        change = np.stack([sum(distance[k - j] * change[j] for j in range(k + 1)) for k in range(levels)])
         change[0] += jump[level] / math.factorial(level)
     return change * np.array([math.factorial(k) for k in range(levels)], float)[:, None]
 
@@ -353,10 +353,10 @@ def _crossings(
     """
     every, count = np.arange(len(knots)), len(AMONG) + 2 * len(CLOSE) + 1
 
-    def away(instants: np.ndarray) -> np.ndarray:
+    def distance(instants: np.ndarray) -> np.ndarray:
         return seen.coefficients(leader, instants.reshape(-1))[0].reshape(instants.shape) - knots
 
-    under, over = away(low), away(high)
+    under, over = distance(low), distance(high)
     below = under < 0
     for _ in range(STEPS):
         width = high - low
@@ -367,7 +367,7 @@ def _crossings(
         near = np.clip(share + np.concatenate([-CLOSE, [0.0], CLOSE])[:, None], 0.0, 1.0)
         shares = np.sort(np.concatenate([np.broadcast_to(AMONG[:, None], (len(AMONG), len(knots))), near]), axis=0)
         instants = np.concatenate([low[None], low + shares * width, high[None]])
-        values = np.concatenate([under[None], away(instants[1:-1]), over[None]])
+        values = np.concatenate([under[None], distance(instants[1:-1]), over[None]])
         before = (values[1:-1] < 0) == below
         first = np.where(before.all(axis=0), count, np.argmin(before, axis=0))  # last before the passage
         low, high = instants[first, every], instants[first + 1, every]

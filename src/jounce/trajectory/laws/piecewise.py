@@ -205,18 +205,18 @@ class PiecewiseMotion(CompositeLaw):
 
     def _sizes(self, order: int) -> list[Float[np.ndarray, " levels"]]:
         """Return the size of the derivatives of each law; unbounded laws count for the length of their neighbors."""
-        known = [float(x) for x in self.until]
+        ends = [float(x) for x in self.until]
         if self.beyond != "continue":
-            borders = [float(self.start), *known]
+            borders = [float(self.start), *ends]
         else:
-            lengths = np.diff(known) if len(known) > 1 else [abs(known[0]) or 1.0]
-            borders = [known[0] - lengths[0], *known, known[-1] + lengths[-1]]
+            lengths = np.diff(ends) if len(ends) > 1 else [abs(ends[0]) or 1.0]
+            borders = [ends[0] - lengths[0], *ends, ends[-1] + lengths[-1]]
         sizes = []
         for part, begin, end in zip(self._known_parts(), borders, borders[1:], strict=False):
             try:
                 sizes.append(derivative_sizes(part, begin, end, order))
             except MechanismError:  # samples that end before: the derivatives at the knot are known
-                instant = begin if begin == known[-1] else end
+                instant = begin if begin == ends[-1] else end
                 sizes.append(derivative_sizes(part, instant, instant, order))
         return sizes
 

@@ -203,9 +203,9 @@ def _check_closed(values: list[Value]) -> None:
     """Raise TrajectoryError unless a law to be repeated ends where it begins."""
     if is_traced(values):
         return
-    away = values[-1] - values[0]
-    if abs(away) > CLOSED * (max(values) - min(values)):
-        message = f"do not end where they begin, but {away:.6g} from there; close them, or choose beyond: advance"
+    gap = values[-1] - values[0]
+    if abs(gap) > CLOSED * (max(values) - min(values)):
+        message = f"do not end where they begin, but {gap:.6g} from there; close them, or choose beyond: advance"
         raise TrajectoryError(message, name="segments", value=float(values[-1]))
 
 

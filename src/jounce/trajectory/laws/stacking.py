@@ -56,10 +56,10 @@ def _along_joints(*leaves: Any) -> Any:
 def _evaluated(laws: Sequence[AbstractMotion], members: Members, time: Jet) -> Jet:
     flat = time.map(lambda c: jnp.reshape(c, (1, -1)))
     evaluated: list[tuple[Any, ...]] = []
-    for law, its in zip(laws, members, strict=True):
-        shape = (len(its), *flat.shape[1:])
+    for law, indices in zip(laws, members, strict=True):
+        shape = (len(indices), *flat.shape[1:])
         evaluated.append(tuple(jnp.broadcast_to(c, shape) for c in law(flat).dense().coefficients))
-    order = np.argsort([index for its in members for index in its])
+    order = np.argsort([index for indices in members for index in indices])
     return Jet(
         jnp.reshape(jnp.concatenate(levels)[order], (len(order), *time.shape))
         for levels in zip(*evaluated, strict=True)

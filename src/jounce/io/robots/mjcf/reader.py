@@ -300,17 +300,17 @@ class _Reader:
         numbers = range(model.body_jntadr[k], model.body_jntadr[k] + model.body_jntnum[k])
         for j in numbers:
             anchor, last = np.array(model.jnt_pos[j]), j == numbers[-1]
-            here = name if last and not anchor.any() else self._unused(f"{name}_{self.joint_names[j]}")
+            link = name if last and not anchor.any() else self._unused(f"{name}_{self.joint_names[j]}")
             if model.jnt_type[j] == self.kind["free"]:
                 self._expand(j, parent, name, np.zeros(3), np.eye(3))
                 return
-            if here != name:
-                self.links.append(Link(here))
+            if link != name:
+                self.links.append(Link(link))
             if model.jnt_type[j] == self.kind["ball"]:
-                self._expand(j, parent, here, position + rotation @ anchor, rotation)
+                self._expand(j, parent, link, position + rotation @ anchor, rotation)
             else:
-                self._single(j, parent, here, position + rotation @ anchor, rotation)
-            parent, position, rotation = here, -anchor, np.eye(3)
+                self._single(j, parent, link, position + rotation @ anchor, rotation)
+            parent, position, rotation = link, -anchor, np.eye(3)
         if parent != name:
             self.joints.append(Joint(self._unused(f"{name}_fixed"), parent, name, "fixed", position, rotation))
 

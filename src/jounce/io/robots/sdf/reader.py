@@ -173,9 +173,9 @@ class _Reader:
             later = []
             for joint in waiting:
                 if joint.parent in reached or joint.child in reached:
-                    away = joint if joint.parent in reached else joint.reversed()
-                    tree.append(away)
-                    reached.add(away.child)
+                    outward = joint if joint.parent in reached else joint.reversed()
+                    tree.append(outward)
+                    reached.add(outward.child)
                 else:
                     later.append(joint)
             waiting = later
@@ -199,18 +199,18 @@ class _Reader:
     def _add(self, joint: SdfJoint, mimics: dict[str, Mimic]) -> None:
         """Add a joint of the tree, with the massless links that it needs."""
         parent, child = self._link_pose(joint.parent), self._link_pose(joint.child)
-        here = FramePose(joint.origin, child.rotation)  # frame of the joint, with the axes of the child
+        joint_frame = FramePose(joint.origin, child.rotation)  # frame of the joint, with the axes of the child
         offset_origin = joint.kind != "fixed" and bool(np.any(np.abs(joint.origin - child.position) > 1e-12))
         intermediate = self._unused(f"{joint.child}_{joint.name}") if offset_origin else joint.child
         if offset_origin:
             self.links.append(Link(intermediate))
-        first = (child if joint.kind == "fixed" else here).seen_from(parent)
+        first = (child if joint.kind == "fixed" else joint_frame).seen_from(parent)
         for part in self._parts(joint, intermediate, child.rotation, mimics):
             self.joints.append(dataclasses.replace(part, position=first.position, rotation=first.rotation))
             self.lines.add(joint.element, "joints", part.name)
             first = HERE
         if offset_origin:
-            offset = child.seen_from(here).position
+            offset = child.seen_from(joint_frame).position
             self.joints.append(Joint(self._unused(f"{joint.child}_fixed"), intermediate, joint.child, "fixed", offset))
 
     def _parts(

@@ -46,8 +46,8 @@ def placed(model: Element) -> FramePose:
     frame, pose = model.attributes.get("placement_frame", "").strip(), pose_of(model)
     if not frame:
         return pose
-    here = Frames(model, named(model)).of(frame, model, "placement_frame")
-    return pose.then(FramePose(np.zeros(3), np.eye(3)).seen_from(here))
+    frame_pose = Frames(model, named(model)).of(frame, model, "placement_frame")
+    return pose.then(FramePose(np.zeros(3), np.eye(3)).seen_from(frame_pose))
 
 
 def reference_pose(model: Element) -> tuple[FramePose, str]:
