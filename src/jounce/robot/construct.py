@@ -19,7 +19,7 @@ X, Y, Z = np.eye(3)
 
 @dataclasses.dataclass(frozen=True)
 class DenavitHartenberg:
-    """One row of a Denavit-Hartenberg table; the moving parameter is at its value for coordinate zero.
+    """One row of a Denavit-Hartenberg table; the variable parameter has its value at coordinate zero.
 
     Parameters
     ----------
@@ -34,9 +34,9 @@ class DenavitHartenberg:
     type : {"revolute", "continuous", "prismatic"}, default "revolute"
         The coordinate is added to theta, or to d of a prismatic joint.
     inertia : Inertia, optional
-        Of the link that the joint moves, in its Denavit-Hartenberg frame.
+        Inertia of the moved link, in its Denavit-Hartenberg frame.
     limits : Limits, optional
-        What the joint may do.
+        Limits of the joint.
     """
 
     a: float = 0.0
@@ -50,20 +50,20 @@ class DenavitHartenberg:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class JointAxis:
-    """A joint by its screw axis in the frame of the base, at coordinates zero. Negrean 2025, equations 31-34.
+    """A joint, given by its screw axis in the frame of the base at coordinates zero. Negrean 2025, equations 31-34.
 
     Parameters
     ----------
     axis : array_like of shape (3,)
         Direction of the axis.
     point : array_like of shape (3,), default zero
-        A point of the axis, m.
+        A point on the axis, m.
     type : {"revolute", "continuous", "prismatic"}, default "revolute"
         Whether the joint turns about the axis or slides along it.
     inertia : Inertia, optional
-        Of the link that the joint moves, in the frame of the base at coordinates zero.
+        Inertia of the moved link, in the frame of the base at coordinates zero.
     limits : Limits, optional
-        What the joint may do.
+        Limits of the joint.
     """
 
     axis: Any
@@ -78,12 +78,12 @@ def from_denavit_hartenberg(
 ) -> Robot:
     """Return a serial robot from a table of Denavit-Hartenberg parameters.
 
-    Links are named link_1 to link_n, with their Denavit-Hartenberg frames, joints joint_1 to joint_n, the base base.
+    Links link_1 to link_n have their Denavit-Hartenberg frames; the joints are joint_1 to joint_n, the base is base.
 
     Parameters
     ----------
     rows : sequence of DenavitHartenberg
-        One for each joint, from the base outwards.
+        One row for each joint, from the base outwards.
     convention : {"standard", "modified"}, default "standard"
         Standard: ``Rz(theta) Tz(d) Tx(a) Rx(alpha)``, frames at the far end of links. Modified (Craig): ``Rx(alpha)
         Tx(a) Rz(theta) Tz(d)``, frames at the near end.
@@ -98,7 +98,7 @@ def from_denavit_hartenberg(
     Raises
     ------
     RobotError
-        If the convention is not known, or a row gives no possible joint.
+        If the convention is unknown, or a row does not define a valid joint.
 
     Examples
     --------
@@ -120,7 +120,7 @@ def from_denavit_hartenberg(
             joints.append(
                 Joint(f"joint_{k}", parent, f"link_{k}", position=transform, rotation=about_x @ about_z, **moved)
             )
-        else:  # the axis of the joint does not pass through the frame of its link: a frame on the axis is added between
+        else:  # the joint axis does not pass through the origin of the link frame: add a frame on the axis in between
             joints.append(Joint(f"joint_{k}", parent, f"axis_{k}", **moved))
             links.append(Link(f"axis_{k}"))
             transform = about_z @ (row.a * X) + row.d * Z
@@ -130,15 +130,15 @@ def from_denavit_hartenberg(
 
 
 def from_screws(screws: Sequence[JointAxis], tool: ArrayLike | None = None, name: str = "robot") -> Robot:
-    """Return a serial robot from the screw axes of its joints, as a product of exponentials has them.
+    """Return a serial robot from the screw axes of its joints, as in a product of exponentials.
 
     Links are named link_1 to link_n; at coordinates zero their frames coincide with that of the base. The frame tool is
-    fixed to the last one.
+    fixed to the last link.
 
     Parameters
     ----------
     screws : sequence of JointAxis
-        One for each joint, from the base outwards.
+        One axis for each joint, from the base outwards.
     tool : array_like of shape (4, 4), optional
         Pose of the tool in the frame of the base at coordinates zero.
     name : str, default "robot"
@@ -152,7 +152,7 @@ def from_screws(screws: Sequence[JointAxis], tool: ArrayLike | None = None, name
     Raises
     ------
     RobotError
-        If an axis has no direction, a value is not finite, or the tool has no rigid pose.
+        If an axis has no direction, a value is not finite, or the tool is not a rigid pose.
 
     Examples
     --------

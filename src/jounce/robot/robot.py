@@ -1,4 +1,4 @@
-"""The robot as its user sees it: what it is made of, and the mechanism that it is."""
+"""The robot class of the public interface, with its conversion to a mechanism."""
 
 from typing import Any
 
@@ -14,36 +14,36 @@ class Robot(AbstractRobot):
     Parameters
     ----------
     name : str
-        What it is called.
+        Name of the robot.
     links : sequence of Link
-        One of them, the base, is no joint's child.
+        Links, one of which, the base, is not the child of a joint.
     joints : sequence of Joint
-        Every link but the base is the child of exactly one.
+        Joints, of which every link but the base is the child of exactly one.
     gravity : array_like of shape (3,), default (0, 0, -9.81)
         Acceleration of free fall in the frame of the base, m/s^2.
     closures : sequence of Closure, default none
-        What closes loops of the tree. A robot that has some moves as a mechanism does (`mechanism`); the functions on
-        coordinates refuse it, as its coordinates depend on one another, and take `opened` instead.
+        Constraints between links that close loops of the tree. The coordinates of a robot with closures depend on one
+        another: use its `mechanism`, or `opened`, the tree without closures, for functions on coordinates.
     strict : bool, default True
         Refuse joints that move no mass. Otherwise they are kept (`massless_joints`): inverse dynamics gives them no
-        torque, and a simulation in which they are free is refused, since nothing determines their acceleration.
+        torque, and a simulation with such a joint free is refused, as its acceleration is undetermined.
     couplings : sequence of Tendon or BallDrive, default none
-        What acts on several joints at once.
+        Tendons and drives of balls, which act on several joints at once.
 
     Attributes
     ----------
     joint_names : tuple of str
         Moving joints that follow no other, parents before children, branches in the order given: the order of q.
     base : str
-        The link that does not move.
+        Name of the link that does not move.
     frames : dict of str to Frame
-        Where each link is in the bodies of the tree.
+        Frame of each link in its body of the tree.
 
     Raises
     ------
     RobotError
-        If names repeat or lead nowhere, the joints form a loop or several trees, a joint moves no mass and the robot
-        is strict, a joint follows one that cannot be followed, or a closure joins links that move as one.
+        If names repeat or do not exist, the joints form a loop or several trees, a joint moves no mass and `strict` is
+        True, a joint follows one that cannot be followed, or a closure joins links that move as one.
 
     Examples
     --------
@@ -57,10 +57,10 @@ class Robot(AbstractRobot):
     """
 
     def mechanism(self, q: GivenCoordinates = None, **settings: Any) -> Mechanism:
-        """Return the `jounce.Mechanism` that the robot is, with its masses, for `jounce.solve`; loops may be closed.
+        """Return the robot as a `jounce.Mechanism`, with masses and closed loops, for `jounce.solve`.
 
         See Also
         --------
-        jounce.robot.closed_loops.closed_loop.mechanism : What there is to set: drivers, outputs, time, and so on.
+        jounce.robot.closed_loops.closed_loop.mechanism : The settings: drivers, outputs, time, and so on.
         """
         return mechanism(self, q, **settings)

@@ -1,1 +1,1 @@
-"""What is computed of a robot with its joint coordinates: torques, accelerations, Jacobians."""
+"""Algorithms on the joint coordinates of a robot: torques, accelerations, Jacobians."""

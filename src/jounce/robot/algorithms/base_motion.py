@@ -1,4 +1,4 @@
-"""The motion of a base that moves freely: a pose without singular orientation, and velocities in its own axes."""
+"""Motion of a free base: its pose, without singular orientations, and its velocities in its own axes."""
 
 import dataclasses
 from typing import Any
@@ -19,24 +19,24 @@ from jounce.robot.model.abstract_robot import AbstractRobot
 from jounce.robot.model.arguments import floats
 from jounce.robot.recursions.tree_equations import BaseBody
 
-UNIT = 1e-6  # by which the length of a quaternion may differ from one: rounding of files; it is then divided by it
+UNIT = 1e-6  # allowed deviation of the length of a quaternion from one, as files round; quaternions are normalized
 TwistSeries = Float[Numbers, "levels 6 batch"]
 
 
 @jax.tree_util.register_dataclass
 @dataclasses.dataclass(frozen=True, eq=False)
 class BaseMotion:
-    """Where a free base is and how it moves, with derivatives of any order.
+    """Pose and twist of a free base, with derivatives of any order.
 
     Parameters
     ----------
     position : array_like of shape (..., 3)
-        Of the origin of the base link, in the axes of the scene, m.
+        Position of the origin of the base link, in the axes of the scene, m.
     quaternion : array_like of shape (..., 4)
         Unit Euler parameters ``[e0, e1, e2, e3]``, scalar first, from the base to the scene.
     twist : array_like of shape (..., levels, 6)
-        Velocity of that origin, m/s, then angular velocity, rad/s, in the axes of the base, and the time derivatives of
-        these components. The first of them is not the acceleration: that is ``v' + w x v``.
+        Velocity of the origin, m/s, then angular velocity, rad/s, in the axes of the base, and the time derivatives of
+        these components. The first derivative is not the acceleration, which is ``v' + w x v``.
 
     Examples
     --------
@@ -51,7 +51,7 @@ class BaseMotion:
 
 
 def base_arrays(base: BaseMotion, lead: tuple[int, ...], levels: int) -> tuple[Any, Any]:
-    """Return pose, (..., 1, 7), and twist, (..., levels, 6), of a base, checked.
+    """Return the checked pose, (..., 1, 7), and twist, (..., levels, 6), of a base.
 
     Raises
     ------
@@ -79,14 +79,14 @@ def base_arrays(base: BaseMotion, lead: tuple[int, ...], levels: int) -> tuple[A
 
 
 def base_body(robot: AbstractRobot) -> BaseBody:
-    """Return the inertia of the base; it may have none, as where a massless frame carries the robot."""
+    """Return the inertia of the base, zero where a massless frame carries the robot."""
     inertia = robot.base_inertia or Inertia(0.0, strict=False)
     mass = inertia.mass if isinstance(inertia.mass, Tracer) else np.float64(inertia.mass)
     return BaseBody(mass, inertia.center_of_mass, inertia.tensor)
 
 
 def scene_axes(quaternion: Float[Numbers, "4 batch"], twist: TwistSeries) -> tuple[Jet, Jet, Jet]:
-    """Return the axes of the scene as vectors in the axes of the base: ``u' = -w x u``, to one order more."""
+    """Return the axes of the scene in the axes of the base, ``u' = -w x u``, to one order more than the twist."""
     axes = body_axes(quaternion)
     coefficients = []
     for i in range(3):
@@ -99,13 +99,13 @@ def scene_axes(quaternion: Float[Numbers, "4 batch"], twist: TwistSeries) -> tup
 
 
 def in_base(axes: tuple[Jet, Jet, Jet], vector: Jet | Numbers) -> Jet:
-    """Return a vector in the axes of the base, from its components in those of the scene."""
+    """Return a vector in the axes of the base from its components in the axes of the scene."""
     parts = [vector[i : i + 1] for i in range(3)]
     rotated = axes[0] * parts[0] + axes[1] * parts[1] + axes[2] * parts[2]
     return rotated.dense()
 
 
 def free_fall_velocity(axes: tuple[Jet, Jet, Jet], gravity: Numbers, levels: int) -> Float[Numbers, "level 3 batch"]:
-    """Return the velocity, zero now, of a base that accelerates against gravity, in its axes, (levels, 3, batch)."""
+    """Return the velocity, zero now, of a base that accelerates against gravity, in base axes, (levels, 3, batch)."""
     against = stacked(in_base(axes, -jnp.asarray(gravity)[:, None]))[: levels - 1]
     return jnp.concatenate([jnp.zeros_like(against[:1]), against])

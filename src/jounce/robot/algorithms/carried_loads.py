@@ -1,4 +1,4 @@
-"""Loads that links carry during a part of a motion: which robot moves when, and what a change of its load does."""
+"""Loads that links carry during a part of a motion: the robot of each interval, and the effect of a load change."""
 
 import dataclasses
 import itertools
@@ -15,8 +15,8 @@ from jounce.robot.recursions.kinematics import forward_kinematics
 from jounce.robot.robot import Robot
 
 COUNTED_BY = ("time", "s", "share", "waypoint")
-SAME = 1e-12  # of a motion: changes that are nearer to each other, or to an end, are at once
-NO_STEP = 1e-12  # of the largest torque: rounding
+SAME = 1e-12  # fraction of the motion: changes nearer to each other, or to an end, count as simultaneous
+NO_STEP = 1e-12  # fraction of the largest torque: smaller steps are rounding
 
 Place = Literal["time", "s", "share", "waypoint"]
 
@@ -30,19 +30,19 @@ class CarriedLoad:
     link : str
         Name of the link.
     inertia : Inertia
-        Of the load, in the frame of the link.
+        Inertia of the load, in the frame of the link.
     start, stop : float, optional
-        Where it is taken up and where it is set down; the ends of the motion unless given.
+        Where the load is taken up and set down; by default the ends of the motion.
     by : {"time", "s", "share", "waypoint"}, default "time"
-        What these count: instants, s, of the trajectory; values of the parameter of a path; shares of it, from 0 to 1;
-        or its waypoints, of which the first is 1.
+        Unit of `start` and `stop`: an instant of the trajectory, s; the parameter of a path; a share of the path, from
+        0 to 1; or the number of a waypoint, the first being 1.
     moving : bool, default False
-        Whether it is taken up and set down in motion, as from a conveyor; otherwise `retime` stops there.
+        Whether the load is taken up and set down in motion, as from a conveyor; otherwise `retime` stops at both.
 
     Raises
     ------
     TrajectoryError
-        If it is no such load, or is set down before it is taken up.
+        If a value is not valid, or the load is set down before it is taken up.
 
     Examples
     --------
@@ -78,7 +78,7 @@ class CarriedLoad:
 
     @property
     def words(self) -> str:
-        """What is carried, and how long."""
+        """The load in words: its link, mass and interval."""
         unit = " s" if self.by == "time" else ""
         ends = [f" from {self.start:g}{unit}"] * (self.start is not None)
         ends += [f" to {self.stop:g}{unit}"] * (self.stop is not None)
@@ -87,18 +87,18 @@ class CarriedLoad:
 
 @dataclasses.dataclass(frozen=True)
 class LoadChange:
-    """What a change of the load does to a robot in motion.
+    """Effect of a load change on a robot in motion.
 
     Parameters
     ----------
     time : float
-        The instant, s.
+        Instant of the change, s.
     masses : dict of str to float
-        What is added to links, kg; negative what is taken from them.
+        Mass added to each link, kg; negative for mass removed.
     speed : float
-        Of the center of mass of what is added or taken, m/s, the largest of several.
+        Speed of the center of mass of the load, m/s; the largest of several loads.
     steps : dict of str to float
-        By how much the torque or force of each joint steps, N m or N.
+        Jump of the torque or force of each joint, N m or N.
 
     Examples
     --------
@@ -124,23 +124,23 @@ class LoadedRobot:
     Parameters
     ----------
     robot : Robot
-        The robot without them.
+        The robot without loads.
     loads : sequence of CarriedLoad
-        All by what the motion runs over.
+        Loads, all in the unit that the motion runs over.
     start, stop : float
         Ends of the motion.
 
     Attributes
     ----------
     changes : array of shape (change,)
-        Where loads change within the motion.
+        Load changes within the motion.
     robots : tuple of Robot
-        Before the first change, from there to the next one, and so on.
+        The loaded robot before the first change, between the first and the second change, and so on.
 
     Raises
     ------
     RobotError, TrajectoryError
-        If there is no such link, or a load is not carried during the motion.
+        If a link does not exist, or a load is not carried during the motion.
 
     Examples
     --------
@@ -180,7 +180,7 @@ class LoadedRobot:
     def torques(
         self, q: Float[np.ndarray, "*some place derivative joint"], at: Float[np.ndarray, " place"], drives: bool
     ) -> Float[np.ndarray, "*some place derivative-2 joint"]:
-        """Return the torques for coordinates at places; where a load changes, those after it."""
+        """Return the torques for coordinates at places of the motion; at a load change, the torques after it."""
         if len(self.robots) == 1:
             return np.asarray(inverse_dynamics(self.robots[0], q, drives=drives))
         which = np.searchsorted(self.changes, at, side="right")
@@ -191,7 +191,7 @@ class LoadedRobot:
         return torques
 
     def at_changes(self, q: Float[np.ndarray, "change derivative joint"], drives: bool) -> tuple[LoadChange, ...]:
-        """Return what each change does, for the coordinates there."""
+        """Return the effect of each load change, for the coordinates at the changes."""
         return tuple(self._change(k, own[None, :3], drives) for k, own in enumerate(q))
 
     def _change(self, k: int, q: Float[np.ndarray, "1 3 joint"], drives: bool) -> LoadChange:

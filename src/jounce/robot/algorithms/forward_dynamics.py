@@ -1,4 +1,4 @@
-"""Motion of a robot from torques: accelerations and their rates to any order."""
+"""Forward dynamics of a robot: accelerations and their rates, to any order, from torques."""
 
 import math
 from collections.abc import Sequence
@@ -23,8 +23,8 @@ from jounce.robot.recursions.tree_equations import TreeEquations, Unknowns, free
 from jounce.robot.robot import Robot
 from jounce.trajectory.labels import in_order
 
-MOST_UNROLLED = 5  # orders, each with code of its own
-WIDE = 32  # samples side by side where there are rates: their histories shall stay in the cache
+MOST_UNROLLED = 5  # levels with code of their own
+WIDE = 32  # samples side by side where rates are computed: their histories fit in the cache
 
 
 @overload
@@ -68,52 +68,53 @@ def forward_dynamics(
 ) -> Array[Numbers, "*batch derivative joint"] | tuple[BaseMotion, Array[Numbers, "*batch derivative joint"]]:
     """Return the motion that joint torques or forces cause, to any order: the inverse of `inverse_dynamics`.
 
-    Articulated bodies (Featherstone 2008, Rigid Body Dynamics Algorithms, chapter 7), in a time linear in the number of
-    joints; their inertias are made once and serve all orders. Where joints follow others, a dense mass matrix does.
+    The articulated-body algorithm (Featherstone 2008, Rigid Body Dynamics Algorithms, chapter 7) takes a time linear in
+    the number of joints; articulated inertias are computed once and serve all orders. Robots with joints that follow
+    others use a dense mass matrix.
 
     Parameters
     ----------
     robot : Robot
-        The robot, with what it holds (`Robot.with_payload`) and the gravity that it feels.
+        The robot, with its payload (`Robot.with_payload`) and gravity.
     state : array_like of shape (..., 2, n)
         Coordinates and velocities in the order of `robot.joint_names`, rad or m, by s.
     tau : array_like of shape (..., order + 1, n)
-        Torques or forces ``tau, tau', ...`` in N m or N, by s. In the columns of driven joints: their accelerations
-        ``q'', q''', ...``. With `base` also of shape (..., order + 1, 6 + n), as `inverse_dynamics` gives it: the force
-        on the base and the moment about its origin, in its axes, come first.
+        Torques or forces ``tau, tau', ...`` in N m or N, by s. Columns of driven joints hold their accelerations
+        ``q'', q''', ...`` instead. With `base`, the shape may be (..., order + 1, 6 + n), as `inverse_dynamics` returns
+        it: first the force on the base and the moment about its origin, in base axes.
     driven : sequence of str, optional
-        Joints that follow their laws, whatever it takes; `inverse_dynamics` of the result gives their torques.
+        Joints with prescribed accelerations; `inverse_dynamics` of the result gives their torques.
     wrenches : sequence of Wrench, optional
-        Forces and torques from outside; arrays of them hold order + 1 levels.
+        External forces and torques; their arrays have order + 1 levels.
     time : array_like of shape (...), optional
         Instants of the samples, s; needed where a wrench is a function of time.
     drives : bool, default True
-        Let the drives count: armature inertia, viscous damping and Coulomb friction of the joints. Friction has the
-        sign of the velocity and is zero at rest.
+        Include the drives: armature inertia, viscous damping and Coulomb friction of the joints. Friction has the sign
+        of the velocity and is zero at rest.
     base : BaseMotion, optional
-        Where a free base is and how it moves, with its twist alone; the base is fixed unless given.
+        Pose and twist, without derivatives, of a free base; the base is fixed unless given.
     strict : bool, default True
-        Raise where nothing resists a joint; otherwise such samples are NaN.
+        Raise where a joint moves no inertia; otherwise such samples are NaN.
 
     Returns
     -------
     array of shape (..., order + 3, n)
         ``q, q', q'', ...`` to the derivative order + 2, rad or m, by s.
     base : BaseMotion
-        Only with `base`, and first then: with the rates of its twist to the order order + 1.
+        Only with `base`, and then first: its motion with the rates of its twist to order + 1.
 
     Raises
     ------
     RobotError
-        If an argument does not fit the robot, or the robot has closed loops: `jounce.simulate` and
-        `jounce.constraint_equations` take the mechanism that it is (`Robot.mechanism`).
+        If an argument does not fit the robot, or the robot has closed loops: use `jounce.simulate` or
+        `jounce.constraint_equations` with its mechanism (`Robot.mechanism`).
     SingularityError
         If a joint moves no inertia, so that nothing determines its acceleration (with `strict`).
 
     Notes
     -----
-    Derivatives of free motion grow fast with the order, and rounding with them: the torques that `inverse_dynamics`
-    gives back agree to rounding with the largest term in them, the inertia times the highest derivative.
+    Derivatives of free motion grow fast with the order, and rounding errors with them: `inverse_dynamics` of the result
+    returns the torques to rounding of their largest term, the inertia times the highest derivative.
 
     Examples
     --------
@@ -154,7 +155,7 @@ def forward_dynamics(
 
 
 def _checked_forces(robot: Robot, tau: Any, lead: tuple[int, ...], free: bool) -> tuple[Any, Any]:
-    """Return the forces of the joints, and those on a free base, of the same number of levels."""
+    """Return the checked forces of the joints, and the forces on a free base, with as many levels."""
     tau, n = floats("tau", in_order("tau", tau, robot.joint_names, RobotError)), len(robot.joint_names)
     columns = (n, 6 + n) if free else (n,)
     if tau.ndim != len(lead) + 2 or tau.shape[:-2] != lead or tau.shape[-1] not in columns or not tau.shape[-2]:
@@ -174,7 +175,7 @@ def _moved(
     drives: bool,
     reversible: bool,
 ) -> Any:
-    """Return coordinates, margins of the joints and the twist of the base, as Taylor coefficients."""
+    """Return Taylor coefficients of the coordinates, the margins of the joints, and those of the twist of the base."""
     driven, frames, body = constants
     equations = TreeEquations(tree, driven, body, frames, global_axes, drives)
     levels, lanes = len(arrays[1]), arrays[0].shape[-1]
@@ -202,9 +203,9 @@ def _coefficients(equations: TreeEquations, arrays: tuple[Any, ...], reversible:
         return Unknowns(forces, at_base), pushes
 
     order = len(forces) - 1
-    # forces of driven joints are what they have to be: nothing is missing there
+    # forces of driven joints follow from their accelerations: they have no force residual
     given = ((1.0 - mask) * forces, at_base, pushes)
-    # one sample, of whose program machine code is made: that of long histories is too long
+    # only the program of one sample is unrolled, as it becomes machine code; unrolled long histories would be too long
     single = state.shape[-1] == 1 and not reversible and len(forces) <= MOST_UNROLLED
     motion = equations.motion(state[0], state[1], base)
     series = motion_series(equations, motion, applied, given, driven, order, reversible=reversible, unrolled=single)
@@ -216,13 +217,13 @@ def _coefficients(equations: TreeEquations, arrays: tuple[Any, ...], reversible:
 
 
 def coordinates_of(series: MotionSeries, order: int) -> Float[Numbers, "level coordinate batch"]:
-    """Return the coefficients of the coordinates, two more than those of the accelerations."""
+    """Return the coefficients of the coordinates, two levels more than those of the accelerations."""
     last = series.accelerations.joints[order:] / ((order + 1) * (order + 2))
     return jnp.concatenate([series.coordinates[: order + 2], last])
 
 
 def _check_margins(robot: Robot, margin: Any, driven: np.ndarray) -> None:
-    """Raise SingularityError, by name, where nothing resists a joint."""
+    """Raise SingularityError, naming the joint, if a free joint moves no inertia."""
     margin = np.reshape(margin, (math.prod(margin.shape[:-1]), margin.shape[-1]))  # a lone body has no joints
     free = np.ones(margin.shape[1])
     by_joint = robot.tree.shape.direct and not robot.tree.shape.armed
@@ -242,5 +243,5 @@ def _check_margins(robot: Robot, margin: Any, driven: np.ndarray) -> None:
         f"the bodies that this joint moves have no inertia about its axis{where}, so that its acceleration is not "
         "determined; give the link an inertia, or the joint an armature, or drive it"
     )
-    # the outermost one: what carries it is not known there either
+    # name the outermost joint: the accelerations of the joints that carry it are undetermined as well
     raise SingularityError(message, name=names[int(joints[-1])])

@@ -1,4 +1,4 @@
-"""Torques of a prescribed motion and the wrenches that its joints carry, with their rates, to any order."""
+"""Inverse dynamics of a robot: joint torques of a prescribed motion and joint wrenches, with rates of any order."""
 
 import dataclasses
 from collections.abc import Sequence
@@ -48,27 +48,27 @@ def inverse_dynamics(
     Parameters
     ----------
     robot : Robot
-        The robot, with what it holds (`Robot.with_payload`) and the gravity that it feels.
+        The robot, with its payload (`Robot.with_payload`) and gravity.
     q : array_like of shape (..., order + 1, n)
         Coordinates and their derivatives ``q, q', q'', ...`` in the order of `robot.joint_names`, rad or m; order 2 or
-        more. Every derivative beyond the second gives one rate of the torques.
+        more. Each derivative beyond the second gives one rate of the torques.
     wrenches : sequence of Wrench, optional
-        Forces and torques from outside.
+        External forces and torques.
     time : array_like of shape (...), optional
         Instants of the samples, s; needed where a wrench is a function of time.
     drives : bool, default True
-        Add what the drives need: armature inertia, viscous damping and Coulomb friction of the joints. Friction has the
-        sign of the velocity and is zero at rest; its jumps are not in the rates.
+        Include the drives: armature inertia, viscous damping and Coulomb friction of the joints. Friction has the sign
+        of the velocity and is zero at rest; the rates do not include its jumps.
     base : BaseMotion, optional
-        Motion of the base, its twist with order - 1 derivatives; it stands still unless given. Gravity, and wrenches in
-        the axes of the base, are then in those of the scene.
+        Motion of a free base, its twist with order - 1 derivatives; the base is fixed unless given. With it, gravity
+        and wrenches with ``frame="base"`` are in the axes of the scene.
 
     Returns
     -------
     array of shape (..., order - 1, n), or (..., order - 1, 6 + n) with `base`
-        ``tau, tau', tau'', ...`` in N m, or N for prismatic joints, by s. A joint that others follow bears their part.
-        Of a base that moves come first the force on it from outside, N, and the moment about its origin, N m, in its
-        axes, and their rates: zero where the motion is one that it can make alone.
+        ``tau, tau', tau'', ...`` in N m, or N for prismatic joints, by s. The torque of a joint that others follow
+        includes theirs. With `base`, the first six columns are the external force on the base, N, and the moment about
+        its origin, N m, in base axes: zero for a motion that the base can make unaided.
 
     Raises
     ------
@@ -102,29 +102,29 @@ def joint_wrenches(
     frame: str = "link",
     fixed: Sequence[str] = (),
 ) -> Array[Numbers, "*batch derivative body 6"]:
-    """Return the forces and moments that the joints carry, and their rates: what bearings and flanges feel.
+    """Return the forces and moments that the joints transmit, as loads on bearings and flanges, and their rates.
 
     Parameters
     ----------
     robot, q, wrenches, time
         As for `inverse_dynamics`.
     frame : {"link", "base"}, default "link"
-        Axes of the components: those of the moved link, of which the rates are then the rates of the components, or
-        those of the base.
+        Axes of the components: those of the moved link, where the rates are the rates of the components, or those of
+        the base.
     fixed : sequence of str, optional
-        Fixed joints that are wanted, too, such as that of a force sensor between flange and tool, or of the base
-        bolted to the ground.
+        Fixed joints to include, such as the joint of a force sensor between flange and tool, or that of a base bolted
+        to the ground.
 
     Returns
     -------
     array of shape (..., order - 1, bodies, 6)
-        Force, N, and moment about the origin of the link, N m, that each of `robot.moving_links` gets through its joint
-        from its parent, by s; then the children of the `fixed` joints in their order.
+        Force, N, and moment about the origin of the link, N m, by s, that the parent exerts through the joint on each
+        of `robot.moving_links`, then on the children of the `fixed` joints in their order.
 
     Raises
     ------
     RobotError
-        If q or a wrench does not fit the robot, or a joint of `fixed` is none that is fixed.
+        If q or a wrench does not fit the robot, or `fixed` names a joint that is not fixed.
 
     Examples
     --------
@@ -147,7 +147,7 @@ def joint_wrenches(
 
 
 def _checked_fixed(robot: Robot, names: Sequence[str]) -> Sequence[str]:
-    """Return the names of fixed joints, or raise RobotError."""
+    """Return the names of fixed joints, or raise RobotError if one is unknown, not fixed or repeated."""
     if isinstance(names, str) or not isinstance(names, Sequence):
         raise RobotError("must be a list of names of fixed joints", name="fixed", value=names)
     known = [name for name, joint in robot.joints.items() if not joint.moving]
@@ -159,7 +159,7 @@ def _checked_fixed(robot: Robot, names: Sequence[str]) -> Sequence[str]:
 
 
 def _with_held_joints(robot: Robot, q: Any, names: Sequence[str]) -> tuple[Robot, Any]:
-    """Return the robot with joints that turn, at zero, in the place of fixed ones."""
+    """Return the robot with revolute joints, held at zero, in place of fixed joints, and its coordinates."""
     joints = [
         dataclasses.replace(joint, type="continuous", axis=(0, 0, 1)) if name in names else joint
         for name, joint in robot.joints.items()
@@ -174,7 +174,7 @@ def _with_held_joints(robot: Robot, q: Any, names: Sequence[str]) -> tuple[Robot
 def _applied(
     robot: Robot, q: Any, wrenches: Sequence[Wrench], time: ArrayLike | None, *, free: bool = False
 ) -> tuple[Any, Any]:
-    """Return the arrays, the constants and what is static of the wrenches."""
+    """Return the arrays, the constants and the static arguments of a program with wrenches."""
     given = wrench_arrays(robot, wrenches, q.shape[:-2], q.shape[-2] - 2, time, free=free)
     frames = tuple(frame_at(robot, wrench.link, wrench.point) for wrench in wrenches)
     return ((q, *given), frames), (tuple(wrench.frame == "base" for wrench in wrenches),)
@@ -187,10 +187,10 @@ def _on_bodies(
     global_axes: tuple[bool, ...],
     scene: tuple[Jet, Jet, Jet] | None = None,
 ) -> BodyWrenches | None:
-    """Return external wrenches about the origins of bodies, in their frames, that of the base last; None without any.
+    """Return external wrenches about the origins of bodies, in body frames, that of the base last; None without any.
 
-    What bears bodies that gravity does not pull at is one of them. The axes of the scene are given, in those of the
-    base, where that turns.
+    The lift of bodies that feel less than all of gravity counts as a wrench. For a base that turns, `scene` has the
+    axes of the scene in base axes.
     """
     q, *wrenches = arrays
     lifted = tree.shape.lifted
@@ -225,7 +225,7 @@ def _on_bodies(
 def generalized_forces(
     tree: Tree, arrays: tuple[Any, ...], frames: tuple[Frame, ...], global_axes: tuple[bool, ...], drives: bool
 ) -> Float[Numbers, "levels coordinate batch"]:
-    """Return joint torques, as `inverse_dynamics` does, on Taylor coefficients."""
+    """Return the joint torques of `inverse_dynamics` as Taylor coefficients."""
     q = arrays[0]
     applied = _on_bodies(tree, arrays, frames, global_axes)
     applied = None if applied is None else applied[:, :-1]

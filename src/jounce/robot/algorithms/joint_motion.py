@@ -1,4 +1,4 @@
-"""Joint motion from the motion of a link, order by order, by one pseudo-inverse. Negrean 2025, equation 60."""
+"""Joint motion from the motion of a link, order by order, with one pseudo-inverse. Negrean 2025, equation 60."""
 
 import dataclasses
 from collections.abc import Sequence
@@ -35,11 +35,11 @@ class JointMotion:
     q : array of shape (..., order + 1, n)
         Coordinates and their derivatives.
     singular_values : array of shape (..., k)
-        Of the Jacobian of the task, the largest first.
+        Singular values of the Jacobian of the task, the largest first.
     singular : array of bool, shape (...)
-        Whether the configuration is singular: the motion is damped there, or NaN without damping.
+        Whether the configuration is singular: its motion is damped, or NaN without damping.
     residual : array of shape (..., order, task)
-        What the motion lacks of the one prescribed: zero to rounding, unless damped or where joints are too few.
+        Prescribed motion minus that of the joints: zero to rounding, unless damped or with too few joints.
     """
 
     q: Array[Numbers, "*batch derivative joint"]
@@ -67,7 +67,6 @@ def _solved(
     near = s <= limit  # also where all are zero, and no motion is possible
     squares = jnp.where(near, damping**2 * (1 - (s / jnp.where(limit == 0, 1.0, limit)) ** 2), 0.0)
     inverse = jnp.where(near & (damping == 0), jnp.nan, s / jnp.where(squares + s == 0, 1.0, s**2 + squares))
-    # the pseudo-inverse is made once, and serves all orders
     pseudo = jnp.sum(v[:, None] * (u * inverse[None])[None], axis=2)
     q = position
     for k in range(target.shape[0]):
@@ -92,8 +91,8 @@ def joint_motion(
 ) -> JointMotion:
     """Return the joint motion that gives a link a prescribed motion, order by order: Negrean 2025, equation 60.
 
-    One pseudo-inverse of the Jacobian, from its singular values, serves all orders. A redundant robot moves with the
-    least norm of each derivative in turn.
+    One pseudo-inverse of the Jacobian, from its singular values, serves all orders. For a redundant robot, each
+    derivative in turn has the least norm.
 
     Parameters
     ----------
@@ -102,23 +101,24 @@ def joint_motion(
     position : array_like of shape (..., n)
         Coordinates, rad or m.
     operational : array_like of shape (..., order, 6) or (..., order, rows)
-        ``X', X'', ...`` as `operational_accelerations` gives them, or the rows of the task alone.
+        ``X', X'', ...`` as `operational_accelerations` returns them, or the rows of the task only.
     link, point
         As for `jacobian`.
     task : {"pose", "position", "orientation"} or sequence of int, default "pose"
-        Which rows count; numbers from 0 to 5 choose them freely, as ``(0, 1)`` for a place in the x-y plane.
+        Rows of the Jacobian to fulfill, by name or by numbers from 0 to 5, such as ``(0, 1)`` for a position in the x-y
+        plane.
     damping : float, default 0
-        Damped least squares: how strongly directions near singularity are held back, in the units of the Jacobian; it
-        fades in below the threshold. Zero is no damping: singular configurations are errors.
+        Damping factor of damped least squares, in the units of the Jacobian, which fades in below the threshold.
+        Without damping, singular configurations are errors.
     threshold : float, default 1e-3
-        A configuration is singular where the smallest singular value does not exceed this part of the largest.
+        Ratio of the smallest to the largest singular value at or below which a configuration is singular.
     strict : bool, default True
         Raise at singular configurations without damping; otherwise they are NaN.
 
     Returns
     -------
     JointMotion
-        Coordinates with their derivatives, singular values, and what is lacking.
+        Coordinates with their derivatives, singular values, and the residual.
 
     Raises
     ------
@@ -164,7 +164,7 @@ def joint_motion(
 
 
 def _rows(task: str | Sequence[int]) -> tuple[int, ...]:
-    """Return the rows of the Jacobian that a task has."""
+    """Return the rows of the Jacobian in a task."""
     if isinstance(task, str):
         check_choice("task", task, TASKS, RobotError)
         return TASKS[task]

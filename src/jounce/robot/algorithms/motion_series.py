@@ -1,4 +1,4 @@
-"""The series of the motion of a tree under forces: order by order, by one factorization of its articulated inertias."""
+"""Taylor series of the motion of a tree under forces, order by order, with one factorization of its inertias."""
 
 from collections.abc import Callable
 from functools import partial
@@ -23,11 +23,11 @@ class MotionSeries(NamedTuple):
     ----------
     coordinates, rates : array of shape (order + 2, coordinates, batch)
     accelerations : Unknowns
-        To the order, as all of a motion follows from them.
+        Coefficients to the given order, from which all others follow.
     factor : TreeFactor
-        Of the inertias at order zero.
+        Factorized inertias at order zero.
     position, quaternion, twist : array of shape (order + 2, 3 or 4 or 6, batch), or None
-        Of a free base.
+        Motion of a free base.
     """
 
     coordinates: Any
@@ -56,23 +56,23 @@ def motion_series(
     Parameters
     ----------
     equations : TreeEquations
-        Of the robot.
+        Equations of motion of the robot.
     motion : TreeState
-        The state.
+        State at the expansion point.
     applied : callable
-        Maps a motion and what is given to the forces of the coordinates, those on a free base, and wrenches on bodies.
+        Maps a motion and `given` to the forces of the coordinates, those on a free base, and wrenches on bodies.
     given : pytree of array of shape (order + 1, ..., batch)
-        Series of what forces depend on besides the motion.
+        Series of the inputs of forces other than the motion.
     driven : array of shape (order + 1, coordinates, batch)
-        Accelerations of driven coordinates, and zero for those that are free.
+        Accelerations of driven coordinates, zero for free ones.
     order : int
-        Of the accelerations.
+        Order of the accelerations.
     reversible : bool, default False
-        Whether JAX may differentiate it in reverse mode.
+        Whether JAX may differentiate the program in reverse mode.
     unrolled : bool, default False
         Whether each order has code of its own.
-    still : Still, optional
-        Of the equations, from `constant_motion`.
+    still : ConstantEntries, optional
+        Constant entries of the equations, from `constant_motion`.
     """
     factor = equations.factored(motion)
     start = jax.tree.map(lambda x: x[0], given)
@@ -121,7 +121,7 @@ def motion_series(
 
 
 def _integrated(motion: TreeState, accelerations: Unknowns, pose_rates: Any, factor: TreeFactor) -> MotionSeries:
-    """Return the series of a motion from those of its accelerations and of the rates of the pose of a free base."""
+    """Return the series of a motion from those of its accelerations and of the pose rates of a free base."""
     levels = jnp.arange(1.0, len(accelerations.joints) + 1)[:, None, None]
 
     def integrated(start: Any, rates: Any) -> Any:
@@ -148,16 +148,16 @@ def constant_motion(
     accelerations: Unknowns,
     given: Series,
 ) -> ConstantEntries:
-    """Return what does not change in the motion of a tree.
+    """Return the entries that stay constant in the equations of motion of a tree.
 
     Parameters
     ----------
     read : callable
-        Returns the equations and the forces, as `motion_series` takes them, for parameters.
+        Maps parameters to the equations and the forces that `motion_series` takes.
     parameters : pytree of array
-        NaN where a number is not known beforehand.
+        Parameters, NaN where unknown beforehand.
     motion, accelerations, given : pytree of array
-        A state and what forces depend on besides the motion, NaN where they are not known.
+        A state and the other inputs of forces, NaN where unknown.
     """
     structure = jax.tree.structure((motion, accelerations, given))
 
@@ -179,12 +179,12 @@ def _missing(
 
 
 def _program(equations: TreeEquations, applied: Any, structure: Any, *leaves: Any) -> Any:
-    """Return the forces that are missing, and how the motion changes."""
+    """Return the force residual and the rates of the motion."""
     motion, accelerations, given = jax.tree.unflatten(structure, leaves)
     return _missing(equations, applied, motion, accelerations, given), equations.motion_rates(motion, accelerations)
 
 
 def _with_accelerations(rates: TreeState, accelerations: Unknowns) -> TreeState:
-    """Return rates in which the accelerations are those found, in the place of those tried."""
+    """Return the rates of a motion with the given accelerations in place of the trial values."""
     base = None if rates.base is None else rates.base._replace(twist=accelerations.base)
     return rates._replace(rates=accelerations.joints, base=base)

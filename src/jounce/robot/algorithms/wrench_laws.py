@@ -35,44 +35,45 @@ class WrenchPart(Module):
         return self.function(*given)
 
     def at(self, *state: Any) -> Any:
-        """Return three components at one state, or at one time, as the function did when it was read off."""
+        """Return three components at one state, or at one time, from the function as it was when read."""
         assert self.function is not None
         return self.function.at(*state)
 
 
 class WrenchLaws(Module):
-    """Wrenches from outside as functions of time and state; see `wrench_laws`."""
+    """External wrenches as functions of time and state; see `wrench_laws`."""
 
     parts: tuple[tuple[WrenchPart, WrenchPart], ...]
 
     @property
     def changing(self) -> bool:
-        """Whether one depends on anything but the pose of its link."""
+        """Whether a wrench depends on anything but the pose of its link."""
         return any(part.function is not None for both in self.parts for part in both)
 
     def __call__(self, time: Any, q: Any, rate: Any) -> tuple[Any, ...]:
-        """Return force and torque of each wrench, (6, batch)."""
+        """Return the force and torque of each wrench, (6, batch)."""
         return tuple(jnp.concatenate([part(time, q, rate) for part in both]) for both in self.parts)
 
 
 def wrench_laws(
     robot: Robot, wrenches: Sequence[Wrench], *, free: bool
 ) -> tuple[WrenchLaws, tuple[Frame, ...], tuple[bool, ...]]:
-    """Return the laws of wrenches, where they act, and whether they are in the axes of the scene.
+    """Return the laws of wrenches, the frames in which they act, and whether each is in the axes of the scene.
 
     Parameters
     ----------
     robot : Robot
         The robot.
     wrenches : sequence of Wrench
-        Whose forces and torques are constant, or functions of time, or of time, coordinates and rates.
+        Wrenches with constant forces and torques, or functions of time, or of time, coordinates and rates.
     free : bool
-        Whether the base moves, and may be pushed.
+        Whether the base is free, so that wrenches may act on it.
 
     Raises
     ------
     RobotError
-        If a wrench is none, a link does not exist or does not move, or a force is neither constant nor such a function.
+        If an entry is not a Wrench, a link does not exist or does not move, or a force is neither constant nor such a
+        function.
     """
     check_wrenches(robot, wrenches, free=free)
     parts, n = [], len(robot.joint_names)

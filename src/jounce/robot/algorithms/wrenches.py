@@ -1,4 +1,4 @@
-"""External wrenches: forces and torques that act on links, as functions of time."""
+"""External wrenches: forces and torques on links, as functions of time."""
 
 import dataclasses
 from collections.abc import Sequence
@@ -22,25 +22,25 @@ FRAMES = ("base", "link")
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Wrench:
-    """A force and a torque from outside on a link, for example of a contact or a tool.
+    """An external force and torque on a link, for example of a contact or a tool.
 
     Parameters
     ----------
     link : str
-        Name of the link that it acts on.
+        Name of the link.
     force, torque : array_like or callable, default zero
-        N and N m. Shape (3,): constant. Shape (..., order - 1, 3): values and derivatives in time for each sample, as
-        many torques as are requested. A callable maps the time, a scalar in s, to three components, by JAX functions.
+        N and N m. Shape (3,): constant. Shape (..., order - 1, 3): values and time derivatives for each sample, as many
+        as the requested torques have. A callable maps the time, a scalar in s, to three components, by JAX functions.
     point : array_like of shape (3,), default zero
-        Where the force acts, in the frame of the link, m.
+        Point of application, in the frame of the link, m.
     frame : {"base", "link"}, default "base"
-        Whose axes the components refer to; those of the link turn with it. Where the base moves (`BaseMotion`), "base"
-        are the axes of the scene, in which its pose is given.
+        Axes of the components; those of the link turn with it. Where the base moves (`BaseMotion`), "base" means the
+        axes of the scene, in which the pose of the base is given.
 
     Raises
     ------
     RobotError
-        If the frame is not known or the point is not made of three finite numbers.
+        If the frame is unknown, or the point is not three finite numbers.
     """
 
     link: str
@@ -65,13 +65,13 @@ def wrench_arrays(
 ) -> tuple[Any, ...]:
     """Return the wrenches as arrays of plain derivatives, of shape (..., levels, 6): force, then torque.
 
-    The base may be pushed where it is free.
+    Wrenches may act on the base only if it is free.
 
     Raises
     ------
     RobotError
-        If a wrench is none, a link does not exist, the base is pushed, a shape does not fit the samples, or a function
-        has no time.
+        If an entry is not a Wrench, a link does not exist, a wrench acts on a fixed base, a shape does not fit the
+        samples, or a force is a function of time and `time` is missing.
     """
     check_wrenches(robot, wrenches, free=free)
     arrays = []
@@ -85,7 +85,7 @@ def wrench_arrays(
 
 
 def check_wrenches(robot: Robot, wrenches: Sequence[Wrench] | Refused, *, free: bool) -> None:
-    """Raise RobotError unless these are wrenches on links that move; on the base where it is free."""
+    """Raise RobotError unless all are wrenches on links that move, or on the base if it is free."""
     if not isinstance(wrenches, Sequence) or isinstance(wrenches, str):
         raise RobotError("must be a list of jn.robot.Wrench", name="wrenches", value=type(wrenches).__name__)
     for k, wrench in enumerate(wrenches):

@@ -1,4 +1,4 @@
-"""Damping and friction of a ball, against the angular velocity of one body relative to another."""
+"""Damping and friction of a ball joint, against the relative angular velocity of two bodies."""
 
 import jax.numpy as jnp
 
@@ -9,9 +9,9 @@ from jounce.rigid import SpatialPose
 
 
 class BallDamper(AbstractForce, space="spatial"):
-    """Moment against the angular velocity of body j relative to body i, alike about all axes.
+    """Moment against the angular velocity w of body j relative to body i, isotropic.
 
-    ``M = -damping w - friction sign(w)``, each component along an axis of body j.
+    ``M = -damping w - friction sign(w)``, by components along the axes of body j.
     """
 
     damping: Scalar  # N m s/rad
@@ -22,8 +22,7 @@ class BallDamper(AbstractForce, space="spatial"):
     symbol = "rotation"
 
     def displacement(self, body_i: SpatialPose, body_j: SpatialPose, time: Jet) -> Jet:  # noqa: ARG002
-        """Return nothing that changes."""
-        # no vector changes at the rate of an angular velocity: the rates below are those on which the moment works
+        """Return zero: no vector has an angular velocity as its rate, so `velocity` and `variation` replace it."""
         return Jet.constant(jnp.zeros_like(body_j.position.coefficients[0]), body_j.order)
 
     def velocity(self, body_i: SpatialPose, body_j: SpatialPose, time: Jet) -> Jet:  # noqa: ARG002
@@ -31,7 +30,7 @@ class BallDamper(AbstractForce, space="spatial"):
         return body_j.to_body(body_j.global_angular_velocity() - body_i.global_angular_velocity())
 
     def variation(self, bodies: tuple[SpatialPose, ...], changes: tuple[SpatialPose, ...], time: Jet) -> Jet:  # noqa: ARG002
-        """Return the relative turn in axes of body j."""
+        """Return the relative infinitesimal rotation in axes of body j."""
         rotated = bodies[0].direction(bodies[0].turning(changes[0]))
         return bodies[1].turning(changes[1]) - bodies[1].to_body(rotated)
 

@@ -1,4 +1,4 @@
-"""A robot as a mechanism: bodies with masses, joints, loops closed, drives that prescribe coordinates."""
+"""A robot as a mechanism: bodies with masses, joints, closed loops, and drivers that prescribe coordinates."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -38,49 +38,50 @@ def mechanism(
 ) -> Mechanism:
     """Return a robot as a spatial mechanism, with masses and gravity, its loops closed.
 
-    Each moving link is a body of that name, whose frame is that of the link; links fixed to it are part of it, the base
-    is the ground. Joints and closures keep their names. The six joints of a base that floats, and the three turns of a
-    ball, are one free body, and one spherical joint, unless a coordinate of theirs is driven. A closure holds in those
-    directions only in which the joints do not hold already (`closure_wrenches`), so that reactions in the others are
-    the joints' alone; with `redundant_reactions` it holds in all, and that choice determines its reactions.
+    Each moving link becomes a body of the same name and frame, which includes the links fixed to it; the base is the
+    ground. Joints and closures keep their names. The six joints of a floating base become a free body, and the three
+    turns of a ball one spherical joint, unless one of their coordinates is driven. A closure constrains only the
+    directions that the joints leave free (`closure_wrenches`), so that the joints alone bear the reactions in the
+    others. With `redundant_reactions` it constrains all its directions, and that choice determines its reactions.
 
     Parameters
     ----------
     robot : Robot
-        With closures or without.
+        The robot, with closures or without.
     q : array_like of shape (n,) or dict of str to float, optional
-        Coordinates near which the mechanism is assembled, where the joints start unless given: at zero, or in the pose
-        of an MJCF file. Driven joints start where their laws do, the others are moved until the loops are closed.
-        Unless given, a robot drawn with its loops closed stays in that assembly as driven joints go to their start.
+        Coordinates near which the mechanism is assembled; by default the start positions of the joints: zero, or the
+        pose of an MJCF file. Driven joints start at the start values of their laws, and the others move until the loops
+        are closed. By default, a robot whose start positions close the loops stays in that assembly while the driven
+        joints move to their start values.
     drivers : dict of str to law, or JointTrajectory, optional
         Laws of coordinates, by name of the joint: expressions of t, functions of time, motions or numbers; rad or m.
         The driver of joint A is named ``A_drive``, and its force is the torque or force of the joint.
     initial : dict of str to law, optional
-        Coordinates that hold at the start of a simulation only, named ``A_start``.
+        Coordinates prescribed at the start of a simulation only, named ``A_start``.
     forces : dict of str to AbstractForce, optional
         Applied forces; their bodies are moving links, or ``"ground"``.
     outputs : dict of str to AbstractOutput or str, optional
-        Quantities requested; a word is the name of a joint, for its coordinate. Unless given, the coordinates of
-        all joints in `joint_names` under their names, with ``_`` behind those of columns of results, such as
-        ``time``. An angle starts between half a turn either side of zero.
+        Requested outputs; a string is the name of a joint, for its coordinate. By default the coordinates of all
+        `joint_names`, under their names, with a ``_`` appended to those that name a column of results, such as
+        ``time``. Angles start between minus half a turn and half a turn.
     parameters : dict of str to number or expression, optional
         Named values for laws and forces.
     time : array_like or TimeGrid, optional
-        Instants to solve for, s; of a trajectory, its own unless given.
+        Instants to solve for, s; by default those of a trajectory.
     drives : bool, default True
-        Count the armature inertia of the joints, each as that of a rotor on the ground, the body ``A_rotor``, that the
-        constraint ``A_gear`` turns with the joint; their viscous damping, Coulomb friction and springs, as forces
-        named ``A_damping``, ``A_friction`` and ``A_spring``, and what the drives of balls have, ``A_ball``. Friction
-        has the sign of the velocity and is zero at rest. Without, all are left out. What bears links that feel less
-        than all of gravity is a force ``LINK_lift`` in any case.
+        Include the drives: armature inertias, each as that of a rotor on the ground, the body ``A_rotor``, which the
+        constraint ``A_gear`` turns with the joint; viscous damping, Coulomb friction and springs, as forces named
+        ``A_damping``, ``A_friction`` and ``A_spring``; and the losses of drives of balls, ``A_ball``. Friction has the
+        sign of the velocity and is zero at rest. The lift of links that feel less than all of gravity, ``LINK_lift``,
+        is included in any case.
     redundant_reactions : {"unique", "least_norm"} or dict of str to dict, optional
         As of `Mechanism`: reactions without a unique value are NaN, those of least norm, or as stiffnesses of joints
-        share them. The redundant equations of closures must then agree, as those of any mechanism: to 1e-9.
+        share them. The redundant equations of closures must then agree to 1e-9, as those of any mechanism.
 
     Returns
     -------
     Mechanism
-        Square where as many joints are driven as the robot has degrees of freedom.
+        The mechanism, square if as many joints are driven as the robot has degrees of freedom.
 
     Raises
     ------
@@ -134,7 +135,7 @@ def mechanism(
 
 
 def _coordinate_outputs(joints: tuple[str, ...]) -> dict[str, str]:
-    """Return joints by the names of the outputs of their coordinates: their own, unless results have such columns."""
+    """Return joints by the names of their outputs: the joint's own name, unless a column of results has it."""
     outputs = {}
     for joint in joints:
         name = joint
@@ -147,7 +148,7 @@ def _coordinate_outputs(joints: tuple[str, ...]) -> dict[str, str]:
 def _start(
     robot: AbstractRobot, q: Any, laws: Mapping[str, Any], parameters: Mapping[str, Any], time: Any
 ) -> np.ndarray:
-    """Return the coordinates to start from: those given, and what the laws say of the driven joints."""
+    """Return the start coordinates: those given, with the values of the laws for driven joints."""
     start = given_coordinates(robot, q)
     if laws:
         values = Mechanism(
@@ -169,9 +170,9 @@ def _start(
 def _closed_start(
     robot: AbstractRobot, loops: Loops, start: np.ndarray, free: np.ndarray, *, drawn: bool
 ) -> np.ndarray:
-    """Return coordinates at which the loops are closed: in the assembly in which the robot is drawn, if it is.
+    """Return start coordinates at which the loops are closed, in the assembly in which the robot is drawn, if in one.
 
-    The driven joints are moved from there to where their laws start.
+    The driven joints move from the drawn pose to the start values of their laws.
     """
     if drawn:
         reached = loops.followed(given_coordinates(robot, None), start, free)
@@ -181,16 +182,16 @@ def _closed_start(
 
 
 def body_point(robot: AbstractRobot, link: str, point: ArrayLike = (0.0, 0.0, 0.0)) -> tuple[str, np.ndarray]:
-    """Return the body of a mechanism that a link is part of, and where a point of the link is in the frame of the body.
+    """Return the body of the mechanism that includes a link, and a point of the link in the frame of that body.
 
     Parameters
     ----------
     robot : Robot
         The robot.
     link : str
-        Name of the link; the base and what is fixed to it are the ground.
+        Name of the link; the base and links fixed to it are the ground.
     point : array_like of shape (3,), default the origin
-        In the frame of the link, m.
+        The point, in the frame of the link, m.
 
     Returns
     -------
@@ -200,7 +201,7 @@ def body_point(robot: AbstractRobot, link: str, point: ArrayLike = (0.0, 0.0, 0.
     Raises
     ------
     RobotError
-        If there is no such link.
+        If the link does not exist.
 
     Examples
     --------

@@ -1,8 +1,8 @@
-"""Closing the loops of a robot: what holds two links together, and which of it the joints of the tree do already.
+"""Closures of the loops of a robot: the wrenches that they bear, and those that the joints of the tree bear already.
 
-In a loop of hinges with parallel axes a closure holds some directions that the hinges hold too. Such equations are
-redundant: the forces in them have no unique value. They are found by the rank of the velocities of the closures in
-the coordinates of the tree, near the closed position as well as in it, and left out.
+In a loop of hinges with parallel axes, a closure constrains some directions that the hinges constrain too. These
+equations are redundant: their reactions have no unique value. The rank of the closure velocities in the coordinates of
+the tree, in the closed position and near it, finds the redundant equations, and the mechanism omits them.
 """
 
 import math
@@ -33,21 +33,21 @@ from jounce.robot.recursions.tree_scan import Series
 from jounce.trajectory.labels import in_order
 
 GivenCoordinates = TypeAliasType("GivenCoordinates", Mapping[str, float] | ArrayLike | None)
-"""Coordinates in order, or by name of the joint; those not given are where the joints start."""
+"""Coordinates in order, or by name of the joint; coordinates not given are the start positions of the joints."""
 
 RANK_TOLERANCE = 1e-5  # rad, or sizes of the robot: files give axes with six digits
 MAX_STEPS = 100
-DRAWN = 0.05  # rad, or sizes of the robot: coordinates that move less until the loops close are those of a drawn pose
-STRIDE = 0.1  # rad, or sizes of the robot: of joints that lead the others
-STRAY = 0.3  # of a step: what leads to the same assembly is nearer to where the velocities point
-SHORTEST = 1e-4  # of the largest step
-SWAY = 0.05  # rad, or sizes of the robot: how far a position in general is from the one given
+DRAWN = 0.05  # rad, or sizes of the robot: a pose is drawn closed if closing its loops moves no coordinate by more
+STRIDE = 0.1  # rad, or sizes of the robot: largest step of the driven joints
+STRAY = 0.3  # fraction of a step: a larger distance from the predicted position may lead to another assembly
+SHORTEST = 1e-4  # fraction of the largest step
+SWAY = 0.05  # rad, or sizes of the robot: distance of a position in general from the one given
 
 
 class LinkClosure(AbstractConstraint, type="closure", space="spatial"):
-    """Two links held together in some directions, each a wrench that the closure can bear.
+    """Two links held together in some directions, each given by a wrench that the closure can bear.
 
-    With the offset d of the points and the turn e that is missing, both in axes of body i, the rows are
+    With the offset d of the points and the rotation error e, both in axes of body i, the rows are
     ``force . d + moment . e``.
     """
 
@@ -80,10 +80,10 @@ class LinkClosure(AbstractConstraint, type="closure", space="spatial"):
         return rows + turn.map(lambda x: jnp.sum(moment * x[None], axis=1))
 
     def sense_at(self, body_i: SpatialPose, body_j: SpatialPose) -> Float[Numbers, "..."] | None:
-        """Return the sign of the Euler parameters at a pose, (...), as either sign tells the same attitude; or None.
+        """Return the sign of the Euler parameters at a pose, (...), as either sign gives the same attitude; or None.
 
-        A row of force and moment both would else be another one. The sign stays along a motion: none is looked for on
-        the way, as it would change where a body turns past half a turn in a pin, and the Jacobian with it.
+        The sign matters to a row with both force and moment. It stays constant along a motion: choosing it anew would
+        switch it, and the Jacobian with it, where a body passes half a turn in a pin.
         """
         if self.vector_part is None:
             return None
@@ -107,7 +107,7 @@ def constraint_wrenches(closure: Closure) -> np.ndarray:
 def _placed(
     tree: Tree, arrays: tuple[Series], link_frames: tuple[Frame, Frame]
 ) -> Float[Numbers, "order 4 3 closure batch"]:
-    """Return offset of the points, and axes of the second link, of each closure, in axes of its first link."""
+    """Return the offset of the points, and the axes of the second link, of each closure, in axes of its first link."""
     frames = body_frames(tree, arrays[0])
 
     def point_and_axes(link_frame: Frame) -> tuple[Jet, list[Jet]]:
@@ -122,13 +122,13 @@ def _placed(
 
 
 def _missing_turn(closure: Closure, rotation: np.ndarray) -> np.ndarray:
-    """Return by how much the second link of a closure is turned from where it is closed, rad, as a vector.
+    """Return the rotation of the second link of a closure from its closed attitude, a rotation vector, rad.
 
-    That is the angle, up to half a turn: the sine of it would vanish for links that are half a turn apart. What a pin
-    leaves free does not count.
+    Its length is the angle, up to half a turn, as the sine would vanish for links that are half a turn apart. A
+    rotation about the axis of a pin does not count.
     """
     if closure.type != "pin":
-        from scipy.spatial.transform import Rotation  # here, since importing SciPy takes half a second
+        from scipy.spatial.transform import Rotation  # importing SciPy takes half a second
 
         return Rotation.from_matrix(rotation).as_rotvec()
     axis = np.asarray(closure.axis)
@@ -145,7 +145,7 @@ class Loops:
     Parameters
     ----------
     robot : Robot
-        With closures.
+        A robot with closures.
     """
 
     def __init__(self, robot: AbstractRobot):
@@ -162,9 +162,9 @@ class Loops:
         self.frames = tuple(jax.tree.map(lambda *xs: np.stack(xs), *side) for side in sides)
 
     def gaps(self, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the scaled gaps of all closures, (closures, 6), and velocities by the scaled coordinates.
+        """Return the scaled gaps of all closures, (closures, 6), and their velocities by the scaled coordinates.
 
-        The velocities of gaps that are turns are angular: those of the gaps themselves near where they are closed.
+        The velocities of rotations are angular velocities, which are the rates of the gaps near the closed position.
         """
         count = len(q)
         directions = np.diag(self.scale) if count else np.zeros((1, 0))
@@ -180,12 +180,14 @@ class Loops:
         return np.array(gaps), np.array(slopes)
 
     def closed(self, q: Float[np.ndarray, " joint"], free: Any = slice(None)) -> Float[np.ndarray, " joint"]:
-        """Return the coordinates nearest to the given ones at which the loops are closed; only those free change.
+        """Return coordinates near the given ones at which the loops are closed, by damped Gauss-Newton iteration.
+
+        Only free coordinates change.
 
         Raises
         ------
         RobotError
-            If there are none nearby.
+            If the iteration does not close the loops.
         """
         q = np.array(q, float)
 
@@ -217,10 +219,10 @@ class Loops:
     def followed(
         self, q: Float[np.ndarray, " joint"], target: Float[np.ndarray, " joint"], free: np.ndarray
     ) -> Float[np.ndarray, " joint"] | None:
-        """Return where joints that are free come to from coordinates q, as the others go straight to a target.
+        """Return the coordinates that the free joints reach from q as the others move straight to a target.
 
-        Small steps along the velocities keep the loops in one assembly. None if they are open at q already, or open on
-        the way.
+        Small steps along the velocities keep the loops in one assembly. The result is None if the loops are open at q
+        or cannot be kept closed on the way.
         """
         try:
             here = self.closed(q, free)
@@ -264,13 +266,13 @@ class Loops:
             raise RobotError(message, name=f"closures.{self.names[worst]}")
 
     def independent(self, q: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
-        """Return for each closure the wrenches that it alone bears, (k, 6), and those that the rest bears too.
+        """Return for each closure the wrenches that it alone bears, (k, 6), and those that other constraints bear too.
 
-        What vanishes in this position only, as at a dead point, counts as independent: positions nearby tell.
+        Wrenches redundant only in this position, as at a dead point, count as independent: nearby positions decide.
         """
         split = self._split(q)
         best = split
-        random = np.random.default_rng(1)  # any directions do, the same each time
+        random = np.random.default_rng(1)  # arbitrary but reproducible directions
         for _ in range(2):
             slopes = np.concatenate([w @ s for (w, _), s in zip(best, self.gaps(q)[1], strict=True)])
             motions = _null_space(slopes)
@@ -288,7 +290,7 @@ class Loops:
 
     def _split(self, q: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
         _, slopes = self.gaps(q)
-        motions = np.eye(len(q))  # that the closures so far allow
+        motions = np.eye(len(q))  # motions that the closures so far allow
         groups = []
         for wrenches, slope in zip(self.wrenches, slopes, strict=True):
             rows = wrenches @ slope @ motions
@@ -300,7 +302,7 @@ class Loops:
 
 
 def _aligned(basis: np.ndarray) -> np.ndarray:
-    """Return an orthonormal basis, as rows, of the same space as the columns given: along the axes where it can be."""
+    """Return an orthonormal basis, as rows, of the space of orthonormal columns, along the axes where possible."""
     projector = basis @ basis.T
     rows = []
     for _ in range(basis.shape[1]):
@@ -319,14 +321,14 @@ def _null_space(matrix: np.ndarray) -> np.ndarray:
 
 
 def given_coordinates(robot: AbstractRobot, q: GivenCoordinates) -> Float[np.ndarray, " joint"]:
-    """Return coordinates from an array, or from values by name of the joint; of others those where they start."""
+    """Return coordinates from an array, or from values by name of the joint, with start positions for the others."""
     if q is None or isinstance(q, Mapping):
         return robot.coordinates(**{**{name: robot.joints[name].start for name in robot.joint_names}, **(q or {})})
     return np.array(finite_numbers("q", in_order("q", q, robot.joint_names, RobotError), (len(robot.joint_names),)))
 
 
 def size_of(robot: AbstractRobot) -> float:
-    """Return a length of the robot, m: the largest distance from a joint to the next, or from a joint to a closure."""
+    """Return the size of the robot, m: the largest distance from a joint to the next or to a closure, or 1 m."""
     lengths = [float(np.linalg.norm(joint.position)) for joint in robot.joints.values()]
     lengths += [float(np.linalg.norm(p)) for closure in robot.closures.values() for p in closure.points]
     return max(lengths, default=0.0) or 1.0
@@ -335,17 +337,17 @@ def size_of(robot: AbstractRobot) -> float:
 def closure_wrenches(
     robot: AbstractRobot, q: GivenCoordinates = None
 ) -> dict[str, tuple[Float[np.ndarray, "wrench 6"], Float[np.ndarray, "redundant 6"]]]:
-    """Return what each closure of a robot bears, and what of it is redundant, as the joints of the tree bear it too.
+    """Return the wrenches that each closure of a robot bears, and its redundant wrenches, which the joints bear too.
 
-    A mechanism of the robot has one equation for each wrench of the first kind. Those of the second kind hold by
-    themselves; their reactions would have no unique value, and are zero in the mechanism.
+    The mechanism of the robot has one equation for each wrench borne. The equations of redundant wrenches follow from
+    the others; their reactions would have no unique value, and are zero in the mechanism.
 
     Parameters
     ----------
     robot : Robot
-        With closures.
+        A robot with closures.
     q : array_like of shape (n,) or dict of str to float, optional
-        Coordinates near which the loops are closed; where the joints start unless given.
+        Coordinates near which the loops are closed; by default the start positions of the joints.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""The coordinate of a joint between two bodies, by their poses: driven, followed by another joint, or an output."""
+"""The coordinate of a joint as a function of the poses of two bodies: driven, coupled to another, or an output."""
 
 import dataclasses
 from fractions import Fraction
@@ -21,8 +21,8 @@ from jounce.rigid.body_arrays import each_jet
 KINDS = ("turn-turn", "turn-slide", "slide-turn", "slide-slide")
 ROLES = "ijmn"
 AT_REST = "0"
-NO_PERIOD = 1e300  # which no equation goes through
-LARGEST_DENOMINATOR = 1000  # of ratios that are taken for those of whole numbers
+NO_PERIOD = 1e300  # larger than the range of any equation
+LARGEST_DENOMINATOR = 1000  # of ratios of whole numbers
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -36,7 +36,7 @@ class JointPlacement:
     turning : bool
         Whether the coordinate is an angle.
     point : array of shape (3,)
-        Origin of the joint on the first body; on the second it is the origin of the frame.
+        Origin of the joint on the first body; on the second body it is the origin of the frame.
     axis_i, axis_j : array of shape (3,)
         Axis on each body.
     vector_i, vector_j : array of shape (3,)
@@ -63,7 +63,7 @@ def coordinate(
 
 
 def at_rest(like: SpatialPose) -> SpatialPose:
-    """Return the pose of space itself, with the shape and the order of another."""
+    """Return the identity pose, at rest, with the shape and the order of another pose."""
     zero = jnp.zeros_like(like.position.coefficients[0])
     still = SpatialPose.at(zero, jnp.concatenate([jnp.ones_like(zero[:1]), zero]))
     return each_jet(lambda jet: Jet.constant(jet.coefficients[0], like.order), still)
@@ -72,12 +72,12 @@ def at_rest(like: SpatialPose) -> SpatialPose:
 class CoupledJoints(AbstractConstraint, type="coupled", space="spatial"):
     """A joint follows another one: ``weight_2 q_2 - weight_1 q_1 = offset``, up to whole periods.
 
-    The angles of turning joints are known up to whole turns. Unless given, the period is one turn
-    where both turn by whole weights, and otherwise that of the joint that turns, so that a continuous motion never
-    loses count over many turns.
+    Angles of turning joints are known up to whole turns. By default the period is one turn if both joints turn and
+    have whole weights, and otherwise a turn of the turning joint times its weight, so that a continuous motion stays
+    consistent over many turns.
 
-    The role 0 of the parent of the second joint is that of space itself, on which nothing acts: so turn the rotors that
-    stand for inertia against the rate of a coordinate alone.
+    Role 0 as the parent of the second joint is inertial space, which takes no reaction. The rotors that represent
+    armature inertia, whose force depends on the rate of a coordinate alone, turn against it.
     """
 
     roles: str = field(static=True)  # parent and child of each joint among the bodies i, j, m, n, such as ijim; ij0m
@@ -115,7 +115,7 @@ class CoupledJoints(AbstractConstraint, type="coupled", space="spatial"):
             raise MechanismError(message, name="roles", value=self.roles)
 
     def residual(self, *bodies_and_time: Any) -> Jet:
-        """Return what the second joint lacks of following the first."""
+        """Return the deviation of the second joint from following the first."""
         given = dict(zip(ROLES, bodies_and_time, strict=False)) | {AT_REST: at_rest(bodies_and_time[0])}
         bodies = [given[role] for role in self.roles]
         turning = [kind == "turn" for kind in self.kinds.split("-")]
@@ -128,11 +128,11 @@ class CoupledJoints(AbstractConstraint, type="coupled", space="spatial"):
 
     @property
     def unfelt(self) -> tuple[int, ...]:
-        """Places of the bodies of which the ground does not feel what turns them."""
+        """Positions in `bodies` of those whose reaction moments the ground does not receive."""
         return (ROLES.index(self.roles[3]),) if self.roles[2] == AT_REST else ()
 
     def _period(self, leader_turns: bool, follower_turns: bool) -> Any:
-        """Return by what the equation changes where a turning joint makes a whole turn."""
+        """Return the change of the equation when a turning joint makes a whole turn."""
         if self.period is not None:
             return self.period
         weight = jnp.abs(self.weight_2 if follower_turns else self.weight_1)
@@ -147,10 +147,10 @@ def coupled(
 ) -> CoupledJoints:
     """Return the constraint that makes a joint follow another: ``q_2 = multiplier q_1 + offset``.
 
-    In space, the follower turns from where its axes are drawn in the ground, and nothing acts on that.
+    With `in_space`, the parent of the follower is inertial space, which takes no reaction.
 
-    A turning joint whose multiplier is no ratio of whole numbers below a thousand is followed for half a turn either
-    side of zero only; beyond it the motion cannot be followed.
+    Between turning joints, a multiplier that is not a ratio with a denominator of at most a thousand is valid only
+    within half a turn either side of zero.
     """
     bodies = list(dict.fromkeys([*leader.bodies, *follower.bodies[in_space:]]))
     follower_roles = [AT_REST if in_space and k == 0 else ROLES[bodies.index(x)] for k, x in enumerate(follower.bodies)]
@@ -172,7 +172,7 @@ def coupled(
 
 
 class SlideOutput(AbstractOutput):
-    """Distance, along a direction of body i, from a point of it to a point of body j, m; it may be negative."""
+    """Signed distance from a point of body i to a point of body j along a direction of body i, m."""
 
     point_i: Vector  # m, in the frame of each body
     point_j: Vector
@@ -181,5 +181,5 @@ class SlideOutput(AbstractOutput):
     body_count = 2
 
     def evaluate(self, body_i: PlanarPose | SpatialPose, body_j: PlanarPose | SpatialPose) -> Jet:
-        """Return the distance."""
+        """Return the signed distance."""
         return slide(body_i, body_j, self.point_i, self.point_j, self.vector_i)

@@ -1,1 +1,1 @@
-"""Links, joints and laws of a robot, and its tree."""
+"""Links, joints and joint laws of a robot, and its tree."""

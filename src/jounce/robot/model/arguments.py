@@ -1,4 +1,4 @@
-"""What users hand to the functions of robots, checked: numbers, coordinates and their derivatives."""
+"""Checks of the arguments of robot functions: numbers, coordinates and their derivatives."""
 
 from collections.abc import Callable
 from functools import partial, wraps
@@ -19,14 +19,14 @@ R = TypeVar("R")
 
 
 def stacked_arguments(count: int, hint: str) -> Callable[[Callable[P, R]], Callable[P, R]]:
-    """Decorate a function so that a call as in another library, with separate derivatives, raises an error with a hint.
+    """Return a decorator for functions that take stacked derivatives: a call with separate ones raises a RobotError.
 
     Parameters
     ----------
     count : int
-        How many arguments it takes without their names.
+        Number of positional arguments.
     hint : str
-        The call here, and that of the other library.
+        The call in jounce, and that in another library, for the message.
     """
 
     def decorated(function: Callable[P, R]) -> Callable[P, R]:
@@ -43,12 +43,12 @@ def stacked_arguments(count: int, hint: str) -> Callable[[Callable[P, R]], Calla
 
 
 def floats(name: str, values: Any, read: Callable[..., np.ndarray] = real_numbers) -> Float[Numbers, "..."]:
-    """Return values as an array of double precision, of NumPy unless it is one of JAX.
+    """Return values as an array of double precision: a NumPy array, or a JAX array if they are one.
 
     Raises
     ------
     RobotError
-        If they are not real numbers in one rectangular array.
+        If the values are not real numbers in one rectangular array.
     """
     if is_real(values):
         return values.astype(float, copy=False)
@@ -65,12 +65,12 @@ whole_number = partial(errors.whole_number, error=RobotError)
 
 
 def joints_of(robot: object) -> tuple[str, ...]:
-    """Return the names of the joints of what must be a robot.
+    """Return the joint names of a robot.
 
     Raises
     ------
     RobotError
-        If it is none.
+        If the argument is not a robot.
     """
     if not isinstance(robot, AbstractRobot):
         message = "must be a jn.Robot, as jn.load_robot gives it; the robot is the first argument"
@@ -79,7 +79,7 @@ def joints_of(robot: object) -> tuple[str, ...]:
 
 
 def _numbered(robot: AbstractRobot, name: str, q: object) -> tuple[int, Float[Numbers, "..."]]:
-    """Return the number of joints, and coordinates as an array."""
+    """Return the number of joints, and the coordinates as an array."""
     count = len(joints_of(robot))
     if isinstance(q, str) and q in robot.frames:
         message = "must be an array of real numbers; the arguments are the robot, q, then the name of a link"
@@ -88,12 +88,12 @@ def _numbered(robot: AbstractRobot, name: str, q: object) -> tuple[int, Float[Nu
 
 
 def checked_position(robot: AbstractRobot, q: object, name: str = "q") -> Float[Numbers, "*batch 1 joint"]:
-    """Return coordinates without derivatives as those of order zero.
+    """Return checked coordinates without derivatives, with an axis for the order zero.
 
     Raises
     ------
     RobotError
-        If there is no robot, or their shape, (..., n), does not fit it.
+        If `robot` is not a robot, or the coordinates do not have the shape (..., n).
     """
     n, q = _numbered(robot, name, q)
     if q.ndim < 1 or q.shape[-1] != n:
@@ -102,12 +102,12 @@ def checked_position(robot: AbstractRobot, q: object, name: str = "q") -> Float[
 
 
 def checked_state(robot: AbstractRobot, state: object) -> Float[Numbers, "*batch 2 joint"]:
-    """Return coordinates and velocities.
+    """Return checked coordinates and velocities.
 
     Raises
     ------
     RobotError
-        If there is no robot, or their shape, (..., 2, n), does not fit it.
+        If `robot` is not a robot, or the state does not have the shape (..., 2, n).
     """
     n, state = len(joints_of(robot)), floats("state", in_order("state", state, robot.joint_names, RobotError))
     if state.ndim < 2 or state.shape[-2:] != (2, n):
@@ -119,12 +119,12 @@ def checked_state(robot: AbstractRobot, state: object) -> Float[Numbers, "*batch
 def checked_coordinates(
     robot: AbstractRobot, q: object, least: int = 0, most: int | None = None
 ) -> Float[Numbers, "*batch derivative joint"]:
-    """Return coordinates and their derivatives, at least so many, cut to at most so many.
+    """Return checked coordinates and derivatives, to the order `least` or more, truncated to the order `most`.
 
     Raises
     ------
     RobotError
-        If there is no robot, their shape does not fit it, or the derivatives are too few or too many.
+        If `robot` is not a robot, the shape does not fit it, or the derivatives are too few or too many.
     """
     n, q = _numbered(robot, "q", q)
     if q.ndim < 2 or q.shape[-1] != n:

@@ -1,4 +1,4 @@
-"""What acts on several joints at once: tendons along joints, and drives of balls."""
+"""Couplings, which act on several joints at once: tendons along joints, and drives of balls."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ OF_BALL = ("armature", "damping", "friction")
 
 
 def _check_numbers(coupling: Any, fields: Sequence[str]) -> None:
-    """Replace the values of fields by numbers, all but ``rest`` zero or greater."""
+    """Convert the values of fields to numbers; raise RobotError if one other than ``rest`` is negative."""
     for field in fields:
         where = f"couplings.{coupling.name}.{field}"
         value = float(finite_numbers(where, getattr(coupling, field), ()))
@@ -28,18 +28,18 @@ def _check_numbers(coupling: Any, fields: Sequence[str]) -> None:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Tendon:
-    """A line along joints, of a length that sums up their coordinates, with spring, damper, friction and inertia.
+    """A line along joints, whose length is a weighted sum of coordinates, with spring, damper, friction and inertia.
 
     Parameters
     ----------
     name : str
         Name of the tendon.
     weights : dict of str to float
-        What a unit of each coordinate adds to the length, m/rad or 1.
+        Change of the length per unit of each coordinate, m/rad or 1.
     stiffness : float, default 0
-        Of the spring, N by the unit of the length.
+        Stiffness of the spring, N by the unit of the length.
     rest : float, default 0
-        Length at which the spring is free.
+        Length at which the spring is unstressed.
     damping : float, default 0
         Viscous friction.
     friction : float, default 0
@@ -79,11 +79,11 @@ class Tendon:
 
     @property
     def joints(self) -> tuple[str, ...]:
-        """The joints that it runs along."""
+        """Names of the joints along the tendon."""
         return tuple(self.weights)
 
     def locked(self, positions: Mapping[str, float]) -> Tendon | None:
-        """Return the tendon of a robot some of whose joints are held; None if all of its own are."""
+        """Return the tendon of a robot with some joints locked; None if all joints of the tendon are."""
         held = {joint for joint in self.weights if joint in positions}
         left = {joint: weight for joint, weight in self.weights.items() if joint not in held}
         rest = self.rest - sum(self.weights[joint] * positions[joint] for joint in held)
@@ -92,16 +92,16 @@ class Tendon:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class BallDrive:
-    """Armature, damping and friction against the relative angular velocity of three turns that are one ball.
+    """Armature, damping and friction against the relative angular velocity of three turns that form a ball joint.
 
     Parameters
     ----------
     name : str
         Name of the ball.
     joints : sequence of str
-        Its three turns, each about an axis of the frame moved by those before: z, y and x.
+        The three turns of the ball, about z, y and x, each axis moved by the turns before it.
     armature : float, default 0
-        Inertia against the relative angular acceleration, alike about all axes, kg m^2.
+        Isotropic inertia against the relative angular acceleration, kg m^2.
     damping : float, default 0
         Viscous friction, N m s/rad.
     friction : float, default 0
@@ -134,7 +134,7 @@ class BallDrive:
         object.__setattr__(self, "joints", joints)
 
     def locked(self, positions: Mapping[str, float]) -> BallDrive | None:
-        """Return the drive of a robot some of whose joints are held; None if all three turns are."""
+        """Return the drive of a robot with some joints locked; None if all three turns are."""
         held = [joint for joint in self.joints if joint in positions]
         if held and len(held) < 3:
             message = f"is one turn of the ball {self.name}, which has armature, damping or friction; hold all three"
@@ -146,15 +146,15 @@ Coupling = Tendon | BallDrive
 
 
 def check_coupling(coupling: Any, joints: Mapping[str, Any], free: Collection[str]) -> None:
-    """Raise RobotError unless a coupling is of joints that move, and those of a ball are turns z, y, x of it.
+    """Raise RobotError unless a coupling acts on moving joints, and those of a ball are turns about z, y, x.
 
     Parameters
     ----------
     coupling : Tendon or BallDrive
     joints : dict of str to Joint
-        Of the robot.
+        Joints of the robot.
     free : collection of str
-        Those that follow no other.
+        Names of the joints that follow no other joint.
     """
     moving = [name for name, joint in joints.items() if joint.moving]
     names = free if isinstance(coupling, BallDrive) else moving

@@ -14,18 +14,18 @@ def floating_joints(
     Parameters
     ----------
     base : str
-        The link that is set free.
+        Name of the link that becomes free.
     sequence : str, default "ZYX"
         Axes of the three turns.
     prefix : str, default "base"
-        What the names begin with.
+        Prefix of the names.
     world : str, default "world"
         Name of the new base.
 
     Raises
     ------
     RobotError
-        If the sequence is not made of three letters X, Y, Z of which neighbors differ.
+        If the sequence is not three letters X, Y, Z of which neighbors differ.
     """
     letters = sequence.upper()
     if len(letters) != 3 or set(letters) - set("XYZ") or letters[0] == letters[1] or letters[1] == letters[2]:

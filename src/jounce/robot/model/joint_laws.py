@@ -24,7 +24,7 @@ RATE = "_d1"  # as columns of files name rates
 
 
 class _Expressed(Module):
-    """An expression of time, coordinates and rates by the names of joints."""
+    """A force given by an expression of time and of coordinates and rates, by the names of joints."""
 
     expression: Expression = field(static=True)
     names: tuple[str, ...] = field(static=True)
@@ -36,7 +36,7 @@ class _Expressed(Module):
 
 
 class _ForceOfTime(Module):
-    """A motion law, read as a force of time."""
+    """A force as a function of time, given by a motion law."""
 
     law: AbstractMotion
 
@@ -45,12 +45,12 @@ class _ForceOfTime(Module):
 
 
 class AbstractJointLaws(Module):
-    """Forces of all joints, of whole batches at once."""
+    """Forces of all joints, for whole batches at once."""
 
     @property
     @abc.abstractmethod
     def changing(self) -> bool:
-        """Whether they depend on anything."""
+        """Whether the forces depend on time or state."""
 
     @abc.abstractmethod
     def __call__(
@@ -65,13 +65,13 @@ class JointLaws(AbstractJointLaws):
     Attributes
     ----------
     constant : array of shape (coordinates,)
-        What does not change.
+        Constant forces.
     whole : callable or None
-        Gives the forces of all joints at once.
+        Function that returns the forces of all joints at once.
     single : tuple of callable
-        Give the force of one joint each.
+        Functions that return the force of one joint each.
     columns : tuple of int
-        Which.
+        Numbers of these joints.
     """
 
     constant: Any
@@ -81,7 +81,7 @@ class JointLaws(AbstractJointLaws):
 
     @property
     def changing(self) -> bool:
-        """Whether they depend on anything."""
+        """Whether the forces depend on time or state."""
         return self.whole is not None or bool(self.single)
 
     def __call__(
@@ -99,18 +99,18 @@ class JointLaws(AbstractJointLaws):
 
 
 GivenLaws = ArrayLike | Callable[..., Any] | Mapping[str, Any] | JointTrajectory | AbstractJointLaws
-"""Forces of joints: constants, a function of time and state, or by name of the joint a law of its own."""
+"""Forces of joints: constants, a function of time and state, or one law for each joint by its name."""
 
 
 def joint_laws(names: Sequence[str], given: GivenLaws | None, what: str = "torque") -> AbstractJointLaws:
-    """Return what a user gives for the forces of joints, checked.
+    """Return the checked laws of the joint forces that a user gives.
 
     Parameters
     ----------
     names : sequence of str
-        Of the joints, in the order of q.
+        Names of the joints, in the order of q.
     given : None, array_like of shape (n,), callable, mapping, JointTrajectory or AbstractJointLaws
-        None for no forces; constants; a function of time, q and rates, of one sample, by operations of JAX, that
+        None for no forces; constants; a function of time, q and rates of one sample, by operations of JAX, that
         returns n forces; or one law for each joint that has a force: a number, an expression of ``t``, of the names of
         joints and of their rates as ``NAME_d1``, a motion law, or a function that returns one force.
     what : str
@@ -119,7 +119,7 @@ def joint_laws(names: Sequence[str], given: GivenLaws | None, what: str = "torqu
     Raises
     ------
     RobotError
-        If a joint does not exist, or a law is none or returns another shape.
+        If a joint does not exist, or a law is not valid or returns another shape.
     """
     count, nothing = len(names), np.zeros(len(names))
     if given is None:
@@ -176,25 +176,25 @@ def read_forces(
     state: Sequence[Any],
     arguments: str = "time, q and rates",
 ) -> SampleFunction:
-    """Return what a function of a user computes now, checked.
+    """Return the program that a function of a user computes now, checked.
 
     Parameters
     ----------
     function : callable
-        Of arrays of one sample.
+        Function of arrays of one sample.
     where : str
-        What gave it, for messages.
+        Argument that gave the function, for messages.
     shape : tuple of int
-        Of what it has to return.
+        Shape that the function must return.
     state : sequence of array
-        Arguments, of which shapes and types count.
+        Arguments; only their shapes and types matter.
     arguments : str
-        What they are, for messages.
+        Description of the arguments, for messages.
 
     Raises
     ------
     RobotError
-        If it cannot be used, or returns another shape.
+        If JAX cannot trace the function, or it returns another shape.
     """
     try:
         sampled = SampleFunction.of(function, *state)

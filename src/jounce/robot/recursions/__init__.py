@@ -1,1 +1,1 @@
-"""Recursions over the tree of links: poses, Newton and Euler, articulated bodies."""
+"""Recursions over the tree of links: poses, Newton-Euler, articulated bodies."""

@@ -1,7 +1,7 @@
-"""Articulated bodies: the inertias of a tree whose joints are free, made once, which give accelerations for any forces.
+"""Articulated-body inertias of a tree: factorized once, they give the accelerations for any forces.
 
-Featherstone 2008, Rigid Body Dynamics Algorithms, chapter 7. Vectors are in the axes of the base, and moments refer to
-the origin of each body, so that a step from joint to joint is a shift and no turn.
+Featherstone 2008, Rigid Body Dynamics Algorithms, chapter 7. Vectors are in the axes of the base, and moments are about
+the origin of each body, so that a step from joint to joint is a shift without rotation.
 """
 
 from typing import Any
@@ -21,18 +21,18 @@ from jounce.robot.recursions.tree_sums import BaseVector, BodyVectors
 
 Joints = Float[Numbers, "body batch"]
 """One number for each moving body, or its joint."""
-LEAST_INERTIA = 1e-13  # of a joint, of that of the articulated body that it moves: less is rounding
+LEAST_INERTIA = 1e-13  # ratio of the inertia along a joint to that of its articulated body: less is rounding
 
 
 class RigidInertia(Module):
-    """Inertia of bodies in the axes of the base: mass, center of mass from the origin, tensor about the center."""
+    """Inertias of bodies in the axes of the base: mass, center of mass from the origin, tensor about the center."""
 
     mass: Float[Numbers, "*body 1"]
     center: Float[Numbers, "3 *body batch"]
     tensor: Float[Numbers, "3 3 *body batch"]
 
     def blocks(self) -> tuple[Any, Any, Any]:
-        """Return the blocks of the spatial inertia about the origin: moments by turns, by shifts, forces by shifts."""
+        """Return the blocks of the spatial inertia about the origin: rotational, coupling, translational."""
         c, mass = self.center, self.mass[None, None]
         x, y, z = c
         zero = jnp.zeros_like(x)
@@ -43,20 +43,20 @@ class RigidInertia(Module):
 
 
 class ArticulatedBodies(Module):
-    """What the joints of a tree resist with, ready to be solved for; driven joints do not give way.
+    """Factorized articulated-body inertias of a tree; driven joints have no compliance.
 
     Attributes
     ----------
     axis, arm : array of shape (3, bodies, batch)
-        Axis of each joint, and the way from the origin of the parent to that of the body.
+        Axis of each joint, and the vector from the origin of the parent to that of the body.
     moment, force : array of shape (3, bodies, batch)
-        That a unit acceleration of the joint takes.
+        Moment and force for a unit acceleration of the joint.
     compliance : array of shape (bodies, batch)
-        Acceleration of the joint by a unit of force along it; zero where it is driven, NaN where nothing resists.
+        Acceleration of the joint per unit of force along it; zero if it is driven, NaN if it moves no inertia.
     margin : array of shape (bodies, batch)
-        Inertia along the joint, as part of the largest of its articulated body; not finite where it moves no mass.
+        Ratio of the inertia along the joint to the largest of its articulated body; not finite if it moves no mass.
     base : tuple of DenseFactor and array of shape (6, batch), optional
-        Of the inertia of a free base, scaled, and the scales.
+        Factor of the scaled inertia of a free base, and the scales.
     """
 
     tree: Tree
@@ -88,11 +88,11 @@ class ArticulatedBodies(Module):
         axis, arm : array of shape (3, bodies, batch)
             As in the attributes.
         inertia : RigidInertia
-            Of the bodies.
+            Inertias of the bodies.
         armature, free : array of shape (bodies,)
-            Inertia of the drives; 0 where the acceleration of the joint is given, else 1.
+            Armature inertia of each joint; 0 if its acceleration is given, else 1.
         base : RigidInertia, optional
-            Of a free base.
+            Inertia of a free base.
         """
 
         def inward(state: Any, entry: Any) -> tuple[Any, Any]:
@@ -112,7 +112,7 @@ class ArticulatedBodies(Module):
             by_moment, by_force = (moment * compliance[None])[None], (force * compliance[None])[None]
             about, coupling = about - moment[:, None] * by_moment, coupling - moment[:, None] * by_force
             mass = mass - force[:, None] * by_force
-            # seen from the origin of the parent
+            # shift to the origin of the parent
             first = _rows_crossed(r, coupling)
             coupling = coupling + _rows_crossed(r, mass).swapaxes(0, 1)
             about = about + first + _rows_crossed(r, coupling).swapaxes(0, 1)
@@ -202,7 +202,7 @@ def _transposed_product(matrix: Any, vector: Any) -> Any:
 
 
 def _rows_crossed(vector: Any, matrix: Any) -> Any:
-    """Return the matrix whose rows are the vector times those of a matrix."""
+    """Return the matrix whose rows are the cross products of a vector with the rows of a matrix."""
     return cross(vector[:, None], jnp.swapaxes(matrix, 0, 1)).swapaxes(0, 1)
 
 

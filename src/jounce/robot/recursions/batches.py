@@ -1,7 +1,7 @@
-"""How batches of samples go through the algorithms: one sample's program, run for many (see `execution.mapped`).
+"""Execution of robot algorithms on batches: the program of one sample, run for many (see `execution.mapped`).
 
-Machine code is used for a single sample, too: it is compiled as fast as one of XLA's programs, of which each size of
-blocks needs one, and called in a third of the time.
+Single samples run as machine code, too: it compiles as fast as one program of XLA, which needs one for each block size,
+and a call takes a third of the time.
 """
 
 import math
@@ -20,16 +20,16 @@ from jounce.jet.derivatives import plain_derivatives, taylor_coefficients
 from jounce.robot.model.abstract_robot import AbstractRobot
 from jounce.settings import check_process
 
-LEAST_THREADED = 2**12  # samples of a thread: fewer are done before threads are started
-WIDTHS = (8, SIDE_BY_SIDE, 16 * SIDE_BY_SIDE)  # sizes of blocks by XLA: each compiles once for a kind of robot
+LEAST_THREADED = 2**12  # samples per thread: fewer take less time than starting a thread
+WIDTHS = (8, SIDE_BY_SIDE, 16 * SIDE_BY_SIDE)  # block sizes with XLA: each compiles once for a kind of robot
 
 
 class Batched:
-    """A function on Taylor coefficients, batch last, made to work on plain derivatives, batch first.
+    """A function on Taylor coefficients, batch last, that is called with plain derivatives, batch first.
 
-    The function gets the tree, a tuple of arrays of shape (order + 1, ..., batch), a pytree of constants and static
-    arguments, and returns a pytree of arrays of the shape (order + 1, ..., batch). Results are NumPy arrays, or JAX
-    arrays under a transformation of JAX.
+    The function takes the tree, a tuple of arrays of shape (order + 1, ..., batch), a pytree of constants and static
+    arguments, and returns a pytree of arrays of shape (order + 1, ..., batch). Results are NumPy arrays, or JAX arrays
+    under a transformation of JAX.
     """
 
     def __init__(self, function: Callable[..., Any]):
@@ -44,13 +44,13 @@ class Batched:
 
     @cached_property
     def nested(self) -> Any:
-        """The function compiled on its own within transformations of JAX, which take no options of the compiler."""
+        """The function compiled for use within transformations of JAX, which accept no compiler options."""
         return jax.jit(self._block, static_argnums=3)
 
     def __call__(
         self, robot: AbstractRobot, arrays: tuple[Any, ...], constants: Any = (), static: tuple[Any, ...] = ()
     ) -> Any:
-        """Return results for arrays of derivatives, the first one of shape (batch..., order + 1, n)."""
+        """Return the results for arrays of derivatives, the first one of shape (batch..., order + 1, n)."""
         check_process()
         lead = arrays[0].shape[:-2]
         axes, count = len(lead), math.prod(lead)
@@ -64,7 +64,7 @@ class Batched:
         return jax.tree.map(lambda x: np.reshape(x, (*lead, *x.shape[1:])), result)
 
     def _sample(self, shared: tuple[Any, Any], arrays: tuple[Any, ...], *, static: tuple[Any, ...]) -> Any:
-        """Return plain derivatives for those of samples, which are along the last axis."""
+        """Return plain derivatives of the results for plain derivatives of the arrays, samples last."""
         tree, constants = shared
         result = self.function(tree, tuple(map(taylor_coefficients, arrays)), constants, *static)
         return jax.tree.map(plain_derivatives, result)

@@ -1,6 +1,6 @@
-"""What the drives of joints need: armature, damping, Coulomb friction, springs and tendons, and drives of balls.
+"""Forces of drives: armature, damping and Coulomb friction of joints, springs and tendons, and drives of balls.
 
-Written once on jets; the equations of motion of an instant are jets of order zero.
+They are written once on jets; the equations of motion at an instant use jets of order zero.
 """
 
 from typing import Any
@@ -15,7 +15,7 @@ from jounce.robot.model.tree import Tree
 
 
 def passive_forces(tree: Tree, q: Jet, rate: Jet, order: int) -> Jet:
-    """Return what damping, friction and springs need, of shape (coordinates, batch); friction jumps at rest.
+    """Return the forces against damping, friction and springs, (coordinates, batch); friction jumps at rest.
 
     Parameters
     ----------
@@ -24,7 +24,7 @@ def passive_forces(tree: Tree, q: Jet, rate: Jet, order: int) -> Jet:
     q, rate : Jet of shape (coordinates, batch)
         Coordinates and their rates, to the order of the result or beyond.
     order : int
-        Of the result.
+        Order of the result.
     """
     q, rate = q.truncate(order), rate.truncate(order)
     forces = rate * jnp.asarray(tree.damping)[:, None] + _held(_dry(tree.friction, rate, tree.friction_skew), order)
@@ -46,7 +46,7 @@ def passive_forces(tree: Tree, q: Jet, rate: Jet, order: int) -> Jet:
 
 
 def inertial_forces(tree: Tree, q: Jet, rate: Jet, acceleration: Jet) -> Jet:
-    """Return what armatures need, of shape (coordinates, batch), to the order of the accelerations."""
+    """Return the forces that accelerate armatures, (coordinates, batch), to the order of the accelerations."""
     forces = acceleration * jnp.asarray(tree.armature)[:, None]
     if not tree.shape.armed:
         return forces
@@ -70,7 +70,7 @@ def inertial_forces(tree: Tree, q: Jet, rate: Jet, acceleration: Jet) -> Jet:
 
 
 def armature_matrix(tree: Tree, q: Jet) -> Float[Numbers, "order coordinate coordinate batch"]:
-    """Return what armatures add to the mass matrix, as Taylor coefficients."""
+    """Return the armature terms of the mass matrix, as Taylor coefficients."""
     inertia_of_joints = jnp.diag(jnp.asarray(tree.armature))
     if tree.shape.armed and tree.shape.tendons:
         weights = jnp.asarray(tree.tendons.weights)
@@ -88,7 +88,7 @@ def armature_matrix(tree: Tree, q: Jet) -> Float[Numbers, "order coordinate coor
 
 
 def spring_energy(tree: Tree, q: Float[Numbers, "coordinate batch"]) -> Float[Numbers, " batch"]:
-    """Return the energy that springs have stored, J."""
+    """Return the energy stored in springs, J."""
     line = tree.tendons
     length = jnp.asarray(line.weights) @ q - jnp.asarray(line.rest)[:, None]
     return 0.5 * jnp.sum(jnp.asarray(line.stiffness)[:, None] * length * length, axis=0)
@@ -115,14 +115,14 @@ def _held(values: Any, order: int) -> Jet:
 
 
 def _dry(friction: Any, rate: Jet, skew: Any = None) -> Any:
-    """Return Coulomb friction for the sign that the rate has, zero at rest."""
+    """Return Coulomb friction by the sign of the rate, zero at rest."""
     sign = jnp.sign(rate.coefficients[0])
     force = jnp.asarray(friction)[:, None] * sign
     return force if skew is None else force + jnp.asarray(skew)[:, None] * jnp.abs(sign)
 
 
 def _turns_of(tree: Tree, values: Jet) -> list[Jet]:
-    """Return what belongs to the three turns of each ball, each of shape (balls, batch)."""
+    """Return the values of the three turns of each ball, each of shape (balls, batch)."""
     select = jnp.asarray(tree.balls.select)
     return [values.map(lambda x, k=k: select[k] @ x) for k in range(3)]
 
@@ -132,7 +132,7 @@ def _product(a: list[Jet], b: list[Jet]) -> Jet:
 
 
 def _ball_axes(tree: Tree, q: Jet) -> list[list[Jet]]:
-    """Return what the rates of the turns z, y, x add to each component of the spin in the axes of the moved link."""
+    """Return the factors of the rates of turns z, y, x in each component of the spin, in axes of the moved link."""
     _, theta, phi = _turns_of(tree, q)
     s, c, s_phi, c_phi = sin(theta), cos(theta), sin(phi), cos(phi)
     zero, one = Jet.constant(jnp.zeros(theta.shape), q.order), Jet.constant(jnp.ones(theta.shape), q.order)
@@ -140,7 +140,7 @@ def _ball_axes(tree: Tree, q: Jet) -> list[list[Jet]]:
 
 
 def _at_turns(tree: Tree, axes: list[list[Jet]], moments: list[Jet]) -> Jet:
-    """Return forces of coordinates that do the work of moments in the axes of the moved links."""
+    """Return the generalized forces of moments in the axes of the moved links."""
     each = [_product([axes[i][k] for i in range(3)], moments) for k in range(3)]
     return _to_coordinates(tree, each)
 

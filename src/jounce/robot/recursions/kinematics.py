@@ -1,4 +1,4 @@
-"""Kinematics of any order: frames, points, center of mass. Negrean 2025, equations 39, 44-48 and 55-58."""
+"""Forward kinematics of any order: frames, points, center of mass. Negrean 2025, equations 39, 44-48 and 55-58."""
 
 import dataclasses
 from typing import Any
@@ -30,7 +30,7 @@ from jounce.robot.recursions.tree_scan import (
 
 
 def body_frames(tree: Tree, q: Series) -> Frames:
-    """Return the frames of all bodies, of the shape (3, bodies + 1, batch); the last one is the base."""
+    """Return the frames of all bodies, of shape (3, bodies + 1, batch); the last one is the base."""
     levels, _, samples = q.shape
     zero = jnp.zeros((levels, 3, samples))
     units = tuple(zero.at[0, i].set(1.0) for i in range(3))
@@ -55,7 +55,7 @@ def body_frames(tree: Tree, q: Series) -> Frames:
 
     coordinates = Jet(tuple(joint_coordinates(tree, q)[:, :, None]))
     angles = coordinates * jnp.asarray(tree.turning)[:, None, None] if tree.shape.sliding else coordinates
-    # made before the scan, in which XLA would take sine and cosine again for each use of them
+    # computed before the scan, where XLA would evaluate sine and cosine again for each use
     turns = (angles, *sine_cosine(angles)) if tree.shape.turning else None
     _, frames = jax.lax.scan(outward, fill_slots(tree, base), (entries(tree), coordinates, turns))
     arrays = [jnp.moveaxis(jnp.concatenate([x, fixed[None]]), 0, 2) for x, fixed in zip(frames, base, strict=True)]
@@ -68,19 +68,19 @@ def _combined(axes: Any, local: Any) -> Jet:
 
 
 def link_frame(tree: Tree, q: Series, frame_in_body: Frame) -> Frames:
-    """Return the frame at a place on a body, the last of which is the base."""
+    """Return the motion of a frame fixed to a body; the last body is the base."""
     frame = body_frames(tree, q).take(frame_in_body.body)
     axes = tuple(frame.direction(frame_in_body.rotation[:, i]) for i in range(3))
     return Frames(frame.point(frame_in_body.position), axes, frame.angular_velocity)
 
 
 def frame_at(robot: AbstractRobot, link: str, point: ArrayLike) -> Frame:
-    """Return where the frame of a link, moved to a point, is in its body; the base follows the moving bodies.
+    """Return the frame of a link, moved to a point, as a frame in its body; the base is numbered after the bodies.
 
     Raises
     ------
     RobotError
-        If there is no such link, or the point is not made of three finite numbers.
+        If the link does not exist, or the point is not three finite numbers.
     """
     check_name("link", link, robot.frames, RobotError, name="link")
     point = vector_numbers("point", point, (3,))
@@ -92,7 +92,7 @@ def frame_at(robot: AbstractRobot, link: str, point: ArrayLike) -> Frame:
 @jax.tree_util.register_dataclass
 @dataclasses.dataclass(frozen=True, eq=False)
 class FrameMotion:
-    """Where a frame is and how it moves, in components of the base, with derivatives of any order.
+    """Pose and motion of a frame, in components along the axes of the base, with derivatives of any order.
 
     Parameters
     ----------
@@ -131,7 +131,7 @@ def forward_kinematics(
     link : str
         Name of the link.
     point : array_like of shape (3,), default the origin
-        Origin of the frame that is looked at, in the frame of the link, m.
+        Origin of the requested frame, in the frame of the link, m.
 
     Returns
     -------
@@ -142,7 +142,7 @@ def forward_kinematics(
     Raises
     ------
     RobotError
-        If there is no such link, or q does not fit the robot.
+        If the link does not exist, or q does not fit the robot.
 
     Examples
     --------
@@ -171,19 +171,19 @@ def center_of_mass(robot: AbstractRobot, q: ArrayLike) -> Array[Numbers, "*batch
     Parameters
     ----------
     robot : Robot
-        The robot; the mass of its base counts too.
+        The robot; the mass of its base counts.
     q : array_like of shape (..., order + 1, n)
         Coordinates and their derivatives, rad or m.
 
     Returns
     -------
     array of shape (..., order + 1, 3)
-        In the frame of the base, m by s.
+        Position of the center of mass and its derivatives, in the frame of the base, m by s.
 
     Raises
     ------
     RobotError
-        If q does not fit the robot, or nothing has a mass.
+        If q does not fit the robot, or no link has a mass.
 
     Examples
     --------

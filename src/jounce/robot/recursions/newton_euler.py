@@ -1,9 +1,9 @@
-"""Recursive Newton-Euler on jets: forces and torques of a tree of bodies, with rates of any order, written once.
+"""Recursive Newton-Euler algorithm on jets: forces and torques of a tree of bodies, with rates of any order.
 
-Everything is in the frame of each body, whose z is the axis of its joint. The state that goes outwards is the jet of
-the angular velocity w and of the velocity v of the origin. A force is the rate of a momentum seen from the turning
-frame, ``f = p' + w x p``; these two products and the turns from frame to frame are all that is not linear. Gravity is
-a base that accelerates the other way.
+Vectors are in the frame of each body, whose z is the axis of its joint. The outward pass carries jets of the angular
+velocity w and of the velocity v of the origin. A force is the rate of a momentum in the rotating frame,
+``f = p' + w x p``; only these products and the rotations between frames are nonlinear. Gravity is represented by a base
+that accelerates the other way.
 """
 
 import dataclasses
@@ -39,17 +39,17 @@ QUARTER = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 0.0]])  # a qu
 @jax.tree_util.register_dataclass
 @dataclasses.dataclass(frozen=True)
 class Turn:
-    """The rotation from a body to its parent, ``M Rz(d)``: a matrix for each sample, and a jet of the turn since then.
+    """The rotation from a body to its parent, ``M Rz(d)``: the matrix M at the instant, and the jet of the rotation d.
 
     The jet starts at zero, so that sine and ``versine = cosine - 1`` have no first coefficients, and most products
-    vanish. They are made for all joints at once outside of the scans, inside which XLA would take them again for each
-    use. The matrix is cheaper made than kept.
+    vanish. Both are computed for all joints at once before the scans, where XLA would evaluate them again for each use.
+    Computing the matrix takes less time than storing it.
     """
 
-    constant: Any  # the matrix is still + across cosine + quarter sine, each (..., 3, 3, batch or 1)
+    constant: Any  # the matrix is constant + across cosine + quarter sine, each (..., 3, 3, batch or 1)
     across: Any = None
     quarter: Any = None
-    start: tuple[Any, Any] | None = None  # cosine and sine of the value
+    start: tuple[Any, Any] | None = None  # cosine and sine of the coordinate
     sine: Jet | None = None
     versine: Jet | None = None
 
@@ -73,19 +73,19 @@ class Turn:
 
     @property
     def matrix(self) -> Any:
-        """The matrix for the value, shape (3, 3, batch)."""
+        """The rotation matrix at the instant, shape (3, 3, batch)."""
         if self.start is None:
             return self.constant
         cosine, sine = self.start
         return self.constant + self.across * cosine + self.quarter * sine
 
     def outward(self, vector: Jet) -> Jet:
-        """Take a vector from the parent's frame to that of the body."""
+        """Return a vector in the frame of the body from its components in that of the parent."""
         rows = zip(self.matrix, components(vector), strict=True)
         return self._turned(total(bilinear(jnp.multiply, row, part) for row, part in rows), 1)
 
     def inward(self, vector: Jet) -> Jet:
-        """Take a vector from the frame of the body to the parent's."""
+        """Return a vector in the frame of the parent from its components in that of the body."""
         return matvec(self.matrix, self._turned(vector, -1))
 
     def _turned(self, vector: Jet, sign: int) -> Jet:
@@ -105,7 +105,7 @@ def _constant(value: Any) -> Any:
 def recursive_newton_euler(
     tree: Tree, q: Series, wrenches: BodyWrenches | None = None, base: tuple[Any, Any] | None = None
 ) -> tuple[Rates, RatesOfVectors, RatesOfVectors, tuple[Any, Any]]:
-    """Return generalized forces at the joints and the wrenches that they carry.
+    """Return the generalized forces and the wrenches of the joints.
 
     Parameters
     ----------
@@ -116,17 +116,17 @@ def recursive_newton_euler(
     wrenches : array of shape (order - 1, bodies, 6, batch), optional
         Taylor coefficients of external forces and of their moments about the origin, in the frame of each body.
     base : tuple of two arrays of shape (order, 3, batch), optional
-        Angular velocity of a base that moves, and velocity of its origin, with that of a fall against gravity, in its
-        own axes; one at rest unless given.
+        Angular velocity of a moving base, and velocity of its origin plus that of a fall against gravity, in base axes;
+        by default a base at rest.
 
     Returns
     -------
     along : array of shape (order - 1, bodies, batch)
         Taylor coefficients of the force or torque along the axis of each joint.
     force, moment : array of shape (order - 1, bodies, 3, batch)
-        Force and moment about the origin of the body that it gets through its joint, in its own frame.
+        Force on each body through its joint, and moment about the origin of the body, in its frame.
     carried : tuple of two arrays of shape (order - 1, 3, batch)
-        Force and moment about its origin that the base has to give to what it carries, in its axes.
+        Force and moment about its origin that the base exerts on the bodies that it carries, in base axes.
     """
     order = q.shape[0] - 1
     coordinates = joint_coordinates(tree, q)
@@ -136,7 +136,7 @@ def recursive_newton_euler(
         falling = jnp.broadcast_to(-jnp.asarray(tree.gravity)[:, None], (3, samples))
         base = jnp.stack([zero] * order), jnp.stack([zero, falling, *[zero] * (order - 2)])
     along_joints = Jet(tuple(coordinates[:, :, None]))
-    # turns are made before the scan, all at once: inside, XLA would take sine and cosine again for each use of them
+    # rotations are computed before the scan, where XLA would evaluate sine and cosine again for each use
     bodies = (
         entries(tree),
         along_joints,
@@ -196,7 +196,7 @@ def recursive_newton_euler(
 
 
 def inertial_wrench(mass: Any, center: Any, inertia: Any, w: Jet, v: Jet) -> tuple[Jet, Jet]:
-    """Return the force and the moment about the origin that a body needs to move so, all in its own axes."""
+    """Return the force on a body and the moment about its origin that cause a motion, all in body axes."""
     momentum = (v + cross(w, _constant(center))) * mass
     spin = matvec(inertia[:, :, None], w)
     momentum, spin = materialised((momentum, spin))

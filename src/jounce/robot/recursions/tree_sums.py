@@ -1,4 +1,4 @@
-"""Sums along the branches of a tree: from the base outwards to each body, and from its branches inwards."""
+"""Sums along the branches of a tree: outward from the base to each body, and inward over the bodies that it carries."""
 
 from typing import Any
 
@@ -16,9 +16,9 @@ BaseVector = Float[Numbers, "component batch"]
 
 
 def sums_at_parents(tree: Tree, own: BodyVectors, base: BaseVector) -> BodyVectors:
-    """Return the sum over all bodies from the base to the parent of each body, that of the base included.
+    """Return, for each body, the sum over the base and all bodies from it to the parent.
 
-    Only sums and moves are used, so that `jet.programs.series` runs the loop over the bodies as it is at every order.
+    Only sums and copies occur, so that `jet.programs.series` runs the same loop over the bodies at every order.
     """
 
     def outward(state: Any, entry: Any) -> tuple[Any, Any]:
@@ -32,16 +32,16 @@ def sums_at_parents(tree: Tree, own: BodyVectors, base: BaseVector) -> BodyVecto
 
 
 def totals(tree: Tree, own: BodyVectors, passed: BodyVectors | None = None) -> tuple[BodyVectors, BaseVector]:
-    """Return what each body and all that it carries add up to, and the same for what the base carries.
+    """Return the sum over each body and all bodies that it carries, and the sum over those that the base carries.
 
     Parameters
     ----------
     tree : Tree
         Arrays of the robot.
     own : array of shape (components, bodies, batch)
-        What each body adds.
+        Contribution of each body.
     passed : array, optional
-        Of the same shape: what each adds to its parent besides its total.
+        Contribution of each body to its parent in addition to its total, of the same shape.
     """
     rows = (own,) if passed is None else (own, passed)
 
