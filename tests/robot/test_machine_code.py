@@ -6,7 +6,7 @@ import pytest
 import jounce as jn
 from jounce.execution.backends import VARIABLE
 from jounce.execution.llvm.self_test import is_usable
-from jounce.robot.algorithms.forward_dynamics import _moved
+from jounce.robot.algorithms.forward_dynamics import _forward_dynamics
 from jounce.robot.algorithms.inverse_dynamics import generalized_forces
 from jounce.robot.recursions.batches import LEAST_THREADED
 from tests.problems.robots import random_robot, robot_named
@@ -104,7 +104,7 @@ def test_free_motion_gives_back_its_torques(monkeypatch, robot, levels):
     again = jn.inverse_dynamics(robot, found, drives=True)
     size = np.abs(found[:, 2:]).max(axis=(0, 2)) * np.abs(jn.mass_matrix(robot, q[:, 0])).max() + 1.0
     assert (np.abs(again - tau) <= 1e-12 * size[:, None]).all()
-    assert len(_moved.mapped.machine_code)
+    assert len(_forward_dynamics.mapped.machine_code)
 
 
 def test_threads_change_no_bit(monkeypatch):

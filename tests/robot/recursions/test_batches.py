@@ -57,7 +57,7 @@ def test_shapes_of_batches_are_kept(torque, lead):
 def test_programs_that_are_too_long_with_single_values_have_arrays_in_memory(monkeypatch):
     state, forces = Q[:40, :2], 30.0 * Q[40:80, 1:]
     expected = jn.forward_dynamics(ROBOT, state, forces)
-    moved = forward_dynamics_._moved.mapped
+    moved = forward_dynamics_._forward_dynamics.mapped
     monkeypatch.setattr(modules, "MOST_LINES_WITHOUT_LOOPS", 3000)
     monkeypatch.setattr(moved.machine_code, "_programs", ByKey())
     found = jn.forward_dynamics(ROBOT, state, forces)

@@ -148,7 +148,7 @@ def forward_dynamics(
     constants = (mask, frames, None if base is None else base_body(robot))
     traced = is_traced((arrays, robot.tree, constants))
     static = (tuple(wrench.frame == "base" for wrench in wrenches), drives, traced)
-    q, margin, *base_twist = _moved(robot, arrays, constants, static)
+    q, margin, *base_twist = _forward_dynamics(robot, arrays, constants, static)
     if strict and not traced:
         _check_margins(robot, margin, mask)
     return q if base is None else (BaseMotion(base.position, base.quaternion, base_twist[0]), q)
@@ -167,7 +167,7 @@ def _checked_forces(robot: Robot, tau: Any, lead: tuple[int, ...], free: bool) -
 
 
 @Batched
-def _moved(
+def _forward_dynamics(
     tree: Tree,
     arrays: tuple[Any, ...],
     constants: Any,

@@ -150,9 +150,9 @@ def _checked_fixed(robot: Robot, names: Sequence[str]) -> Sequence[str]:
     """Return the names of fixed joints, or raise RobotError if one is unknown, not fixed or repeated."""
     if isinstance(names, str) or not isinstance(names, Sequence):
         raise RobotError("must be a list of names of fixed joints", name="fixed", value=names)
-    known = [name for name, joint in robot.joints.items() if not joint.moving]
+    fixed_joints = [name for name, joint in robot.joints.items() if not joint.moving]
     for name in names:
-        check_name("fixed joint", name, known, RobotError, name="fixed")
+        check_name("fixed joint", name, fixed_joints, RobotError, name="fixed")
     if len(set(names)) < len(names):
         raise RobotError("a joint is there twice", name="fixed", value=list(names))
     return names
@@ -166,8 +166,10 @@ def _with_held_joints(robot: Robot, q: Any, names: Sequence[str]) -> tuple[Robot
     ]
     held = robot.changed(joints=joints, strict=False)  # a fixed link may be a frame without mass
     column = {name: k for k, name in enumerate(robot.joint_names)}
-    of = jnp if is_traced(q) else np
-    wider = of.concatenate([q, of.zeros((*q.shape[:-1], 1))], axis=-1)  # the last column is that of all held joints
+    library = jnp if is_traced(q) else np
+    wider = library.concatenate(
+        [q, library.zeros((*q.shape[:-1], 1))], axis=-1
+    )  # the last column is that of all held joints
     return held, wider[..., [column.get(name, len(column)) for name in held.joint_names]]
 
 

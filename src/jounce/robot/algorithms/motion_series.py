@@ -88,8 +88,8 @@ def motion_series(
         return _integrated(motion, accelerations, poses, factor)
     program = partial(_program, equations, applied, jax.tree.structure((motion, solved, start)))
     before, after = ([None] * len(jax.tree.leaves(part)) for part in (motion, start))  # of the unknowns
-    known = jax.tree.leaves((motion, solved, start))
-    recursion = Recursion(program, known, order, reversible=reversible, unrolled=unrolled, still=still)
+    inputs = jax.tree.leaves((motion, solved, start))
+    recursion = Recursion(program, inputs, order, reversible=reversible, unrolled=unrolled, still=still)
 
     def room(first: Any) -> Any:
         least = 0 if unrolled else LARGE // max(first.size, 1) + 1  # in memory, to write at a place that varies
@@ -100,12 +100,12 @@ def motion_series(
 
     def level(k: Any, carry: Any) -> Any:
         history, now, accelerations, poses = carry
-        known = Unknowns(jnp.broadcast_to(driven[k], motion.rates.shape), base)
-        inputs = jax.tree.leaves((now, known, jax.tree.map(lambda x: x[k], given)))
+        trial = Unknowns(jnp.broadcast_to(driven[k], motion.rates.shape), base)
+        inputs = jax.tree.leaves((now, trial, jax.tree.map(lambda x: x[k], given)))
         (gap, rates), newest = recursion.advanced(history, k, inputs)
         change = factor.solve(gap)
         history = recursion.noted(history, k, recursion.corrected(newest, (*before, *jax.tree.leaves(change), *after)))
-        newest = jax.tree.map(jnp.add, known, change)
+        newest = jax.tree.map(jnp.add, trial, change)
         rates = _with_accelerations(rates, newest)
         now = jax.tree.map(lambda x: x / (k + 1), rates)
         return history, now, put(accelerations, newest, k), put(poses, _poses(rates), k)

@@ -170,11 +170,11 @@ class Loops:
         directions = np.diag(self.scale) if count else np.zeros((1, 0))
         states = np.stack([np.broadcast_to(q, directions.shape), directions], axis=1)
         placed = _placed(self.tree, (states,), self.frames)  # (coordinates, 2, 4, 3, closures)
-        here, rates = placed[0, 0], placed[:count, 1]
+        gap_vectors, rates = placed[0, 0], placed[:count, 1]
         gaps, slopes = [], []
         for k, closure in enumerate(self.closures):
-            rotation, turning = here[1:, :, k].T, np.swapaxes(rates[:, 1:, :, k], 1, 2) @ here[1:, :, k]
-            gaps.append(np.concatenate([here[0, :, k] / self.size, _missing_turn(closure, rotation)]))
+            rotation, turning = gap_vectors[1:, :, k].T, np.swapaxes(rates[:, 1:, :, k], 1, 2) @ gap_vectors[1:, :, k]
+            gaps.append(np.concatenate([gap_vectors[0, :, k] / self.size, _missing_turn(closure, rotation)]))
             spins = 0.5 * (turning - np.swapaxes(turning, 1, 2))[:, [2, 0, 1], [1, 2, 0]]  # angular velocities
             slopes.append(np.concatenate([rates[:, 0, :, k] / self.size, spins], axis=1).T)
         return np.array(gaps), np.array(slopes)
@@ -204,13 +204,13 @@ class Loops:
             for _halving in range(12):
                 trial = q.copy()
                 trial[free] += step * self.scale[free]
-                there = state(trial)
-                if np.linalg.norm(there[0]) < np.linalg.norm(gap) or length < 1e-12:
+                trial_state = state(trial)
+                if np.linalg.norm(trial_state[0]) < np.linalg.norm(gap) or length < 1e-12:
                     break
                 step *= 0.5
             else:
                 break
-            q, (gap, slope) = trial, there
+            q, (gap, slope) = trial, trial_state
             if length < 1e-12:
                 break
         self._check_closed(q)
@@ -225,10 +225,10 @@ class Loops:
         or cannot be kept closed on the way.
         """
         try:
-            here = self.closed(q, free)
+            position = self.closed(q, free)
         except RobotError:
             return None
-        if np.abs((here - q) / self.scale).max(initial=0.0) > DRAWN:
+        if np.abs((position - q) / self.scale).max(initial=0.0) > DRAWN:
             return None
         lead = np.where(free, 0.0, (target - q) / self.scale)
         length = float(np.abs(lead).max(initial=0.0))
@@ -236,22 +236,22 @@ class Loops:
         step = most
         while share < 1.0:
             part = min(step, 1.0 - share)
-            slopes = np.concatenate([w @ s for w, s in zip(self.wrenches, self.gaps(here)[1], strict=True)])
+            slopes = np.concatenate([w @ s for w, s in zip(self.wrenches, self.gaps(position)[1], strict=True)])
             change = part * lead
             change[free] = np.linalg.lstsq(slopes[:, free], -slopes @ change, rcond=RANK_TOLERANCE)[0]
-            predicted = here + self.scale * change
+            predicted = position + self.scale * change
             try:
-                there = self.closed(predicted, free)
-                off = np.abs((there - predicted) / self.scale).max() / max(np.abs(change).max(), STRIDE / 10)
+                corrected = self.closed(predicted, free)
+                deviation = np.abs((corrected - predicted) / self.scale).max() / max(np.abs(change).max(), STRIDE / 10)
             except RobotError:
-                there, off = here, np.inf
-            if off > STRAY:
+                corrected, deviation = position, np.inf
+            if deviation > STRAY:
                 step = part / 2
                 if step < SHORTEST * most:
                     return None
                 continue
-            here, share, step = there, share + part, min(2 * part, most)
-        return np.where(free, here, target)
+            position, share, step = corrected, share + part, min(2 * part, most)
+        return np.where(free, position, target)
 
     def _check_closed(self, q: np.ndarray) -> None:
         gaps, _ = self.gaps(q)

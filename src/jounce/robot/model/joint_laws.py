@@ -30,9 +30,9 @@ class _Expressed(Module):
     names: tuple[str, ...] = field(static=True)
 
     def __call__(self, time: Any, q: Any, rate: Any) -> Any:
-        known = {name: q[k] for k, name in enumerate(self.names)}
-        known |= {name + RATE: rate[k] for k, name in enumerate(self.names)}
-        return self.expression.evaluate({"t": time, **known})
+        values = {name: q[k] for k, name in enumerate(self.names)}
+        values |= {name + RATE: rate[k] for k, name in enumerate(self.names)}
+        return self.expression.evaluate({"t": time, **values})
 
 
 class _ForceOfTime(Module):
