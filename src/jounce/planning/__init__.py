@@ -1,4 +1,4 @@
-"""Planning: what a controller is sent, from a path or a task: time laws, coordinates of a tool path, feedforward."""
+"""Planning: commands for a controller from a path or a task: time laws, joint motion of tool paths, feedforward."""
 
 from jounce.planning.elastic.drives import Drive as Drive
 from jounce.planning.elastic.feedforward import feedforward as feedforward

@@ -1,4 +1,4 @@
-"""Laws of polynomials that follow one another."""
+"""Piecewise polynomial laws."""
 
 from typing import Literal
 
@@ -8,18 +8,18 @@ from jounce.trajectory import SplineMotion
 
 
 class JoinedPieces(SplineMotion):
-    """Polynomials that follow one another; where they meet, derivatives may jump.
+    """A piecewise polynomial; derivatives may jump between pieces.
 
     Parameters
     ----------
     begins : array_like of shape (pieces,)
-        Begins of the pieces, increasing.
+        Start of each piece, increasing.
     powers : array_like of shape (powers, pieces)
-        Coefficients, lowest power first, of the argument less the begin of its piece.
+        Coefficients, lowest power first, in the argument minus the start of its piece.
     stop : float
         End of the last piece.
     beyond : {"refuse", "continue"}, default "refuse"
-        Whether the polynomials at the ends go on beyond them.
+        Whether the polynomials at the ends extend beyond them.
     """
 
     def __init__(
@@ -29,12 +29,12 @@ class JoinedPieces(SplineMotion):
 
 
 class SmoothPieces(JoinedPieces):
-    """Polynomials of a spline with all derivatives below its degree continuous."""
+    """A spline with all derivatives below its degree continuous."""
 
     def __init__(self, begins: np.ndarray, powers: np.ndarray, stop: float):
         super().__init__(begins, powers, stop)
 
     @property
     def joined(self) -> int:
-        """Highest derivative that is known to be continuous where pieces meet."""
+        """Highest derivative that is continuous between pieces."""
         return self.degree - 1

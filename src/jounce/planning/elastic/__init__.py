@@ -1,1 +1,1 @@
-"""Motors behind springs: the motion of motors for a required motion of links, and the motion of links under torques."""
+"""Elastic drives: the motion of motors for a required motion of links, and the motion of links under motor torques."""

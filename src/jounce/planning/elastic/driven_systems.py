@@ -1,4 +1,4 @@
-"""Driven systems, robots and mechanisms in one form: coordinates, and the forces that they need."""
+"""Driven robots and mechanisms in one form: coordinates, and the forces that their motion needs."""
 
 import abc
 import dataclasses
@@ -29,10 +29,10 @@ from jounce.robot.recursions.drive_forces import passive_forces
 from jounce.robot.robot import Robot
 from jounce.trajectory.joint_trajectory import JointTrajectory
 
-BLOCK = 2048  # instants at once, always the same number, so that programs are compiled once
+BLOCK = 2048  # instants per call, always the same number, so that programs compile once
 
 Moved = tuple[Float[np.ndarray, "time level joint"], Float[np.ndarray, "time level joint"]]
-"""Coordinates and the forces on the links that they need, with their derivatives, the same number of both."""
+"""Coordinates and the forces on the links that the motion needs, with equally many derivatives."""
 
 
 class DrivenSystem(abc.ABC):
@@ -41,13 +41,13 @@ class DrivenSystem(abc.ABC):
     Attributes
     ----------
     title : str
-        Of the robot or mechanism.
+        Title of the robot or mechanism.
     drives : dict of str to Drive
-        As they were given.
+        The given drives.
     arrays : DriveArrays
-        The same in arrays, of all joints.
+        The drives of all joints in arrays.
     instants : array of shape (time,)
-        Those of the trajectory, s.
+        Instants of the trajectory, s.
     """
 
     title: str
@@ -57,11 +57,11 @@ class DrivenSystem(abc.ABC):
 
     @abc.abstractmethod
     def moved(self, times: Float[np.ndarray, " time"], levels: int) -> Moved:
-        """Return coordinates and forces at instants, each with so many levels."""
+        """Return coordinates and forces at instants, both with the given number of levels."""
 
 
 class DrivenRobot(DrivenSystem):
-    """A robot on a trajectory, its motors on the links before them; damping of the robot file acts on the links."""
+    """A robot on a trajectory, each motor on its parent link; damping of the robot file acts on the links."""
 
     def __init__(self, robot: Robot, trajectory: JointTrajectory, drives: Any, losses: bool):
         self.robot, self.trajectory, self.losses = robot, trajectory, losses
@@ -71,7 +71,7 @@ class DrivenRobot(DrivenSystem):
         self.instants = np.unique(np.concatenate([[trajectory.start], trajectory.times, [trajectory.stop]]))
 
     def moved(self, times: Float[np.ndarray, " time"], levels: int) -> Moved:
-        """Return coordinates and forces of the joints."""
+        """Return the coordinates and forces of the joints."""
         q = self.followed.coordinates(times, levels + 1)
 
         def block(some: np.ndarray) -> np.ndarray:
@@ -80,13 +80,13 @@ class DrivenRobot(DrivenSystem):
         return q[:, :levels], in_chunks(block, len(times), (BLOCK,), axis=0)[:, :levels]
 
     def warn(self) -> None:
-        """Warn of samples that do not support the derivatives that were needed."""
+        """Warn of samples that do not support the required derivatives."""
         for message in self.followed.doubts:
             warnings.warn(SampleWarning(message), stacklevel=3)
 
 
 def robot_drives(robot: Robot, drives: object, losses: bool) -> DriveArrays:
-    """Return the drives of a robot; motors without inertia of their own have the armature of the robot file."""
+    """Return the drives of a robot; a motor without rotor inertia has the armature of the robot file."""
     if robot.closures:
         message = (
             "the loops of this robot make its joints depend on one another; drive the mechanism that it is "
@@ -113,7 +113,7 @@ def robot_drives(robot: Robot, drives: object, losses: bool) -> DriveArrays:
 
 
 def link_forces(robot: Robot, q: Numbers, losses: bool) -> Float[Numbers, "*batch level joint"]:
-    """Return forces of joints on their links with rates, two levels fewer than q: with damping, without rotors."""
+    """Return the joint forces on the links with rates, two levels fewer than q: with damping, without rotors."""
     forces = inverse_dynamics(robot, q, drives=False)
     if losses:
         return forces + _passive(robot, (q,))
@@ -122,7 +122,7 @@ def link_forces(robot: Robot, q: Numbers, losses: bool) -> Float[Numbers, "*batc
 
 @Batched
 def _passive(tree: Tree, arrays: tuple[Numbers], _: object) -> Numbers:
-    """Return what springs, dampers and the friction of tendons and balls take; that of joints is the motors'."""
+    """Return the forces of springs, dampers and friction of tendons and balls; joint friction acts on the motors."""
     (q,) = arrays
     coordinates = Jet(tuple(q))
     smooth = dataclasses.replace(tree, friction=jnp.zeros(tree.shape.coordinates))
@@ -130,14 +130,14 @@ def _passive(tree: Tree, arrays: tuple[Numbers], _: object) -> Numbers:
 
 
 def _lossless(robot: Robot) -> Robot:
-    """Return a robot whose drives have springs only, without losses."""
+    """Return the robot without damping and friction, with its springs."""
     joints = [dataclasses.replace(joint, damping=0.0, friction=0.0) for joint in robot.joints.values()]
     couplings = [dataclasses.replace(x, damping=0.0, friction=0.0) for x in robot.couplings.values()]
     return robot.changed(joints=joints, couplings=couplings)
 
 
 class DrivenMechanism(DrivenSystem):
-    """A mechanism moved by its drivers, their motors on the ground side of what they drive."""
+    """A mechanism moved by its drivers, with the motors on the ground side of the driven bodies."""
 
     def __init__(self, mechanism: Mechanism, times: Any, drives: Any):
         self.mechanism, self.drives, names = mechanism, drives, tuple(mechanism.drivers)
@@ -152,7 +152,7 @@ class DrivenMechanism(DrivenSystem):
             raise MechanismError("at least two instants are needed, a start and a stop", name="time")
 
     def moved(self, times: Float[np.ndarray, " time"], levels: int) -> Moved:
-        """Return coordinates and forces of the drivers; the motion is followed from its start each time."""
+        """Return the coordinates and forces of the drivers; each call solves the motion from its start."""
         known = _filled_up(np.union1d(self.instants, times))
         indices = np.searchsorted(known, times)
         motion = solve(self.mechanism, known, order=levels + 1)
@@ -166,6 +166,6 @@ class DrivenMechanism(DrivenSystem):
 
 
 def _filled_up(times: Float[np.ndarray, " time"]) -> Float[np.ndarray, " more"]:
-    """Return instants with some between them, a power of two in all, so that few sizes are compiled."""
+    """Return instants with midpoints added up to a power of two, so that few sizes are compiled."""
     missing = power_of_two(len(times)) - len(times)
     return np.union1d(times, 0.5 * (times[:-1] + times[1:])[:missing])

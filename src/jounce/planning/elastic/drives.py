@@ -17,34 +17,34 @@ NOT_NEGATIVE = ("damping", "rotor_inertia")
 
 @dataclasses.dataclass(frozen=True)
 class Drive:
-    """The motor of a joint or driver, its gear, and the spring between the gear and what it moves.
+    """The motor of a joint or driver, its gear, and the spring between the gear and the link.
 
-    Stiffness, damping and deflection are those seen at the joint, behind the gear: N m/rad, N m s/rad and rad where it
-    turns, N/m, N s/m and m where it slides. Inertia, torque and velocity limits are those of the motor itself, before
-    the gear.
+    Stiffness, damping and deflection are values at the joint, behind the gear: N m/rad, N m s/rad and rad for a turning
+    joint, N/m, N s/m and m for a sliding one. Inertia, torque and velocity limits are values of the motor itself,
+    before the gear.
 
     Parameters
     ----------
     stiffness : float, optional
-        Of the spring; the joint is rigid unless given.
+        Stiffness of the spring; the joint is rigid unless given.
     damping : float, default 0
-        Of a damper parallel to the spring.
+        Damping parallel to the spring.
     rotor_inertia : float, optional
-        Of the motor about its own axis, kg m^2, or its mass, kg, where it slides. The armature of the joint in the
-        robot file unless given: that is the same seen at the joint.
+        Inertia of the motor about its own axis, kg m^2, or mass of a sliding motor, kg; by default the armature of the
+        joint in the robot file, which is the same inertia as seen at the joint.
     gear_ratio : float, default 1
-        Turns of the motor for one turn of the joint; negative where the gear reverses.
+        Turns of the motor for one turn of the joint; negative if the gear reverses.
     lead : float, optional
-        Of a joint that slides and a motor that turns, in the place of `gear_ratio`: m for one turn of the motor.
+        Travel of a sliding joint for one turn of a turning motor, m; instead of `gear_ratio`.
     deflection_limit : float, optional
-        Most that the spring may deflect to either side.
+        Largest deflection of the spring to either side.
     torque_limit, velocity_limit : float, optional
-        Of the motor: N m and rad/s, or N and m/s where it slides.
+        Limits of the motor: N m and rad/s, or N and m/s for a sliding motor.
 
     Raises
     ------
     RobotError
-        If a value is not finite, zero or negative where it must not be, or does not go with another.
+        If a value is not finite, is zero or negative where it must not be, or contradicts another.
 
     Examples
     --------
@@ -84,49 +84,49 @@ class Drive:
 
     @property
     def elastic(self) -> bool:
-        """Whether there is a spring."""
+        """Whether the drive has a spring."""
         return self.stiffness is not None
 
     @property
     def ratio(self) -> float:
-        """Motion of the motor for a motion of the joint: rad/rad, m/m, or rad/m with a lead."""
+        """Ratio of the motion of the motor to that of the joint: rad/rad, m/m, or rad/m with a lead."""
         return self.gear_ratio if self.lead is None else 2 * math.pi / self.lead
 
     @property
     def reflected_inertia(self) -> float | None:
-        """Inertia of the rotor seen at the joint, kg m^2 or kg; None where it is that of the robot file."""
+        """Inertia of the rotor as seen at the joint, kg m^2 or kg; None if the robot file gives it."""
         return None if self.rotor_inertia is None else self.ratio**2 * self.rotor_inertia
 
     @property
     def time_constant(self) -> float:
-        """Damping over stiffness, s, the time constant with which a free deflection decays; 0 undamped."""
+        """Damping over stiffness, s, the time constant with which a free deflection decays; 0 without damping."""
         return 0.0 if self.stiffness is None else self.damping / self.stiffness
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class DriveArrays:
-    """The drives of all joints in arrays of shape (joints,), seen at the joints.
+    """The drives of all joints in arrays of shape (joints,), as seen at the joints.
 
     Attributes
     ----------
     names : tuple of str
-        Of joints or drivers.
+        Names of joints or drivers.
     turning : tuple of bool
-        Which of them turn, and do not slide.
+        Whether each joint turns, rather than slides.
     motor_turning : tuple of bool
-        Whether the motor does.
+        Whether each motor turns.
     stiffness : array
-        N m/rad or N/m, infinite where rigid.
+        Stiffnesses, N m/rad or N/m, infinite for rigid joints.
     time_constant : array
         Damping over stiffness, s.
     inertia : array
-        Of rotors, kg m^2 or kg.
+        Inertias of rotors, kg m^2 or kg.
     friction : array
         Coulomb friction of the motors, N m or N.
     ratio : array
-        Of the gears.
+        Ratios of the gears.
     limits : array of shape (3, joints)
-        Deflection, motor velocity, motor torque; NaN where there is none.
+        Limits of deflection, motor velocity and motor torque; NaN for no limit.
     """
 
     names: tuple[str, ...]
@@ -149,23 +149,23 @@ class DriveArrays:
         friction: Float[np.ndarray, " joint"],
         kind: str,
     ) -> "DriveArrays":
-        """Return the arrays of drives, checked.
+        """Return the checked arrays of drives.
 
         Parameters
         ----------
         names, turning
-            Of joints or drivers.
+            Names of joints or drivers, and whether each turns.
         drives : dict of str to Drive
-            Those that are not named are rigid.
+            Drives; joints without one are rigid.
         armature, friction : array of shape (joints,)
-            Of the robot file.
+            Values of the robot file.
         kind : str
-            What a name is, for messages.
+            Noun for the names, for messages.
 
         Raises
         ------
         RobotError
-            If `drives` is no mapping, names what there is not, or a drive does not fit what it moves.
+            If `drives` is not a mapping, has an unknown name, or a drive does not fit its joint.
         """
         if not isinstance(drives, Mapping):
             raise RobotError(

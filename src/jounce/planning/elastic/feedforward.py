@@ -1,4 +1,4 @@
-"""Motions and torques of motors behind springs that move links exactly as planned: feedforward of elastic joints."""
+"""Feedforward of elastic joints: motions and torques of motors behind springs that move links exactly as planned."""
 
 from collections.abc import Mapping
 from typing import overload
@@ -64,44 +64,44 @@ def feedforward(
 ) -> Feedforward | MotorMotion:
     """Return motions and torques of motors that move links behind springs exactly as planned.
 
-    With q of the links, the torque tau that they need and theta of a motor, seen at the joint:
-    ``K (theta - q) + D (theta' - q') = tau`` and ``B theta'' + tau = u``. Undamped, ``theta = q + tau / K``, so that
-    the motor torque u needs the fourth derivative of q. Rotors have only the spin about their own axes (Spong 1987):
-    their gyroscopic torques, and the effect of the motion of the links that carry them, are left out. With damping, the
-    deflection is integrated along the trajectory, see `jounce.planning.SpringDeflection`.
+    With the link coordinate q, the torque tau that the links need, and the motor position theta as seen at the joint,
+    ``K (theta - q) + D (theta' - q') = tau`` and ``B theta'' + tau = u``. Without damping ``theta = q + tau / K``, so
+    that the motor torque u needs the fourth derivative of q. Rotors have only the spin about their own axes (Spong
+    1987): gyroscopic torques, and the effect of the motion of the links that carry the rotors, are neglected. With
+    damping, the deflection is integrated along the trajectory, see `jounce.planning.SpringDeflection`.
 
     Parameters
     ----------
     system : Robot or Mechanism
-        Masses of rotors and gears are those of the links that carry them. Of a mechanism, the drivers have drives: the
-        motor prescribes one end of a spring in the place of the driver.
+        The system to drive; the links that carry rotors and gears include their masses. In a mechanism, a motor
+        prescribes one end of a spring instead of the coordinate of the driver.
     motion : JointTrajectory, or array_like of shape (..., order + 1, n)
-        Of a robot. Joints that a trajectory does not name stand still at zero, or at the end of their range that is
-        nearest to it. Derivatives ``q, q', q'', ...``, to the order 4 + rates or more, need no instants: with damping,
-        the deflection is then the regular expansion in the time constant D / K. Of a mechanism, the instants of the
-        results, those of its file unless given.
+        Motion of a robot. Joints that a trajectory does not name stand still at zero, or at the end of their range
+        nearest to zero. Derivatives ``q, q', q'', ...``, to the order 4 + rates or more, need no instants; with
+        damping, the deflection is then the regular expansion in the time constant D / K. For a mechanism, the instants
+        of the results; by default those of its file.
     drives : dict of str to Drive
-        By names of joints or drivers; all others are rigid.
+        Drives by name of the joint or driver; all others are rigid.
     rates : int, default 0
         Number of rates of the motor torques.
     times : array_like of shape (time,), optional
-        Instants of the results, s; those of the trajectory unless given.
+        Instants of the results, s; by default those of the trajectory.
     losses : bool, default True
-        Whether damping and friction of the robot file count: damping on the links, Coulomb friction on the motors.
+        Whether to include damping and friction of the robot file: damping on the links, Coulomb friction on the motors.
     tolerance : float, default 1e-6
-        With damping, for given derivatives: largest last term of the expansion, as part of the deflection, and likewise
-        of its derivatives.
+        With damping, for given derivatives: largest ratio of the last term of the expansion to the deflection, and the
+        same for its derivatives.
 
     Returns
     -------
-    Feedforward, or MotorMotion where derivatives are given
+    Feedforward, or MotorMotion for given derivatives
 
     Raises
     ------
     RobotError, MechanismError
         If an argument does not fit, a robot has closed loops, or the expansion does not reach its tolerance.
     TrajectoryError
-        If torques of springs, or their rates, jump along the trajectory, so that motors would have to.
+        If spring torques or their rates jump along the trajectory, so that motors would have to jump.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""The proof of a feedforward: where links go that are simulated with their springs under the torques of the motors."""
+"""Verification of a feedforward: the deviation of links simulated with their springs under the motor torques."""
 
 import dataclasses
 from typing import Any
@@ -11,25 +11,25 @@ from jounce.planning.elastic.driven_systems import DrivenMechanism, DrivenRobot
 from jounce.planning.elastic.motor_motion import Feedforward
 from jounce.planning.elastic.simulation import simulate_elastic
 
-MOST = 1001  # instants at which errors are reported
+MOST = 1001  # instants of the reported errors
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class LinkErrors:
-    """How far links are from where they should be, simulated under a feedforward.
+    """Deviations of links from their planned motion, simulated under a feedforward.
 
     Attributes
     ----------
     names, units : tuple of str
-        Joints of a robot, rad or m; bodies of a mechanism, m: the largest error of its origin and of the points 1 m
-        from it along its axes.
+        Joints of a robot, rad or m; bodies of a mechanism, m: the largest error of the origin and of the points 1 m
+        from it along the axes.
     time : array of shape (time,)
-        s.
+        Instants, s.
     exact : array of shape (time, names)
-        Under the whole torques.
+        Errors under the full torques.
     rigid : array of shape (time, names) or None
-        Under torques without what accelerates the springs, ``B (theta'' - q'')``, which the second rate of the torque
-        gives.
+        Errors under torques without the acceleration of the spring deflection, ``B (theta'' - q'')``, which depends on
+        the second rate of the torque.
     """
 
     names: tuple[str, ...]
@@ -40,18 +40,18 @@ class LinkErrors:
 
 
 def link_errors(feedforward: Feedforward, *, rigid: bool = True) -> LinkErrors:
-    """Simulate what is driven with its springs under a feedforward, and return how far the links go astray.
+    """Simulate a system with its springs under a feedforward, and return the deviations of its links.
 
-    The simulation knows nothing of the trajectory but its start; there is no feedback, so that where a position is not
-    stable by itself, rounding grows as any disturbance would. Coulomb friction is left out, of the torques and of the
-    simulation: a motor that turns back would stick until its torque jumps.
+    The simulation uses the trajectory only for its start. It has no feedback, so that in an unstable position rounding
+    grows as any disturbance does. Torques and simulation omit Coulomb friction, with which a motor that reverses would
+    stick until its torque jumps.
 
     Parameters
     ----------
     feedforward : Feedforward
-        Of a robot on a trajectory, or of a mechanism.
+        Feedforward of a robot on a trajectory, or of a mechanism.
     rigid : bool, default True
-        Whether to simulate it a second time without what accelerates the springs.
+        Whether to simulate a second time without the torques that accelerate the spring deflections.
 
     Raises
     ------

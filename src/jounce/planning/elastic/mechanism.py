@@ -1,7 +1,7 @@
-"""Mechanisms whose drivers are springs between bodies and the rotors of motors: closed loops with elastic drives.
+"""Mechanisms with elastic drives: springs between driven bodies and the rotors of motors.
 
-A rotor is one more body, a slider across gravity whose place is the coordinate of the motor, and a spring is a force on
-what the driver of its type prescribes less that place.
+Each rotor is a body that slides perpendicular to gravity, whose position is the coordinate of the motor. Each spring is
+a force on the difference between the coordinate that the driver prescribes and this position.
 """
 
 import dataclasses
@@ -31,14 +31,14 @@ from jounce.trajectory.labels import in_order
 
 
 class _DriveSpring(AbstractForce):
-    """Spring and damper between the coordinate of a driver, of the first two bodies, and the position of a rotor."""
+    """Spring and damper between the driver coordinate of the first two bodies and the position of a rotor."""
 
     stiffness: Scalar
     damping: Scalar
     across: Vector  # direction of the slide of the rotor
 
     body_count = 3
-    prescribed: ClassVar[Callable[..., Any]]  # the coordinate that the driver prescribes, of the first two bodies
+    prescribed: ClassVar[Callable[..., Any]]  # the coordinate of the first two bodies that the driver prescribes
 
     def displacement(self, body_i: Any, body_j: Any, rotor: Any, time: Any) -> Any:
         coordinate = sum(rotor.position[k] * self.across[k] for k in range(len(self.across)))
@@ -106,7 +106,7 @@ def simulate_elastic_mechanism(
 
 
 def _start(mechanism: Mechanism, arrays: DriveArrays, state: object, instant: float) -> np.ndarray:
-    """Return coordinates and rates of drivers and motors, (2, 2, drivers): those of the laws, springs relaxed."""
+    """Return start values and rates of drivers and motors, (2, 2, drivers): by default of the laws, springs relaxed."""
     n = len(arrays.names)
     if state is None:
         motion = solve(mechanism, [instant], order=1)
@@ -172,7 +172,7 @@ def _uniform(state: np.ndarray, instant: float) -> str:
 
 
 def _across(mechanism: Mechanism) -> tuple[list[float], list[float]]:
-    """Return a unit vector across gravity, and one across that."""
+    """Return a unit vector perpendicular to gravity, and one perpendicular to that vector."""
     plane = mechanism.space == "planar"
     given = [0.0] * (2 if plane else 3) if mechanism.gravity is None else mechanism.gravity
     gravity = np.array([float(resolve(g, mechanism.parameter_values)) for g in given])

@@ -1,4 +1,4 @@
-"""What a feedforward gives: motions, torques and deflections, at instants or all along a trajectory."""
+"""Results of a feedforward: motions, torques and deflections, at instants or along a whole trajectory."""
 
 import dataclasses
 from functools import cached_property
@@ -22,8 +22,8 @@ from jounce.units.shown_units import derivatives_of, time_axes
 if TYPE_CHECKING:
     import xarray
 
-REST = 1e-9  # of the largest velocity of a motor, below which it is at rest
-INSTANTS = 2000  # at least, at which limits are looked at, before peaks are searched between them
+REST = 1e-9  # fraction of the largest velocity of a motor below which the motor is at rest
+INSTANTS = 2000  # least number of instants at which limits are checked before peaks are sought between them
 QUANTITIES = ("deflection", "motor velocity", "motor torque")
 
 
@@ -34,21 +34,21 @@ class MotorMotion:
     Attributes
     ----------
     names : tuple of str
-        Of joints or drivers.
+        Names of joints or drivers.
     q : array of shape (..., levels, n)
-        Of the links, rad or m by s.
+        Coordinates of the links, rad or m by s.
     spring_torque : array of shape (..., levels, n)
-        What springs and dampers, or rigid gears, exert on the links, N m or N by s.
+        Torques of springs and dampers, or of rigid gears, on the links, N m or N by s.
     deflection : array of shape (..., levels, n)
-        Of the springs, ``theta - q``; zero where rigid.
+        Deflections of the springs, ``theta - q``; zero for rigid joints.
     position : array of shape (..., levels, n)
-        Of the motors, theta, seen at the joints.
+        Positions of the motors, theta, as seen at the joints.
     torque : array of shape (..., levels - 2, n)
-        Of the motors, u, seen at the joints.
+        Torques of the motors, u, as seen at the joints.
     motor_position : array of shape (..., levels, n)
-        Their own angles, through the gear ratios.
+        Angles of the motors themselves, through the gear ratios.
     motor_torque : array of shape (..., levels - 2, n)
-        Their own torques.
+        Torques of the motors themselves.
     """
 
     names: tuple[str, ...]
@@ -68,12 +68,12 @@ def motor_motion(
     deflection: Float[np.ndarray, "*batch level joint"],
     rest: Any = 0.0,
 ) -> MotorMotion:
-    """Return what motors do: positions from deflections, torques from forces and the inertia of rotors.
+    """Return the motion of motors: positions from deflections, torques from forces and rotor inertias.
 
     Parameters
     ----------
     rest : array of shape (joints,)
-        Velocities up to which a motor is at rest, without friction.
+        Velocities up to which a motor counts as at rest, without friction.
     """
     position = q + deflection
     torque = forces[..., :-2, :] + arrays.inertia * position[..., 2:, :]
@@ -85,12 +85,12 @@ def motor_motion(
 
 
 class DriveReport(LimitRows):
-    """How far springs and motors are from their limits: the worst instant of each quantity of each joint.
+    """Margins of springs and motors to their limits: the worst instant of each quantity of each joint.
 
     Parameters
     ----------
     rows : tuple of LimitRow
-        Deflection, motor velocity, motor torque; of rigid joints without the first.
+        Deflection, for elastic joints only, motor velocity, and motor torque.
     """
 
     def __init__(self, rows: tuple[LimitRow, ...]):
@@ -98,18 +98,18 @@ class DriveReport(LimitRows):
 
 
 class Feedforward(MotorMotion, Displayed):
-    """What motors do along a trajectory, at its instants and at any other; see `MotorMotion` for the arrays.
+    """Motions and torques of motors along a trajectory, at any of its instants; see `MotorMotion` for the arrays.
 
     Attributes
     ----------
     time : array of shape (time,)
-        s.
+        Instants, s.
     drives : dict of str to Drive
-        As they were given.
+        The given drives.
     title : str
-        Of the robot or mechanism.
+        Title of the robot or mechanism.
     system : DrivenRobot or DrivenMechanism
-        What is driven, and how it moves.
+        The driven system with its motion.
     """
 
     def __init__(
@@ -136,12 +136,12 @@ class Feedforward(MotorMotion, Displayed):
         return motor_motion(self._arrays, q, forces, deflection, self._rest if friction else np.inf)
 
     def at(self, times: ArrayLike) -> "Feedforward":
-        """Return the same at other instants of the trajectory, s.
+        """Return the feedforward at other instants of the trajectory, s.
 
         Raises
         ------
         TrajectoryError
-            If one lies outside of it.
+            If an instant lies outside of the trajectory.
         """
         instants, known = np.atleast_1d(seconds("times", times, TrajectoryError)), self.system.instants
         if not (instants.ndim == 1 and ((instants >= known[0]) & (instants <= known[-1])).all()):
@@ -151,9 +151,9 @@ class Feedforward(MotorMotion, Displayed):
 
     @cached_property
     def expansion_errors(self) -> Float[np.ndarray, "order joint"]:
-        """What the regular expansion in D / K, cut after each order, misses of the deflection, by its peak.
+        """Errors of the regular expansion of the deflection in D / K, truncated after each order, relative to its peak.
 
-        Row 0 is ``tau / K``, row 1 has the damping too. Zero for joints without damping.
+        Row 0 is the error of ``tau / K``; row 1 includes the damping. Zero for joints without damping.
         """
         errors = np.zeros((self._levels, len(self.names)))
         if self._springs is not None:
@@ -163,7 +163,7 @@ class Feedforward(MotorMotion, Displayed):
 
     @property
     def start(self) -> Float[np.ndarray, "2 2 joint"]:
-        """Coordinates and rates of the links, and of the motors, at the start: the state for `simulate_elastic`."""
+        """Coordinates and rates of the links and of the motors at the start: the state for `simulate_elastic`."""
         motion = self._motion_at(self.system.instants[:1])
         return np.stack([motion.q[0, :2], motion.position[0, :2]])
 
@@ -206,17 +206,17 @@ class Feedforward(MotorMotion, Displayed):
         )
 
     def torque_laws(self, *, friction: bool = True) -> dict[str, AbstractMotion]:
-        """Return the motor torques, seen at the joints, as laws of time, of polynomials that are exact to rounding.
+        """Return the motor torques, as seen at the joints, as laws of time: piecewise polynomials exact to rounding.
 
         Parameters
         ----------
         friction : bool, default True
-            Whether they overcome Coulomb friction, and so jump where a motor turns back.
+            Whether the torques overcome Coulomb friction, and so jump where a motor reverses.
         """
         return self._laws(lambda times: self._motion_at(times, friction=friction).torque[:, 0])
 
     def rigid_torque_laws(self, *, friction: bool = True) -> dict[str, AbstractMotion]:
-        """Return what the motor torques are without the acceleration of the springs: ``tau + B q''``, as laws."""
+        """Return the motor torques without the acceleration of the deflections, ``tau + B q''``, as laws of time."""
 
         def torques(times: np.ndarray) -> np.ndarray:
             motion = self._motion_at(times, friction=friction)
@@ -232,11 +232,11 @@ class Feedforward(MotorMotion, Displayed):
 
     @property
     def dataset(self) -> "xarray.Dataset":
-        """All of it as an `xarray.Dataset`, for each joint, with as many rates as there are of the torques.
+        """The motion of each joint as an `xarray.Dataset`, with as many rates as the torques have.
 
-        ``JOINT_motor`` is the motor's own position, ``JOINT_motor_velocity``, ``_acceleration`` and ``_torque`` go with
-        it; ``JOINT_theta`` and ``JOINT_torque`` are position and torque of the motor seen at the joint, and
-        ``JOINT_deflection`` and ``JOINT_spring_torque`` belong to the spring.
+        ``JOINT_motor`` is the position of the motor itself, with ``JOINT_motor_velocity``, ``_acceleration`` and
+        ``_torque``; ``JOINT_theta`` and ``JOINT_torque`` are the position and torque of the motor as seen at the joint;
+        ``JOINT_deflection`` and ``JOINT_spring_torque`` are those of the spring.
         """
         import xarray
 
@@ -263,13 +263,13 @@ class Feedforward(MotorMotion, Displayed):
 
 
 class _Bounds:
-    """Limits of the same size to both sides, in the form for `worst_instants`."""
+    """Symmetric limits, in the form for `worst_instants`."""
 
     def __init__(self, limits: Float[np.ndarray, "3 joint"]):
         self.limits = np.where(np.isnan(limits), 1.0, limits)
 
     def weights(self, values: np.ndarray, times: np.ndarray) -> np.ndarray:
-        """Return ones: all instants count alike."""
+        """Return ones: all instants have the same weight."""
         del times
         return np.ones_like(values)
 

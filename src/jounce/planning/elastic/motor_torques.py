@@ -1,4 +1,4 @@
-"""Torques of motors as a user gives them, sorted into numbers, laws of time and feedback."""
+"""Motor torques given by a user, sorted into numbers, laws of time and feedback."""
 
 from collections.abc import Callable, Mapping
 from typing import Any
@@ -10,18 +10,18 @@ from jounce.planning.elastic.drives import DriveArrays
 from jounce.trajectory import AbstractMotion, JointTrajectory
 from jounce.trajectory.laws.user_laws import law_or_number, read_laws
 
-MOTOR = "_motor"  # what the joint or body of a rotor is called after what it moves
+MOTOR = "_motor"  # suffix of the joint or body of a rotor, after the name of its joint or driver
 
 
 def torques_of(
     arrays: DriveArrays, torque: object
 ) -> tuple[np.ndarray, tuple[tuple[int, AbstractMotion], ...], Callable[..., Any] | None]:
-    """Return torques of motors that do not change, those that are laws of time with their places, and feedback.
+    """Return the constant motor torques, the laws of time with the numbers of their drives, and the feedback.
 
     Raises
     ------
     RobotError
-        If a name is none of the drives, or a law is none.
+        If a drive does not exist, or a law is not valid.
     """
     constant = np.zeros(len(arrays.names))
     if isinstance(torque, JointTrajectory):

@@ -1,4 +1,4 @@
-"""Functions of time as Legendre series on pieces that are halved until the series are exact to rounding."""
+"""Functions of time as Legendre series on pieces, halved until the series are exact to rounding."""
 
 from collections.abc import Callable
 from typing import NamedTuple
@@ -10,14 +10,14 @@ from numpy.polynomial import legendre, polynomial
 from jounce.errors import TrajectoryError
 from jounce.trajectory.motion import SplineMotion
 
-POINTS = 10  # of Gauss, on each piece
+POINTS = 10  # Gauss points of each piece
 NODES, WEIGHTS = legendre.leggauss(POINTS)
 ANALYSIS = legendre.legvander(NODES, POINTS - 1).T * WEIGHTS * (np.arange(POINTS)[:, None] + 0.5)
-"""Takes values at the points to the coefficients of Legendre polynomials."""
+"""Matrix from values at the Gauss points to coefficients of Legendre polynomials."""
 
-RESOLVED = 1e-12  # of the largest value: what the last coefficients may be
-NOISE = 1e-8  # below it, last coefficients that do not fall from a piece to its half are rounding
-SHORTEST = 1e-9  # of the whole: a jump may lie in such a piece
+RESOLVED = 1e-12  # fraction of the largest value, allowed for the last coefficients
+NOISE = 1e-8  # last coefficients below this fraction that do not decrease as a piece is halved are rounding
+SHORTEST = 1e-9  # fraction of the duration: shortest piece, which may contain a jump
 MOST = 100_000  # pieces
 
 
@@ -27,9 +27,9 @@ class Pieces(NamedTuple):
     Attributes
     ----------
     nodes : array of shape (pieces + 1,)
-        Where pieces begin, and the last one ends, s.
+        Start of each piece, and the end of the last one, s.
     values : array of shape (pieces, points, columns)
-        At the points of Gauss on each.
+        Values at the Gauss points of each piece.
     """
 
     nodes: Float[np.ndarray, " nodes"]
@@ -42,7 +42,7 @@ class Pieces(NamedTuple):
 
     @property
     def laws(self) -> tuple["PieceMotion", ...]:
-        """A motion law for each column, of polynomials."""
+        """A piecewise polynomial motion law for each column."""
         series = np.einsum("kg,pgc->kpc", ANALYSIS, self.values)
         unit = np.array([_shifted(k) for k in range(POINTS)])
         powers = (
@@ -52,14 +52,14 @@ class Pieces(NamedTuple):
 
 
 class PieceMotion(SplineMotion):
-    """A law of polynomials, each by the time since its piece began; the first and the last one go on beyond."""
+    """A law of polynomials in the time since the start of each piece; the first and the last extend beyond the ends."""
 
     def __init__(self, nodes: Float[np.ndarray, " nodes"], powers: Float[np.ndarray, "powers pieces"]):
         self._set(nodes[:-1], powers, nodes[-1], "continue")
 
 
 def _shifted(degree: int) -> Float[np.ndarray, " powers"]:
-    """Return the powers of a Legendre polynomial of a variable that goes from 0 to 1."""
+    """Return the power coefficients of a Legendre polynomial on the interval from 0 to 1."""
     shifted, line = np.zeros(1), np.array([-1.0, 2.0])
     for c in legendre.leg2poly([0.0] * degree + [1.0])[::-1]:
         shifted = polynomial.polyadd(polynomial.polymul(shifted, line), [c])
@@ -69,28 +69,28 @@ def _shifted(degree: int) -> Float[np.ndarray, " powers"]:
 def points_of(
     start: Float[np.ndarray, " pieces"], stop: Float[np.ndarray, " pieces"]
 ) -> Float[np.ndarray, "pieces points"]:
-    """Return the instants of the points of Gauss on pieces."""
+    """Return the instants of the Gauss points of pieces."""
     return start[:, None] + 0.5 * (stop - start)[:, None] * (1.0 + NODES)
 
 
 def resolved(
     function: Callable[[np.ndarray], np.ndarray], nodes: Float[np.ndarray, " nodes"], floor: float | np.ndarray = 0.0
 ) -> Pieces:
-    """Return a function of time on pieces, halved until its series are exact to rounding.
+    """Return a function of time on pieces, halved until its Legendre series are exact to rounding.
 
     Parameters
     ----------
     function : callable
         Maps instants, (time,), to values, (time, columns).
     nodes : array of shape (nodes,)
-        Increasing instants, s, to begin with.
+        Ends of the first pieces: increasing instants, s.
     floor : float or array of shape (columns,)
-        Sizes of rounding: what is less does not count.
+        Rounding error; smaller coefficients count as zero.
 
     Raises
     ------
     TrajectoryError
-        If that takes more pieces than there may be.
+        If the function needs more than 100,000 pieces.
     """
     start, stop = nodes[:-1], nodes[1:]
     duration, accepted, total = nodes[-1] - nodes[0], [], 0

@@ -1,8 +1,8 @@
-"""Robots with springs in their joints, simulated with the rotors of their motors.
+"""Robots with elastic joints, simulated with the rotors of their motors.
 
-A rotor is a link of its own on the base, without mass, whose joint has the inertia of the rotor as armature: it turns
-about one axis and does nothing else. The kinetic energy is then that of the links plus ``B theta'^2 / 2`` for each
-rotor, which is the model of Spong (1987), exactly.
+Each rotor is a massless link on the base, whose joint has the inertia of the rotor as armature, so that it only turns
+about its axis. The kinetic energy is that of the links plus ``B theta'^2 / 2`` for each rotor: exactly the model of
+Spong (1987).
 """
 
 import dataclasses
@@ -29,26 +29,26 @@ from jounce.trajectory.labels import in_order
 
 
 def elastic_robot(robot: Robot, drives: Mapping[str, Drive], *, losses: bool = True, friction: bool = True) -> Robot:
-    """Return a robot whose elastic joints are two: that of the link, and that of the rotor, ``NAME_motor``.
+    """Return a robot with two joints for each elastic joint: that of the link, and that of the rotor, ``NAME_motor``.
 
-    Nothing joins the two: the springs are forces, which `simulate_elastic` adds. Coordinates of rotors are those seen
-    at the joints, and their inertia is part of the armatures, so that `drives=True` is needed wherever it shall count.
+    Nothing connects the two; `simulate_elastic` adds the springs as forces. Coordinates of rotors are those seen at the
+    joints. Their inertia is an armature, which counts only with `drives=True`.
 
     Parameters
     ----------
     robot : Robot
-        Without closed loops.
+        A robot without closed loops.
     drives : dict of str to Drive
-        Of its joints; those that are not named stay as they are.
+        Drives of its joints; joints without one do not change.
     losses : bool, default True
-        Whether damping of the links and Coulomb friction of the motors, from the robot file, count.
+        Whether to include the damping of the links and the Coulomb friction of the motors from the robot file.
     friction : bool, default True
-        Whether Coulomb friction does.
+        Whether to include Coulomb friction.
 
     Raises
     ------
     RobotError
-        If a drive does not fit the robot, or an elastic one has a rotor without inertia.
+        If a drive does not fit the robot, or the rotor of an elastic drive has no inertia.
 
     Examples
     --------
@@ -70,7 +70,7 @@ def elastic_robot(robot: Robot, drives: Mapping[str, Drive], *, losses: bool = T
     for joint in robot.joints.values():
         armature, rubbing = joint.armature, joint.friction if rubs else 0.0
         damping = joint.damping if losses else 0.0
-        if joint.moving:  # armature and friction of joints that follow another are among those of its motor
+        if joint.moving:  # the motor of a joint includes the armature and friction of joints that follow it
             leader = joint.name if joint.mimic is None else joint.mimic.joint
             k = columns[leader]
             if arrays.elastic[k]:
@@ -91,15 +91,15 @@ def elastic_robot(robot: Robot, drives: Mapping[str, Drive], *, losses: bool = T
 
 
 class _ElasticForces(AbstractJointLaws):
-    """Forces of all joints of an elastic robot: of motors, as commanded, and of springs between them and the links."""
+    """Forces of all joints of an elastic robot: commanded motor torques, and springs between motors and links."""
 
     torque: Any
     laws: tuple[AbstractMotion, ...]
     stiffness: Any
     damping: Any
-    indices: tuple[int, ...] = field(static=True)  # of the laws among the robot's own joints
-    links: tuple[int, ...] = field(static=True)  # columns of the robot's own joints
-    motors: tuple[int, ...] = field(static=True)  # of what moves each: its rotor, or itself
+    indices: tuple[int, ...] = field(static=True)  # numbers of the original joints with laws
+    links: tuple[int, ...] = field(static=True)  # columns of the original joints
+    motors: tuple[int, ...] = field(static=True)  # columns of their rotors, or of rigid joints themselves
     feedback: SampleFunction | None
 
     @property
@@ -158,7 +158,7 @@ def simulate_elastic_robot(
 def _start(
     arrays: DriveArrays, state: object, count: int, links: tuple[int, ...], motors: tuple[int, ...]
 ) -> np.ndarray:
-    """Return q and q' of links and rotors; springs are relaxed, and rotors move with the links, unless given."""
+    """Return q and q' of links and rotors; by default springs are relaxed, and rotors move with the links."""
     n = len(arrays.names)
     levels = np.zeros((2, n)) if state is None else in_order("state", state, arrays.names, RobotError)
     given = real_numbers("state", levels, RobotError)

@@ -14,7 +14,7 @@ from jounce.planning.elastic.mechanism import simulate_elastic_mechanism
 from jounce.planning.elastic.robot import simulate_elastic_robot
 from jounce.robot import Robot
 
-OWN = ("torque", "state", "driven", "drives", "base", "initial")  # what this simulation sets itself
+OWN = ("torque", "state", "driven", "drives", "base", "initial")  # options that this simulation sets itself
 
 
 @overload
@@ -63,41 +63,42 @@ def simulate_elastic(
     Parameters
     ----------
     system : Robot or Mechanism
-        A mechanism whose drivers prescribe distances, slides or coordinates; rigid ones go on prescribing.
+        The system. Elastic drivers of a mechanism must be of distances, slides or coordinates; rigid drivers keep
+        prescribing their coordinates.
     drives : dict of str to Drive
-        By names of joints or drivers. Elastic ones need rotors with inertia.
+        Drives by name of the joint or driver. Elastic drives need rotors with inertia.
     time : array_like of shape (time,)
-        Instants, s; the first is the start. Those of the mechanism unless given.
+        Instants, s; the first is the start. By default those of the mechanism.
     torque : mapping of str to law, or callable
-        Of the motors, seen at the joints, N m or N: for each name a law of time, an expression of ``t``, a function of
-        time by operations of JAX or a number, as `Feedforward.torque_laws` gives them; none unless given. Of a robot
-        also a function of time, q, q', theta and theta' of one sample, by operations of JAX, that returns n torques.
+        Motor torques, as seen at the joints, N m or N: for each name a law of time, such as those of
+        `Feedforward.torque_laws`, an expression of ``t``, a function of time by operations of JAX, or a number; zero by
+        default. For a robot also a function of time, q, q', theta and theta' of one sample, by operations of JAX, that
+        returns n torques.
     state : array_like of shape (2, 2, n), optional
-        At the start: q and q', and theta and theta', as `Feedforward.start` has them. Unless given, springs are
-        relaxed, a robot is at rest at zero and a mechanism moves as its laws say. Of a robot also (2, n), with relaxed
-        springs.
+        Start state: q and q', then theta and theta', like `Feedforward.start`. By default, springs are relaxed, a robot
+        is at rest at zero, and a mechanism moves by its laws. For a robot also (2, n), with relaxed springs.
     order : int, default 2
         Highest derivative of the results.
     losses : bool, default True
-        Whether damping and friction of the robot file count, as in `feedforward`.
+        Whether to include damping and friction of the robot file, as in `feedforward`.
     friction : bool, default True
-        Whether Coulomb friction counts; a motor that turns back sticks where torques that depend only on time take it
-        through zero.
+        Whether to include Coulomb friction; a motor that reverses under a torque of time alone then sticks as the
+        torque passes zero.
     **options
-        As of `simulate`: method, tolerance, events, longest_step, strict, progress.
+        Options of `simulate`: method, tolerance, events, longest_step, strict, progress.
 
     Returns
     -------
     RobotSimulation or Simulation
-        Of the robot with one more joint for each elastic one, ``NAME_motor``, or of the mechanism with one more body,
-        ``NAME_motor``.
+        Motion of the robot with one more joint, ``NAME_motor``, for each elastic joint, or of the mechanism with one
+        more body, ``NAME_motor``, for each elastic driver.
 
     Raises
     ------
     RobotError, MechanismError, UnsupportedError
         If an argument does not fit.
     SolveError
-        If the motion cannot be followed to an instant, as for `simulate`.
+        If the motion cannot be continued to an instant, as for `simulate`.
     """
     for name in OWN:
         if name in options:

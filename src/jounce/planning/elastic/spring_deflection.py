@@ -1,9 +1,9 @@
-"""How springs with dampers deflect under torques that change: ``K x + D x' = tau``, solved along a trajectory.
+"""Deflection of damped springs under varying torques: ``K x + D x' = tau``, solved along a trajectory.
 
-Every derivative of the deflection obeys the same equation under the same derivative of the torque. From one node to the
-next the solution is a weighted mean of the torque over the past, with weights that fade by the time constant D / K; the
-integrals of Legendre polynomials under such weights are spherical Bessel functions, so that stiff springs (a time
-constant far below the step) are as exact as soft ones. No difference of nearly equal numbers is taken.
+Every derivative of the deflection obeys the same equation with the same derivative of the torque. From one node to the
+next, the solution is a weighted mean of the past torque, with weights that decay with the time constant D / K. The
+integrals of Legendre polynomials with these weights are spherical Bessel functions, so that stiff springs (a time
+constant far below the step) are as exact as soft ones. No nearly equal numbers are subtracted.
 """
 
 from collections.abc import Callable
@@ -15,37 +15,36 @@ from jounce.base.shapes import Array
 from jounce.errors import TrajectoryError
 from jounce.planning.elastic.pieces import ANALYSIS, POINTS, points_of, resolved
 
-ROUNDING = 1e-14  # of the largest torque of any joint, or of its derivative
-JUMP = 1e-6  # of the largest value: less is rounding
-LARGE = 100.0  # from here on the finite sum of Bessel functions of half order is exact
+ROUNDING = 1e-14  # fraction of the largest torque of all joints, or of its derivative
+JUMP = 1e-6  # fraction of the largest value: less is rounding
+LARGE = 100.0  # arguments from which the finite sum for Bessel functions of half order is exact
 
 Torques = Callable[[np.ndarray], np.ndarray]
-"""Torques of the springs and their derivatives at instants: (time,) to (time, levels, joints)."""
+"""Function from instants, (time,), to torques of the springs and their derivatives, (time, levels, joints)."""
 
 
 class SpringDeflection:
     """The deflections of springs along a trajectory, and their derivatives.
 
-    With damping one solution is chosen of those that differ by what fades with the time constant: at the start the
-    spring is as deflected as the regular expansion ``(tau - T tau' + T^2 tau'' - ...) / K`` in the time constant
-    T = D / K says, to the order of the derivatives, or to where its terms cease to fall. A trajectory that begins at
-    rest so begins with a spring at rest.
+    With damping, solutions differ by a term that decays with the time constant T = D / K. The initial deflection is the
+    regular expansion ``(tau - T tau' + T^2 tau'' - ...) / K``, to the order of the derivatives or as long as its terms
+    decrease, so that a trajectory that starts at rest starts with a spring at rest.
 
     Parameters
     ----------
     torques : callable
         See `Torques`.
     stiffness, time_constant : array of shape (joints,)
-        Of the springs.
+        Stiffnesses and time constants of the springs.
     nodes : array of shape (nodes,)
-        First nodes: increasing instants from the start to the stop, s, among them knots and the instants of results.
+        First nodes: increasing instants from the start to the stop, s, which include knots and the instants of results.
     names : tuple of str
-        Of the joints, for messages.
+        Names of the joints, for messages.
 
     Raises
     ------
     TrajectoryError
-        If a torque, or a derivative below the last, jumps: the other side of a spring would have to jump too.
+        If a torque, or a derivative below the last, jumps, as the other end of the spring would have to jump too.
     """
 
     def __init__(
@@ -72,7 +71,7 @@ class SpringDeflection:
         self.solution = self._solved()
 
     def _check_jumps(self, names: tuple[str, ...]) -> None:
-        """Raise TrajectoryError where a derivative is not the integral of the next one."""
+        """Raise TrajectoryError if a derivative is not the integral of the next one."""
         changes = np.diff(self.at_nodes[:, :-1], axis=0)
         integrals = self.pieces.integrals.reshape(len(changes), self.levels, -1)[:, 1:]
         size = np.abs(self.at_nodes[:, :-1]).max(axis=0)
@@ -91,8 +90,8 @@ class SpringDeflection:
             raise TrajectoryError(message, name=names[joint])
 
     def _solved(self) -> Float[np.ndarray, "nodes level joint"]:
-        """Return deflections at the nodes, a linear recurrence for all joints at once."""
-        from scipy.linalg import solve_banded  # here, since importing SciPy takes half a second
+        """Return the deflections at the nodes, from one linear recurrence for all joints."""
+        from scipy.linalg import solve_banded  # importing SciPy takes half a second
 
         deflection = self.at_nodes / self.stiffness
         if not len(self.damped):
@@ -111,14 +110,14 @@ class SpringDeflection:
         return deflection
 
     def _first(self) -> Float[np.ndarray, "joint level"]:
-        """Return the deflections with which damped joints begin: the regular expansion, cut where its terms rise."""
+        """Return the initial deflections of damped joints: the regular expansion, truncated where its terms grow."""
         constant, stiffness = self.time_constant[self.damped], self.stiffness[self.damped]
         torque = self.at_nodes[0][:, self.damped]
         sizes = np.abs(self.at_nodes[..., self.damped]).max(axis=0) * constant ** np.arange(self.levels)[:, None]
         rising = np.concatenate([sizes[1:] >= sizes[:-1], np.ones((1, len(constant)), bool)])
         last = np.argmax(rising, axis=0)  # the last term before the first that is larger
         deflection = np.zeros_like(torque)
-        for level in range(self.levels):  # each from those below
+        for level in range(self.levels):  # each follows from lower levels
             terms = np.arange(self.levels - level)[:, None]
             within = terms <= last - level
             expanded = np.sum(np.where(within, (-constant) ** terms * torque[level:], 0.0), axis=0) / stiffness
@@ -127,7 +126,7 @@ class SpringDeflection:
         return deflection.T
 
     def at(self, times: Array[np.ndarray, " time"]) -> Array[np.ndarray, "time level joint"]:
-        """Return deflections and their derivatives at instants of the trajectory."""
+        """Return the deflections and their derivatives at instants of the trajectory."""
         nodes = self.pieces.nodes
         if not len(self.damped):
             return self.torques(times) / self.stiffness
@@ -149,17 +148,17 @@ class SpringDeflection:
         return deflection
 
     def expansion_errors(self) -> Array[np.ndarray, "order joint"]:
-        """Return what the regular expansion misses of the deflection, cut after each order, by its peak; 0 undamped."""
+        """Return the error of the regular expansion, truncated after each order, relative to the peak deflection."""
         terms = self.at_nodes * (-self.time_constant) ** np.arange(self.levels)[:, None] / self.stiffness
         missed = np.abs(np.cumsum(terms, axis=1) - self.solution[:, :1]).max(axis=0)
         return missed / np.maximum(np.abs(self.solution[:, 0]).max(axis=0), 1e-300)
 
 
 def mean_weights(steps: Float[np.ndarray, "*shape"]) -> Float[np.ndarray, "*shape points"]:
-    """Return the weights of values at the points of Gauss in a mean over the past that fades.
+    """Return the weights of values at the Gauss points in an exponentially weighted mean over the past.
 
-    It is the integral of ``exp(-(h - s) / T) f(s) / T`` over a step h. That of a Legendre polynomial of degree k is
-    ``h/T exp(-a) i_k(a)``, where a = h / 2T and i_k is the modified spherical Bessel function of the first kind.
+    The mean is the integral of ``exp(-(h - s) / T) f(s) / T`` over a step h. For a Legendre polynomial of degree k it
+    is ``h/T exp(-a) i_k(a)``, where a = h / 2T and i_k is the modified spherical Bessel function of the first kind.
 
     Parameters
     ----------

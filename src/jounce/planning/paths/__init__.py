@@ -1,1 +1,1 @@
-"""Paths of joints: positions as functions of a parameter that says nothing of time."""
+"""Paths of joints: positions as functions of a parameter independent of time."""

@@ -1,4 +1,4 @@
-"""From a running motion onto a path: a polynomial that begins with its state and ends on the path, smoothly."""
+"""Transitions from a running motion onto a path: polynomials that start in its state and join the path smoothly."""
 
 import dataclasses
 from collections.abc import Sequence
@@ -16,34 +16,34 @@ from jounce.trajectory import AbstractMotion, ExpressionMotion, FollowingMotion,
 from jounce.trajectory.labels import in_order
 
 FIELDS = ("velocity", "acceleration", "jerk")
-MET = 4  # positions to jerk of the path, where it is joined
-SHARES = (0.05, 0.1, 0.2, 0.4, 0.8)  # of the path before the point where it may be joined
-ROUNDING = 1e-6  # of a limit, or of a rate: rounding of a state
-ALONG = 1e-5  # of a state: a smaller deviation from a path is on it
-STILL = 1e-9  # of a limit: a smaller speed stands still
+MET = 4  # levels that agree with the path at the junction: positions to jerk
+SHARES = (0.05, 0.1, 0.2, 0.4, 0.8)  # shares of the path before the candidate junctions
+ROUNDING = 1e-6  # fraction of a limit or of a rate: rounding of a state
+ALONG = 1e-5  # fraction of a state: largest deviation of a state on a path
+STILL = 1e-9  # fraction of a limit: lower speeds are zero
 LOOKS = 401
-NEAR = 1e-12  # of a path: what is nearer is the same place
+NEAR = 1e-12  # fraction of a path: places nearer to each other are the same
 STEADY = "at + rate*(t - begin)"
 
 State = Float[np.ndarray, "_ joint"]  # position, velocity, ...
 
 
 def clean_state(given: ArrayLike, names: Sequence[str], limits: dict[str, Limits]) -> State:
-    """Return the state of a running robot without rounding errors: below a billionth of a limit, or just above one.
+    """Return the state of a running robot with values below a billionth of a limit set to zero, and cut to the limits.
 
     Parameters
     ----------
     given : array_like of shape (derivatives, joints)
         Positions and velocities, and if known accelerations and jerks, rad or m and s.
     names : sequence of str
-        Of the joints.
+        Names of the joints.
     limits : dict of str to Limits
-        Of the joints.
+        Limits of the joints.
 
     Raises
     ------
     TrajectoryError
-        If it is no such state, or has accelerations at rest.
+        If the state is not valid, or has accelerations at rest.
     """
     message = f"must hold positions, velocities and perhaps accelerations and jerks of {len(names)} joints"
     state = real_numbers("state", in_order("state", given, names, TrajectoryError), TrajectoryError, message).copy()
@@ -58,7 +58,7 @@ def clean_state(given: ArrayLike, names: Sequence[str], limits: dict[str, Limits
                 continue
             if value < STILL * limit:
                 state[level, joint] = 0.0
-            elif value > limit * (1 - 2 * ROUNDING):  # a search needs a little to spare
+            elif value > limit * (1 - 2 * ROUNDING):  # the search needs a small margin
                 state[level, joint] *= (1 - 2 * ROUNDING) * limit / value
     if not state[1].any() and state[2:].any():
         message = "has accelerations or jerks at rest, as where a motion begins or turns; take a neighboring instant"
@@ -67,7 +67,7 @@ def clean_state(given: ArrayLike, names: Sequence[str], limits: dict[str, Limits
 
 
 def rates_along(path: Path, state: State) -> tuple[float, ...] | None:
-    """Return the derivatives of s with which a state runs along a path from its start; None if it is not on it."""
+    """Return the derivatives of s of a state that moves along a path from its start; None if it does not."""
     p = path.derivatives(np.array([path.start]), MET - 1)[0]
     size = np.abs(p[0]).max() + np.abs(path.derivatives(np.array([path.stop]), 0)[0, 0] - p[0]).max()
     if np.abs(state[0] - p[0]).max() > ROUNDING**1.5 * size:
@@ -83,7 +83,7 @@ def rates_along(path: Path, state: State) -> tuple[float, ...] | None:
 
 
 def _following(p: np.ndarray, rates: Sequence[float], level: int) -> Float[np.ndarray, " joint"]:
-    """Return the contribution of curvature to the derivative of a level, without that of s itself."""
+    """Return the contribution of the curvature of the path to a derivative, without that derivative of s."""
     if level == 2:
         return p[2] * rates[0] ** 2
     if level == 3:
@@ -92,16 +92,16 @@ def _following(p: np.ndarray, rates: Sequence[float], level: int) -> Float[np.nd
 
 
 def joined_from_rest(path: Path, start: Float[np.ndarray, " joint"], at: float) -> Path:
-    """Return the path that begins straight toward a place of another one, and goes on as that from there.
+    """Return a path that starts straight toward a place on another path, and continues along that path.
 
     Parameters
     ----------
     path : Path
         The path to join.
     start : array of shape (joint,)
-        Positions.
+        Start positions.
     at : float
-        Parameter of the path where it is joined.
+        Parameter of the path at the junction.
     """
     p = path.derivatives(np.array([at]), MET - 1)[0]
     way = p[0] - start
@@ -112,18 +112,18 @@ def joined_from_rest(path: Path, start: Float[np.ndarray, " joint"], at: float) 
 
 
 def extended_path(path: Path, at: float, rate: float, laws: Sequence[SplineMotion], until: float) -> Path:
-    """Return the path of some laws over s from 0 on, that goes on as another one at a steady rate.
+    """Return a path that follows laws over s from 0 up to a junction, and then another path at a steady rate.
 
     Parameters
     ----------
     path : Path
         The path to join.
     at, rate : float
-        Where it is joined, and how fast its parameter grows with s.
+        Parameter of the path at the junction, and its derivative by s.
     laws : sequence of SplineMotion
-        Of its joints.
+        Laws of the joints before the junction.
     until : float
-        The s at which it is joined.
+        Value of s at the junction.
     """
     stop = until + (path.stop - at) / rate
     named = zip(laws, path.laws.items(), strict=True)
@@ -138,9 +138,9 @@ def extended_path(path: Path, at: float, rate: float, laws: Sequence[SplineMotio
 def _joined_law(
     own: SplineMotion, law: AbstractMotion, at: float, rate: float, until: float, stop: float
 ) -> AbstractMotion:
-    """Return a law that is its own until a value of s, and then another one at a steady rate.
+    """Return a law that equals one law up to a value of s, and then another one at a steady rate.
 
-    Of two splines it is one, all of whose numbers are arrays: what is compiled for it does for the next one too.
+    Two splines give one spline, with all its numbers in arrays, so that its compiled programs serve the next one too.
     """
     last = at + rate * (stop - until)
     near = NEAR * (last - at)
@@ -162,7 +162,7 @@ def _joined_law(
 
 
 def _between(begins: State, ends: State) -> Float[np.ndarray, "power joint"]:
-    """Return the coefficients, lowest power first, of a polynomial with some derivatives at 0 and at 1."""
+    """Return the coefficients, lowest power first, of the polynomial with given derivatives at 0 and at 1."""
     count = len(begins) + len(ends)
     conditions = [(0.0, level) for level in range(len(begins))] + [(1.0, level) for level in range(len(ends))]
     rows = [[perm(k, level) * at ** max(k - level, 0) for k in range(count)] for at, level in conditions]

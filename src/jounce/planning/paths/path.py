@@ -22,20 +22,20 @@ class Path:
     start, stop : float
         Ends of s.
     deviation : float, default 0
-        How far the path is from what it was made of, at most, rad or m: from the straight lines between samples or
-        waypoints, or from the trajectory or the laws that were given.
+        Largest distance of the path from its source, rad or m: from the straight lines between samples or waypoints, or
+        from the given trajectory or laws.
     allowed : float, optional
-        How far it may be, where that was bounded.
+        Bound of the deviation, if one was given.
     words : str, optional
-        What it is, for messages.
+        Description of the path, for messages.
     instants : tuple of arrays, optional
-        Values of s, and the instants of the samples there, s.
+        Values of s, and the instants of the samples at these values, s.
     passed : tuple of arrays, optional
-        Values of s, and the instants of the trajectory, or what else its points count, there.
+        Values of s, and the instants of the trajectory, or other parameter of its points, at these values.
     points : Lines, optional
-        The waypoints that it goes through.
+        Waypoints of the path.
     joined : float, optional
-        The s at which it comes onto the path that was given, from the state of a running robot.
+        Value of s at which the path joins the given path, from the state of a running robot.
     """
 
     laws: Mapping[str, AbstractMotion]
@@ -55,7 +55,7 @@ class Path:
         return tuple(self.laws)
 
     def location(self, s: float) -> str:
-        """Say where on the path a value of s is, by the time of the samples too where it was made of some."""
+        """Return a description of a place on the path for messages, with the time of the samples if it has any."""
         note = "" if self.instants is None else f" (t = {np.interp(s, *self.instants):.6g} s of the samples)"
         return f"s = {s:.6g}{note}"
 

@@ -1,4 +1,4 @@
-"""Paths of joints: positions as functions of a parameter that says nothing of time."""
+"""Paths of joints from waypoints, expressions or trajectories: positions over a parameter independent of time."""
 
 import dataclasses
 import math
@@ -25,26 +25,26 @@ from jounce.trajectory.splines import HIGHEST_DEGREE
 
 DEGREE = 5  # of the splines through waypoints
 KINK_CELLS = 2000  # cells of the search for kinks
-CELLS = (160, 320, 640, 1280)  # of the spline of a time law
+CELLS = (160, 320, 640, 1280)  # cells of the spline of a time law
 POINTS_IN_CELL = 4
-FINEST = 4 * POINTS_IN_CELL * CELLS[-1]  # places at which a path is looked at
-RESOLVED = 0.05  # of the range of a derivative: what straight lines between looks may miss
-SLIGHT = 1e-3  # of what the length of the path makes of it: a derivative this small does not matter
-LOOKS = 16  # between two waypoints
-ENDS = 0.02  # of a path
-REPEATED = 1e-9  # of the length of a path: waypoints that are nearer to each other are one
+FINEST = 4 * POINTS_IN_CELL * CELLS[-1]  # sample points of a path
+RESOLVED = 0.05  # fraction of the range of a derivative: error of linear interpolation between sample points
+SLIGHT = 1e-3  # fraction of the size expected from the length of the path: smaller derivatives are negligible
+LOOKS = 16  # sample intervals between two waypoints
+ENDS = 0.02  # fraction of a path at each end
+REPEATED = 1e-9  # fraction of the length of a path: waypoints nearer to each other are the same
 
 GivenPath = Path | JointTrajectory | Mapping[str, ArrayLike | str | AbstractMotion] | ArrayLike
 """A path: waypoints, positions or expressions of ``s`` by the names of joints, or a trajectory without its times."""
 
 
 class PathExpression(AbstractMotion):
-    """The position of a joint over ``s``, by an expression.
+    """The position of a joint over ``s``, given by an expression.
 
     Parameters
     ----------
     expression : Expression
-        Of ``s``.
+        Expression of ``s``.
     """
 
     expression: Expression = field(static=True)
@@ -59,21 +59,21 @@ class PathExpression(AbstractMotion):
 
 @dataclasses.dataclass(frozen=True)
 class Between:
-    """What a path does between its points.
+    """Shape of a path between its points.
 
     Parameters
     ----------
     deviation : float, optional
-        How far it may be from the straight lines between them, rad or m.
+        Largest distance from the straight lines between the points, rad or m.
     parameter : array_like of shape (points,), optional
-        s at waypoints, increasing; the length of the chords between them, from 0 to 1, unless given.
+        Increasing values of s at waypoints; by default the chord length, scaled to run from 0 to 1.
     degree : int, optional
-        Of the splines through waypoints, 1 to 11.
+        Degree of the splines through waypoints, 1 to 11.
 
     Raises
     ------
     TrajectoryError
-        If one of them is no such number.
+        If a value is not valid.
     """
 
     deviation: float | None = None
@@ -87,7 +87,7 @@ class Between:
             whole_number("degree", self.degree, 1, HIGHEST_DEGREE, error=TrajectoryError)
 
     def check_without_points(self) -> None:
-        """Raise TrajectoryError if something was given that only waypoints have."""
+        """Raise TrajectoryError if a setting was given that applies to waypoints only."""
         for name in ("parameter", "degree"):
             if getattr(self, name) is not None:
                 message = "is for waypoints only, and the path has none; leave it out"
@@ -97,25 +97,25 @@ class Between:
 def path_of(
     path: GivenPath | None, names: Sequence[str] | None = None, order: int = 1, between: Between = Between()
 ) -> Path:
-    """Return the path that was given as waypoints, as expressions, or as a trajectory whose times do not count.
+    """Return the path given by waypoints, by expressions, or by a trajectory, whose times are ignored.
 
     Parameters
     ----------
     path : Path, JointTrajectory, dict of str, or array_like of shape (points, joints)
-        A trajectory gives its geometry. A mapping gives each joint an expression of ``s``, which runs from 0 to 1, or
-        its positions at the waypoints, or a motion over s, which runs over the domain of splines. Splines of degree 5
-        go through waypoints, of a lower one through five or fewer.
+        A trajectory gives its geometry. A mapping gives for each joint an expression of ``s``, which runs from 0 to 1,
+        its positions at the waypoints, or a motion over s, which runs over the domain of splines. Splines through
+        waypoints have degree 5, or less through five or fewer.
     names : sequence of str, optional
-        Of the joints of an array, in the order of its columns.
+        Names of the joints of an array, in the order of its columns.
     order : int, default 1
-        To which derivatives a path is to be continuous: at corners where a trajectory stops, and at few waypoints.
+        Order to which derivatives are continuous at corners where a trajectory stops, and with few waypoints.
     between : Between, optional
-        What the path does between its points.
+        Shape of the path between its points.
 
     Raises
     ------
     TrajectoryError
-        If it is no path, has a kink, or points repeat.
+        If the path is not valid, has a kink, or points repeat.
     """
     if isinstance(path, Path) and path.points is not None:
         return _between(path.points, order, between)
@@ -145,7 +145,7 @@ def path_of(
 
 
 def _lengths(points: Float[np.ndarray, "point joint"], parameter: ArrayLike | None) -> Float[np.ndarray, " point"]:
-    """Return the values of s at waypoints: those given, or the lengths of the chords between them, from 0 to 1."""
+    """Return the values of s at waypoints: those given, or the normalized chord length."""
     chords = np.linalg.norm(np.diff(points, axis=0), axis=1)
     total = float(chords.sum())
     if not total > 0:
@@ -166,7 +166,7 @@ def _lengths(points: Float[np.ndarray, "point joint"], parameter: ArrayLike | No
 def _between(lines: Lines, order: int, between: Between) -> Path:
     """Return the path of splines through waypoints, or one within a deviation of the straight lines between them.
 
-    Five points are given a cubic spline, unless more derivatives than its two are to be continuous: a quartic then.
+    Five points get a cubic spline, or a quartic if more than two derivatives must be continuous.
     """
     if between.deviation is not None:
         between.check_without_points()
@@ -183,12 +183,12 @@ def _between(lines: Lines, order: int, between: Between) -> Path:
 
 
 def checked(path: Path, order: int = 1) -> Path:
-    """Return a path that is finite, moves, and whose derivatives by s are continuous to an order.
+    """Return a path after checking that it is finite, moves, and has continuous derivatives by s to an order.
 
     Raises
     ------
     TrajectoryError
-        If it has none of these: the message says where.
+        If a check fails; the message gives the place.
     """
     for name, law in path.laws.items():
         for instant, jumped in _jumps(law, order):
@@ -216,18 +216,18 @@ def checked(path: Path, order: int = 1) -> Path:
 
 
 def cells_needed(path: Path, order: int) -> int:
-    """Return how many cells resolve how a path varies: twice as many as 160, again and again.
+    """Return the number of cells that resolves a path: 160, doubled as often as necessary.
 
-    The derivative of the given order, which is continuous, is compared at the finest places with what straight lines
-    between the places of a coarser grid make of it.
+    The derivative of the given order, which is continuous, is compared on the finest grid with its linear interpolation
+    from a coarser grid.
 
     Raises
     ------
     TrajectoryError
-        If it needs more than are sensible: the message says where.
+        If 1280 cells do not resolve the path; the message gives the place.
     """
     s = np.linspace(path.start, path.stop, FINEST + 1)
-    values = path.derivatives(s, order + 1)  # as `checked` has them, so that nothing else is compiled
+    values = path.derivatives(s, order + 1)  # the order that `checked` uses, so that its program serves again
     length = path.stop - path.start
     inside = slice(int(ENDS * FINEST), int((1 - ENDS) * FINEST))
     curves, scale = values[:, order], np.abs(values[:, 1]).max() / length ** (order - 1)
@@ -238,7 +238,7 @@ def cells_needed(path: Path, order: int) -> int:
         step = FINEST // (cells * POINTS_IN_CELL)
         ends, part = curves[::step, None], np.arange(step)[:, None] / step
         lines = ends[:-1] + (ends[1:] - ends[:-1]) * part
-        off = np.abs(curves[:-1].reshape(lines.shape) - lines).max(axis=1) / size  # a blend may lie between two looks
+        off = np.abs(curves[:-1].reshape(lines.shape) - lines).max(axis=1) / size  # a blend may lie between two grid points
         off[: int(ENDS * len(off))] = off[int((1 - ENDS) * len(off)) :] = 0.0  # cells are narrow at the ends
         at, joint = divmod(int(np.argmax(off)), off.shape[1])
         if off[at, joint] <= RESOLVED:
@@ -247,7 +247,7 @@ def cells_needed(path: Path, order: int) -> int:
 
 
 def _check_seen(path: Path, order: int, s: np.ndarray, curves: np.ndarray, size: float) -> None:
-    """Raise TrajectoryError where a spline bends so narrowly that it does so between the finest places."""
+    """Raise TrajectoryError if a spline bends so narrowly that the bend lies between points of the finest grid."""
     for name, law, curve in zip(path.names, path.laws.values(), curves.T, strict=True):
         if isinstance(law, SplineMotion) and len(law.coefficients) > order:
             begins = np.asarray(law.breakpoints, float)
@@ -287,7 +287,7 @@ def _kink(location: str, order: int, name: str) -> TrajectoryError:
 
 
 def _domain(laws: Mapping[str, AbstractMotion]) -> tuple[float, float]:
-    """Return from where to where s runs: over what splines are known of, or from 0 to 1."""
+    """Return the range of s: the common domain of splines, or from 0 to 1."""
     bounded = [isinstance(law, SplineMotion) and law.beyond == "refuse" for law in laws.values()]
     domains = {(float(law.breakpoints[0]), float(law.stop)) for law in laws.values() if isinstance(law, SplineMotion)}
     if not all(bounded):

@@ -1,7 +1,7 @@
-"""Paths of what was sampled: splines through the samples where these support them, else a smooth motion near them.
+"""Paths of sampled trajectories: splines through the samples if these support them, otherwise a smooth motion nearby.
 
-Splines through samples with noise, rounding or dwells swing. Such a path is that of the smooth motion within a
-deviation of the samples. Few samples are points, as waypoints are: their path keeps near straight lines between them.
+Splines through samples with noise, rounding or dwells swing; the path is then that of the smooth motion within a
+deviation of the samples. Few samples are treated as waypoints: their path stays near the straight lines between them.
 """
 
 import dataclasses
@@ -16,16 +16,16 @@ from jounce.planning.paths.trajectory_paths import path_of_trajectory, turns_bac
 from jounce.planning.smoothing.smooth import FEWEST, sampled, smooth
 from jounce.trajectory import HermiteSplineMotion, JointTrajectory, SplineMotion
 
-DEVIATION = 1e-3  # rad or m, from samples, unless given
-OF_SMOOTHING = 0.75  # of the deviation, where corners of what smoothing makes are rounded as well
-SHARE = 1e-3  # of the size of the path, if that is less
-LOOKS, MANY = 8, 100_000  # between two samples, and at once
-REST_DISTANCE = 1e-7  # of the size of the path: how far a joint may move while its samples do not
-SAMPLES = 4000  # at which a path is looked at that does not come from samples
+DEVIATION = 1e-3  # rad or m: default deviation from samples
+OF_SMOOTHING = 0.75  # fraction of the deviation for smoothing, if corners of its result are then rounded
+SHARE = 1e-3  # fraction of the size of the path: default deviation of small paths
+LOOKS, MANY = 8, 100_000  # sample intervals between two samples, and points per evaluation
+REST_DISTANCE = 1e-7  # fraction of the size of the path: largest motion of a joint while its samples do not move
+SAMPLES = 4000  # intervals of a path that does not come from samples
 
 
 def lines_of(trajectory: JointTrajectory) -> Lines | None:
-    """Return the straight lines between the samples of a trajectory; None if no joint of it has any."""
+    """Return the straight lines between the samples of a trajectory; None if no joint has samples."""
     samples = {name: sampled(law) for name, law in trajectory.laws.items()}
     times = [own[0] for own in samples.values() if own is not None]
     if not times:
@@ -47,7 +47,7 @@ def lines_of(trajectory: JointTrajectory) -> Lines | None:
 
 
 def lines_along(path: Path) -> Lines:
-    """Return straight lines between many places of a path that does not come from samples."""
+    """Return straight lines between many points of a path that does not come from samples."""
     knots = [np.asarray(law.breakpoints) for law in path.laws.values() if isinstance(law, SplineMotion)]
     at = np.unique(np.concatenate([np.linspace(path.start, path.stop, SAMPLES + 1), *knots]))
     at = at[(at >= path.start) & (at <= path.stop)]
@@ -59,30 +59,31 @@ def lines_along(path: Path) -> Lines:
 
 
 def deviation_of(lines: Lines, given: float | None) -> float:
-    """Return how far from samples a path may be."""
+    """Return the largest allowed distance of a path from samples."""
     return min(DEVIATION, SHARE * lines.size) if given is None else given
 
 
 def path_of_samples(
     trajectory: JointTrajectory, order: int, deviation: float | None = None, *, timed: bool = False
 ) -> Path:
-    """Return where a trajectory leads, within a deviation of its samples if it has any.
+    """Return the path of a trajectory, within a deviation of its samples if it has samples.
 
     Parameters
     ----------
     trajectory : JointTrajectory
-        Its laws go through samples, or are known between any two instants.
+        Trajectory with laws through samples, or with laws known at every instant.
     order : int
-        To which derivatives the path is to be continuous.
+        Order to which derivatives of the path are continuous.
     deviation : float, optional
-        rad or m; unless given 0.001, or a thousandth of the size of the path if that is less.
+        Largest distance from the samples, rad or m; by default 0.001, or a thousandth of the size of the path if that
+        is less.
     timed : bool, default False
-        Whether the path runs over the time of the trajectory, as where its times count.
+        Whether the path runs over the time of the trajectory.
 
     Raises
     ------
     TrajectoryError
-        If it does not move, or a path so near would bend too sharply: the message names the joint and the instant.
+        If the trajectory does not move, or the path would bend too sharply; the message names the joint and instant.
     """
     lines, own = lines_of(trajectory), Path(dict(trajectory.laws), trajectory.start, trajectory.stop)
     if lines is None:
@@ -102,7 +103,7 @@ def path_of_samples(
 
 
 def _are_few(trajectory: JointTrajectory) -> bool:
-    """Return whether samples are a few points that guide a path rather than a log of a motion."""
+    """Return whether the samples are a few points of a path rather than a log of a motion."""
     counts = [len(own[0]) for law in trajectory.laws.values() if (own := sampled(law)) is not None]
     return min(counts) < FEWEST
 
@@ -114,7 +115,7 @@ def _smoothed(trajectory: JointTrajectory, order: int, allowed: float, *, timed:
     ends = np.array([motion.start, motion.stop])
     if timed:
         path = dataclasses.replace(path, instants=(ends, ends))
-    elif turns_back_within(motion, allowed):  # which is no part of the path, but noise that is left of slow motions
+    elif turns_back_within(motion, allowed):  # such a reversal is not part of the path, but noise of a slow motion
         motion = smooth(trajectory, OF_SMOOTHING * allowed)
         lines = dataclasses.replace(lines_along(Path(dict(motion.laws), *ends.tolist())), kind="samples")
         path = rounded(lines, (1 - OF_SMOOTHING) * allowed)
@@ -126,7 +127,7 @@ def _smoothed(trajectory: JointTrajectory, order: int, allowed: float, *, timed:
 
 
 def _swing(trajectory: JointTrajectory, own: Path, lines: Lines, order: int) -> float:
-    """Return how far splines are from straight lines between their samples; infinite if these do not support them."""
+    """Return the distance of splines from straight lines between samples; infinite if these do not support them."""
     laws = [law for law in trajectory.laws.values() if sampled(law) is not None]
     if min(law.degree for law in laws if isinstance(law, SplineMotion)) <= order:
         return np.inf

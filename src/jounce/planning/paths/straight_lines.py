@@ -1,8 +1,8 @@
 """Smooth curves within a deviation of the straight lines between points.
 
-Many short lines are taken together first, so that noise and the points of a dwell add no way. The operator of
-Schoenberg then gives a spline whose control points lie on the lines: it stays in their hulls, turns no more often than
-they do, and stands still where they do. Intervals between its knots are halved where it is not near enough.
+Many short lines are first merged into longer ones, so that noise and the points of a dwell add no length. Schoenberg's
+operator then gives a spline with its control points on the lines: it stays in their convex hulls, turns no more often
+than the lines, and rests where they rest. Knot intervals are halved where the spline is not near enough.
 
 I. J. Schoenberg, On spline functions, in Inequalities (Academic Press, 1967), 255-291; H. Imai and M. Iri, Polygonal
 approximations of a curve, in Computational Morphology (North-Holland, 1988), 71-86.
@@ -22,10 +22,10 @@ from jounce.trajectory.splines import local_powers
 
 DEGREE = 5
 LEAST, MOST = 32, 8192  # pieces
-LOOKS = 8  # in each piece
+LOOKS = 8  # sample points of each piece
 GRADED = 2.5  # largest ratio of the lengths of neighboring pieces
-TOGETHER = 0.25  # of the deviation: largest distance of lines from the many that they replace
-ADJACENT = 2  # lines before and after one, among which the nearest is sought
+TOGETHER = 0.25  # fraction of the deviation: largest distance of merged lines from those that they replace
+ADJACENT = 2  # lines before and after a line that are candidates for the nearest one
 
 _Points = Float[np.ndarray, "point joint"]
 
@@ -37,15 +37,15 @@ class Lines:
     Parameters
     ----------
     at : array of shape (point,)
-        Instants of the points, s, or what else the path runs over, increasing.
+        Increasing values of the path parameter at the points, such as instants, s.
     points : array of shape (point, joint)
         Positions, rad or m.
     names : tuple of str
-        Of the joints.
+        Names of the joints.
     kind : {"samples", "waypoints", "places"}
-        What the points are.
+        Kind of the points.
     own : float, default 0
-        How far the lines are from what they stand for, rad or m.
+        Distance of the lines from the curve that they approximate, rad or m.
     """
 
     at: Float[np.ndarray, " point"]
@@ -56,11 +56,11 @@ class Lines:
 
     @property
     def size(self) -> float:
-        """The diagonal of the box that holds all points."""
+        """Diagonal of the bounding box of all points."""
         return float(np.linalg.norm(np.ptp(self.points, axis=0)))
 
     def distances(self, at: Float[np.ndarray, " point"], points: Float[np.ndarray, "point joint"]) -> np.ndarray:
-        """Return how far points are from the lines about where they should be."""
+        """Return the distances of points from the nearest lines near their parameters."""
         own = np.clip(np.searchsorted(self.at, at, side="right") - 1, 0, len(self.at) - 2)
         nearest = np.full(len(at), np.inf)
         for step in range(-ADJACENT, ADJACENT + 1):
@@ -70,14 +70,14 @@ class Lines:
 
 
 def polynomials_at(law: SplineMotion, at: Float[np.ndarray, " point"]) -> Float[np.ndarray, " point"]:
-    """Return the values of the polynomials of a spline, without a program of its own."""
+    """Return the values of the polynomials of a spline, without compiling a program."""
     begins, powers = np.asarray(law.breakpoints, float), np.asarray(law.coefficients, float)
     piece = np.clip(np.searchsorted(begins, at, side="right") - 1, 0, len(begins) - 1)
     return np.polynomial.polynomial.polyval(at - begins[piece], powers[:, piece], tensor=False)
 
 
 def _distances_from_lines(points: np.ndarray, begins: np.ndarray, ends: np.ndarray) -> Float[np.ndarray, " point"]:
-    """Return distances from lines between two points each."""
+    """Return the distances of points from line segments."""
     along, since = ends - begins, points - begins
     lengths = (along**2).sum(axis=-1)
     share = np.clip((along * since).sum(axis=-1) / np.where(lengths > 0, lengths, 1.0), 0.0, 1.0)
@@ -85,27 +85,27 @@ def _distances_from_lines(points: np.ndarray, begins: np.ndarray, ends: np.ndarr
 
 
 def simplified_polyline(points: _Points, near: float) -> tuple[Int[np.ndarray, " vertex"], float]:
-    """Return few of many points such that straight lines between them come near all, in their sequence.
+    """Return a subset of points such that the straight lines between them are near all points, in sequence.
 
     Parameters
     ----------
     points : array of shape (point, joint)
-        In their sequence.
+        Points in sequence.
     near : float
-        How far points may be from the line that takes their place, and how far back along it they may go.
+        Largest distance of points from the line that replaces them, and largest step back along it.
 
     Returns
     -------
     chosen : array of shape (vertex,)
-        Indices, the first and the last point among them.
+        Indices of the subset, with the first and the last point.
     off : float
-        How far a point is from its line, at most.
+        Largest distance of a point from its line.
     """
     last, chosen, stride, off = len(points) - 1, [0], 1, 0.0
     while chosen[-1] < last:
         first = chosen[-1]
         good, bad, reach = first + 1, last + 1, stride
-        while good < last and bad > last:  # twice as far, again and again, until it is too far
+        while good < last and bad > last:  # double the reach until it is too far
             beyond = min(first + 2 * reach, last)
             good, bad = (beyond, bad) if _off(points[first : beyond + 1], near) <= near else (good, beyond)
             reach = beyond - first
@@ -117,13 +117,13 @@ def simplified_polyline(points: _Points, near: float) -> tuple[Int[np.ndarray, "
             chosen.append(good)
         elif good == last:
             break
-        else:  # back where it was: what comes next starts there
+        else:  # the points return to the same position: the next line starts from it
             chosen[-1] = good
     return np.array(chosen), off
 
 
 def _off(points: _Points, near: float) -> float:
-    """Return how far points are from the line between the first and the last; infinite if they go back along it."""
+    """Return the distance of points from the line between the first and the last; infinite if they go back along it."""
     along, since = points[-1] - points[0], points - points[0]
     length = float(np.linalg.norm(along))
     fraction = since @ (along / length) if length else np.zeros(len(points))
@@ -142,13 +142,13 @@ def rounded(lines: Lines, deviation: float, *, timed: bool = False) -> Path:
     deviation : float
         Largest distance from the lines, rad or m.
     timed : bool, default False
-        Whether it runs over the instants of the points, and is near them at each; it then stands still where they do.
-        Otherwise it runs from 0 to 1, over about the length of the lines.
+        Whether the path runs over the instants of the points and is near each point at its instant; it then rests where
+        the points rest. Otherwise it runs from 0 to 1, approximately over the length of the lines.
 
     Raises
     ------
     TrajectoryError
-        If the lines do not move, or it would take more pieces than are sensible: the message says where.
+        If the lines do not move, or the path would need more than 8192 pieces; the message gives the place.
     """
     if timed:
         knots, points, off, chosen = lines.at, lines.points, 0.0, np.arange(len(lines.at))
@@ -195,12 +195,12 @@ def rounded(lines: Lines, deviation: float, *, timed: bool = False) -> Path:
 
 
 def _on(at: np.ndarray, knots: np.ndarray, points: _Points) -> Float[np.ndarray, "sample joint"]:
-    """Return places on straight lines."""
+    """Return positions on straight lines."""
     return np.stack([np.interp(at, knots, column) for column in points.T], axis=1)
 
 
 def _graded(begins: np.ndarray) -> np.ndarray:
-    """Halve pieces that are much longer than a neighbor."""
+    """Return breakpoints with pieces halved that are much longer than a neighbor."""
     while True:
         lengths = np.diff(begins)
         adjacent = np.minimum(np.append(lengths[1:], np.inf), np.append(np.inf, lengths[:-1]))
@@ -211,8 +211,8 @@ def _graded(begins: np.ndarray) -> np.ndarray:
 
 
 def _schoenberg(begins: np.ndarray, knots: np.ndarray, points: _Points) -> Any:
-    """Return the spline whose control points lie on straight lines, at the mean of the knots that belong to each."""
-    from scipy.interpolate import BSpline  # here, since importing SciPy takes half a second
+    """Return Schoenberg's spline: its control points lie on straight lines, each at the mean of its knots."""
+    from scipy.interpolate import BSpline  # importing SciPy takes half a second
 
     whole = np.concatenate([begins[[0] * DEGREE], begins, begins[[-1] * DEGREE]])
     means = np.lib.stride_tricks.sliding_window_view(whole[1:-1], DEGREE).mean(axis=1)

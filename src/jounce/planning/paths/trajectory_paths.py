@@ -1,9 +1,9 @@
-"""The path of a trajectory over a parameter with which it turns back, and stops at corners, smoothly.
+"""The path of a trajectory over a parameter in which reversals and stops at corners are smooth.
 
-The length of the path is a parameter that does not depend on the times of the trajectory, but at a turning point the
-positions have a cusp over it. Near a turning point the length is therefore a square of the parameter, near a corner at
-which the trajectory stands still a higher power: the positions are smooth over that parameter, and a motion whose
-parameter continues there stops exactly as long as it has to.
+The length of the path does not depend on the times of the trajectory, but positions have a cusp over it at a turning
+point. Near a turning point, the length is therefore a square of the parameter; near a corner at which the trajectory
+rests, a higher power. Positions are smooth over this parameter, and a motion whose parameter passes such a point stops
+exactly as long as necessary.
 """
 
 import dataclasses
@@ -20,50 +20,50 @@ from jounce.planning.paths.path import Path
 from jounce.planning.pieces import JoinedPieces
 from jounce.trajectory import AbstractMotion, FollowingMotion, JointTrajectory, SplineMotion
 
-REST_SPEED = 1e-3  # of the largest speed: a trajectory that is slower than this at its ends stands still there
-RESTING = 1e-5  # of the largest speed: what is slower within stands still
-SLOW = 0.2  # of the largest speed: where the lowest speed is sought closely
-INTERVALS = 4000  # intervals of the first look at a trajectory
-ZOOM, ZOOMS = 9, 20  # instants about each lowest speed, and how often they are laid closer
-NODES = (250, 500, 1000, 2000)  # of the splines along the whole path; more where fewer do not come near
-PART = 24  # of them at least between two stops
-NEAR = 1e-9  # of the length: target error of the splines
-GAIN = 8.0  # least reduction of the error by twice the nodes
-AWAY = 1e-7  # of the length: distance from a stop at which its directions are taken
-BEND = 2e-3  # rad: a smaller change of direction at a stop is none
-BACK = 0.05  # rad: so near to half a turn it is a reversal
-WIDEST = 0.1  # of the length: how far a power reaches on each side of a stop
-CLOSE = 0.125  # of this, within which a power of its own keeps rounding small
-ROUNDING = 4 * float(np.finfo(float).eps)  # of the length
-FLAT = 4  # derivatives to which a power joins the length
+REST_SPEED = 1e-3  # fraction of the largest speed: a trajectory slower than this at its ends rests at them
+RESTING = 1e-5  # fraction of the largest speed: a trajectory slower than this between its ends rests
+SLOW = 0.2  # fraction of the largest speed below which minima of the speed are refined
+INTERVALS = 4000  # intervals of the first sampling of a trajectory
+ZOOM, ZOOMS = 9, 20  # instants about each minimum of the speed, and number of refinements
+NODES = (250, 500, 1000, 2000)  # nodes of the splines along the whole path, as many as the accuracy needs
+PART = 24  # least number of nodes between two stops
+NEAR = 1e-9  # fraction of the length: target error of the splines
+GAIN = 8.0  # least reduction of the error for twice the nodes
+AWAY = 1e-7  # fraction of the length: distance from a stop at which its directions are evaluated
+BEND = 2e-3  # rad: smaller changes of direction at a stop do not count
+BACK = 0.05  # rad: changes of direction this near to half a turn are reversals
+WIDEST = 0.1  # fraction of the length: reach of a power on each side of a stop
+CLOSE = 0.125  # fraction of the reach within which a separate piece keeps rounding small
+ROUNDING = 4 * float(np.finfo(float).eps)  # fraction of the length
+FLAT = 4  # continuous derivatives where a power joins the length
 DEGREE = 5
-TURNING = 1e-2  # of the largest acceleration: more at a rest turns a trajectory smoothly
+TURNING = 1e-2  # fraction of the largest acceleration: with more at a rest, the trajectory reverses smoothly
 NEWTON = 12  # steps
-HALVINGS = 60  # of the interval that contains the end of a stop
+HALVINGS = 60  # bisections of the interval that contains the end of a stop
 GAUSS_NODES, WEIGHTS = np.polynomial.legendre.leggauss(6)
 
 
-_Parameters = Float[np.ndarray, " _"]  # of any length
+_Parameters = Float[np.ndarray, " _"]
 
 
 class Stops(NamedTuple):
-    """Turning points and corners of a trajectory: how far along the path, and the change of direction, rad."""
+    """Turning points and corners of a trajectory: length of the path up to each, and change of direction, rad."""
 
     lengths: Float[np.ndarray, " stop"]
     turns: Float[np.ndarray, " stop"]
 
 
 class Ramps:
-    """A parameter that grows as the length but near some stops, where the length is a power of it.
+    """A parameter that grows like the length, except near stops, where the length is a power of it.
 
     Parameters
     ----------
     stops : array of shape (stop,)
-        Lengths, increasing.
+        Lengths at the stops, increasing.
     widths : array of shape (stop,)
-        How far the power reaches, by length.
+        Reach of the power on each side of a stop, as a length.
     power : int
-        2 or higher.
+        The power, 2 or higher.
     """
 
     def __init__(self, stops: np.ndarray, widths: np.ndarray, power: int):
@@ -83,7 +83,7 @@ class Ramps:
         near = np.argmin(np.abs(lengths[:, None] - self.stops), axis=1)
         away = lengths - self.stops[near]
         target = np.minimum(np.abs(away), self.widths[near]) / self.reach[near]
-        share = np.minimum((self.power * target) ** (1 / self.power), 1.0)  # Newton's steps go down to the root
+        share = np.minimum((self.power * target) ** (1 / self.power), 1.0)  # Newton's method descends to the root
         slope = self.share.deriv()
         for _ in range(NEWTON):
             share = np.maximum(share - (self.share(share) - target) / np.maximum(slope(share), 1e-300), 0.0)
@@ -93,8 +93,8 @@ class Ramps:
     def motion(self, total: float) -> JoinedPieces:
         """Return the length over the parameter, up to a total length.
 
-        Next to a stop the length changes by less than its rounding. Before the center it is less than the stop by a
-        little more than that, so that what has a corner at this length turns at the center, where all rests.
+        Next to a stop, the length changes by less than its rounding. Before the center, it is reduced by slightly more
+        than that, so that a law with a corner at this length turns exactly at the center, where the motion rests.
         """
         begins, pieces = [0.0], [np.polynomial.Polynomial([0.0, 1.0])]
         for stop, center, reach, width in zip(self.stops, self.centers, self.reach, self.widths, strict=True):
@@ -111,19 +111,19 @@ class Ramps:
 
 
 def path_of_trajectory(trajectory: JointTrajectory, order: int) -> Path:
-    """Return where a trajectory leads: over its time, where that is fit, or over about the length of the path.
+    """Return the path of a trajectory over its time, if that is a smooth parameter, or over approximately its length.
 
     Parameters
     ----------
     trajectory : JointTrajectory
-        Its times do not count.
+        The trajectory; its times are ignored.
     order : int
-        To which derivatives of the path are to be continuous where it stops at a corner.
+        Order to which derivatives of the path are continuous where the trajectory stops at a corner.
 
     Raises
     ------
     TrajectoryError
-        If it does not move.
+        If the trajectory does not move.
     """
     path = Path(dict(trajectory.laws), trajectory.start, trajectory.stop)
     with warnings.catch_warnings():
@@ -154,16 +154,16 @@ def path_of_trajectory(trajectory: JointTrajectory, order: int) -> Path:
 def stopping(
     path: Path, at: Float[np.ndarray, " stop"], order: int
 ) -> tuple[Path, Callable[[_Parameters], _Parameters]]:
-    """Return a path over another parameter, at whose places a motion stops, and the values of that for those of s.
+    """Return a path over a parameter with which a motion stops at given places, and the function from s to it.
 
     Parameters
     ----------
     path : Path
-        Where it leads.
+        The path.
     at : array of shape (stop,)
-        Increasing values of its parameter, within it.
+        Parameters of the stops, increasing, within the path.
     order : int
-        To which derivatives the motion is to vanish there.
+        Order to which derivatives of the motion vanish at the stops.
     """
     lengths, total = at - path.start, path.stop - path.start
     edges = np.concatenate([[0.0], lengths, [total]])
@@ -183,14 +183,14 @@ def stopping(
 
 
 def _raised(powers: np.ndarray, by: float) -> np.ndarray:
-    """Return polynomials raised by a number."""
+    """Return polynomials plus a constant."""
     raised = np.array(powers, float)
     raised[0] += by
     return raised
 
 
 def turns_back_within(trajectory: JointTrajectory, size: float) -> bool:
-    """Return whether a trajectory turns back, or stops at a corner, twice within a path shorter than a size."""
+    """Return whether a trajectory reverses, or stops at a corner, twice within a path shorter than a size."""
     path = Path(dict(trajectory.laws), trajectory.start, trajectory.stop)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", SampleWarning)
@@ -204,7 +204,7 @@ def turns_back_within(trajectory: JointTrajectory, size: float) -> bool:
 
 
 def _instants(path: Path, own: np.ndarray) -> Float[np.ndarray, " time"]:
-    """Return many instants, and all at which pieces of laws meet."""
+    """Return evenly spaced instants, with the given instants and all breakpoints of laws."""
     knots = [np.asarray(law.breakpoints) for law in path.laws.values() if isinstance(law, SplineMotion)]
     every = np.concatenate([np.linspace(path.start, path.stop, INTERVALS + 1), own, *knots])
     instants = np.unique(every[(every >= path.start) & (every <= path.stop)])
@@ -217,7 +217,7 @@ def _speeds(path: Path, times: np.ndarray) -> Float[np.ndarray, " time"]:
 
 
 def _rests(path: Path, times: np.ndarray, speeds: np.ndarray, slow: float) -> Float[np.ndarray, " rest"]:
-    """Return the instants within at which a trajectory stands still: of a stay many."""
+    """Return the inner instants at which a trajectory rests; a dwell gives many."""
     before, at, after = speeds[:-2], speeds[1:-1], speeds[2:]
     resting = 1 + np.flatnonzero(at <= slow)
     lowest = 1 + np.flatnonzero((at <= before) & (at <= after) & (at > slow) & (at < SLOW * speeds.max()))
@@ -237,7 +237,7 @@ def _rests(path: Path, times: np.ndarray, speeds: np.ndarray, slow: float) -> Fl
 
 
 def _accelerates_at_rests(path: Path, times: np.ndarray, rests: np.ndarray) -> bool:
-    """Whether a trajectory accelerates wherever it stands still: its own time is then fit to be the parameter."""
+    """Return whether a trajectory accelerates wherever it rests, so that its time is a smooth parameter."""
     if not len(rests):
         return True
     typical = np.linalg.norm(path.derivatives(times, 2)[:, 2], axis=1).max()
@@ -246,14 +246,14 @@ def _accelerates_at_rests(path: Path, times: np.ndarray, rests: np.ndarray) -> b
 
 
 def _between(path: Path, begins: np.ndarray, ends: np.ndarray) -> Float[np.ndarray, " interval"]:
-    """Return lengths of the path from instants to others, by Gauss's quadrature."""
+    """Return the lengths of the path over intervals of time, by Gauss quadrature."""
     half = (ends - begins) / 2
     laid = begins[:, None] + half[:, None] * (1 + GAUSS_NODES)
     return half * (_speeds(path, laid.reshape(-1)).reshape(laid.shape) @ WEIGHTS)
 
 
 def _stops(path: Path, times: np.ndarray, lengths: np.ndarray, rests: np.ndarray) -> Stops:
-    """Return the rests at which the direction changes, each once, however long the trajectory stays there."""
+    """Return the rests at which the direction changes, each once, however long the trajectory rests."""
     away = AWAY * lengths[-1]
     at = lengths[np.searchsorted(times, rests)]
     within = (at > 8 * away) & (at < lengths[-1] - 8 * away)
@@ -280,7 +280,7 @@ def _stops(path: Path, times: np.ndarray, lengths: np.ndarray, rests: np.ndarray
 
 
 def _splined(path: Path, times: np.ndarray, lengths: np.ndarray, stops: Stops, order: int, count: int) -> Path:
-    """Return a path through about so many places, and through all stops exactly."""
+    """Return a path of splines with about the given number of nodes, and exactly through all stops."""
     total = float(lengths[-1])
     edges = np.concatenate([[0.0], stops.lengths, [total]])
     widths = np.minimum(WIDEST * total, np.minimum(np.diff(edges)[:-1], np.diff(edges)[1:]) / 2)
@@ -316,7 +316,7 @@ def _splined(path: Path, times: np.ndarray, lengths: np.ndarray, stops: Stops, o
 
 
 def _joined(knots: np.ndarray, values: np.ndarray, breaks: Int[np.ndarray, " break"]) -> JoinedPieces:
-    """Return splines from one break to the next."""
+    """Return splines joined at breaks."""
     begins, powers = [], []
     for first, last in itertools.pairwise(breaks.tolist()):
         spline = SplineMotion(knots[first : last + 1], values[first : last + 1], DEGREE)

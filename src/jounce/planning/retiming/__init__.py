@@ -1,1 +1,1 @@
-"""The fastest motion along a path that keeps the limits of a robot or of the drivers of a mechanism."""
+"""Time-optimal motion along a path within the limits of a robot or of the drivers of a mechanism."""

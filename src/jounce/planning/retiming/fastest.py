@@ -1,4 +1,4 @@
-"""The fastest law along a path, first coarsely, then finely; and the least slowing of a law that is given."""
+"""The fastest time law along a path, from a coarse to a fine basis, and the least slowing of a given law."""
 
 import numpy as np
 
@@ -8,7 +8,7 @@ from jounce.planning.retiming.rates.rate_law import Conditions, RateLaw, progres
 from jounce.planning.retiming.rates.rate_spline import Parametrization, RateBasis
 from jounce.planning.retiming.search import COARSE, Search
 
-COARSE_ROUNDS = {2: 1, 3: 2}  # by the level of limits: those to the second are linear in the program
+COARSE_ROUNDS = {2: 1, 3: 2}  # by the level of limits: limits up to the second are linear in the program
 
 
 def fastest(
@@ -22,12 +22,12 @@ def fastest(
 ) -> tuple[RateLaw, Search]:
     """Return the fastest law from a start to a stop of s, and the search that found it.
 
-    With `until`, a rate of 1 keeps the limits from the start up to there: the search begins with that.
+    With `until`, the search starts from a law with rate 1 up to that value of s, which keeps the limits.
 
     Raises
     ------
     TrajectoryError
-        If a limit is broken at rest already, or nothing on a part of the path has a limit.
+        If a limit is exceeded at rest, or no limited quantity moves on a part of the path.
     SolveError
         If no law keeps the limits.
     """
@@ -35,7 +35,7 @@ def fastest(
     if until is not None:
         return _faster(source, labels, (start, until, stop), conditions, cells)
     share = np.linspace(0.0, 1.0, 201)
-    slopes = [0.0 if rate == 0 else 1.0 for rate in conditions.rates]  # of a cubic, where it does not rest
+    slopes = [0.0 if rate == 0 else 1.0 for rate in conditions.rates]  # of a cubic at ends without rest
     s = share**2 * (3 - 2 * share) + slopes[0] * share * (1 - share) ** 2 - slopes[1] * share**2 * (1 - share)
     s = start + (stop - start) * s
     duration = 0.0
@@ -59,7 +59,7 @@ def fastest(
 def _faster(
     source: Source, labels: Labels, parts: tuple[float, float, float], conditions: Conditions, cells: int
 ) -> tuple[RateLaw, Search]:
-    """Return the fastest law, from one whose rate is 1 on the first part, and falls to rest on the second one."""
+    """Return the fastest law, found from one with rate 1 on the first part that comes to rest on the second."""
     start, until, stop = parts
     times = np.linspace(0.0, until - start + 2 * (stop - until), 401)
     slowing = np.clip(times - (until - start), 0.0, None)
@@ -80,7 +80,7 @@ def _faster(
 def slowed_only(
     source: Source, labels: Labels, start: float, stop: float, conditions: Conditions, cells: int
 ) -> tuple[RateLaw, Search]:
-    """Return the fastest law that is nowhere faster than s itself, s being a time, and the search that found it."""
+    """Return the fastest law that is nowhere faster than s, which is a time, and the search that found it."""
     check_possible(source, labels, start, stop, bounded=True)
     parameter = Parametrization([0.0, 1.0], [start, stop], (1, 1))
     search = Search(source, labels, parameter, RateBasis(cells, max(conditions.order + 1, 2)), conditions)

@@ -1,9 +1,8 @@
-"""The curve by which a running robot comes onto a path: a spline over time that keeps all limits from its state on.
+"""The joining curve, by which a running robot reaches a path: a spline over time that keeps all limits from its state.
 
-At each instant what is limited depends on the derivative of its own order above all: velocities, accelerations and
-jerks of joints are these, torques and their rates change with accelerations and jerks by the mass matrix, and those of
-points by a Jacobian matrix. With the matrices of the last curve each program is a convex one, and what a curve really
-needs decides whether it is taken.
+Each limited quantity depends mainly on the derivative of its own order: joint limits bound it directly, torques and
+their rates depend on accelerations and jerks by the mass matrix, and quantities of points by a Jacobian matrix. With
+the matrices of the previous curve, each program is convex. A curve is accepted if its exact quantities keep the limits.
 """
 
 import dataclasses
@@ -19,19 +18,19 @@ from jounce.robot.algorithms.equations_of_motion import mass_matrix
 from jounce.robot.algorithms.jacobian import point_slope
 
 INTERVALS = 20
-GROWTH = 1.1  # of intervals, from one to the next: the state is at limits, the path is not
-IN_INTERVAL, FIRST, IN_FIRST = 3, 3, 8  # instants, at which limits hold, and in how many first intervals how many
-DEGREE = 5  # of the splines, or more where more derivatives are to be met
-SPARE = 0.01  # of a limit, left between the instants
-SOON = 0.2  # of the duration, from which on that much is left of what the state may need as a whole
-HELD = 1e-5  # of a limit: what is exceeded by less is kept
-PENALTY = 1e4  # of what is exceeded, as a share of the limit, beside the jerk of the curve
+GROWTH = 1.1  # ratio of successive intervals: the state is at limits, the path is not
+IN_INTERVAL, FIRST, IN_FIRST = 3, 3, 8  # instants per interval, number of first intervals, instants in each of these
+DEGREE = 5  # least degree of the splines; more if more derivatives are given
+SPARE = 0.01  # fraction of a limit, as a margin between the instants
+SOON = 0.2  # fraction of the duration after which the margin holds in full, as the state may need the whole limit
+HELD = 1e-5  # fraction of a limit: a limit exceeded by less is kept
+PENALTY = 1e4  # weight of the excess, as a fraction of the limit, relative to the jerk of the curve
 PROGRAMS = 6
-NEAR = 0.7  # of a limit: where the last curve leaves more, it is left out
-SETTLED = 0.3  # of what is exceeded: if a program leaves more, the next ones do not help
+NEAR = 0.7  # fraction of a limit: rows that the last curve leaves a larger margin are omitted
+SETTLED = 0.3  # ratio of successive excesses above which further programs do not help
 EVEN = np.array([[1.0], [0.0], [0.0], [0.0]])  # a rate of 1 in time
 
-_Points = Float[np.ndarray, " _"]  # of any length
+_Points = Float[np.ndarray, " _"]
 _Motion = Float[np.ndarray, "_ joint"]
 _Coefficients = Float[np.ndarray, "_ joint"]
 
@@ -43,9 +42,9 @@ class TimeSplines:
     Parameters
     ----------
     knots : array of shape (count + degree + 1,)
-        From 0 on, those at the ends repeated.
+        Knots from 0, repeated at the ends.
     degree : int
-        Of the splines.
+        Degree of the splines.
     """
 
     knots: _Points
@@ -62,7 +61,7 @@ class TimeSplines:
         return self.knots[self.degree : len(self.knots) - self.degree]
 
     def matrices(self, at: _Points, order: int) -> Float[np.ndarray, "derivative point spline"]:
-        """Return the values of the splines at instants, and of their derivatives."""
+        """Return the values of the splines and of their derivatives at instants."""
         from scipy.interpolate import BSpline
 
         own = BSpline(self.knots, np.eye(self.count), self.degree)
@@ -71,18 +70,18 @@ class TimeSplines:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class JoiningCurve:
-    """The motion of joints over time, and what it exceeds.
+    """The motion of joints over time, and its largest excess over a limit.
 
     Parameters
     ----------
     splines : TimeSplines
-        What it is made of.
+        Basis of the motion.
     coefficients : array of shape (spline, joint)
-        Of the joints.
+        Coefficients of the joints.
     over : float
-        By what share of a limit it is exceeded at most; 0 where all are kept.
+        Largest excess as a fraction of the limit; 0 if all limits are kept.
     worst : Quantity
-        What is nearest to its limit, or exceeds it most.
+        Quantity nearest to its limit, or with the largest excess.
     """
 
     splines: TimeSplines
@@ -93,20 +92,20 @@ class JoiningCurve:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class _Rows:
-    """Bounds: slopes of a derivative at each instant, and how much of the bound is left to a change of it.
+    """Linear bounds on changes of a derivative: slopes of a limited quantity at each instant, and remaining margins.
 
     Parameters
     ----------
     level : int
-        Which derivative.
+        Order of the derivative.
     slopes : array of shape (point, joint)
-        Share of the limit, for each unit of the derivative of each joint.
+        Fraction of the limit per unit of the derivative of each joint.
     left : array of shape (point,)
-        Share of the limit.
+        Remaining margin, as a fraction of the limit.
     used : array of shape (point,)
-        Whether there is a limit.
+        Whether the quantity has a limit.
     label : Quantity
-        What is limited.
+        Limited quantity.
     """
 
     level: int
@@ -117,16 +116,16 @@ class _Rows:
 
 
 def joining_curve(source: RobotQuantities, begins: _Motion, ends: _Motion, duration: float) -> JoiningCurve:
-    """Return the curve of least jerk from one state to another, or the one that exceeds limits by as little as it can.
+    """Return the curve of least jerk between two states within limits, or the curve with the smallest excess.
 
     Parameters
     ----------
     source : RobotQuantities
-        Of the path that is joined.
+        Limited quantities of the path to join.
     begins, ends : array of shape (derivatives, joints)
-        Positions and derivatives by time.
+        Positions and time derivatives of both states.
     duration : float
-        From one to the other, s.
+        Time between the states, s.
     """
     splines = _graded(duration, max(DEGREE, len(ends)))
     counts = np.where(np.arange(INTERVALS) < FIRST, IN_FIRST, IN_INTERVAL)
@@ -134,7 +133,7 @@ def joining_curve(source: RobotQuantities, begins: _Motion, ends: _Motion, durat
     at = np.append(np.concatenate([np.linspace(*part, endpoint=False) for part in parts]), duration)
     matrices = splines.matrices(at, ORDER)
     coefficients, free = _pinned(splines, begins, ends)
-    growth, given = np.minimum(at / (SOON * duration), 1.0), len(begins)  # as fast as what is not given can make it
+    growth, given = np.minimum(at / (SOON * duration), 1.0), len(begins)  # margins grow with the first free derivative
     left = [1 - SPARE * growth ** max(given - level, 0) for level in range(ORDER + 1)]
     over, slack, worst = np.inf, np.inf, source.labels.every[0]
     named = worst
@@ -154,13 +153,13 @@ def joining_curve(source: RobotQuantities, begins: _Motion, ends: _Motion, durat
         change, slack, named = _least_change(rows, source.columns, matrices, free, coefficients, duration)
         coefficients = coefficients.copy()
         coefficients[free] += change
-        if slack > HELD and not program:  # no torques make it possible
+        if slack > HELD and not program:  # joint limits alone make it impossible
             return JoiningCurve(splines, coefficients, slack, named)
     return JoiningCurve(splines, coefficients, over, worst)
 
 
 def _graded(duration: float, degree: int) -> TimeSplines:
-    """Return splines on intervals that grow from the beginning on."""
+    """Return splines on intervals that grow from the start."""
     ends = np.append(0.0, np.cumsum(GROWTH ** np.arange(INTERVALS)))
     ends *= duration / ends[-1]
     ends[-1] = duration
@@ -168,7 +167,7 @@ def _graded(duration: float, degree: int) -> TimeSplines:
 
 
 def _pinned(splines: TimeSplines, begins: _Motion, ends: _Motion) -> tuple[_Coefficients, slice]:
-    """Return coefficients that meet both ends, and which of them are free."""
+    """Return coefficients that satisfy the conditions at both ends, and the slice of the free ones."""
     first, last = len(begins), len(ends)
     at = splines.matrices(splines.ends[[0, -1]], max(first, last) - 1)
     left = np.linalg.solve(at[:first, 0, :first], begins)
@@ -180,7 +179,7 @@ def _pinned(splines: TimeSplines, begins: _Motion, ends: _Motion) -> tuple[_Coef
 
 
 def _exceeded(source: RobotQuantities, quantities: PathQuantities) -> tuple[float, Quantity]:
-    """Return by what share of a limit the worst of all quantities of a curve exceeds it, and which it is."""
+    """Return the largest excess of a curve, as a fraction of the limit, and its quantity."""
     count = len(quantities.first)
     shape = np.zeros((5, count))
     shape[1] = 1.0
@@ -192,7 +191,7 @@ def _exceeded(source: RobotQuantities, quantities: PathQuantities) -> tuple[floa
 def _both_sides(
     level: int, slopes: np.ndarray, values: np.ndarray, lower: np.ndarray, upper: np.ndarray, left: list, labels: Any
 ) -> list[_Rows]:
-    """Return the rows of quantities with values (point, quantity) and slopes (point, quantity, joint)."""
+    """Return the rows of quantities from values (point, quantity) and slopes (point, quantity, joint)."""
     rows = []
     for k, label in enumerate(labels):
         for sign, bound in ((1.0, upper[:, k]), (-1.0, -lower[:, k])):
@@ -271,15 +270,15 @@ def _least_change(
     coefficients: _Coefficients,
     duration: float,
 ) -> tuple[_Coefficients, float, Quantity]:
-    """Return the change of free coefficients that exceeds bounds least, and then has the least jerk.
+    """Return the change of free coefficients with the smallest excess over bounds, and then the least jerk.
 
     Returns
     -------
     change : array of shape (free spline, joint)
     over : float
-        Share of a limit by which it is exceeded.
+        Excess as a fraction of the limit.
     worst : Quantity
-        What prevents it most.
+        Quantity with the largest dual variable.
     """
     from scipy import sparse
 

@@ -1,4 +1,4 @@
-"""Loads that are taken up and set down along a path: where on it, and when."""
+"""Loads that are taken up and set down along a path: positions on the path, and instants."""
 
 import dataclasses
 from collections.abc import Sequence
@@ -12,27 +12,27 @@ from jounce.robot.algorithms.carried_loads import CarriedLoad
 from jounce.trajectory import FollowingMotion
 from jounce.trajectory.laws.stacking import law_derivatives
 
-SAME = 1e-12  # of a path: changes that are nearer to each other, or to an end, are one
-RESTS = 1e-9  # of the largest speed along a path: what is slower stands still there already
-LOOKS = 65  # instants, among which one is sought, again and again
+SAME = 1e-12  # fraction of a path: changes nearer to each other, or to an end, coincide
+RESTS = 1e-9  # fraction of the largest speed along a path: a slower path already rests
+LOOKS = 65  # instants of each refinement of a search
 
 
 def along_path(loads: Sequence[CarriedLoad], path: Path, *, timed: bool = False) -> tuple[CarriedLoad, ...]:
-    """Return loads by the parameter of a path.
+    """Return loads with their places given by the parameter of a path.
 
     Parameters
     ----------
     loads : sequence of CarriedLoad
-        By time of a trajectory, parameter, share of the path, or waypoints.
+        Loads by time of a trajectory, parameter, share of the path, or waypoint.
     path : Path
         The path.
     timed : bool, default False
-        Whether its parameter is the time.
+        Whether the parameter of the path is time.
 
     Raises
     ------
     TrajectoryError
-        If a place is not on the path, or the path has no such places.
+        If a place is not on the path, or the path does not have the unit of the place.
     """
     return tuple(_along(load, path, timed) for load in loads)
 
@@ -45,9 +45,9 @@ def with_stops(path: Path, loads: Sequence[CarriedLoad], order: int) -> tuple[Pa
     path : Path
         The path.
     loads : sequence of CarriedLoad
-        By its parameter.
+        Loads by the parameter of `path`.
     order : int
-        To which derivatives the motion is to be continuous.
+        Order to which derivatives of the motion are continuous.
     """
     near = SAME * (path.stop - path.start)
     edges = np.unique([x for load in loads if not load.moving for x in (load.start, load.stop) if x is not None])
@@ -76,7 +76,7 @@ def _along(load: object, path: Path, timed: bool) -> CarriedLoad:
 
 
 def _place(value: float, load: CarriedLoad, path: Path, timed: bool) -> float:
-    """Return the parameter of a place."""
+    """Return the parameter of a path at a place in the unit of a load."""
     name, by = f"loads.{load.link}", load.by
     passed = (np.array([path.start, path.stop]),) * 2 if timed else path.passed
     if by == "waypoint" and path.points is None:
@@ -101,7 +101,7 @@ def _place(value: float, load: CarriedLoad, path: Path, timed: bool) -> float:
 
 
 def instant_at(progress: FollowingMotion, duration: float, s: float) -> float:
-    """Return when a parameter of a path reaches a value, s."""
+    """Return the instant at which the parameter of a path reaches a value, s."""
     low, high = 0.0, duration
     while True:
         looks = np.linspace(low, high, LOOKS)
@@ -113,7 +113,7 @@ def instant_at(progress: FollowingMotion, duration: float, s: float) -> float:
 
 
 def in_time(loads: Sequence[CarriedLoad], progress: FollowingMotion, duration: float) -> tuple[CarriedLoad, ...]:
-    """Return loads by time, of those by the parameter of a path, which is known over time."""
+    """Return loads by time, from loads by the parameter of a path and its progress over time."""
 
     def instant(s: float) -> float:
         return instant_at(progress, duration, s)

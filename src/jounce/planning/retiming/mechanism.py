@@ -1,4 +1,4 @@
-"""The fastest motion of a driven mechanism along the path of its drivers, within limits of force and yank."""
+"""Time-optimal motion of a driven mechanism along the path of its drivers, within limits of force and yank."""
 
 import dataclasses
 from collections.abc import Mapping
@@ -17,12 +17,12 @@ from jounce.planning.retiming.retimed import RetimedTrajectory, active_limits
 from jounce.robot.model.links_and_joints import Limits
 from jounce.trajectory import FollowingMotion
 
-EXPANSIONS = 4  # of forces about the last law
-STEADY = 3e-4  # of the duration: a change that ends them
+EXPANSIONS = 4  # expansions of forces about the last law
+STEADY = 3e-4  # fraction of the duration: a smaller change ends the expansions
 INSTANTS = 1501
-AROUND, SPREAD = 33, 2  # instants about the worst of each quantity, and over how many steps to each side
+AROUND, SPREAD = 33, 2  # instants about the worst instant of each quantity, and their reach in steps to each side
 SLOWINGS = 8
-SHORTER = 1e-9  # of a duration
+SHORTER = 1e-9  # fraction of a duration
 
 
 def retime_mechanism(
@@ -33,10 +33,7 @@ def retime_mechanism(
     cells: int,
     duration: float | None = None,
 ) -> RetimedTrajectory:
-    """Return the fastest motion of the drivers of a mechanism along the path of their laws.
-
-    As `retime`, which calls it, says.
-    """
+    """Return the fastest motion of the drivers of a mechanism along the path of their laws; see `retime`."""
     source = MechanismQuantities(mechanism, limits)
     given = source.limits.values()
     least = 2 if any(x.jerk is not None or x.effort_rate is not None for x in given) else 1
@@ -88,7 +85,7 @@ class _MechanismLaws:
 
 
 def _checked(source: MechanismQuantities, mechanism: Mechanism, law: RateLaw) -> tuple[_MechanismLaws, LimitReport]:
-    """Return the motion of a law, and its comparison with the limits by a solve of the mechanism in that motion."""
+    """Return the motion of a law, and its comparison with the limits from a solution of the mechanism."""
     motion = rate_motion(law)
     progress = FollowingMotion(law.parameter, motion)
     laws = _MechanismLaws(

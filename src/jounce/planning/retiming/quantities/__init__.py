@@ -1,1 +1,1 @@
-"""What has limits along a path: of robots and of mechanisms, and whether a motion keeps them."""
+"""Limited quantities along a path, of robots and mechanisms, and checks whether a motion keeps the limits."""

@@ -1,4 +1,4 @@
-"""Whether a path has a fastest motion: what stands still keeps its limits, and what moves has one."""
+"""Feasibility of retiming a path: limits hold at rest, and every motion has a limit."""
 
 import numpy as np
 from jaxtyping import Float
@@ -6,14 +6,14 @@ from jaxtyping import Float
 from jounce.errors import TrajectoryError
 from jounce.planning.retiming.quantities.path_quantities import G, Labels, PathQuantities, Source
 
-POINTS = 1001  # places on the path
-SIDE_OFFSET = 1e-12  # of the path: both sides of where a load changes
-STATIC = 1e-6  # of a limit, which what stands still must leave
-IDLE = 1e-9  # of its largest value: what moves by less does not move
+POINTS = 1001  # sample points of the path
+SIDE_OFFSET = 1e-12  # fraction of the path: offset to either side of a load change
+STATIC = 1e-6  # fraction of a limit that must remain at rest
+IDLE = 1e-9  # fraction of the largest value of a quantity: smaller values count as zero
 
 
 def check_possible(source: Source, labels: Labels, start: float, stop: float, *, bounded: bool = False) -> None:
-    """Raise TrajectoryError if standing still exceeds a limit, or if no quantity with a limit changes."""
+    """Raise TrajectoryError if a limit is exceeded at rest, or if no limited quantity changes on a part of the path."""
     near = SIDE_OFFSET * (stop - start) * np.array([-1.0, 1.0])
     even = np.linspace(start, stop, POINTS)
     s = np.union1d(even, (source.changes[:, None] + near).reshape(-1))
@@ -35,7 +35,7 @@ def check_possible(source: Source, labels: Labels, start: float, stop: float, *,
         return
     moving = _moving(quantities, rates=True)[np.isin(s, even)]
     idle = moving < IDLE
-    stops = np.flatnonzero(idle[1:] & idle[:-1])  # at one place alone the motion may stop
+    stops = np.flatnonzero(idle[1:] & idle[:-1])  # a single idle point may be a stop of the motion
     if len(stops):
         where = source.location(float(even[stops[0]]))
         message = f"nothing with a limit moves at {where}, so that there is no fastest law; give more limits"
@@ -44,18 +44,18 @@ def check_possible(source: Source, labels: Labels, start: float, stop: float, *,
 
 @np.errstate(invalid="ignore")
 def _relative_margin(bound: np.ndarray, at_rest: np.ndarray) -> np.ndarray:
-    """Return what is left up to an upper bound, as a share of the larger of both; infinite where there is none."""
+    """Return the margin to an upper bound, relative to the larger of value and bound; infinite without a bound."""
     size = np.maximum(np.maximum(np.abs(bound), np.abs(at_rest)), np.finfo(float).tiny)
     return np.where(np.isfinite(bound), (bound - at_rest) / size, np.inf)
 
 
 def bounded_everywhere(source: Source, start: float, stop: float) -> bool:
-    """Return whether something with a limit of velocity, acceleration or force moves on the whole path."""
+    """Return whether a quantity with a limit of velocity, acceleration or force moves everywhere on the path."""
     return bool((_moving(source(np.linspace(start, stop, POINTS)), rates=False) >= IDLE).all())
 
 
 def _moving(quantities: PathQuantities, *, rates: bool) -> Float[np.ndarray, " point"]:
-    """Return how much moves of what has a limit, as a share of its largest value."""
+    """Return the largest coefficient of a limited quantity at each point, relative to its largest along the path."""
     limited = np.isfinite(quantities.upper) | np.isfinite(quantities.lower)
     limited |= rates & (np.isfinite(quantities.rate_upper) | np.isfinite(quantities.rate_lower))
     parts = [

@@ -1,4 +1,4 @@
-"""What bounds a motion along a path: limits of joints, also of jounce or depending on position, and of points."""
+"""Limits of a motion along a path: of joints, including jounce and limits that depend on position, and of points."""
 
 import dataclasses
 from collections.abc import Callable, Mapping
@@ -18,19 +18,19 @@ VARYING = ("velocity", "acceleration", "deceleration", "jerk", "jounce", "effort
 PAIR = ("acceleration", "deceleration")
 
 PositionLaw = Callable[[Float[np.ndarray, " point"]], Any]
-"""Gives a limit for positions of its joint, rad or m."""
+"""Function from positions of a joint, rad or m, to a limit."""
 
 
 @dataclasses.dataclass(frozen=True)
 class PointLimits:
-    """How fast a point of a link may be.
+    """Limits of the motion of a point of a link.
 
     Parameters
     ----------
     link : str
         Name of the link.
     speed, acceleration : float or None
-        Largest magnitudes, m/s and m/s^2; None is no limit.
+        Largest magnitudes, m/s and m/s^2; None for no limit.
     point : tuple of float
         The point, m, in the frame of the link; its origin unless given.
     """
@@ -48,28 +48,28 @@ class PointLimits:
 
 @dataclasses.dataclass(frozen=True)
 class MotionLimits:
-    """Limits of a robot's motion, as `retime` keeps them.
+    """Limits of the motion of a robot, for `retime`.
 
     Parameters
     ----------
     joints : dict of str to Limits, optional
-        Limits of some joints, in place of those that the robot has; those of joints that follow them hold as well.
+        Limits of joints that replace those of the robot; limits of joints that follow them hold as well.
     jounce : dict of str to float, optional
         Largest fourth derivatives of coordinates, rad/s^4 or m/s^4.
     varying : dict of str to dict of str to callable, optional
-        Of a joint: velocity, acceleration, deceleration, jerk, jounce, effort or effort_rate as a function of its
-        position, which gets an array of positions. It goes before a constant limit, but for one of a joint that
-        follows.
+        Limits of a joint that depend on its position: velocity, acceleration, deceleration, jerk, jounce, effort or
+        effort_rate as a function of an array of positions. They replace constant limits, except those of joints that
+        follow.
     points : tuple of PointLimits, optional
         Limits of points of links, such as the tool.
     backward : dict of str to Limits, optional
-        Of a joint: the limits of what is below zero, as of the velocity backward or of the torque that pulls, where
-        they differ from those above it: velocity, acceleration, deceleration, jerk, effort or effort_rate.
+        Limits of negative values of a joint, such as the backward velocity or the pulling torque, if they differ from
+        those of positive values: velocity, acceleration, deceleration, jerk, effort or effort_rate.
 
     Raises
     ------
     RobotError
-        If a limit is not greater than zero, or one backward is a range.
+        If a limit is not greater than zero, or a backward limit is a range.
 
     Examples
     --------
@@ -102,27 +102,27 @@ class MotionLimits:
         object.__setattr__(self, "points", tuple(self.points))
 
     def own(self, name: str) -> frozenset[str]:
-        """Return the fields of `Limits` that a joint has by position or direction, with what is judged together."""
+        """Return the fields of `Limits` of a joint that depend on position or direction, with their pairs."""
         fields = set(self.varying.get(name, {})) | directed(self.backward.get(name, Limits()))
         return frozenset(fields | (set(PAIR) if fields & set(PAIR) else set()))
 
 
 def directed(limits: Limits) -> set[str]:
-    """Return the names of the limits that there are."""
+    """Return the names of the limits that are set."""
     return {name for name, value in dataclasses.asdict(limits).items() if value is not None}
 
 
 GivenLimits = Mapping[str, Limits] | MotionLimits
-"""Limits by the names of joints, or all that bounds a motion."""
+"""Limits by name of the joint, or all limits of a motion."""
 
 
 def limits_of(robot: Robot, limits: GivenLimits | None) -> MotionLimits:
-    """Return limits as `MotionLimits` whose joints are all of the robot's.
+    """Return limits as `MotionLimits` with entries for all joints of the robot.
 
     Raises
     ------
     RobotError
-        If a joint or link is not the robot's, or they are no limits.
+        If a joint or link does not exist, or an entry is not a limit.
     """
     given = MotionLimits() if limits is None else limits
     if isinstance(given, Mapping):
@@ -140,12 +140,12 @@ def limits_of(robot: Robot, limits: GivenLimits | None) -> MotionLimits:
         check_name("link", point.link, robot.frames, RobotError, name="limits")
     own = {name: given.joints.get(name, robot.joints[name].limits) for name in robot.joint_names}
     constant = {name: dataclasses.replace(x, **_nothing(given.varying.get(name, {}))) for name, x in own.items()}
-    joints = robot.limits_with(constant)  # in whose place there is a law: then those of the joints that follow
+    joints = robot.limits_with(constant)  # where a law replaces the limit, only limits of joints that follow remain
     varying = {name: _with_followers(laws, constant[name], joints[name]) for name, laws in given.varying.items()}
     reverse = robot.limits_with(
         {name: dataclasses.replace(x, **_given(given.backward, name)) for name, x in own.items()}
     )
-    backward = {  # with those of the joints that follow
+    backward = {  # with limits of the joints that follow
         name: Limits(**{field: getattr(reverse[name], field) for field in directed(entry)})
         for name, entry in given.backward.items()
     }
@@ -162,7 +162,7 @@ def _nothing(laws: Mapping[str, PositionLaw]) -> dict[str, None]:
 
 
 def _with_followers(laws: Mapping[str, PositionLaw], own: Limits, joined: Limits) -> dict[str, PositionLaw]:
-    """Return laws of a joint that are nowhere above the limits of the joints that follow it."""
+    """Return the laws of a joint, bounded by the limits of the joints that follow it."""
     whole = dict(laws)
     if "acceleration" in laws and own.deceleration is None and joined.deceleration is not None:
         whole.setdefault("deceleration", laws["acceleration"])
