@@ -1,4 +1,4 @@
-"""The solver of cone programs, which is an extra."""
+"""The solver of cone programs, an optional dependency."""
 
 import importlib
 from importlib.util import find_spec
@@ -8,19 +8,19 @@ from jounce.errors import UnsupportedError
 
 
 def require_solver() -> None:
-    """Raise UnsupportedError where the solver of cone programs is not installed."""
+    """Raise UnsupportedError if the solver of cone programs is not installed."""
     if find_spec("clarabel") is None:
         message = "retiming needs Clarabel, which is not installed; install it with: pip install 'jounce[planning]'"
         raise UnsupportedError(message, name="clarabel")
 
 
 def cone_solver() -> Any:
-    """Return Clarabel, whose names are those of a compiled module.
+    """Return the module Clarabel, untyped as it is compiled.
 
     Raises
     ------
     UnsupportedError
-        If it is not installed.
+        If Clarabel is not installed.
     """
     require_solver()
     return importlib.import_module("clarabel")

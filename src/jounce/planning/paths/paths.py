@@ -238,7 +238,7 @@ def cells_needed(path: Path, order: int) -> int:
         step = FINEST // (cells * POINTS_IN_CELL)
         ends, part = curves[::step, None], np.arange(step)[:, None] / step
         lines = ends[:-1] + (ends[1:] - ends[:-1]) * part
-        off = np.abs(curves[:-1].reshape(lines.shape) - lines).max(axis=1) / size  # a blend may lie between two grid points
+        off = np.abs(curves[:-1].reshape(lines.shape) - lines).max(axis=1) / size  # bends may lie between grid points
         off[: int(ENDS * len(off))] = off[int((1 - ENDS) * len(off)) :] = 0.0  # cells are narrow at the ends
         at, joint = divmod(int(np.argmax(off)), off.shape[1])
         if off[at, joint] <= RESOLVED:

@@ -1,4 +1,4 @@
-"""Trajectories that were retimed, and what limits them where."""
+"""Retimed trajectories, and their active limits along the path."""
 
 import dataclasses
 from collections.abc import Mapping, Sequence
@@ -14,7 +14,7 @@ from jounce.planning.retiming.search import Search
 from jounce.robot.algorithms.carried_loads import CarriedLoad
 from jounce.trajectory import AbstractMotion, FollowingMotion, JointTrajectory
 
-BINDS = 1e-2  # of a limit: where less is left, it binds
+BINDS = 1e-2  # fraction of a limit: with a smaller margin, the limit binds
 
 
 class RetimedTrajectory(JointTrajectory):
@@ -27,17 +27,18 @@ class RetimedTrajectory(JointTrajectory):
     stop : float
         Duration, s.
     path : Path
-        Where it leads.
+        The path of the trajectory.
     progress : FollowingMotion
         The parameter s of the path over time.
     report : LimitReport
-        Comparison of the trajectory with its limits, as `check_limits` makes it.
+        Comparison of the trajectory with its limits, as by `check_limits`.
     active : xarray.Dataset
-        Over ``s`` and ``limit`` (such as "panda_joint1 torque rate"): ``share`` of the limit that is used; ``binds``,
-        whether less than a hundredth of it is left; ``price``, by how much the duration would fall, s, were this limit
-        raised along the path by a share of 1, divided among its points. Over ``s``: ``time``.
+        Over ``s`` and ``limit`` (such as "panda_joint1 torque rate"): ``share``, the used fraction of the limit;
+        ``binds``, whether less than a hundredth of the limit is left; ``price``, s, the decrease of the duration per
+        relative increase of the limit at the point, the sum over points being that for the whole path. Over ``s``:
+        ``time``.
     loads : tuple of CarriedLoad
-        What links carry during parts of the motion, by time.
+        Loads of links during parts of the motion, by time.
     """
 
     def __init__(
@@ -54,7 +55,7 @@ class RetimedTrajectory(JointTrajectory):
         self.path, self.progress, self.report, self.active, self.loads = path, progress, report, active, tuple(loads)
 
     def slower(self, factor: float) -> "RetimedTrajectory":
-        """Return the same motion, slower by a factor; its report is that of this one."""
+        """Return the motion slowed by a factor, with the report of this one."""
         parameter, motion = self.progress.parts
         assert isinstance(motion, RateMotion)
         slow = motion.slower(factor)
@@ -74,7 +75,7 @@ class RetimedTrajectory(JointTrajectory):
 
 
 def active_limits(search: Search, law: RateLaw, motion: RateMotion) -> Any:
-    """Return which limits bind where, and what they cost, labeled."""
+    """Return the labeled dataset of active limits along the path and their prices."""
     import xarray
 
     shares = search.curves.ratios(law.at(search.points))

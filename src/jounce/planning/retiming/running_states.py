@@ -1,4 +1,4 @@
-"""The fastest motion from the state of a running robot: along a path, or along a curve onto it first."""
+"""The fastest motion from the state of a running robot, along a path or first along a curve that joins it."""
 
 import dataclasses
 from collections.abc import Callable
@@ -28,16 +28,16 @@ from jounce.planning.retiming.rates.rate_law import Conditions
 from jounce.planning.retiming.retimed import RetimedTrajectory
 from jounce.robot.algorithms.equations_of_motion import mass_matrix
 
-SPARE = 2e-8  # of a limit, which a search needs
-SHORTEST = 1e-3  # of the time that the path takes from there at that rate
-USED = 0.5  # of a limit, at a steady rate where a path is joined
-DURATIONS = 10  # that are tried, each longer than the last
-LONGER = (1.1, 2.5)  # by what factor: at least, at most
-SHORTENED = 4  # times at most, between one that was too short and one that was not
-CLOSE = 1.1  # times one that was too short: a duration that is short enough
+SPARE = 2e-8  # fraction of a limit: margin that a search needs
+SHORTEST = 1e-3  # fraction of the time of the rest of the path at the steady rate
+USED = 0.5  # fraction of a limit used by the steady rate at the junction
+DURATIONS = 10  # largest number of trial durations, each longer than the last
+LONGER = (1.1, 2.5)  # smallest and largest ratio of successive durations
+SHORTENED = 4  # largest number of bisections between an infeasible and a feasible duration
+CLOSE = 1.1  # ratio of feasible to infeasible duration at which the bisection ends
 
 Planned = Callable[[Path, Conditions, float | None], RetimedTrajectory]
-"""Gives the motion along a path, which may keep a rate of 1 up to a value of s."""
+"""Function that returns the motion along a path, which can have the rate 1 up to a value of s."""
 
 
 def retimed_from(
@@ -47,26 +47,25 @@ def retimed_from(
     quantities: Callable[[Path], RobotQuantities],
     planned: Planned,
 ) -> RetimedTrajectory:
-    """Return the motion along a path that begins with a state.
+    """Return the motion along a path that starts in a state.
 
     Parameters
     ----------
     path : Path
-        The path that is to be followed.
+        The path to follow.
     given : array_like of shape (derivatives, joints), or None
-        The state of a running robot; None for one that is where the path begins, with the rate that the conditions say.
+        State of a running robot; None for a robot at the start of the path, with the rate of the conditions.
     conditions : Conditions
-        Of the law along the path.
+        Conditions of the law along the path.
     quantities : callable
-        Gives what is limited along a path.
+        Returns the limited quantities of a path.
     planned : callable
-        Gives the motion along a path.
+        Returns the motion along a path.
 
     Raises
     ------
     TrajectoryError, SolveError
-        If the state breaks limits, or no motion that begins in it and keeps them is found: the message says which limit
-        is in the way.
+        If the state exceeds a limit, or no motion from it within the limits is found; the message names the limit.
     """
     if given is None:
         return planned(path, conditions, None)
@@ -77,7 +76,7 @@ def retimed_from(
     state = clean_state(given, path.names, dict(source.limits.joints))
     check_possible(source, source.labels, path.start, path.stop)
     check_state(source, np.asarray(given, float), ROUNDING)
-    if largest_ratio(source, state)[0] > 1 - SPARE:  # of points, or of torques
+    if largest_ratio(source, state)[0] > 1 - SPARE:  # a limit of a point or of a torque, not of a joint
         state = within_torque_limits(source, state * (1 - 2 * ROUNDING) ** np.arange(len(state))[:, None])
         check_state(source, state, -SPARE)
     if along := rates_along(path, state):
@@ -85,7 +84,7 @@ def retimed_from(
         try:
             return planned(path, own, None)
         except SolveError:
-            pass  # the path bends too sharply for this state: it is left and joined again
+            pass  # the path bends too sharply for this state: leave it, and join it again
     moving = bool(state[1].any())
     own = conditions
     if moving:
@@ -111,7 +110,7 @@ def retimed_from(
 
 
 def check_state(source: RobotQuantities, state: Float[np.ndarray, "derivative joint"], allowed: float) -> None:
-    """Raise TrajectoryError if a state breaks a limit by more than a share of it: the message has name and value."""
+    """Raise TrajectoryError if a state exceeds a limit by more than a fraction of it."""
     for name, value in zip(source.path.names, state[0].tolist(), strict=True):
         limits = source.limits.joints[name]
         for bound, sign, word in ((limits.upper, 1, "above"), (limits.lower, -1, "below")):
@@ -131,9 +130,9 @@ def check_state(source: RobotQuantities, state: Float[np.ndarray, "derivative jo
 def largest_ratio(
     source: RobotQuantities, state: Float[np.ndarray, "derivative joint"]
 ) -> tuple[float, float, Quantity]:
-    """Return the share of its limit that a state uses most of, the value there, and what it is."""
+    """Return the largest ratio of a quantity of a state to its limit, the value, and the quantity."""
     curves, labels = _curves(source, state)[0], source.labels
-    known = (1, 2, 3, 2, 4)  # the derivatives that values in the order of the labels need
+    known = (1, 2, 3, 2, 4)  # orders of derivatives of the quantities, in the order of the labels
     counts = [len(x) for x in (labels.first, labels.second, labels.rates, labels.vectors, labels.fourth)]
     ratios = np.where(np.repeat(known, counts) < len(state), curves.ratios(EVEN)[0], 0.0)
     worst = int(np.argmax(ratios))
@@ -142,7 +141,7 @@ def largest_ratio(
 
 
 def within_torque_limits(source: RobotQuantities, state: Float[np.ndarray, "derivative joint"]) -> State:
-    """Return a state whose accelerations are changed so that torques at their limits are below them by rounding."""
+    """Return a state with accelerations changed so that torques at their limits are below them by rounding."""
     if len(state) <= 2 or not source.with_effort:
         return state
     curves, q = _curves(source, state)
@@ -157,7 +156,7 @@ def within_torque_limits(source: RobotQuantities, state: Float[np.ndarray, "deri
 
 
 def _curves(source: RobotQuantities, state: Float[np.ndarray, "derivative joint"]) -> tuple[Curves, np.ndarray]:
-    """Return the limited quantities of a state that is passed at a rate of 1, and its coordinates."""
+    """Return the limited quantities of a state at a rate of 1, and its coordinates."""
     motion = np.zeros((1, ORDER + 1, state.shape[1]))
     motion[0, : len(state)] = state
     shape, q = np.array([[source.path.start], [1.0], [0.0], [0.0], [0.0]]), source.whole(motion)
@@ -165,12 +164,12 @@ def _curves(source: RobotQuantities, state: Float[np.ndarray, "derivative joint"
 
 
 def joined(source: RobotQuantities, state: State, at: float, order: int) -> tuple[Path, float]:
-    """Return the path that begins with a state at a rate of 1 and joins another one, and the s at which it does.
+    """Return a path that starts in a state at a rate of 1 and joins another path, and the value of s at the junction.
 
     Raises
     ------
     SolveError
-        If no curve from the state keeps the limits: the message says which is in the way.
+        If no curve from the state keeps the limits; the message names the limit.
     """
     path, count = source.path, max(MET, order + 1)
     p = path.derivatives(np.array([at]), count - 1)[0]
@@ -202,7 +201,7 @@ def joined(source: RobotQuantities, state: State, at: float, order: int) -> tupl
 
 
 def steady_rate(source: RobotQuantities, at: float) -> float:
-    """Return the rate with which a part of all limits is used at a place."""
+    """Return the rate at a place of the path that uses half of the limits."""
     shape = np.array([[at], [1.0], [0.0], [0.0], [0.0]])
     curves = Curves(source(shape[0]), shape)
 
@@ -219,7 +218,7 @@ def steady_rate(source: RobotQuantities, at: float) -> float:
 
 
 def first_duration(source: RobotQuantities, state: State, ends: Float[np.ndarray, "derivative joint"]) -> float:
-    """Return a time in which the way from a state to another one is made at the limits of velocity or acceleration."""
+    """Return an estimate of the time between two states, from the limits of velocity and acceleration."""
     limits = [source.limits.joints[name] for name in source.path.names]
 
     def bounds(field: str) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""Retimed trajectories as samples for a controller: whole periods, and splines through samples within the limits."""
+"""Samples of retimed trajectories for a controller: whole periods, and splines through samples within the limits."""
 
 import dataclasses
 import warnings
@@ -13,7 +13,7 @@ from jounce.planning.retiming.retimed import RetimedTrajectory
 from jounce.robot.robot import Robot
 from jounce.trajectory import JointTrajectory
 
-WHOLE = 1e-9  # of a period
+WHOLE = 1e-9  # fraction of a period
 ATTEMPTS = 12
 LEAST = 11  # samples
 
@@ -27,37 +27,37 @@ def fit_to_samples(
     degree: int = 5,
     lasting: bool = False,
 ) -> tuple[RetimedTrajectory, LimitReport]:
-    """Return a trajectory slowed until it lasts whole periods, and splines through its samples keep the limits too.
+    """Return a trajectory slowed to whole periods, and until splines through its samples keep the limits as well.
 
-    Between samples such splines swing where a limited derivative bends, by about a percent at 1 kHz.
+    Between samples, such splines swing by about a percent at 1 kHz where a limited derivative bends.
 
     Parameters
     ----------
     robot : Robot
-        The robot, with what it holds.
+        The robot, with its payload.
     trajectory : RetimedTrajectory
-        As `retime` returned it.
+        Trajectory from `retime`.
     limits : MotionLimits
-        Those that it keeps.
+        Limits of the trajectory.
     rate : float
-        Samples a second.
+        Samples per second.
     degree : int, default 5
-        Of the splines that a reader puts through the samples.
+        Degree of the splines that a reader puts through the samples.
     lasting : bool, default False
-        Whether its duration is to stay as it is.
+        Whether to keep the duration.
 
     Returns
     -------
     RetimedTrajectory
-        Its `times` are the instants of the samples.
+        The trajectory, with the instants of the samples as `times`.
     LimitReport
-        Of the splines through the samples.
+        Report of the splines through the samples.
 
     Raises
     ------
     TrajectoryError
-        If the rate gives too few samples, the splines cannot be made to keep the limits, or a duration that is to stay
-        is not a number of whole periods.
+        If the rate gives too few samples, the splines exceed the limits at any speed tried, or a kept duration is not a
+        whole number of periods.
     """
     period, hand_over = 1 / rate, trajectory.report.hand_over
     if trajectory.stop < LEAST * period:

@@ -1,8 +1,8 @@
-"""The fastest rate along a path by sequential convex programming: each program takes up where the last one ended.
+"""The fastest rate along a path by sequential convex programming: each program starts from the last solution.
 
 Verscheure and others, Time-optimal path tracking for robots: a convex optimization approach, IEEE Transactions on
-Automatic Control 54 (2009), for velocity, acceleration and torque. What limits a rate is not convex in z; its tangent
-at the last iterate is, and lies on the safe side.
+Automatic Control 54 (2009), for velocity, acceleration and torque. Limits of rates (jerk, torque rate) are not convex
+in z; their tangents at the last iterate are, and are conservative.
 """
 
 import dataclasses
@@ -17,31 +17,31 @@ from jounce.planning.retiming.rates.rate_law import Conditions, RateLaw, quadrat
 from jounce.planning.retiming.rates.rate_spline import Parametrization, RateBasis
 
 COARSE = 60  # cells of a first law
-ENDS = 1e-9  # of a cell: both sides of a knot are looked at
-OFFSETS = np.array([ENDS, 0.25, 0.5, 0.75, 1 - ENDS])  # in a cell, of the points that are looked at
+ENDS = 1e-9  # fraction of a cell: distance of the points on both sides of a knot
+OFFSETS = np.array([ENDS, 0.25, 0.5, 0.75, 1 - ENDS])  # positions of the checked points in a cell
 END_CELLS, END_POINTS = 2, 20
-FIRST = (1, 3)  # of them, where limits hold from the beginning
-NEAR, SETTLED_NEAR, HELD_NEAR = 0.2, 0.6, 0.9  # of a limit: where less is used, it is left out until it matters
-SETTLED = 2e-4  # of the duration: an improvement that ends the iteration
-EXCEEDED = 1e-4  # of a limit: what is left to the last slowing
+FIRST = (1, 3)  # offsets at which limits are enforced from the first program
+NEAR, SETTLED_NEAR, HELD_NEAR = 0.2, 0.6, 0.9  # ratios to a limit below which a program omits the limit
+SETTLED = 2e-4  # fraction of the duration: a smaller improvement ends the iteration
+EXCEEDED = 1e-4  # fraction of a limit: a smaller excess is left to the final slowing
 ROUNDS = 20
 EXCHANGES = 4
-EASE = 3.0  # times the limit of the fourth order: how much is taken back at a time
-TRUST = 4.0  # times a coefficient of z, where programs are but near the truth
-CLOSE = 2e-3  # to the largest ratio: peaks that are refined
-ZOOMS = 3  # how often they are refined
-ASIDE = 0.1  # of the way to the points beside, of those about a vertex
-SPARE = 2e-8  # of a limit, left to rounding
+EASE = 3.0  # factor by which an excess over a limit of fourth order is reduced in each program
+TRUST = 4.0  # trust region of programs with approximate limits, as a factor of the coefficients of z
+CLOSE = 2e-3  # distance from the largest ratio of the peaks to refine
+ZOOMS = 3  # refinements of peaks
+ASIDE = 0.1  # distance of points beside a vertex, as a fraction of the distance to the neighboring points
+SPARE = 2e-8  # fraction of a limit: margin for rounding
 SLOWINGS = 12
-LEAST_FALL = 1e-3  # of a limit, by a slowing of one
-HOPELESS = 0.1  # of a limit: no slowing as a whole is meant to mend so much
+LEAST_FALL = 1e-3  # least decrease of a ratio per relative slowing
+HOPELESS = 0.1  # fraction of a limit: a larger excess is not removed by slowing
 MOST = 1e16
-EVENED, SAME = 20, 1e-12  # steps to a duration, and share of it that is none
-GIVEN = 4  # cells in which what is left of limits grows from nothing, after a state that is given
+EVENED, SAME = 20, 1e-12  # steps toward a duration, and its relative tolerance
+GIVEN = 4  # cells after a given state over which the margin grows from zero
 BISECTIONS = 54  # to rounding
-FLOOR = 1e-7  # of the mean of z: its least value
+FLOOR = 1e-7  # fraction of the mean of z: its least value
 
-_Points = Float[np.ndarray, " _"]  # of any length
+_Points = Float[np.ndarray, " _"]
 
 
 class Search:
@@ -50,9 +50,9 @@ class Search:
     Parameters
     ----------
     source : callable
-        Gives the limited quantities at values of s.
+        Returns the limited quantities at values of s.
     labels : Labels
-        Their names.
+        Names of the quantities.
     parameter : Parametrization
         s over u.
     basis : RateBasis
@@ -60,7 +60,7 @@ class Search:
     conditions : Conditions
         Further conditions of the law.
     level : int, default 4
-        Level of the limits to keep: 2 for those of acceleration and torque, 3 for those of their rates too, 4 for all.
+        Level of the limits to keep: 2 up to acceleration and torque, 3 up to their rates, 4 for all.
     """
 
     def __init__(
@@ -80,7 +80,7 @@ class Search:
         self.prices = np.zeros((0, len(labels.every)))
         self.held = np.zeros((0, len(labels.every)), bool)  # limits of the last program
         grid = ((np.arange(basis.cells)[:, None] + OFFSETS) / basis.cells).reshape(-1)
-        ends = np.linspace(0.0, END_CELLS / basis.cells, END_POINTS)[1:]  # where it rests, limits change fast
+        ends = np.linspace(0.0, END_CELLS / basis.cells, END_POINTS)[1:]  # near rest, ratios to limits change fast
         enforced = np.isin(np.arange(len(grid)) % len(OFFSETS), FIRST)
         sides = np.array([self._share(s) for s in source.changes])[:, None] + ENDS / basis.cells * np.array([-1.0, 1.0])
         enforced = np.append(enforced, np.ones(2 * len(ends) + sides.size, bool))
@@ -98,7 +98,7 @@ class Search:
         return high
 
     def extend(self, points: _Points, enforced: Bool[np.ndarray, " point"]) -> None:
-        """Look at more values of u; where `enforced`, all limits that are near hold from the beginning."""
+        """Add values of u at which limits are checked; `enforced` points have nearby limits in the first program."""
         before, joined = self.points, np.concatenate([self.points, points])
         self.points, first = np.unique(joined, return_index=True)
         self.enforced = np.concatenate([self.enforced, enforced])[first]
@@ -120,13 +120,13 @@ class Search:
 
     @property
     def largest_z(self) -> float:
-        """Largest z."""
+        """Largest z that the largest rate allows."""
         if self.conditions.max_rate is None:
             return np.inf
         return float((self.conditions.max_rate / self.shape[1].max()) ** 2)
 
     def law_of(self, coefficients: _Points) -> RateLaw:
-        """Return the law of coefficients."""
+        """Return the law with the given coefficients."""
         return RateLaw(self.parameter, self.basis, coefficients)
 
     def at(self, coefficients: _Points) -> Float[np.ndarray, "4 point"]:
@@ -134,7 +134,7 @@ class Search:
         return np.stack([matrix @ coefficients for matrix in self.matrices])
 
     def level(self) -> float:
-        """Return the largest even z that breaks no limit of velocity, acceleration or torque, within a twentieth."""
+        """Return a constant z near the largest that exceeds no limit."""
         z, one = min(1.0, self.largest_z), np.ones(self.basis.count)
 
         def worst(z: float) -> float:
@@ -147,12 +147,12 @@ class Search:
         return z
 
     def run(self, start: _Points, rounds: int = ROUNDS, *, settled: bool = False) -> RateLaw:
-        """Return the fastest law, from the coefficients of one to begin with, which may be near the end already.
+        """Return the fastest law, from the coefficients of a first law, which is near the result if `settled`.
 
         Raises
         ------
         SolveError
-            If no program has a solution: the message says which limit, and where.
+            If no program has a solution; the message gives the limit and the place.
         """
         x, cost = start, self._cost(start) if settled else np.inf
         ratios = self.curves.ratios(self.at(x))
@@ -178,12 +178,12 @@ class Search:
         return self.law_of(x)
 
     def _cost(self, x: _Points) -> float:
-        """Return what is to be least: the duration, or where that is given the mean of z."""
+        """Return the objective: the duration, or, if that is given, the mean of z."""
         z = self.node_matrix @ x
         return float(self.weights @ (1 / np.sqrt(z) if self.duration is None else z))
 
     def _improved(self, x: _Points, chosen: np.ndarray, *, near: bool) -> _Points:
-        """Return the solution of the program about a law, which may be near the fastest."""
+        """Return the solution of the program about a law, expanded to second order if `near` the fastest."""
         program, labels, at = self._program(x, chosen)
         scale = float(np.mean(x))
         if near:
@@ -194,12 +194,12 @@ class Search:
         prices = np.zeros(chosen.shape)
         np.add.at(prices, (at, labels), solution.prices[: len(at)])
         counted = np.arange(chosen.shape[1]) < len(self.labels.first)
-        # limits of the first order are squared in the program: raised by a share, their bound rises by two
+        # limits of first order are squared in the program: a relative increase raises the bound by twice as much
         self.prices = prices * np.where(counted, 2.0, 1.0) / np.sqrt(scale)
         return solution.coefficients * scale
 
     def _infeasibility_error(self, program: Program, labels: np.ndarray, at: np.ndarray) -> SolveError:
-        """Return the error of a program without a solution: which limit prevents it most."""
+        """Return the error of a program without a solution, which names the limit with the largest dual variable."""
         elastic = solve_program(program, elastic=True)
         prices = elastic.prices[: len(at)]
         if elastic.coefficients is None or not prices.size or elastic.slack < 1e-5:
@@ -213,12 +213,12 @@ class Search:
         return SolveError(message, name="rates", value=list(self.conditions.rates))
 
     def ratios_at(self, u: _Points, law: RateLaw) -> Float[np.ndarray, "point curve"]:
-        """Return how much of its bound each quantity uses at values of u."""
+        """Return the ratio of each quantity to its bound at values of u."""
         shape = self.parameter.derivatives(u, 4)
         return Curves(self.source(shape[0]), shape).ratios(law.at(u))
 
     def peaks(self, law: RateLaw, zooms: int = ZOOMS) -> tuple[_Points, _Points]:
-        """Return where the highest peaks are between the points, and the ratios there, the largest among them."""
+        """Return the positions and ratios of the highest peaks, also between the points."""
         ratios = self.curves.ratios(law.at(self.points))
         at, curve = np.nonzero(_peaks(ratios) & (ratios > min(float(ratios.max()), 1.0) - CLOSE))
         neighbors = np.clip(at + np.array([[-1], [0], [1]]), 0, len(self.points) - 1)
@@ -235,9 +235,9 @@ class Search:
         return u[1], values[1]
 
     def fastest_law(self, start: _Points) -> RateLaw:
-        """Return the fastest law that keeps its limits between the points too.
+        """Return the fastest law that keeps its limits at and between the points.
 
-        Where a limit is exceeded between them, it is held there, and the search goes on.
+        A position between points at which a limit is exceeded becomes an enforced point, and the search continues.
         """
         law = self.run(start)
         for _ in range(EXCHANGES):
@@ -250,19 +250,19 @@ class Search:
         return self.slowed_to_limits(law)
 
     def _among_points(self, positions: _Points) -> tuple[_Points, Bool[np.ndarray, " point"]]:
-        """Return positions between points, and those halfway to the points beside, all of which limits hold at."""
+        """Return positions between points, and those halfway to the neighboring points, all of them enforced."""
         after = np.clip(np.searchsorted(self.points, positions), 1, len(self.points) - 1)
         halfway = (positions + self.points[np.stack([after - 1, after])]) / 2
         points = np.unique(np.append(halfway.reshape(-1), positions))
         return points, np.ones(len(points), bool)
 
     def slowed_to_limits(self, law: RateLaw) -> RateLaw:
-        """Return a law slowed as a whole by what it exceeds limits between the points.
+        """Return a law slowed as a whole until no peak exceeds a limit.
 
         Raises
         ------
         SolveError
-            If slowing does not help.
+            If slowing does not suffice.
         """
         before, step = np.inf, np.inf
         for _ in range(SLOWINGS):
@@ -271,7 +271,7 @@ class Search:
                 return law
             if over > HOPELESS:
                 break
-            # a torque that holds weight for the most part falls by a small share of what the motion is slowed
+            # a torque that mostly bears weight decreases by a small fraction of the slowing
             fell = (before - over) / step if np.isfinite(step) else 1.0
             step, before = over / float(np.clip(fell, LEAST_FALL, 1.0)), over
             law = self.with_margin(law, step)
@@ -282,17 +282,17 @@ class Search:
         raise SolveError(message)
 
     def with_margin(self, law: RateLaw, over: float) -> RateLaw:
-        """Return a law that uses less of its limits by a share: slower as a whole, where no rate is given at an end."""
+        """Return a law with a margin to its limits: slowed as a whole, unless rates are given at the ends."""
         if self.duration is None and not any(self.conditions.rates):
             return law.slowed(1 + over)
         self.margin += 1.1 * over
         return self.lengthened(self.run(law.coefficients, settled=True), self.duration)
 
     def lengthened(self, law: RateLaw, duration: float | None) -> RateLaw:
-        """Return a law of a duration that is no shorter: as slow as it may be everywhere, from a faster one.
+        """Return a law with a given longer duration, from a faster law, with the least mean square of the rate.
 
-        That is the same law slowed evenly, unless rates are given at the ends, or a limit is in the way, as of torques
-        with damping.
+        That is the same law slowed uniformly, unless rates are given at the ends or that exceeds a limit, as is
+        possible for torques with damping.
         """
         if duration is None:
             return law
@@ -302,7 +302,7 @@ class Search:
             return slowed
         law = self.run(law.coefficients, settled=True)
         inside = np.zeros(self.basis.count)
-        inside[self.basis.degree + 1 : -self.basis.degree - 1] = 1.0  # what is given at the ends stays as it is
+        inside[self.basis.degree + 1 : -self.basis.degree - 1] = 1.0  # given rates at the ends stay
         for _ in range(EVENED):
             by = law.duration / duration
             law = dataclasses.replace(law, coefficients=law.coefficients * by ** (2 * inside))
@@ -321,7 +321,7 @@ class Search:
         first, dense = self.compact
         data = np.einsum("kr,krj->rj", slopes[:, at, row] * scale, dense[:, at])
         columns = first[at][:, None] + np.arange(data.shape[1])
-        # coefficients that are positive make a spline that is, also between its knots
+        # positive coefficients make the spline positive everywhere
         count = self.basis.count
         begins = np.append(np.arange(len(at)) * data.shape[1], data.size + np.arange(count + 1))
         entries = np.append(data.reshape(-1), np.full(count, -1.0)), np.append(columns.reshape(-1), np.arange(count))
@@ -329,7 +329,7 @@ class Search:
         squared = np.where(curve[row] < len(self.labels.first), 2.0, 1.0)
         margin = self.margin * self._margin_shares(at, curve[row])
         right = np.append(right[at, row] - margin * squared, np.full(self.basis.count, -FLOOR))
-        if self.labels.fourth and self.limit_level == 4:  # their programs are near the truth only about the last law
+        if self.labels.fourth and self.limit_level == 4:  # limits of fourth order are accurate only near the last law
             rows = sparse.vstack([rows, sparse.identity(self.basis.count), -sparse.identity(self.basis.count)])
             right = np.concatenate([right, TRUST * np.abs(x) / scale, -x / TRUST / scale])
         if self.conditions.max_rate is not None:
@@ -351,7 +351,7 @@ class Search:
         return Program(self.weights, self.node_matrix, *bounded, duration), curve[row], at
 
     def _margin_shares(self, at: np.ndarray, curve: np.ndarray) -> _Points:
-        """Return which share of the margin rows keep: a state that is given may touch its limits."""
+        """Return the fraction of the margin that rows keep, as a given state may be at its limits."""
         if not self.conditions.further:
             return np.ones(len(at))
         counts = [len(self.labels.first), len(self.labels.second), len(self.labels.rates)]
@@ -359,7 +359,7 @@ class Search:
         return np.where(given, np.minimum(self.points[at] * self.basis.cells / GIVEN, 1.0) ** 2, 1.0)
 
     def _end_equations(self, scale: float) -> tuple[object, _Points]:
-        """Return the equations for rates that are given at the ends."""
+        """Return the equations for given rates at the ends."""
         from scipy import sparse
 
         ends = np.array([0.0, 1.0])
@@ -370,7 +370,7 @@ class Search:
             return sparse.csr_matrix((0, self.basis.count)), np.zeros(0)
         rows = [self.basis.matrices(ends[[k for k, _ in given]], 0)[0]]
         if further := self.conditions.further:
-            # the second derivative of s is s_u z_u / 2 + s_uu z; the third, by the rate of u, the next but one line
+            # s'' = s_u z_u / 2 + s_uu z, and s''' / u' = s_u z_uu / 2 + 3/2 s_uu z_u + s_uuu z
             s1, s2, s3 = self.parameter.derivatives(ends[:1], 3)[1:, 0]
             z, z1, z2, _ = self.basis.matrices(ends[:1])
             sums = [s1 / 2 * z1 + s2 * z, s1 / 2 * z2 + 1.5 * s2 * z1 + s3 * z]
@@ -381,7 +381,7 @@ class Search:
 
 
 def _about_vertex(u: Float[np.ndarray, "3 peak"], values: Float[np.ndarray, "3 peak"]) -> Float[np.ndarray, "3 peak"]:
-    """Return the vertex of a parabola through three points, or the one in the middle, and instants on its two sides."""
+    """Return the vertex of a parabola through three points, or the middle point, with a point on each side."""
     before, after = u[1] - u[0], u[2] - u[1]
     fall = (values[1] - values[0]) * after, (values[1] - values[2]) * before
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -392,6 +392,6 @@ def _about_vertex(u: Float[np.ndarray, "3 peak"], values: Float[np.ndarray, "3 p
 
 
 def _peaks(ratios: np.ndarray) -> np.ndarray:
-    """Return where curves have a local maximum."""
+    """Return the mask of local maxima of curves."""
     edge = np.full((1, ratios.shape[1]), -np.inf)
     return (ratios >= np.concatenate([edge, ratios[:-1]])) & (ratios >= np.concatenate([ratios[1:], edge]))

@@ -1,4 +1,4 @@
-"""B-splines of degree 7 on knots: their values at samples, their jounce, and systems with few diagonals."""
+"""B-splines of degree 7 on knots: values at samples, jounce, and banded systems."""
 
 from __future__ import annotations
 
@@ -10,21 +10,21 @@ import numpy as np
 from jaxtyping import Float
 
 DEGREE, PENALIZED = 7, 4
-"""Degree of the splines, that of natural splines for jounce, and the order of the derivative to keep small: jounce."""
+"""Degree of the splines, that of natural splines of least jounce, and order of the penalized derivative: jounce."""
 PART = 50_000
-"""Samples or cells whose splines are evaluated at once."""
+"""Number of samples or cells whose splines are evaluated at once."""
 _Knots = Float[np.ndarray, " knot"]
 
 
 class Samples:
-    """Samples of a joint in units of the knots, from the first one on, made as they are looked at: logs are long.
+    """Samples of a joint in units of the knots, from the first knot on, converted on access, as logs are long.
 
     Parameters
     ----------
     times, values : array of shape (sample,)
-        s, rad or m.
+        Instants, s, and positions, rad or m.
     knots : array of shape (cell + 1,)
-        s.
+        Knots, s.
     """
 
     def __init__(self, times: np.ndarray, values: np.ndarray, knots: np.ndarray):
@@ -37,27 +37,27 @@ class Samples:
         return len(self._times)
 
     def times(self, which: Any) -> Float[np.ndarray, " some"]:
-        """Return some instants."""
+        """Return selected instants."""
         return np.clip((self._times[which] - self._first) / self.scale, 0.0, self.knots[-1])
 
     def values(self, which: Any) -> Float[np.ndarray, " some"]:
-        """Return some values, from their mean."""
+        """Return selected values minus the mean of all."""
         return self._values[which] - self.middle
 
     def place(self, instant: float, side: str = "left") -> int:
-        """Return where an instant belongs among those of the samples."""
+        """Return the index at which an instant belongs among those of the samples, by bisection."""
         bisect = bisect_left if side == "left" else bisect_right
         return bisect(range(len(self)), instant, key=lambda k: self.times([k])[0])
 
 
 def whole(knots: _Knots) -> Float[np.ndarray, " repeated"]:
-    """Return knots with those at the ends repeated, as B-splines need them."""
+    """Return knots repeated at the ends, as for B-splines."""
     return np.concatenate([np.full(DEGREE, knots[0]), knots, np.full(DEGREE, knots[-1])])
 
 
 def values_at(times: Float[np.ndarray, " sample"], knots: _Knots) -> Any:
     """Return the sparse matrix of the values of B-splines at instants, (sample, spline)."""
-    from scipy.interpolate import BSpline  # here, since importing SciPy takes half a second
+    from scipy.interpolate import BSpline  # importing SciPy takes half a second
 
     return BSpline.design_matrix(times, whole(knots), DEGREE)
 
@@ -68,7 +68,7 @@ def penalty_root(repeated: _Knots, weights: Float[np.ndarray, " cell"]) -> Any:
     Parameters
     ----------
     repeated : array of shape (cell + 1 + 2 * degree,)
-        Not decreasing: the ends of the cells, and the knots before and after them that splines there need.
+        Nondecreasing knots: the ends of the cells, with the knots before and after them.
     weights : array of shape (cell,)
         Weight of each cell.
     """
@@ -80,7 +80,7 @@ def penalty_root(repeated: _Knots, weights: Float[np.ndarray, " cell"]) -> Any:
     for _ in range(PENALIZED):
         count = derivative.shape[0]
         gaps = repeated[degree + 1 : degree + count] - repeated[1:count]
-        build: Any = sparse.diags_array  # its types know one diagonal only
+        build: Any = sparse.diags_array  # its type stubs allow one diagonal only
         step = build([-degree / gaps, degree / gaps], offsets=[0, 1], shape=(count - 1, count))
         derivative, repeated, degree = step.tocsr() @ derivative, repeated[1:-1], degree - 1
     nodes, shares = np.polynomial.legendre.leggauss(degree + 1)  # exact for squares
@@ -91,20 +91,20 @@ def penalty_root(repeated: _Knots, weights: Float[np.ndarray, " cell"]) -> Any:
 
 
 def parts_of(count: int) -> Iterator[slice]:
-    """Yield parts of many samples or cells, so that matrices of each part need little memory."""
+    """Yield the parts of many samples or cells, so that the matrices of each part need little memory."""
     for first in range(0, count, PART):
         yield slice(first, min(first + PART, count))
 
 
 def cost(samples: Samples, weights: Float[np.ndarray, " cell"]) -> tuple[Any, Float[np.ndarray, " spline"]]:
-    """Return the symmetric sparse matrix, and the vector, of the sum of squares of distances and of jounce.
+    """Return the symmetric sparse matrix and the vector of the cost: squared distances plus weighted squared jounce.
 
     Parameters
     ----------
     samples : Samples
-        With the knots.
+        Samples with the knots.
     weights : array of shape (cell,)
-        Of the square of the jounce in each cell.
+        Weight of the squared jounce in each cell.
     """
     from scipy import sparse
 

@@ -1,4 +1,4 @@
-"""Splines near samples of one joint: least jounce by weight, still in dwells, within a deviation of every sample."""
+"""Splines near samples of one joint: least weighted jounce, at rest in dwells, within a deviation of every sample."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ from jounce.planning.solver import cone_solver
 
 CELL = np.pi / 4  # length of a cell times the cutoff frequency
 GRADED = 1.6  # ratio of the lengths of neighboring cells
-FEWEST = 8  # cells of a time between dwells
-INSIDE = 1 - 1e-6  # of the deviation, less the tolerance of the solver
+FEWEST = 8  # cells between two dwells
+INSIDE = 1 - 1e-6  # fraction of the deviation that allows for the tolerance of the solver
 ROUNDS, HALVINGS = 12, 12
-LOOKS = 8  # at the density of knots in an interval
+LOOKS = 8  # evaluations of the knot density in an interval
 HALVED = 3  # cells on each side of one that is halved
 PADDING = 24  # neighboring splines that move with those at samples that are too far
-TOGETHER = 400  # splines that are moved at once, about
+TOGETHER = 400  # approximate number of splines that are solved for at once
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -34,11 +34,11 @@ class Curve:
     Parameters
     ----------
     knots : array of shape (cell + 1,)
-        s.
+        Knots, s.
     coefficients : array of shape (spline,)
-        rad or m.
+        Coefficients, rad or m.
     away : float
-        Its largest distance from a sample.
+        Largest distance of the spline from a sample.
     """
 
     knots: Float[np.ndarray, " knot"]
@@ -47,7 +47,7 @@ class Curve:
 
 
 class TooFarError(Exception):
-    """No spline on these knots is within the deviation of a sample."""
+    """Raised if no spline on given knots is within the deviation of the samples."""
 
     def __init__(self, samples: Int[np.ndarray, " sample"]):
         super().__init__(samples)
@@ -61,12 +61,12 @@ def smoothed_curve(
     estimates: Sequence[IntervalEstimate],
     dwells: Sequence[Dwell],
 ) -> Curve:
-    """Return the spline within a deviation of every sample that is as smooth as the estimated weights require.
+    """Return the spline of least cost with the estimated weights within a deviation of every sample.
 
     Raises
     ------
     SolveError
-        If there is none: the message has the instant.
+        If no spline is within the deviation; the message gives the instant.
     """
     knots = laid_knots(times, estimates, dwells)
     far = np.zeros(1, int)
@@ -84,7 +84,7 @@ def smoothed_curve(
 def laid_knots(
     times: Float[np.ndarray, " sample"], estimates: Sequence[IntervalEstimate], dwells: Sequence[Dwell]
 ) -> Float[np.ndarray, " knot"]:
-    """Return knots, among them the ends of dwells, with distances by the cutoff frequency."""
+    """Return knots, which include the ends of dwells, at distances set by the cutoff frequency."""
     ends = [times[0], *(t for d in dwells for t in (times[d.first], times[d.last])), times[-1]]
     ends = np.unique(ends)
     at = np.array([(s.start + s.stop) / 2 for s in estimates])
@@ -109,7 +109,7 @@ def laid_knots(
 def _halved(
     knots: Float[np.ndarray, " knot"], times: Float[np.ndarray, " sample"], samples: Int[np.ndarray, " far"]
 ) -> Float[np.ndarray, " halved"]:
-    """Return knots twice as near one another about samples, but no nearer than half of the time between samples."""
+    """Return knots at half the distance near some samples, but no closer than half of the time between samples."""
     cells = np.clip(np.searchsorted(knots, times[samples], side="right") - 1, 0, len(knots) - 2)
     near = np.zeros(len(knots) - 1, bool)
     for offset in range(-HALVED, HALVED + 1):
@@ -144,7 +144,7 @@ def _on_knots(
 
 
 def _runs(chosen: Bool[np.ndarray, " spline"]) -> list[slice]:
-    """Return the runs of chosen splines."""
+    """Return the runs of consecutive chosen splines."""
     edges = np.flatnonzero(np.diff(np.concatenate([[0], chosen.astype(int), [0]])))
     return [slice(int(a), int(b)) for a, b in edges.reshape(-1, 2)]
 
@@ -163,7 +163,7 @@ def _solved(system: Any, right: np.ndarray, coefficients: np.ndarray, run: slice
 
 @dataclasses.dataclass
 class _Problem:
-    """The problem of the least cost within a deviation of the samples, solved only where the spline exceeds it."""
+    """Minimization of the cost within a deviation of the samples, solved only where the spline exceeds it."""
 
     samples: Samples
     system: Any
@@ -172,7 +172,7 @@ class _Problem:
     away: float = 0.0
 
     def within(self, coefficients: np.ndarray, free: np.ndarray) -> Float[np.ndarray, " spline"]:
-        """Return coefficients within the deviation."""
+        """Return the coefficients of a spline within the deviation."""
         for _ in range(ROUNDS):
             far = self._far(coefficients)
             if not len(far):
@@ -189,12 +189,12 @@ class _Problem:
         raise TooFarError(self._far(coefficients))
 
     def _cells(self, samples: Int[np.ndarray, " some"]) -> Int[np.ndarray, " some"]:
-        """Return the cells of samples, which are also the first splines that are not zero there."""
+        """Return the cells of samples, whose numbers are also those of the first nonzero splines at the samples."""
         knots = self.samples.knots
         return np.clip(np.searchsorted(knots, self.samples.times(samples), side="right") - 1, 0, len(knots) - 2)
 
     def _far(self, coefficients: np.ndarray) -> Int[np.ndarray, " far"]:
-        """Return the samples that are farther away than the deviation, and store the largest distance."""
+        """Return the samples farther away than the deviation, and store the largest distance."""
         from scipy.interpolate import BSpline
 
         spline, far, self.away = BSpline(whole(self.samples.knots), coefficients, DEGREE), [np.zeros(0, int)], 0.0
@@ -205,7 +205,7 @@ class _Problem:
         return np.concatenate(far)
 
     def _move(self, coefficients: np.ndarray, run: slice) -> None:
-        """Solve for a run of coefficients such that all samples that they affect are within the deviation."""
+        """Solve for a run of coefficients such that all samples under its splines are within the deviation."""
         from scipy import sparse
 
         clarabel = cone_solver()
@@ -241,7 +241,7 @@ class _Problem:
 
 
 def _parts(run: slice) -> list[slice]:
-    """Return parts of a long run that overlap."""
+    """Return overlapping parts of a long run."""
     count = run.stop - run.start
     if count <= 2 * TOGETHER:
         return [run]

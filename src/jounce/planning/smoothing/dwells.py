@@ -1,4 +1,4 @@
-"""Dwells: times at which samples stand still, within their noise or the steps in which they were written."""
+"""Dwells: intervals in which samples rest, within their noise or their quantization step."""
 
 from __future__ import annotations
 
@@ -10,31 +10,31 @@ from jaxtyping import Float
 
 from jounce.trajectory.sample_errors import noise
 
-BLOCK = 8  # samples whose mean is compared
+BLOCK = 8  # samples of a block, whose means are compared
 LEAST = 32  # samples of a dwell
 SURE = 4.0  # standard deviations
 SLOPE = 3.0  # standard deviations of the drift over a dwell
-SHARES = (1.0, 0.95, 0.9, 0.8, 0.65, 0.5)  # of a run, that are tried
-NEAR = 5  # blocks between dwells that are one
+SHARES = (1.0, 0.95, 0.9, 0.8, 0.65, 0.5)  # trial fractions of a run
+NEAR = 5  # largest number of blocks between dwells that are joined
 LEAST_LEFT = 2  # samples
 MARGIN = 1.5  # blocks at each end of a dwell that may belong to the neighboring motion
 LONGER = 4  # least ratio of the length of a dwell of equal samples to that of neighboring runs
-EQUAL = 16  # samples in a run of equal ones
+EQUAL = 16  # least number of samples in a run of equal ones
 SEEN = 20_000  # samples from which noise and steps are estimated
-AGREE = 1e-3  # of a step: tolerance for differences that are whole numbers of steps
-QUANTA = 4096  # steps in the range of the samples at most
+AGREE = 1e-3  # fraction of a step: tolerance for differences that are whole numbers of steps
+QUANTA = 4096  # largest number of steps in the range of the samples
 
 
 @dataclasses.dataclass(frozen=True)
 class Dwell:
-    """A time at which samples stand still.
+    """An interval in which samples rest.
 
     Parameters
     ----------
     first, last : int
         Indices of its first and last sample.
     position : float
-        rad or m.
+        Position, rad or m.
     """
 
     first: int
@@ -43,7 +43,7 @@ class Dwell:
 
 
 def step_of(values: Float[np.ndarray, " sample"]) -> float:
-    """Return the step in which samples were written; 0 where none is visible."""
+    """Return the quantization step of samples; 0 if none is visible."""
     differences = np.abs(np.diff(values[:SEEN]))
     differences = differences[differences > 0]
     if len(differences) < 8:
@@ -57,7 +57,7 @@ def step_of(values: Float[np.ndarray, " sample"]) -> float:
 
 
 def noise_of(times: Float[np.ndarray, " sample"], values: Float[np.ndarray, " sample"]) -> float:
-    """Return the standard deviation of the noise of samples, including that of their steps."""
+    """Return the standard deviation of the noise of samples, including quantization noise."""
     estimate = noise(times[:SEEN], values[:SEEN])
     return max(estimate, step_of(values) / np.sqrt(12))
 
@@ -68,15 +68,15 @@ def dwells(times: Float[np.ndarray, " sample"], values: Float[np.ndarray, " samp
     Parameters
     ----------
     times, values : array of shape (sample,)
-        s, rad or m.
+        Instants, s, and positions, rad or m.
     sigma : float
-        Standard deviation of their noise.
+        Standard deviation of the noise.
     """
     chosen: list[Dwell] = []
     taken = np.zeros(len(values), bool)
     for dwell in sorted([*_of_equal(values), *_of_noise(times, values, sigma)], key=lambda x: x.first - x.last):
         own = slice(dwell.first, dwell.last + 1)
-        if not taken[own].any():  # the longest first
+        if not taken[own].any():  # the longest dwells come first
             chosen.append(dwell)
             taken[own] = True
     return _joined(sorted(chosen, key=lambda dwell: dwell.first), values, sigma)
@@ -85,16 +85,16 @@ def dwells(times: Float[np.ndarray, " sample"], values: Float[np.ndarray, " samp
 def without_margins(
     dwells: Sequence[Dwell], times: Float[np.ndarray, " sample"], scales: Sequence[tuple[float, float]]
 ) -> list[Dwell]:
-    """Return dwells without the times at their ends where the neighboring motions may already change unseen.
+    """Return dwells without margins at their ends in which the neighboring motions may change unseen.
 
     Parameters
     ----------
     dwells : sequence of Dwell
-        In the order of time.
+        Dwells in order of time.
     times : array of shape (sample,)
-        s.
+        Instants, s.
     scales : sequence of (float, float)
-        The time in which the motion before a dwell, and the one after it, may change, s.
+        Time scales of the motions before and after each dwell, s.
     """
     inner = []
     for dwell, (before, after) in zip(dwells, scales, strict=True):
@@ -110,7 +110,7 @@ def without_margins(
 
 
 def _joined(dwells: list[Dwell], values: np.ndarray, sigma: float) -> list[Dwell]:
-    """Join dwells at one position with little more than a margin between them."""
+    """Return dwells with those joined that rest at one position a short time apart."""
     result: list[Dwell] = []
     for dwell in dwells:
         if result and dwell.first - result[-1].last <= NEAR * BLOCK:
@@ -125,7 +125,7 @@ def _joined(dwells: list[Dwell], values: np.ndarray, sigma: float) -> list[Dwell
 
 
 def _of_equal(values: np.ndarray) -> list[Dwell]:
-    """Return runs of equal samples that are much longer than neighboring runs: others are steps of a slow motion."""
+    """Return runs of equal samples much longer than neighboring runs; others are quantization of a slow motion."""
     begins = np.flatnonzero(np.append(True, values[1:] != values[:-1]))
     lengths = np.diff(begins, append=len(values))
     runs = []
@@ -141,7 +141,7 @@ def _of_equal(values: np.ndarray) -> list[Dwell]:
 
 
 def _of_noise(times: np.ndarray, values: np.ndarray, sigma: float) -> list[Dwell]:
-    """Return runs of blocks whose means, drift and scatter are those of noise about one position."""
+    """Return runs of blocks with means, drift and scatter of noise about one position."""
     count = len(values) // BLOCK
     if count < LEAST // BLOCK or sigma <= 0:
         return []
@@ -159,7 +159,7 @@ def _of_noise(times: np.ndarray, values: np.ndarray, sigma: float) -> list[Dwell
         whole = end - begin + 1
         lengths = [n for share in SHARES if (n := int(share * whole)) >= LEAST]
         still = next((n for n in lengths if _still(times[begin : begin + n], values[begin : begin + n], sigma)), 0)
-        if still:  # the first samples of a motion may pass for noise
+        if still:  # the first samples of a motion may look like noise
             end = begin + still - 1
             begin, end = _within(begin, end, len(values), int(MARGIN * BLOCK))
             if end - begin >= 2:
@@ -183,5 +183,5 @@ def _still(times: np.ndarray, values: np.ndarray, sigma: float) -> bool:
 
 
 def _within(first: int, last: int, count: int, margin: int) -> tuple[int, int]:
-    """Return a dwell without its margins, but at the ends of the samples."""
+    """Return a dwell without its margins, which are kept at the ends of the samples."""
     return (first if first == 0 else first + margin), (last if last == count - 1 else last - margin)

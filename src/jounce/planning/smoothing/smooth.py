@@ -1,4 +1,4 @@
-"""Smooth motions within a deviation of samples, with the torque rates of the motion, not those of its noise."""
+"""Smooth motions within a deviation of samples, whose torque rates are those of the motion, not of the noise."""
 
 from __future__ import annotations
 
@@ -21,15 +21,15 @@ from jounce.trajectory.sampled.deferred import SampledLaw
 from jounce.trajectory.splines import local_powers
 
 FEWEST = 12  # samples
-NEIGHBORS = 4  # samples on either side with which one is compared
-OUTLYING = 20.0  # times as far as any of those from what is beside it: it is an outlier
-OUTSIDE = 5.0  # deviations, less than which no sample is doubted
-WRITTEN = 20.0  # times the step in which samples are written: a step after samples that repeat
-CATCHES_UP = 0.6  # of the step after it
-SAME = 1e-9  # of the range of the samples: what differs by less was the same before an angle was converted
-REPEATED = 0.05  # of the samples: fewer may be chance
-LONG = 5  # samples that repeat one, which is no chance where the step after them is long
-UNSEEN = 3.0  # over the cutoff frequency: for so long a motion may begin or end unseen
+NEIGHBORS = 4  # samples on either side with which a sample is compared
+OUTLYING = 20.0  # ratio of the deviation of an outlier from its neighbors to the largest deviation near it
+OUTSIDE = 5.0  # least distance of an outlier, in deviations
+WRITTEN = 20.0  # least ratio of a step after repeated samples to the quantization step
+CATCHES_UP = 0.6  # least ratio of a step after repeated samples to the next step
+SAME = 1e-9  # fraction of the range: smaller differences are rounding of a conversion of units
+REPEATED = 0.05  # fraction of the samples: fewer repeated samples may be chance
+LONG = 5  # repeated samples that are not chance if the step after them is long
+UNSEEN = 3.0  # time in which a motion may start or end unseen, times the cutoff frequency
 
 
 @dataclasses.dataclass(frozen=True)
@@ -43,9 +43,9 @@ class SmoothedJoint:
     away : float
         Largest distance of the motion from a sample, rad or m.
     dwells : tuple of (float, float)
-        Times at which it stands still, s.
+        Start and end of each dwell, s.
     cutoff : tuple of (float, float)
-        Lowest and highest frequency above which the motion does not follow the samples, Hz.
+        Lowest and highest cutoff frequency, above which the motion does not follow the samples, Hz.
     """
 
     noise: float
@@ -88,34 +88,34 @@ class SmoothedTrajectory(JointTrajectory):
 def smooth(trajectory: JointTrajectory, deviation: float) -> SmoothedTrajectory:
     """Return a smooth motion within a deviation of the samples of a trajectory.
 
-    Splines of degree 7 stay within the deviation of each sample. How much jounce counts against distance follows from
-    the samples themselves, in each interval, as the weight under which they are most likely; where that leads too far
-    from a sample, the motion is the one of the least cost within the deviation. Where samples stand still, so does the
-    motion. Derivatives to the sixth are continuous, so that torques and their rates are, too.
+    Splines of degree 7 stay within the deviation of each sample. In each interval, the weight of jounce against
+    distance is the one under which the samples are most likely. Where the spline of that weight is too far from a
+    sample, the motion is the spline of least cost within the deviation. The motion rests where the samples rest.
+    Derivatives to the sixth are continuous, so that torques and their rates are continuous as well.
 
     Parameters
     ----------
     trajectory : JointTrajectory
-        Through samples, as a log; its positions count, at instants that may be uneven. Laws that do not come from
-        samples stay as they are.
+        Trajectory through samples, such as a log. Only positions matter, at instants that may be uneven. Laws that do
+        not come from samples do not change.
     deviation : float
-        How far the motion may be from a sample, rad or m, for each joint.
+        Largest distance of the motion from a sample, rad or m, for each joint.
 
     Returns
     -------
     SmoothedTrajectory
-        With noise, distance and dwells of each joint.
+        The motion, with the noise, distance and dwells of each joint.
 
     Raises
     ------
     TrajectoryError
-        If no joint has samples, too few, an angle goes by a whole turn from one to the next, or no motion is within the
-        deviation: the message names joint and instant.
+        If no joint has samples or one has too few, an angle steps by a whole turn, or no motion is within the
+        deviation; the message names the joint and the instant.
 
     Warns
     -----
     RecordingWarning
-        A sample is far from those beside it, so that the motion goes there and back; or samples repeat the one before
+        If a sample is far from its neighbors, so that the motion moves to it and back, or samples repeat the one before
         while the joint moves.
 
     Examples
@@ -149,12 +149,12 @@ def smooth(trajectory: JointTrajectory, deviation: float) -> SmoothedTrajectory:
 
 
 def _doubt(times: Float[np.ndarray, " sample"], values: Float[np.ndarray, " sample"], deviation: float) -> str:
-    """Return what the samples have that no motion does, and what to do; or nothing.
+    """Return a warning of repeated samples or outliers with a remedy, or an empty string.
 
     Raises
     ------
     TrajectoryError
-        If they go by a whole turn from one sample to the next.
+        If the samples step by a whole turn.
     """
     if len(times) < FEWEST:
         return ""
@@ -177,18 +177,18 @@ def _check_turns(times: Float[np.ndarray, " sample"], values: Float[np.ndarray, 
 
 
 def _repeated(times: Float[np.ndarray, " sample"], values: Float[np.ndarray, " sample"]) -> str:
-    """Return where samples stay behind and catch up in one step, as those that are written again before new ones come.
+    """Return a warning of samples that repeat old values and catch up in one step, or an empty string.
 
-    Neither do so where the motion rests, whose first steps are short, nor where the steps of an encoder are seen.
+    Dwells do not count, as their motion starts with short steps, and neither do quantization steps of an encoder.
     """
     steps = np.abs(np.diff(values))
     moving = np.flatnonzero(steps)
     if len(moving) < FEWEST:
         return ""
-    stays = np.diff(moving) - 1  # samples that repeat one, before each step but the first
+    stays = np.diff(moving) - 1  # number of repeated samples before each step but the first
     jumps, after, before = steps[moving[1:-1]], steps[moving[2:]], steps[moving[:-2]]
     gaps = np.diff(np.unique(values))
-    seen = gaps[gaps > SAME * np.ptp(values)].min()  # the step in which they are written, if any
+    seen = gaps[gaps > SAME * np.ptp(values)].min()  # the quantization step, if any
     late = (stays[:-1] > 0) & (jumps > WRITTEN * seen) & (jumps > CATCHES_UP * after)
     long = late & (stays[:-1] >= LONG) & (jumps > LONG / 2 * np.maximum(after, before))
     count = int(stays[:-1][late].sum())
@@ -205,7 +205,7 @@ def _repeated(times: Float[np.ndarray, " sample"], values: Float[np.ndarray, " s
 
 
 def _outlier(times: Float[np.ndarray, " sample"], values: Float[np.ndarray, " sample"], deviation: float) -> str:
-    """Return which sample is far from those beside it, as others near it are not, and what to do; or nothing."""
+    """Return a warning of samples far from their neighbors, with a remedy, or an empty string."""
     steps = np.diff(times)
     between = (values[:-2] * steps[1:] + values[2:] * steps[:-1]) / (steps[1:] + steps[:-1])
     off = np.abs(values[1:-1] - between)
@@ -225,13 +225,13 @@ def _outlier(times: Float[np.ndarray, " sample"], values: Float[np.ndarray, " sa
 def samples_of(
     trajectory: JointTrajectory, name: str
 ) -> tuple[Float[np.ndarray, " sample"], Float[np.ndarray, " sample"]] | None:
-    """Return the times and values of the samples of a joint; None where its law does not come from samples."""
+    """Return the times and values of the samples of a joint; None if its law does not come from samples."""
     law = trajectory.laws.given()[name]
     return (law.times, law.values) if isinstance(law, SampledLaw) else sampled(law)
 
 
 def sampled(law: AbstractMotion) -> tuple[Float[np.ndarray, " sample"], Float[np.ndarray, " sample"]] | None:
-    """Return the times and values of the samples of a law; None where it does not come from samples."""
+    """Return the times and values of the samples of a law; None if it does not come from samples."""
     of_samples = type(law) in (SplineMotion, HermiteSplineMotion) and law.beyond == "refuse"
     if of_samples and law.samples.value is not None:
         return law.samples.value
@@ -250,7 +250,7 @@ def smoothed_samples(
     Raises
     ------
     TrajectoryError, SolveError
-        As `smooth`.
+        If there are too few samples, or no motion is within the deviation.
     """
     if len(times) < FEWEST:
         message = f"at least {FEWEST} samples are needed; a path through few points takes a deviation in retime"
@@ -263,11 +263,11 @@ def smoothed_samples(
         still, estimates = _dwells_and_estimates(times, values, sigma)
         still = [_fitting(times, values, dwell, deviation) for dwell in still]
     curve = smoothed_curve(times, values, deviation, estimates, still)
-    from scipy.interpolate import BSpline  # here, since importing SciPy takes half a second
+    from scipy.interpolate import BSpline  # importing SciPy takes half a second
 
     spline = BSpline(whole(curve.knots), curve.coefficients, DEGREE)
     powers = local_powers(spline, curve.knots[:-1], DEGREE)
-    for dwell in still:  # at rest exactly, not up to rounding
+    for dwell in still:  # exactly at rest, not only to rounding
         own = (curve.knots[:-1] >= times[dwell.first]) & (curve.knots[:-1] < times[dwell.last])
         powers[0, own], powers[1:, own] = dwell.position, 0.0
     law = SmoothPieces(curve.knots[:-1], powers, float(curve.knots[-1]))
@@ -282,7 +282,7 @@ def _dwells_and_estimates(
 ) -> tuple[list[Dwell], list[IntervalEstimate]]:
     """Return dwells without their margins, and the estimates of the intervals between them.
 
-    A dwell that is all margin was a slow part of a motion: the motions before and after it are then one.
+    A dwell no longer than its margins is a slow part of a motion, and is dropped.
     """
     whole_dwells = dwells(times, values, sigma)
     known: dict[tuple[int, int], list[IntervalEstimate]] = {}
@@ -296,7 +296,7 @@ def _dwells_and_estimates(
 
 
 def _fitting(times: np.ndarray, values: np.ndarray, dwell: Dwell, deviation: float) -> Dwell:
-    """Return a dwell at a position that is within the deviation of all its samples."""
+    """Return a dwell at a position within the deviation of all its samples."""
     own = values[dwell.first : dwell.last + 1]
     low, high = float(own.max()) - deviation, float(own.min()) + deviation
     if low > high:
@@ -310,7 +310,7 @@ def _fitting(times: np.ndarray, values: np.ndarray, dwell: Dwell, deviation: flo
 
 
 def _scales(times: np.ndarray, dwell: Dwell, estimates: list[IntervalEstimate]) -> tuple[float, float]:
-    """Return the times in which the motions before and after a dwell may change, s."""
+    """Return the time scales of the motions before and after a dwell, s."""
     before = [estimate for estimate in estimates if estimate.stop <= times[dwell.first]]
     after = [estimate for estimate in estimates if estimate.start >= times[dwell.last]]
     ends = before[-1] if before else estimates[0], after[0] if after else estimates[-1]

@@ -1,9 +1,9 @@
-"""The weight of jounce against distances from samples: the weight under which the samples are most likely.
+"""The weight of jounce against distances from samples, by generalized maximum likelihood.
 
-The likelihood of the samples, of a motion whose jounce is noise and of independent noise of their own, has one maximum
-over the weight (G. Wahba, A comparison of GCV and GML for choosing the smoothing parameter, Annals of Statistics 13
-(1985), 1378-1402): neither a noise level nor a bandwidth has to be given. It is estimated interval by interval, since
-fast parts of a motion support less smoothing than slow ones.
+The samples are modeled as a motion whose jounce is white noise, plus independent noise; their likelihood has one
+maximum over the weight (G. Wahba, A comparison of GCV and GML for choosing the smoothing parameter, Annals of
+Statistics 13 (1985), 1378-1402), so that no noise level or bandwidth is needed. The weight is estimated for each
+interval, as fast parts of a motion allow less smoothing than slow ones.
 """
 
 from __future__ import annotations
@@ -18,12 +18,12 @@ from jaxtyping import Float
 
 from jounce.planning.smoothing.bases import DEGREE, PENALIZED, penalty_root, values_at, whole
 
-CELLS = (8, 16, 32, 64)  # of an interval: the fewest that resolve the cutoff frequency, since rounding grows with them
+CELLS = (8, 16, 32, 64)  # of an interval: the fewest that resolve the cutoff frequency, as rounding grows with them
 MOST, LEAST = 3000, 64  # samples in an interval
 RESOLVED = np.pi / 2  # largest cutoff frequency times the length of a cell
-RANGE = (-24.0, 20.0)  # of the natural logarithm of the weight, cells having the length 1
-STEPS, FINE, REFINED = 24, 9, 2  # weights at once: at first, then about the best, so often
-FLOOR = 1e-7  # of the range of samples: less is no noise
+RANGE = (-24.0, 20.0)  # of the natural logarithm of the weight, for cells of length 1
+STEPS, FINE, REFINED = 24, 9, 2  # weights of the first grid, weights of each refinement, and number of refinements
+FLOOR = 1e-7  # fraction of the range of samples: smaller noise counts as zero
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -33,13 +33,13 @@ class IntervalEstimate:
     Parameters
     ----------
     start, stop : float
-        s.
+        Ends of the interval, s.
     weight : float
-        Of the integral of the square of the jounce, s^7, against the sum of squares of distances.
+        Weight of the integral of the squared jounce against the sum of squared distances, s^7.
     cutoff : float
         Frequency above which the motion does not follow the samples, rad/s.
     noise : float
-        Standard deviation, rad or m.
+        Standard deviation of the noise, rad or m.
     """
 
     start: float
@@ -52,7 +52,7 @@ class IntervalEstimate:
 def interval_estimates(
     times: Float[np.ndarray, " sample"], values: Float[np.ndarray, " sample"]
 ) -> list[IntervalEstimate]:
-    """Return the estimates of intervals of samples, which are short where the motion is fast."""
+    """Return the estimates of intervals of samples, shorter where the motion is fast."""
     count = len(times)
     pending = [(k, min(k + MOST, count)) for k in range(0, count, MOST)]
     if len(pending) > 1 and pending[-1][1] - pending[-1][0] < MOST // 2:
@@ -70,7 +70,7 @@ def interval_estimates(
 
 
 def _resolved(times: np.ndarray, values: np.ndarray) -> tuple[IntervalEstimate, bool]:
-    """Return the likely weight by as few cells as resolve what is followed, and whether they do."""
+    """Return the estimate with the fewest cells that resolve the cutoff frequency, and whether any do."""
     counts = [min(cells, len(times) - 1) for cells in CELLS]
     own = _estimate(times, values, counts[0])
     for k, cells in enumerate(counts):
@@ -81,7 +81,7 @@ def _resolved(times: np.ndarray, values: np.ndarray) -> tuple[IntervalEstimate, 
 
 
 def _estimate(times: np.ndarray, values: np.ndarray, cells: int) -> IntervalEstimate:
-    """Return the estimate of one interval, by splines with a number of cells."""
+    """Return the estimate of one interval, from splines with a number of cells."""
     count, span = len(times), float(times[-1] - times[0])
     matrix = values_at(np.clip((times - times[0]) * (cells / span), 0.0, cells), np.arange(cells + 1.0))
     offset = _without_cubic(times, values)
@@ -115,7 +115,7 @@ def _estimate(times: np.ndarray, values: np.ndarray, cells: int) -> IntervalEsti
 
 
 def _without_cubic(times: np.ndarray, values: np.ndarray) -> Float[np.ndarray, " sample"]:
-    """Return samples less the cubic nearest to them, which has no jounce."""
+    """Return samples minus their least-squares cubic, which has no jounce."""
     since = np.clip((times - times[0]) * (2 / (times[-1] - times[0])) - 1, -1.0, 1.0)
     powers = np.polynomial.legendre.legvander(since, PENALIZED - 1)
     return values - powers @ np.linalg.lstsq(powers.T @ powers, powers.T @ values)[0]
@@ -124,12 +124,12 @@ def _without_cubic(times: np.ndarray, values: np.ndarray) -> Float[np.ndarray, "
 def _least_cost(
     matrix: Any, offset: Float[np.ndarray, " sample"], floor: float, cells: int
 ) -> Callable[..., tuple[np.ndarray, np.ndarray]]:
-    """Return the least cost of splines near values, and the logarithm of the determinant, as functions of the weight.
+    """Return a function from weights to the least cost of splines and the logarithm of the determinant.
 
-    The last pivot of the system, bordered by its right-hand side, is the least cost; the others give the determinant.
-    So one Cholesky factorization for each weight gives both. The cost is counted from splines that follow the samples,
-    or from zero, whichever costs less under that weight, so that hardly anything cancels. Where the system is not
-    positive definite, both are infinite.
+    The last pivot of the system bordered by its right-hand side is the square root of the least cost, and the others
+    give the determinant, so that one Cholesky factorization for each weight gives both. Costs refer to splines that
+    follow the samples, or to zero, whichever costs less for the weight, so that hardly any digits cancel. If the system
+    is not positive definite, both results are infinite.
 
     Parameters
     ----------
@@ -138,9 +138,9 @@ def _least_cost(
     offset : array of shape (sample,)
         The samples, rad or m.
     floor : float
-        What is added to the cost, for rounding.
+        Constant added to the cost, for rounding.
     cells : int
-        Of length 1.
+        Number of cells, of length 1.
     """
     from scipy.linalg import cho_solve
 
@@ -149,7 +149,7 @@ def _least_cost(
     base[:-1, :-1] = (matrix.T @ matrix).toarray()
     slope[:-1, :-1] = root.T @ root
     near = np.zeros(len(root.T))
-    for weight in np.exp(np.linspace(*RANGE, STEPS)):  # the first one, unless samples are missing
+    for weight in np.exp(np.linspace(*RANGE, STEPS)):  # the first succeeds, unless cells have no samples
         try:
             factor = np.linalg.cholesky(base[:-1, :-1] + weight * slope[:-1, :-1])
         except np.linalg.LinAlgError:
@@ -175,7 +175,7 @@ def _least_cost(
 
 
 def _pivots(systems: Float[np.ndarray, "weight row row"]) -> Float[np.ndarray, "weight row"]:
-    """Return diagonals of Cholesky factors, infinite where a system is not positive definite."""
+    """Return the diagonals of Cholesky factors, infinite for systems that are not positive definite."""
     try:
         return np.diagonal(np.linalg.cholesky(systems), axis1=1, axis2=2)
     except np.linalg.LinAlgError:
@@ -186,6 +186,6 @@ def _pivots(systems: Float[np.ndarray, "weight row row"]) -> Float[np.ndarray, "
 
 @functools.cache
 def _jounce_root(cells: int) -> Float[np.ndarray, "row spline"]:
-    """Return a matrix whose square is that of the square of the jounce of splines on so many cells of length 1."""
+    """Return a root of the matrix of the integrated squared jounce of splines on cells of length 1."""
     root = penalty_root(whole(np.arange(cells + 1.0)), np.ones(cells)).toarray()
     return np.asarray(np.linalg.qr(root, mode="r"))

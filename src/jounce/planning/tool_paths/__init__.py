@@ -1,1 +1,1 @@
-"""Joint coordinates that place a tool, or lead it along a path, with all derivatives."""
+"""Joint coordinates that place a tool or move it along a path, with all derivatives."""

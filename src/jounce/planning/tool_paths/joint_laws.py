@@ -1,4 +1,4 @@
-"""Instants through which laws of joints follow an exact motion closely, and kinks between them."""
+"""Instants at which laws of joints interpolate an exact motion closely, and kinks between them."""
 
 import math
 from collections.abc import Callable
@@ -10,16 +10,16 @@ from jounce.errors import TrajectoryError
 from jounce.trajectory import HermiteMotion
 from jounce.trajectory.motion import SplineMotion
 
-SHARES = np.array([0.04, 0.15, 0.29, 0.43, 0.57, 0.71, 0.85, 0.96])  # in an interval, where laws are compared
-NEAR = 1e-9  # rad or m, or of the largest coordinate: what laws may miss
-SHORT = 2.0**-17  # of the time: where an interval would have to be shorter, a kink is sought in it
-SIDE = 1e-9  # of the time: how far from a kink its sides are looked at
+SHARES = np.array([0.04, 0.15, 0.29, 0.43, 0.57, 0.71, 0.85, 0.96])  # positions in an interval where laws are compared
+NEAR = 1e-9  # rad or m, or fraction of the largest coordinate: largest error of the laws
+SHORT = 2.0**-17  # fraction of the duration: a kink is sought in intervals that would have to be shorter
+SIDE = 1e-9  # fraction of the duration: distance from a kink at which its sides are evaluated
 ROUNDS = 64
 MOST = 20000  # instants
-KINKED = 1e-6  # of the largest derivative: what jumps by less is smooth
+KINKED = 1e-6  # fraction of the largest derivative: smaller jumps do not count
 STEPS = 4  # of Newton's method
 
-_Times = Float[np.ndarray, " _"]  # of any length
+_Times = Float[np.ndarray, " _"]
 _Motion = Float[np.ndarray, "_ derivative joint"]
 
 
@@ -29,22 +29,22 @@ def followed_closely(exact: Callable[[_Times], _Motion], times: _Times, known: _
     Parameters
     ----------
     exact : callable
-        Gives coordinates and their derivatives at instants.
+        Returns coordinates and their derivatives at instants.
     times : array of shape (time,)
-        To begin with, increasing.
+        First instants, increasing.
     known : array of shape (kinks,)
-        Where derivatives may jump.
+        Instants at which derivatives may jump.
 
     Returns
     -------
     times : array of shape (instants,)
-        An instant at which derivatives jump is there twice: the first row is from the left.
+        Instants; one at which derivatives jump occurs twice, with the derivatives on its left side first.
     q : array of shape (instants, derivative, joint)
 
     Raises
     ------
     TrajectoryError
-        If the instants do not increase, or polynomials come not near the motion: the message says where.
+        If the instants do not increase, or polynomials do not approach the motion; the message gives the instant.
     """
     if len(times) < 2 or (np.diff(times) <= 0).any():
         raise TrajectoryError("laws need two instants at least, which increase", name="time", value=times.tolist()[:5])
@@ -54,12 +54,12 @@ def followed_closely(exact: Callable[[_Times], _Motion], times: _Times, known: _
     side = SIDE * duration
     first, last = exact(times[[0, -1]] + [side, -side])[:, None]
     inside = np.concatenate([_shifted(first, -side), _shifted(last, side)])
-    outside = np.flatnonzero(_jumped(given[[0, -1]], inside))  # a law that is held at its end says what it is then
+    outside = np.flatnonzero(_jumped(given[[0, -1]], inside))  # a law may be constant beyond its ends
     given[-outside] = inside[outside]
     kinks = _Kinks(exact, side)
     kinks.add(known[(known > times[0] + 2 * side) & (known < times[-1] - 2 * side)], only_if_kinked=True)
     nodes, q = times, given
-    done = np.zeros((0, 2))  # intervals that were found to be near
+    done = np.zeros((0, 2))  # intervals with small errors
     for _ in range(ROUNDS):
         joined, rows = kinks.among(nodes, q)
         intervals = np.stack([joined[:-1], joined[1:]], axis=1)
@@ -75,11 +75,11 @@ def followed_closely(exact: Callable[[_Times], _Motion], times: _Times, known: _
         if len(short):
             at_kinks = np.array([_kink(exact, joined[k : k + 2], rows[k : k + 2], near) for k in short.tolist()])
             kinks.add(at_kinks)
-            keep = _clear(nodes, times, at_kinks)  # what was laid about them is no longer needed
+            keep = _clear(nodes, times, at_kinks)  # instants added near kinks are no longer needed
             nodes, q = nodes[keep], q[keep]
         bad = np.setdiff1d(bad, short)
         if not len(short) and len(bad):
-            between = worst[np.isin(np.flatnonzero(open_), bad)]  # what was seen there is not lost again
+            between = worst[np.isin(np.flatnonzero(open_), bad)]  # the instants of the largest errors
             nodes, order = np.unique(np.concatenate([nodes, between]), return_index=True)
             q = np.concatenate([q, exact(between)])[order]
         if len(nodes) > MOST:
@@ -91,7 +91,7 @@ def followed_closely(exact: Callable[[_Times], _Motion], times: _Times, known: _
 
 
 class _Kinks:
-    """Instants at which derivatives jump, and derivatives on both sides of them."""
+    """Instants at which derivatives jump, and the derivatives on both sides of them."""
 
     def __init__(self, exact: Callable[[_Times], _Motion], side: float):
         self.exact, self.side = exact, side
@@ -116,7 +116,7 @@ class _Kinks:
         self.times, self.before, self.after = np.concatenate([self.times, new]), before, after
 
     def among(self, nodes: _Times, q: _Motion) -> tuple[_Times, _Motion]:
-        """Return instants and derivatives with the kinks among them, each twice; an instant at a kink is left out."""
+        """Return instants and derivatives merged with the kinks, each twice, which replace instants at kinks."""
         if not len(self.times):
             return nodes, q
         distinct = (np.abs(nodes[:, None] - self.times) > 2 * self.side).all(axis=1)
@@ -127,14 +127,14 @@ class _Kinks:
 
 
 def _jumped(before: _Motion, after: _Motion) -> np.ndarray:
-    """Return where derivatives differ by more than rounding."""
+    """Return the mask of instants at which derivatives differ by more than rounding."""
     size = np.maximum(np.abs(before), np.abs(after)).max(axis=(0, 2))
     size = np.maximum.accumulate(np.append(1.0, size))[1:, None]
     return np.any(np.abs(after - before) > KINKED * size, axis=(1, 2))
 
 
 def _shifted(q: _Motion, by: float) -> _Motion:
-    """Return derivatives a little later, by their Taylor series."""
+    """Return derivatives shifted in time, by their Taylor series."""
     levels = q.shape[1]
     powers = [[by ** (j - k) / math.factorial(j - k) if j >= k else 0.0 for j in range(levels)] for k in range(levels)]
     return np.einsum("kj,tjn->tkn", np.array(powers), q)
@@ -143,7 +143,7 @@ def _shifted(q: _Motion, by: float) -> _Motion:
 def _missed(
     exact: Callable[[_Times], _Motion], times: _Times, q: _Motion, open_: np.ndarray
 ) -> tuple[Float[np.ndarray, " open"], Float[np.ndarray, " open"]]:
-    """Return how far laws are from the motion in some of the intervals, and where they are."""
+    """Return the largest error of the laws in each open interval, and its instant."""
     chosen = np.flatnonzero(open_)
     steps = times[chosen + 1] - times[chosen]
     looks = times[chosen, None] + SHARES * steps[:, None]
@@ -155,7 +155,7 @@ def _missed(
 
 
 def _within(law: SplineMotion, looks: np.ndarray) -> np.ndarray:
-    """Return the values of a law at places, by its polynomials."""
+    """Return the values of a law from its polynomials."""
     begins, powers = np.asarray(law.breakpoints), np.asarray(law.coefficients)
     piece = np.clip(np.searchsorted(begins, looks, side="right") - 1, 0, len(begins) - 1)
     local, value = looks - begins[piece], powers[-1][piece]
@@ -165,12 +165,12 @@ def _within(law: SplineMotion, looks: np.ndarray) -> np.ndarray:
 
 
 def _kink(exact: Callable[[_Times], _Motion], ends: Float[np.ndarray, " 2"], q: _Motion, near: float) -> float:
-    """Return where the series of the ends of a short interval meet: there the velocity jumps.
+    """Return the instant in a short interval at which the series of its ends meet, where the velocity jumps.
 
     Raises
     ------
     TrajectoryError
-        If they do not meet, or the motion is not near them.
+        If the series do not meet, or the motion is not near them.
     """
     joint = int(np.argmax(np.abs(q[1, 1] - q[0, 1])))
     at = float(ends.mean())
@@ -193,13 +193,13 @@ def _kink(exact: Callable[[_Times], _Motion], ends: Float[np.ndarray, " 2"], q: 
 
 
 def _clear(nodes: _Times, times: _Times, kinks: _Times) -> np.ndarray:
-    """Return which instants were given, or are not in an interval between given ones that has a kink."""
+    """Return the mask of instants that were given, or lie away from intervals between given instants with a kink."""
     cells = np.clip(np.searchsorted(times, kinks, side="right") - 1, 0, len(times) - 2)
     inside = np.clip(np.searchsorted(times, nodes, side="right") - 1, 0, len(times) - 2)
     return np.isin(nodes, times) | ~np.isin(inside, np.concatenate([cells - 1, cells]))
 
 
 def _among(intervals: Float[np.ndarray, "interval 2"], done: Float[np.ndarray, "known 2"]) -> np.ndarray:
-    """Return which intervals are among others."""
+    """Return the mask of intervals that are in a second set."""
     known = np.sort(done[:, 0] + 1j * done[:, 1])
     return np.isin(intervals[:, 0] + 1j * intervals[:, 1], known)

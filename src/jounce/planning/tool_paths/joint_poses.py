@@ -1,4 +1,4 @@
-"""The result of inverse kinematics: coordinates for each pose, with what is missed where there are none."""
+"""The result of inverse kinematics: coordinates for each pose, with the remaining error where a pose is not reached."""
 
 import dataclasses
 from typing import Any
@@ -14,29 +14,29 @@ from jounce.planning.tool_paths.task_rank import losing_joints
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
 class JointPoses(Displayed):
-    """Coordinates that bring a tool to poses, and how far it stays away where none do.
+    """Coordinates that bring a tool to poses, and the remaining errors of poses that are not reached.
 
     Attributes
     ----------
     q : numpy.ndarray of shape (..., n)
         Coordinates, rad or m, in the order of ``robot.joint_names``; NaN where the status is not OK.
     status : numpy.ndarray of shape (...)
-        A `Status` for each pose: OK; NOT_ASSEMBLED where nothing near the starts is nearer than `closest`;
-        NOT_CONVERGED where the steps ended before that was certain.
+        A `Status` for each pose: OK; NOT_ASSEMBLED if `closest` is a local minimum of the error; NOT_CONVERGED if the
+        steps ended before a minimum was certain.
     closest : numpy.ndarray of shape (..., n)
-        The nearest coordinates found, those of `q` where there are some.
+        Coordinates nearest to the pose that were found; those of `q` for a reached pose.
     distance, angle : numpy.ndarray of shape (...)
-        How far the tool is from the pose at `closest`, m, and by what angle it is turned away, rad.
+        Distance, m, and angle, rad, between tool and pose at `closest`.
     singular : numpy.ndarray of bool, shape (...)
-        Whether the tool loses a motion at `closest`, which joints bring about in general.
+        Whether `closest` is a singular position, in which the tool loses a motion that it has in general.
     singular_values : numpy.ndarray of shape (..., rank)
-        Of the task there, the largest first, with lengths in sizes of the robot.
+        Singular values of the task at `closest`, the largest first, with lengths in sizes of the robot.
     shares : numpy.ndarray of shape (..., n)
-        How joints move together, at the least singular value, while the tool moves least.
+        Right singular vector of the least singular value: the joint motion that moves the tool least.
     joint_names : tuple of str
-        The order of q.
+        Names of the joints, in the order of q.
     limited : numpy.ndarray of bool, shape (..., n)
-        Which joints are at a limit at `closest`.
+        Whether each joint is at a limit at `closest`.
     """
 
     q: Array[np.ndarray, "*batch n"]
@@ -55,12 +55,12 @@ class JointPoses(Displayed):
         return f"<JointPoses: {solved} of {self.status.size} poses, {int(self.singular.sum())} singular>"
 
     def explain(self, *index: int) -> str:
-        """Return in words what became of a pose: what is missed and why, and which joints lose a motion.
+        """Return the result for a pose in words: the remaining error and its cause, and the joints that lose a motion.
 
         Parameters
         ----------
         *index : int
-            Of the pose in the batch; none for a single one.
+            Index of the pose in the batch; none for a single pose.
         """
         lane: Any = index
         words = []

@@ -1,4 +1,4 @@
-"""Equations that make joint coordinates a function of the path: the task, joints held, and the nearest posture."""
+"""Equations that determine joint coordinates along a path: the task, held joints, and the nearest posture."""
 
 from typing import Any, NamedTuple
 
@@ -13,31 +13,31 @@ from jounce.planning.tool_paths.tool_tasks import Tool, columns_of, task_rows
 from jounce.robot.model.tree import Tree
 
 MOST = 12  # corrections
-CLOSE = 1e-7  # of a correction, rad, or sizes of the robot: the next one leaves rounding only
+CLOSE = 1e-7  # rad, or sizes of the robot: after a correction this small, the next leaves only rounding
 
 Unknowns = Float[Numbers, "order unknown batch"]
-"""Series of the coordinates in their scale, then of the multipliers of the task where a posture is held."""
+"""Series of the scaled coordinates, then of the multipliers of the task if a posture is given."""
 
 
 class PathEquations(Module):
     """The equations of the coordinates along a path.
 
-    With fewer rows than joints, the coordinates are those of the task that are nearest to a posture: multipliers of the
-    rows, as many further unknowns, balance the gradient of the squared distance. So they depend only on the instant of
-    the path, not on the way there, and have all its derivatives.
+    With fewer rows than joints, the coordinates that fulfill the task are those nearest to a posture: Lagrange
+    multipliers of the rows, as further unknowns, balance the gradient of the squared distance. The coordinates
+    therefore depend only on the instant, not on the path before it, and have all derivatives of the path.
 
     Attributes
     ----------
     tree : Tree
-        Of the robot.
+        Arrays of the robot.
     tool : Tool
-        What follows the path.
+        The tool that follows the path.
     basis : array of shape (rows, independent)
-        The rows that the joints can move, including those of held joints.
+        Basis of the rows that the joints can move, including those of held joints.
     scale, weights : array of shape (n,)
-        Scale of each coordinate, and the weight of its distance from the posture.
+        Scale of each coordinate, and weight of its distance from the posture.
     fixed_joints : tuple of int
-        Joints that have laws of their own.
+        Held joints, which have laws of their own.
     kinds : tuple of str
         Kinds of the goals.
     count : int
@@ -55,21 +55,21 @@ class PathEquations(Module):
 
     @property
     def rows(self) -> int:
-        """How many rows the task has."""
+        """Number of rows of the task."""
         return self.basis.shape[1]
 
     @property
     def has_posture(self) -> bool:
-        """Whether joints are left that a posture decides."""
+        """Whether the posture determines some coordinates."""
         return self.rows < self.count
 
     @property
     def size(self) -> int:
-        """How many unknowns there are."""
+        """Number of unknowns."""
         return self.count + (self.rows if self.has_posture else 0)
 
     def task(self, x: Any, target: dict[str, Any]) -> Any:
-        """Return the rows of the task at coordinates in their scale, as series."""
+        """Return the series of the rows of the task at scaled coordinates."""
         goal = {kind: target[kind] for kind in self.kinds}
         rows = task_rows(self.tree, self.tool, x * jnp.asarray(self.scale)[None, :, None], goal)
         if self.fixed_joints:
@@ -77,11 +77,11 @@ class PathEquations(Module):
         return jnp.sum(jnp.asarray(self.basis)[None, :, :, None] * rows[:, :, None], axis=1)
 
     def residual(self, u: Unknowns, target: dict[str, Any]) -> Float[Numbers, "order row batch"]:
-        """Return what vanishes along the path, as series."""
+        """Return the series of the residual, which vanishes along the path."""
         x, multipliers = u[:, : self.count], u[:, self.count :]
         if not self.has_posture:
             return self.task(x, target)
-        # coefficients of J^T l are a convolution, which is what the transposed map does with l in reverse
+        # coefficients of J^T l are a convolution: the transposed map applied to l in reverse order
         rows, back = jax.vjp(lambda x: self.task(x, target), x)
         balance = back(multipliers[::-1])[0][::-1]
         pull = jnp.asarray(self.weights)[None, :, None] * (x - target["posture"])
@@ -93,9 +93,9 @@ class PathEquations(Module):
         return columns_of(lambda u: self.residual(u[None], first)[0], u)
 
     def corrected(self, u: Float[Numbers, "unknown batch"], target: dict[str, Any]) -> "Corrected":
-        """Return the unknowns after Newton's corrections, all lanes until the last one is there.
+        """Return the unknowns after Newton corrections, in all lanes until the last one has converged.
 
-        The last matrix is made where the correction before has led, so that it is that of the result to rounding.
+        The last matrix is evaluated before the last correction, which is so small that it is that of the result.
         """
         first = {kind: series[:1] for kind, series in target.items()}
 
@@ -118,7 +118,7 @@ class PathEquations(Module):
     def series(
         self, u: Float[Numbers, "unknown batch"], factor: "PathFactor", target: dict[str, Any], order: int
     ) -> Unknowns:
-        """Return the series of the unknowns, order after order by one factorization."""
+        """Return the series of the unknowns, order by order, with one factorization."""
 
         def level(k: Any, series: Any) -> Any:
             missing = jax.lax.dynamic_index_in_dim(self.residual(series, target), k, 0, keepdims=False)
@@ -129,25 +129,25 @@ class PathEquations(Module):
 
 
 class PathFactor(Module):
-    """The factored Jacobian: square, or with more rows than unknowns, which agree where the path can be followed."""
+    """The factored Jacobian: square, or with more rows than unknowns, consistent where the path can be followed."""
 
     matrix: Float[Numbers, "row column batch"]
     inverse: Float[Numbers, "column row batch"]
 
     @classmethod
     def of(cls, matrix: Float[Numbers, "row column batch"]) -> "PathFactor":
-        """Factor matrices of full column rank."""
+        """Return the factors of matrices of full column rank."""
         rows, columns, lanes = matrix.shape
         if rows == columns:
             return cls(matrix, DenseFactor.of(matrix).inverse())
-        # least squares by the augmented matrix, whose condition is not squared (Bjorck 1967)
+        # least squares by the augmented matrix, which does not square the condition number (Bjorck 1967)
         whole = jnp.zeros((rows + columns, rows + columns, lanes))
         whole = whole.at[:rows, :rows].set(jnp.eye(rows)[..., None])
         whole = whole.at[:rows, rows:].set(matrix).at[rows:, :rows].set(jnp.swapaxes(matrix, 0, 1))
         return cls(matrix, DenseFactor.of(whole).inverse()[rows:, :rows])
 
     def solve(self, right: Float[Numbers, "row batch"]) -> Float[Numbers, "column batch"]:
-        """Return the solution, refined once."""
+        """Return the solution with one step of iterative refinement."""
 
         def product(right: Any) -> Any:
             return jnp.sum(self.inverse * right[None], axis=1)
@@ -157,7 +157,7 @@ class PathFactor(Module):
 
 
 class Corrected(NamedTuple):
-    """Unknowns after corrections, the factored matrix there, and the sizes of the first correction and the last."""
+    """Unknowns after corrections, their factored matrix, and the sizes of the first and the last correction."""
 
     u: Any
     factor: PathFactor

@@ -1,4 +1,4 @@
-"""Following a path from its start, node after node: each interval is looked at along its way before it counts."""
+"""Continuation along a path from its start, node by node, with a check of each interval."""
 
 from collections.abc import Callable
 from typing import Any, NamedTuple
@@ -12,28 +12,28 @@ from jounce.base.padding import padded
 from jounce.execution.compilation import compiled
 from jounce.planning.tool_paths.path_equations import PathEquations
 
-ORDER = 6  # of the series from node to node
-POINTS_IN_STEP = 8  # in an interval that are looked at
-FIRST = 32  # intervals to begin with
-BLOCK = 64  # nodes that are compiled for
-CHANGE = 0.5  # of the Jacobian over an interval, by its inverse at the beginning: less, and it cannot become singular
-NEAR = 0.05  # rad, or sizes of the robot: how far the equations may be from a series
-TAME = 0.1  # of the Jacobian over a correction
-GOOD = 1e-9  # of the last correction
-SHORTEST = 2.0**-16  # of the path: an interval that needs to be shorter ends it
+ORDER = 6  # order of the series from node to node
+POINTS_IN_STEP = 8  # checked points of an interval
+FIRST = 32  # first intervals
+BLOCK = 64  # nodes of the compiled program
+CHANGE = 0.5  # largest relative change of the Jacobian over an interval, within which it cannot become singular
+NEAR = 0.05  # rad, or sizes of the robot: largest distance of the solution from a series
+TAME = 0.1  # largest relative change of the Jacobian over a correction
+GOOD = 1e-9  # largest last correction
+SHORTEST = 2.0**-16  # fraction of the path: continuation fails at an interval that would have to be shorter
 
 
 class Nodes(NamedTuple):
-    """Instants along a path with series of the unknowns, and how far they hold.
+    """Instants along a path with series of the unknowns.
 
     Attributes
     ----------
     time : array of shape (nodes,)
-        s.
+        Instants, s.
     series : array of shape (nodes, order + 1, unknowns)
         Taylor coefficients.
     failed : int or None
-        The interval that could not be passed; None where the path was followed to its end.
+        Number of the interval that could not be passed; None if the path was followed to its end.
     """
 
     time: Float[np.ndarray, " nodes"]
@@ -48,24 +48,24 @@ def march(equations: PathEquations, start: Any, steps: Any, targets: Any, inner:
     Parameters
     ----------
     equations : PathEquations
-        To be met.
+        Equations of the coordinates.
     start : array of shape (unknowns, 1)
-        At the first node, nearly.
+        Guess of the unknowns at the first node.
     steps : array of shape (nodes,)
-        To the next node, s.
+        Time from each node to the next, s.
     targets, inner : dict of array
         Series at the nodes, (nodes, order + 1, ..., 1), and values within the intervals, (nodes, 1, ..., points).
 
     Returns
     -------
     guess : array of shape (unknowns, 1)
-        Where the series leads from the last node.
+        Unknowns predicted by the series of the last node.
     series : array of shape (nodes, order + 1, unknowns)
     first, last : array of shape (nodes,)
-        Corrections at each node.
+        Sizes of the first and last correction at each node.
     change, gap, tame : array of shape (nodes,)
-        What happens in the interval after it: the change of the Jacobian, the distance from the series, and the change
-        of the Jacobian over that distance.
+        For the interval after each node: relative change of the Jacobian, distance of the solution from the series, and
+        change of the Jacobian over that distance.
     """
     shares = jnp.arange(1.0, POINTS_IN_STEP + 1) / POINTS_IN_STEP
 
@@ -97,11 +97,11 @@ def followed(
     end: float,
     order: int,
 ) -> Nodes:
-    """Follow a path from its begin to its end; intervals that are too long are halved until they are passed.
+    """Follow a path from its start to its end, halving intervals until each passes its checks.
 
-    Over an interval the Jacobian changes by less than half of itself, by its inverse at the beginning, and the
-    equations are met so near the series that Newton's corrections from there contract (Deuflhard 2011, Newton Methods
-    for Nonlinear Problems, theorem 2.3): the solution at its end is the one that the solution at its beginning becomes.
+    Over an interval, the Jacobian changes by less than half, relative to its value at the start, and the solution is so
+    near the series that Newton corrections contract (Deuflhard 2011, Newton Methods for Nonlinear Problems,
+    theorem 2.3): the solution at the end is on the branch of that at the start.
     """
     time = np.linspace(begin, end, FIRST + 1)
     while True:
@@ -117,7 +117,7 @@ def followed(
         if passed.all():
             return Nodes(time, series, None)
         lost = ~at_node[1:]
-        until = int(np.argmax(lost)) + 1 if lost.any() else len(passed)  # what follows has no basis
+        until = int(np.argmax(lost)) + 1 if lost.any() else len(passed)  # later nodes start from a wrong guess
         bad = np.flatnonzero(~passed[:until])
         short = bad[steps[bad] <= SHORTEST * (end - begin)]
         if short.size:
@@ -129,7 +129,7 @@ def followed(
 
 
 def _marched(equations: PathEquations, start: Any, time: Any, target: Any, order: int) -> list[np.ndarray]:
-    """Return the results of `march` for nodes, which are padded to a multiple of the compiled length."""
+    """Return the results of `march` for nodes, padded to a multiple of the compiled length."""
     count = BLOCK * -(-len(time) // BLOCK)
     nodes = padded(time, count)
     steps = np.append(np.diff(nodes), 0.0)
@@ -150,13 +150,13 @@ def _marched(equations: PathEquations, start: Any, time: Any, target: Any, order
 
 
 def _filled(array: np.ndarray, order: int) -> np.ndarray:
-    """Return series with zeros for the orders that are not known: the series is as good as they are."""
+    """Return series padded with zeros to an order."""
     missing = order + 1 - len(array)
     return np.concatenate([array, np.zeros((missing, *array.shape[1:]))]) if missing > 0 else array
 
 
 def predicted(nodes: Nodes, time: Float[np.ndarray, " time"]) -> Float[np.ndarray, "time unknown"]:
-    """Return the unknowns at instants by the series of the nodes before."""
+    """Return the unknowns at instants, by the series of the nodes before them."""
     chosen = np.clip(np.searchsorted(nodes.time, time, side="right") - 1, 0, len(nodes.time) - 1)
     since = time - nodes.time[chosen]
     powers = since[:, None] ** np.arange(nodes.series.shape[1])

@@ -1,4 +1,4 @@
-"""Levenberg-Marquardt within the limits of joints, for batches of poses at once."""
+"""Projected Levenberg-Marquardt within the limits of joints, for batches of poses."""
 
 from typing import Any, NamedTuple
 
@@ -11,16 +11,16 @@ from jounce.planning.tool_paths.tool_tasks import Goal, columns_of, misses
 from jounce.robot.model.tree import Tree
 from jounce.robot.recursions.batches import Batched
 
-FIRST = 1e-3  # damping, as part of the squares of what is missed: Fan and Yuan 2005, which keeps quadratic convergence
-LEAST = 1e-15  # damping, as part of the squares of the Jacobian: where joints are redundant nothing else holds them
+FIRST = 1e-3  # damping relative to the squared error: Fan and Yuan 2005, which keeps quadratic convergence
+LEAST = 1e-15  # damping relative to the squared Jacobian, which keeps redundant joints in place
 GROWTH = 4.0
-STALLED = 1e-15  # of a step, rad: nothing moves any more
-FLAT = 1e-8  # slope, as part of what it could be: there is nothing nearer
+STALLED = 1e-15  # rad: smallest step
+FLAT = 1e-8  # relative slope of the error at a minimum
 STIFF = 1e12  # damping beyond which no step is worth trying
 
 
 class _Look(NamedTuple):
-    """What is missed at coordinates, and its Jacobian."""
+    """Error at coordinates, and its Jacobian."""
 
     x: Any
     rows: Any
@@ -30,18 +30,18 @@ class _Look(NamedTuple):
 
 @Batched
 def solve_poses(tree: Tree, arrays: tuple[Any, ...], constants: Any, kinds: tuple[str, ...]) -> Any:
-    """Return coordinates nearest to a goal, what is missed, and how the joints move the tool there.
+    """Return coordinates nearest to a goal, the remaining error, and the singular values of the task.
 
-    Projected Levenberg-Marquardt (Kanzow, Yamashita and Fukushima 2004): joints at a limit that are pushed outwards are
-    held, the others take the damped step, which is cut at the limits, and counts where it brings the tool nearer.
+    Projected Levenberg-Marquardt (Kanzow, Yamashita and Fukushima 2004): joints pushed outward at a limit are held, and
+    the others take the damped step, clipped at the limits, if it brings the tool nearer.
 
     Returns
     -------
     q : array of shape (1, coordinates, batch)
     square : array of shape (1, batch)
-        What is missed, squared and summed: rad, or sizes of the robot.
+        Sum of squared errors, in rad or sizes of the robot.
     level : array of shape (1, batch)
-        Slope of that, as part of what it could be; small where nothing near is nearer.
+        Relative slope of this sum; small at a local minimum.
     active : array of shape (1, batch)
         1 where more steps may help.
     values, shares : array of shape (1, k, batch) and (1, k, coordinates, batch)
@@ -77,7 +77,7 @@ def solve_poses(tree: Tree, arrays: tuple[Any, ...], constants: Any, kinds: tupl
 
     def improved(carry: Any) -> Any:
         best, x, damping, active, count = carry
-        trial = evaluated(x)  # the start in the first pass, which is better than nothing
+        trial = evaluated(x)  # in the first pass the start, which replaces the infinite error
         better = (trial.square < best.square) & active
         model = best.rows + jnp.sum(best.columns * (trial.x - best.x)[None], axis=1)
         good = best.square - trial.square > 0.25 * (best.square - jnp.sum(model * model, axis=0))

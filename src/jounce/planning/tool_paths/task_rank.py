@@ -1,4 +1,4 @@
-"""How many motions of a tool joints can bring about at all, and which joints lose one at a singular position."""
+"""The number of motions of a tool that joints can cause, and the joints that lose one at a singular position."""
 
 from typing import Any
 
@@ -13,14 +13,14 @@ from jounce.robot.recursions.batches import Batched
 from jounce.robot.recursions.kinematics import link_frame
 
 CONFIGURATIONS = 16  # random configurations that show the general rank
-RANK = 1e-9  # of the largest singular value: less is none
-SINGULAR = 1e-3  # of the largest singular value: a position where the least one is below counts as singular
-NOTABLE = 0.1  # of the largest share: joints with less have no part in a motion that is lost
+RANK = 1e-9  # fraction of the largest singular value: smaller values are zero
+SINGULAR = 1e-3  # fraction of the largest singular value: a position with a smaller least value is singular
+NOTABLE = 0.1  # fraction of the largest share: joints with smaller shares take no part in a lost motion
 
 
 @Batched
 def _columns(tree: Tree, arrays: tuple[Any, ...], constants: Any, kinds: tuple[str, ...]) -> Any:
-    """Return the Jacobian of a task where it is done, by coordinates in their scale."""
+    """Return the Jacobian of a task by scaled coordinates, with the present pose as its goal."""
     tool, scale = constants
     q = arrays[0][0]
     frame = link_frame(tree, q[None], tool.frame)
@@ -37,12 +37,12 @@ def _columns(tree: Tree, arrays: tuple[Any, ...], constants: Any, kinds: tuple[s
 def task_columns(
     robot: AbstractRobot, tool: Tool, q: Any, kinds: tuple[str, ...], scale: Any
 ) -> Float[np.ndarray, "samples row column"]:
-    """Return the Jacobians of a task at coordinates, (samples, n), as if it were done there."""
+    """Return the Jacobians of a task at coordinates, (samples, n), with their poses as goals."""
     return np.asarray(_columns(robot, (np.asarray(q)[:, None],), (tool, scale), (kinds,)))[:, 0]
 
 
 def random_coordinates(lower: Any, upper: Any, scale: Any, count: int, seed: int) -> Float[np.ndarray, "count n"]:
-    """Return coordinates spread over the range of joints, of half a turn to each side where it has no end."""
+    """Return a Halton sequence of coordinates over the ranges of joints; ranges without limits span one turn."""
     from scipy.stats import qmc
 
     turn = 2 * np.pi * scale
@@ -52,7 +52,7 @@ def random_coordinates(lower: Any, upper: Any, scale: Any, count: int, seed: int
 
 
 def reachable_rows(columns: Float[np.ndarray, "samples row column"]) -> tuple[Float[np.ndarray, "row some"], int]:
-    """Return a basis of the rows that joints can move anywhere, and how many of them they move in general."""
+    """Return a basis of the rows that joints can move in any sample, and the general rank of the task."""
     wide = np.concatenate(list(columns), axis=1)
     u, s, _ = np.linalg.svd(wide, full_matrices=False)
     basis = u[:, s > RANK * s[0]]
@@ -61,7 +61,7 @@ def reachable_rows(columns: Float[np.ndarray, "samples row column"]) -> tuple[Fl
 
 
 def losing_joints(names: tuple[str, ...], shares: Float[np.ndarray, " n"]) -> list[str]:
-    """Return the joints whose motions cancel at the tool, those with the largest part first."""
+    """Return the joints whose motions cancel at the tool, the largest shares first."""
     sizes = np.abs(shares)
     order = np.argsort(-sizes, kind="stable")
     return [names[k] for k in order if sizes[k] >= NOTABLE * sizes.max()] if sizes.any() else []

@@ -27,34 +27,34 @@ if TYPE_CHECKING:
 
 XYZ = ("x", "y", "z")
 ANGLES = ("angle_1", "angle_2", "angle_3")
-INSTANTS, POINTS, ROUNDS = 1025, 9, 9  # at a law of progress: over the time, around its extremes, and how often
-ROUNDING = 1e-9  # of what a law of progress goes through
+INSTANTS, POINTS, ROUNDS = 1025, 9, 9  # samples of a law of progress, samples about an extremum, and refinements
+ROUNDING = 1e-9  # fraction of the range of a law of progress
 
 
 class ToolPath(Displayed):
-    """Where a tool is to be from a start to a stop, with derivatives of any order.
+    """The prescribed pose of a tool from a start to a stop, with derivatives of any order.
 
     Parameters
     ----------
     position : sequence of three laws, optional
-        Of the point of the tool in the frame of the base, m: motions, expressions of ``t``, or numbers; anywhere unless
-        given.
+        Position of the point of the tool in the frame of the base, m: motions, expressions of ``t``, or numbers; free
+        unless given.
     orientation : optional
-        Of the link in the frame of the base: constant, as a unit quaternion, scalar first, a rotation matrix or a
-        rotation of SciPy; ``(SEQUENCE, [law, law, law])`` for Euler angles such as ``("ZYX", ["t", 0, 0])``, rad; or
+        Orientation of the link in the frame of the base: a constant unit quaternion, scalar first, rotation matrix or
+        SciPy rotation; ``(SEQUENCE, [law, law, law])`` for Euler angles such as ``("ZYX", ["t", 0, 0])``, rad; or
         `jounce.rigid.AttitudeSamples`.
     direction : sequence of three laws, optional
-        Of a vector along which an axis of the link points, in the place of an orientation; of any length but zero.
+        Vector of any length but zero along which an axis of the link points, instead of an orientation.
     start, stop : float
         First and last instant, s.
     progress : AbstractMotion, Expression or str, optional
-        Law, a function of ``t``, that replaces ``t`` in all other laws: another time law along the same
-        path. `start` and `stop` are instants, not values of it.
+        Function of ``t`` that replaces ``t`` in all other laws: another time law along the same path. `start` and
+        `stop` are instants, not values of this law.
 
     Raises
     ------
     TrajectoryError
-        If there is nothing to follow, or a law is none.
+        If no position, orientation or direction is given, or a law is not valid.
 
     Examples
     --------
@@ -103,20 +103,21 @@ class ToolPath(Displayed):
         Parameters
         ----------
         times : array_like of shape (samples,)
-            Increasing, s.
+            Instants, increasing, s.
         positions : array_like of shape (samples, 3)
-            m, in the frame of the base.
+            Positions in the frame of the base, m.
         orientations : optional
-            One for each instant, (samples, 4) or (samples, 3, 3), or a rotation of SciPy; a single one is constant.
+            One orientation for each instant, (samples, 4) or (samples, 3, 3), or a SciPy rotation; a single one is
+            constant.
         degree : int, default 7
-            Of the splines, odd; derivatives to one less are continuous.
+            Odd degree of the splines; derivatives to degree - 1 are continuous.
         **settings
             ``direction`` and ``progress``, as for the class.
 
         Raises
         ------
         TrajectoryError
-            If there are too few samples, or they do not fit one another.
+            If there are too few samples, or their shapes do not match.
 
         Examples
         --------
@@ -139,13 +140,13 @@ class ToolPath(Displayed):
 
     @property
     def kinds(self) -> tuple[str, ...]:
-        """What is followed: "position", "rotation", "direction"."""
+        """Kinds of the goals: "position", "rotation", "direction"."""
         parts = {"position": self._position, "rotation": self._attitude, "direction": self._direction}
         return tuple(kind for kind, part in parts.items() if part is not None)
 
     @property
     def highest(self) -> int:
-        """The highest derivative that is continuous, as far as splines decide it."""
+        """Highest derivative that is continuous, according to the degrees of splines."""
         laws = [law for part in (self._position, self._direction) if part is not None for law in part.laws.values()]
         degrees = [law.degree for law in laws if type(law) is SplineMotion]
         if isinstance(self._attitude, AttitudeSamples):
@@ -154,8 +155,8 @@ class ToolPath(Displayed):
 
     @property
     def knots(self) -> Array[np.ndarray, " knots"]:
-        """Instants within at which a derivative of a law is known to jump; those of `abs` in expressions are not."""
-        if self._progress is not None:  # what the other laws are of is no time
+        """Inner instants at which a derivative of a law is known to jump, without those of `abs` in expressions."""
+        if self._progress is not None:  # the argument of the other laws is not time
             return knots(self._progress.laws["progress"], self.start, self.stop)
         turning = self._attitude[1] if isinstance(self._attitude, tuple) else None
         parts = [part for part in (self._position, self._direction, turning) if part is not None]
@@ -164,7 +165,7 @@ class ToolPath(Displayed):
         return every[(every > self.start) & (every < self.stop)]
 
     def judge(self, order: int) -> None:
-        """Warn where the samples of a law do not support its derivatives to an order, as `JointTrajectory` does."""
+        """Warn, as `JointTrajectory` does, if the samples of a law do not support its derivatives to an order."""
         for part in (self._position, self._direction, self._progress):
             if part is not None:
                 part.derivatives([part.start], order)
@@ -178,7 +179,7 @@ class ToolPath(Displayed):
         Raises
         ------
         TrajectoryError
-            If the path has none, or an instant is outside.
+            If the path has no position, or an instant is outside.
         """
         if self._position is None:
             raise TrajectoryError("this path has an orientation only", name="position")
@@ -191,12 +192,12 @@ class ToolPath(Displayed):
         )
 
     def series(self, times: Array[np.ndarray, " time"], order: int) -> Goal:
-        """Return the Taylor coefficients of what is followed at instants, components first, the instants last.
+        """Return the Taylor coefficients of the goals at instants, components first, instants last.
 
         Raises
         ------
         TrajectoryError
-            If an instant is outside, a law is not smooth there, or there is no derivative so high.
+            If an instant is outside, a law is not smooth at an instant, or the order is too high.
         """
         if order > self.highest:
             message = f"the splines of this path have continuous derivatives to {self.highest}; give a higher degree"
@@ -206,7 +207,7 @@ class ToolPath(Displayed):
             rates = self._progress.derivatives(times, order)[:, :, 0]
             time = Jet.from_derivatives(np.moveaxis(rates, -1, 0))
             inside = self._position or self._direction
-            if inside is not None:  # rounding may take it out of the range of the laws
+            if inside is not None:  # rounding may exceed the range of the laws
                 first = np.asarray(time.coefficients[0])
                 nearest = np.clip(first, inside.start, inside.stop)
                 beyond = np.abs(first - nearest) > ROUNDING * (inside.stop - inside.start)
@@ -256,7 +257,7 @@ def _laws(name: str, laws: Mapping[str, Any], start: float, stop: float) -> Join
 
 
 def _reach(progress: JointTrajectory) -> tuple[float, float]:
-    """Return the least and the largest value of a law of progress, also between the instants that are looked at."""
+    """Return the least and the largest value of a law of progress, refined between sampled instants."""
 
     def both(times: Float[np.ndarray, " time"]) -> Float[np.ndarray, "time 2"]:
         values = progress.derivatives(times, 0)[:, 0, 0]
@@ -275,7 +276,7 @@ def _reach(progress: JointTrajectory) -> tuple[float, float]:
 
 
 def _attitude(given: Any, start: float, stop: float) -> Any:
-    """Return an orientation: constant, as samples, or as a sequence with laws of its angles."""
+    """Return an orientation: constant, samples, or a sequence with laws of its angles."""
     if isinstance(given, AttitudeSamples):
         return given
     if isinstance(given, tuple) and len(given) == 2 and isinstance(given[0], str):

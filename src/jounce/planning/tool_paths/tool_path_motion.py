@@ -1,4 +1,4 @@
-"""The result of following a path of a tool: coordinates with derivatives of any order, a status for each instant."""
+"""The joint motion along a path of a tool: coordinates with derivatives of any order, and a status of each instant."""
 
 from collections.abc import Callable
 from typing import Any
@@ -28,11 +28,11 @@ from jounce.trajectory import HermiteMotion
 from jounce.trajectory.joint_trajectory import MAX_ORDER, JointTrajectory
 
 INSTANTS = 201
-BLOCKS = (256, 1024)  # instants at once, so that little is compiled
-LEAST = 3  # order of the derivatives that laws of joints are made of
-MET = 1e-9  # rad, or sizes of the robot: what may be missed
-RATES = 1e-6  # of a derivative of the path that the tool has to have
-WEAK = 0.05  # of the largest singular value: where a path ends, less is why
+BLOCKS = (256, 1024)  # instants per call, so that few programs are compiled
+LEAST = 3  # least order of the derivatives that laws of joints interpolate
+MET = 1e-9  # rad, or sizes of the robot: largest error of the pose
+RATES = 1e-6  # largest error of a derivative, relative to that of the path
+WEAK = 0.05  # fraction of the largest singular value: a smaller least value explains the end of a path
 JUMP = 1e-3  # m or rad within the shortest interval
 LIMIT = 1e-9  # largest permitted excess of a coordinate over its range
 
@@ -41,7 +41,7 @@ LIMIT = 1e-9  # largest permitted excess of a coordinate over its range
 def _along(
     tree: Tree, arrays: tuple[Any, ...], constants: Any, names: tuple[str, ...], static: tuple[Any, ...], order: int
 ) -> Any:
-    """Return the series of the coordinates, of what is missed, and singular values of the task."""
+    """Return the series of the coordinates and of the errors, the corrections, and singular values of the task."""
     guess, *series = arrays
     target = dict(zip(names, series, strict=True))
     tool, basis, scale, weights = constants
@@ -68,27 +68,27 @@ class ToolPathMotion(Displayed):
     Attributes
     ----------
     robot : Robot
-        As it was given.
+        The robot.
     link : str
-        That carries the tool.
+        The link that carries the tool.
     path : ToolPath
-        That is followed.
+        The path of the tool.
     time : numpy.ndarray of shape (time,)
-        s.
+        Instants, s.
     q : numpy.ndarray of shape (time, order + 1, n)
         Coordinates and their derivatives, rad or m by s; NaN where the status is not OK.
     status : numpy.ndarray of shape (time,)
-        A `Status` for each instant: SINGULAR where the path runs into a singular position, BRANCH_JUMP where it
-        jumps, NOT_REACHED after that,
-        NOT_ASSEMBLED where the tool cannot keep to the path, INADMISSIBLE where a joint leaves its range.
+        A `Status` for each instant: SINGULAR where the path runs into a singular position, BRANCH_JUMP where it jumps,
+        NOT_REACHED after either, NOT_ASSEMBLED where the tool cannot keep to the path, INADMISSIBLE where a joint
+        leaves its range.
     residual : numpy.ndarray of shape (time, order + 1)
-        The largest of what the tool misses, by derivatives: rad, or sizes of the robot, by s.
+        Largest error of the tool and of its derivatives: rad, or sizes of the robot, by s.
     singular_values : numpy.ndarray of shape (time, rank)
-        Of the task, the largest first, lengths in sizes of the robot.
+        Singular values of the task, the largest first, with lengths in sizes of the robot.
     singular : numpy.ndarray of bool, shape (time,)
-        Whether the least of them is near zero: derivatives are large and lose digits there.
+        Whether the least singular value is near zero, so that derivatives are large and lose digits.
     ending : str
-        Why the path could not be followed to its end; empty where it was.
+        Reason why the path could not be followed to its end; empty if it was.
     """
 
     def __init__(
@@ -156,7 +156,7 @@ class ToolPathMotion(Displayed):
         return np.array([float(math.factorial(k)) for k in range(self.order + 1)])
 
     def _why(self) -> tuple[Status, str]:
-        """Return why the path ends before its end: what the joints lose there, or a jump of the path."""
+        """Return the reason why the path could not be followed to its end: a singular position, or a jump."""
         equations, nodes, target, rank, _ = self._parts
         time, u = nodes.time[-1], nodes.series[-1, 0]
         gap = 2.0**-16 * (self.path.stop - self.path.start)
@@ -189,7 +189,7 @@ class ToolPathMotion(Displayed):
         return f"<ToolPathMotion of {self.robot.name}: {solved} of {len(self.time)} instants to order {self.order}>"
 
     def explain(self, index: int) -> str:
-        """Return a description of an instant: what failed and why, and which joints lose a motion."""
+        """Return the result at an instant in words: the failure and its cause, and the joints that lose a motion."""
         status, time, words = Status(int(self.status[index])), float(self.time[index]), []
         if status in (Status.SINGULAR, Status.BRANCH_JUMP, Status.NOT_REACHED):
             return self.ending or f"singular at t = {time:.6g} s"
@@ -218,27 +218,27 @@ class ToolPathMotion(Displayed):
         Parameters
         ----------
         time : array_like of shape (time,)
-            Within the path, s.
+            Instants within the path, s.
         order : int, optional
-            Highest derivative; that of this motion unless given.
+            Highest derivative; by default that of this motion.
         """
         equations, nodes, target, rank, ranges = self._parts
         order = self.order if order is None else order
         return ToolPathMotion(self.robot, self.link, self.path, equations, nodes, target, rank, ranges, time, order)
 
     def trajectory(self) -> JointTrajectory:
-        """Return the motion as laws of the joints, for all that takes a trajectory.
+        """Return the motion as a trajectory of joint laws.
 
-        At the instants of this motion they have its derivatives; in between they are polynomials, which are compared
-        with the exact motion at eight places of each interval: where they would be further from it than 1e-9 rad or m
-        (or of the largest coordinate), instants are added. At a corner of the path the velocities of the laws jump, as
-        those of the tool do, and `retime` refuses them as a kink. `at` is exact everywhere.
+        The laws are polynomials between the instants of this motion, at which they have its derivatives. They are
+        compared with the exact motion at eight places of each interval, and instants are added where the error exceeds
+        1e-9 rad or m (or that fraction of the largest coordinate). At a corner of the path, the velocities of the laws
+        jump like that of the tool, which `retime` refuses as a kink. `at` is exact everywhere.
 
         Raises
         ------
         TrajectoryError
-            If there are no coordinates at an instant, the instants do not increase, or the path has a jump or a spike
-            that is too narrow to be followed: the message names the instant.
+            If an instant has no coordinates, the instants do not increase, or the path has a jump or a spike that is
+            too narrow to be followed; the message names the instant.
         """
         if (self.status != Status.OK).any():
             bad = int(np.argmax(self.status != Status.OK))
@@ -249,7 +249,7 @@ class ToolPathMotion(Displayed):
         return JointTrajectory(laws, float(times[0]), float(times[-1]), np.unique(times))
 
     def _exact(self, order: int) -> Callable[[np.ndarray], np.ndarray]:
-        """Return the function that gives coordinates and their derivatives at instants."""
+        """Return the function from instants to coordinates and their derivatives."""
 
         def exact(instants: np.ndarray) -> np.ndarray:
             return in_chunks(lambda some: known(instants[some]), len(instants), BLOCKS, axis=0)
@@ -277,12 +277,12 @@ def _instants(path: ToolPath, time: Any) -> np.ndarray:
 
 
 def _by_instant(series: np.ndarray) -> np.ndarray:
-    """Return plain derivatives with the instants first, from Taylor coefficients with them last."""
+    """Return plain derivatives, instants first, from Taylor coefficients, instants last."""
     return np.moveaxis(np.asarray(plain_derivatives(series)), -1, 0)
 
 
 def _singular(robot: Robot, equations: PathEquations, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return singular values and right singular vectors of a task where it is done."""
+    """Return the singular values and right singular vectors of a task at coordinates that fulfill it."""
     columns = task_columns(robot, equations.tool, (x * equations.scale)[None], equations.kinds, equations.scale)[0]
     columns = equations.basis.T @ np.concatenate([columns, np.eye(equations.count)[list(equations.fixed_joints)]])
     _, values, shares = np.linalg.svd(columns, full_matrices=False)

@@ -1,4 +1,4 @@
-"""What a tool is to do: be at a place, have an orientation, or point in a direction; as rows that vanish, on jets."""
+"""Tasks of a tool - a position, an orientation or a direction - as rows on jets that vanish when fulfilled."""
 
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -22,23 +22,23 @@ from jounce.robot.recursions.kinematics import frame_at, link_frame
 if TYPE_CHECKING:
     from scipy.spatial.transform import Rotation
 
-UNIT = 1e-6  # largest deviation of a quaternion or a direction from the length of one: printed digits
+UNIT = 1e-6  # largest deviation of the length of a quaternion from one: printed digits
 
 Goal = dict[str, Any]
 """Series of the goals: "position" and "direction" (order, 3, batch), "rotation" (order, 3, 3, batch)."""
 
 
 class Tool(NamedTuple):
-    """Where the tool is on its link, and what measures its error.
+    """Frame of the tool on its link, and scale of its errors.
 
     Attributes
     ----------
     frame : Frame
-        Its point, on the moving body.
+        Frame at the point of the tool, on the moving body.
     axes : array of shape (3, 3)
-        In the frame of the link; the last column is the axis that may have a direction.
+        Axes of the tool in the frame of the link; the last column is the axis of a direction.
     length : float
-        What counts as much as 1 rad, m: the size of the robot.
+        Length that is equivalent to 1 rad, m: the size of the robot.
     """
 
     frame: Frame
@@ -52,7 +52,7 @@ def tool_of(robot: AbstractRobot, link: str, point: ArrayLike, axis: ArrayLike) 
     Raises
     ------
     RobotError
-        If there is no such link, it does not move, or the point or the axis is none.
+        If the link does not exist or does not move, or the point or the axis is not valid.
     """
     joints_of(robot)
     check_name("link", link, robot.frames, RobotError, name="link")
@@ -67,10 +67,10 @@ def tool_of(robot: AbstractRobot, link: str, point: ArrayLike, axis: ArrayLike) 
 
 
 def task_rows(tree: Tree, tool: Tool, q: Any, goal: Goal) -> Float[Numbers, "order row batch"]:
-    """Return what the tool misses, as series: where all rows are zero, and the tool is near, the task is done.
+    """Return the series of the errors of a tool; if all are zero, and the tool is near its goal, the task is fulfilled.
 
-    Rows of the position are in sizes of the robot; those of an orientation are the sine of the angle that is left,
-    about its axis; those of a direction are two components of it across the axis.
+    Rows of a position are in sizes of the robot. Rows of an orientation are the sine of the remaining angle times its
+    axis; rows of a direction are its two components perpendicular to the axis of the tool.
     """
     frame = link_frame(tree, q, tool.frame)
     rows = []
@@ -86,9 +86,9 @@ def task_rows(tree: Tree, tool: Tool, q: Any, goal: Goal) -> Float[Numbers, "ord
 
 
 def misses(tree: Tree, tool: Tool, q: Any, goal: Goal) -> Float[Numbers, "row batch"]:
-    """Return what the tool misses at any distance, without derivatives: the sum of squares grows up to half a turn.
+    """Return the errors of a tool at any distance, whose sum of squares grows with the angle up to half a turn.
 
-    Differences of axes, whose squares add up to that of ``2 sin(angle / 2)`` for an orientation.
+    They are differences of axes; for an orientation, their squares add up to that of ``2 sin(angle / 2)``.
     """
     frame = link_frame(tree, q[None], tool.frame)
     rows = []
@@ -104,18 +104,18 @@ def misses(tree: Tree, tool: Tool, q: Any, goal: Goal) -> Float[Numbers, "row ba
 
 
 def columns_of(function: Any, at: Float[Numbers, "column batch"]) -> Float[Numbers, "row column batch"]:
-    """Return the Jacobian of a function of coordinates, batch last, by its derivatives along each of them."""
+    """Return the Jacobian of a function of coordinates, batch last, by forward differentiation along each."""
     units = jnp.broadcast_to(jnp.eye(len(at))[..., None], (len(at), *at.shape))
     return jax.vmap(lambda unit: jax.jvp(function, (at,), (unit,))[1], out_axes=1)(units)
 
 
 def rotation_matrices(name: str, value: "ArrayLike | Rotation") -> Float[np.ndarray, "*batch 3 3"]:
-    """Return rotation matrices from such, from unit quaternions with the scalar first, or from SciPy's rotations.
+    """Return rotation matrices from matrices, unit quaternions with the scalar first, or SciPy rotations.
 
     Raises
     ------
     RobotError
-        If they are none.
+        If the values are not rotations.
     """
     from scipy.spatial.transform import Rotation
 
@@ -125,7 +125,7 @@ def rotation_matrices(name: str, value: "ArrayLike | Rotation") -> Float[np.ndar
     if array.ndim >= 2 and array.shape[-2:] == (3, 3):
         flat = array.reshape(-1, 3, 3)
         check_rotation(np.moveaxis(flat, 0, -1), name)
-        return Rotation.from_matrix(flat).as_matrix().reshape(array.shape)  # printed digits made orthonormal
+        return Rotation.from_matrix(flat).as_matrix().reshape(array.shape)  # orthonormalizes printed digits
     if array.ndim >= 1 and array.shape[-1] == 4:
         turned = Rotation.from_quat(np.roll(_units(name, array.reshape(-1, 4)), -1, axis=-1))
         return turned.as_matrix().reshape(*array.shape[:-1], 3, 3)
@@ -134,12 +134,12 @@ def rotation_matrices(name: str, value: "ArrayLike | Rotation") -> Float[np.ndar
 
 
 def unit_vectors(name: str, value: ArrayLike) -> Float[np.ndarray, "*batch 3"]:
-    """Return directions of unit length.
+    """Return directions normalized to unit length.
 
     Raises
     ------
     RobotError
-        If they are not vectors, or have no length.
+        If the values are not finite vectors, or a vector is zero.
     """
     array = np.asarray(floats(name, by_component(name, value, RobotError)))
     if array.ndim < 1 or array.shape[-1] != 3:

@@ -1,8 +1,8 @@
-"""The limited quantities of a driven mechanism on the path of its drivers: their motion, force and yank, and outputs.
+"""The limited quantities of a driven mechanism on the path of its drivers: motion, force, yank, and outputs.
 
-The inertial part of the force of a driver is m s'' + c s'^2, whatever the speed; it comes from two motions of the
-mechanism without forces. The rest may depend on the speed in any way: about a time law it is expanded from three
-motions, at that law's speed and a little slower and faster, and once more about the law found with it.
+The inertial part of the force of a driver is m s'' + c s'^2 at any speed; two motions of the mechanism without forces
+determine it. The rest may depend on the speed in any way. It is expanded about a time law from three motions, at the
+speed of the law, slightly slower and slightly faster, and expanded again about the law found with it.
 """
 
 import dataclasses
@@ -29,37 +29,37 @@ from jounce.robot.model.links_and_joints import Limits
 from jounce.trajectory import AbstractMotion, Expression, ExpressionMotion, FollowingMotion
 
 SAMPLES = 2001
-SPEEDS = np.array([0.95, 1.0, 1.05])  # of the time law about which forces are expanded
-SLOW = 1e-3  # of the mean rate: below it a force counts as one at rest
+SPEEDS = np.array([0.95, 1.0, 1.05])  # factors of the time law about which forces are expanded
+SLOW = 1e-3  # fraction of the mean rate below which a force counts as one at rest
 ORDER = 3
 TURN = {"velocity": "rad/s", "acceleration": "rad/s^2", "jerk": "rad/s^3", "torque": "N m", "torque rate": "N m/s"}
 SLIDE = {"velocity": "m/s", "acceleration": "m/s^2", "jerk": "m/s^3", "force": "N", "force rate": "N/s"}
 
-_Points = Float[np.ndarray, " _"]  # of any length
+_Points = Float[np.ndarray, " _"]
 
 
 class MechanismQuantities:
-    """Gives the limited quantities of a mechanism at points of the path that its drivers describe.
+    """The limited quantities of a mechanism at points of the path of its drivers.
 
     Parameters
     ----------
     mechanism : Mechanism
-        Drivers whose laws say, over the time of the mechanism, where they lead.
+        The mechanism; the laws of its drivers over its time are the path.
     limits : dict of str to Limits
-        Of drivers, and of outputs: velocity, acceleration, and for outputs that are one number jerk; of drivers effort
-        and effort_rate (yank) too.
+        Limits of drivers and outputs by name: velocity, acceleration, jerk of drivers and scalar outputs, and effort
+        and effort_rate (yank) of drivers.
 
     Raises
     ------
     MechanismError
-        If there is no driver, or a limit is of nothing there is.
+        If the mechanism has no driver, or a limit names neither a driver nor an output.
     """
 
     def __init__(self, mechanism: Mechanism, limits: Mapping[str, Limits]):
         if not mechanism.drivers:
             raise MechanismError("a mechanism without a driver has no motion to be retimed", name="drivers")
         self.limits = dict(limits)
-        self.changes = np.zeros(0)  # nothing jumps along the path
+        self.changes = np.zeros(0)  # no quantity jumps along the path
         for name, entry in self.limits.items():
             check_name(
                 "driver or output", name, [*mechanism.drivers, *mechanism.outputs], MechanismError, name="limits"
@@ -93,7 +93,7 @@ class MechanismQuantities:
         self.labels = self._labels()
 
     def refer_to(self, law: RateLaw | None) -> None:
-        """Expand the forces of the drivers about a time law; about the times of the mechanism without one."""
+        """Expand the forces of the drivers about a time law, or about the times of the mechanism without a law."""
         if not self.loaded:
             return
         if law is None:
@@ -101,7 +101,7 @@ class MechanismQuantities:
             progress: AbstractMotion = ExpressionMotion("start + t*1", {"start": self.path.start})
             duration = length
         else:
-            motion = rate_motion(law, exact=False)  # of as many pieces each time, so that one program serves all
+            motion = rate_motion(law, exact=False)  # always equally many pieces, so that one program serves all
             progress, duration = FollowingMotion(law.parameter, motion), motion.duration
         times = np.linspace(0.0, duration, SAMPLES)
         s, s1, s2 = np.asarray(progress(Jet.variable(jnp.asarray(times), 2)).dense().derivatives())
@@ -151,13 +151,13 @@ class MechanismQuantities:
         return PathQuantities(first, speeds, second, -upper, upper, -rates, rates, vector, accelerations, fourth, none)
 
     def location(self, s: float) -> str:
-        """Say where on the path a value of s is."""
+        """Return a description of a place on the path for messages."""
         values = self.motions(np.array([s]))[0, 0, : len(self.drivers)]
         listed = ", ".join(f"{name} = {x:.5g}" for name, x in zip(self.drivers, values, strict=True))
         return f"t = {s:.6g} s of the mechanism ({listed})"
 
     def ratios_of(self, progress: AbstractMotion, times: _Points) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return values, bounds and ratios of all quantities of the mechanism in a motion, without any expansion."""
+        """Return values, bounds and ratios of all quantities in a motion, from a solution without expansions."""
         motion = solve(_following(self.mechanism, self.laws, progress), times, ORDER + 2)
         s = np.asarray(progress(Jet.variable(jnp.asarray(times), 0)).derivatives())[0]
         numbers = [np.asarray(motion.driver(name).values) for name in self.drivers]
@@ -185,12 +185,12 @@ class MechanismQuantities:
         return values, bounds, np.abs(values) / bounds
 
     def _inertial(self, grid: _Points) -> "_Table":
-        """Return the table of m, c and their derivatives along the path, of what the drivers do to masses only."""
+        """Return the table of m, c and their derivatives along the path: the inertial part of the driver forces."""
         empty = dataclasses.replace(self.mechanism, forces={}, gravity=None, outputs={})
         start, length = self.path.start, self.path.stop - self.path.start
         even = ExpressionMotion("start + t*1", {"start": start})
         c, c1 = self._forces(even, grid - start, empty)
-        slope = 1 / length  # the rate of s grows from 1/2, its square evenly
+        slope = 1 / length  # the rate of s grows from 1/2, and its square linearly in s
         grown = ExpressionMotion("start + t/2 + slope*t**2/2", {"start": start, "slope": slope})
         square = (0.25 + 2 * slope * (grid - start))[:, None]
         times = (np.sqrt(square[:, 0]) - 0.5) / slope
@@ -201,7 +201,7 @@ class MechanismQuantities:
         return _Table(grid, np.stack([m, c, m1, c1], axis=1))
 
     def _forces(self, progress: AbstractMotion, times: _Points, mechanism: Mechanism) -> tuple[np.ndarray, np.ndarray]:
-        """Return the forces of the loaded drivers and their rates."""
+        """Return the forces of drivers with force limits, and their rates."""
         bare = dataclasses.replace(mechanism, outputs={})
         motion: Motion = solve(_following(bare, self.laws, progress), times, ORDER)
         forces = [np.asarray(driver_force(motion, name).values) for name in self.loaded]
@@ -234,7 +234,7 @@ class MechanismQuantities:
 
 
 class _Scaled(AbstractMotion):
-    """A motion run faster by a factor."""
+    """A motion with its time scaled by a factor."""
 
     motion: AbstractMotion
     factor: Any
@@ -245,7 +245,7 @@ class _Scaled(AbstractMotion):
 
 
 class _Table:
-    """Values over s, between which splines go."""
+    """Values over s, interpolated by monotone cubic splines (PCHIP)."""
 
     def __init__(self, s: _Points, values: np.ndarray):
         from scipy.interpolate import PchipInterpolator
@@ -258,12 +258,12 @@ class _Table:
 
 
 def rate_motion(law: RateLaw, *, exact: bool = True) -> RateMotion:
-    """Return the motion of u in time of a law."""
+    """Return the motion of u over time of a law."""
     return RateMotion(np.linspace(0.0, 1.0, law.basis.cells + 1), law.basis.pieces(law.coefficients), exact=exact)
 
 
 def _law_of(mechanism: Mechanism, name: str) -> AbstractMotion:
-    """Return the law of a driver with numbers in the place of parameters."""
+    """Return the law of a driver with its parameters replaced by numbers."""
     driver: Any = mechanism.drivers[name]
     law, values = driver.motion, mechanism.parameter_values
     if isinstance(law, AbstractMotion):
@@ -273,11 +273,11 @@ def _law_of(mechanism: Mechanism, name: str) -> AbstractMotion:
 
 
 def _following(mechanism: Mechanism, laws: Mapping[str, AbstractMotion], progress: AbstractMotion) -> Mechanism:
-    """Return a mechanism whose drivers go through their laws at another rate."""
+    """Return a mechanism whose drivers follow their laws with another progress."""
     drivers = {
         name: dataclasses.replace(driver, motion=FollowingMotion(laws[name], progress))
         for name, driver in mechanism.drivers.items()
     }
     for driver in drivers.values():
-        settle(driver)  # solving the mechanism warned of their units
+        settle(driver)  # the first solve already warned of their units
     return dataclasses.replace(mechanism, drivers=drivers)

@@ -1,8 +1,8 @@
-"""What is limited along a path: values that are polynomials of the rates of s, whose coefficients come from jets.
+"""Limited quantities along a path: polynomials in the time derivatives of s, with coefficients from jets.
 
-With a path q(s), every quantity of the second order is ``F = m s'' + c s'^2 + d s' + g``, primes on s for time: the
-acceleration of a joint (m = dq/ds, c = d2q/ds2), its torque, the force of a driver, the acceleration of a point. Its
-rate follows from the derivatives of m, c, d and g along the path: jerk, torque rate, yank.
+With a path q(s), every quantity of second order is ``F = m s'' + c s'^2 + d s' + g``, where primes denote time
+derivatives of s: the acceleration of a joint (m = dq/ds, c = d2q/ds2), its torque, the force of a driver, the
+acceleration of a point. Its rate - jerk, torque rate, yank - follows from the derivatives of m, c, d and g by s.
 """
 
 import dataclasses
@@ -17,16 +17,16 @@ M, C, D, G = range(4)
 
 @dataclasses.dataclass(frozen=True)
 class Quantity:
-    """The name of what is limited.
+    """The name of a limited quantity.
 
     Parameters
     ----------
     owner : str
-        Joint, driver, or link.
+        Joint, driver, output or link.
     word : str
         velocity, acceleration, jerk, jounce, torque, torque rate, tool speed, ...
     unit : str
-        Of values and limits.
+        Unit of values and limits.
     """
 
     owner: str
@@ -36,26 +36,26 @@ class Quantity:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class PathQuantities:
-    """Coefficients of the limited quantities at points of a path, and their bounds; infinite where there is none.
+    """Coefficients of the limited quantities at points of a path, and their bounds, infinite for no limit.
 
     Parameters
     ----------
     first : array of shape (point, k1)
-        Value of each quantity of the first order for a rate of s of 1.
+        Value of each quantity of first order for a rate of s of 1.
     first_bounds : array of shape (point, k1)
-        Its largest magnitude.
+        Largest magnitudes of these quantities.
     second : array of shape (point, k2, 8)
         m, c, d, g and their derivatives along the path.
     lower, upper, rate_lower, rate_upper : array of shape (point, k2)
         Ranges of the values, and of their rates.
     vectors : array of shape (point, k3, 3, 2)
-        m and c of vectors, whose magnitude is limited.
+        m and c of vectors with limited magnitudes.
     vector_bounds : array of shape (point, k3)
-        Largest magnitude.
+        Largest magnitudes of the vectors.
     fourth : array of shape (point, k4, 4)
-        First to fourth derivative by s of what has a limit of its fourth derivative by time.
+        First to fourth derivatives by s of coordinates with a limit of their fourth time derivative.
     fourth_bounds : array of shape (point, k4)
-        Its largest magnitude.
+        Largest magnitudes of the fourth time derivatives.
     """
 
     first: Array
@@ -93,7 +93,7 @@ class Curves:
     Parameters
     ----------
     quantities : PathQuantities
-        At some points.
+        Quantities at the points.
     parameter : array of shape (5, point)
         s at the points, and its derivatives by u.
     """
@@ -122,7 +122,7 @@ class Curves:
         self.vector = np.stack([m * s1, m * s2 + c * s1**2])
         q1, q2, q3, q4 = np.moveaxis(q.fourth, -1, 0)
         s1, s2 = s1[..., 0], s2[..., 0]
-        # derivatives by u of what is limited: composition of the path with the parametrization
+        # derivatives by u of the limited coordinates: composition of the path with the parametrization
         self.fourth = np.stack(
             [
                 q1 * s1,
@@ -148,7 +148,7 @@ class Curves:
         return self.speed * w, second, rates, vectors, fourth
 
     def ratios(self, law: Array) -> Float[np.ndarray, "point curve"]:
-        """Return how much of its bound each quantity uses; 1 is at the bound, columns as in `Labels.every`."""
+        """Return the ratio of each quantity to its bound, 1 at the bound, with columns as in `Labels.every`."""
         q = self.quantities
         first, second, rates, vectors, fourth = self.values(law)
         sides = np.maximum(_over(second, q.upper), _over(-second, -q.lower))
@@ -165,31 +165,31 @@ class Curves:
         )
 
     def fourth_ratio(self, law: Array) -> float:
-        """Return the largest ratio of what is limited in the fourth order."""
+        """Return the largest ratio of a quantity of fourth order to its bound."""
         return float(np.max(np.abs(self.values(law)[-1]) / self.quantities.fourth_bounds, initial=0.0))
 
     @np.errstate(invalid="ignore")
     def rows(self, law: Array, eased: float = 1.0) -> tuple[Array, Array, Int[np.ndarray, " row"]]:
-        """Return what linear bounds on z and its derivatives hold at a time law and, where theory allows, imply all.
+        """Return linear bounds on z and its derivatives that are exact at a time law and, if possible, conservative.
 
-        A bound on a rate reads ``linear <= bound / sqrt(z)``: its right side is convex, and the tangent that takes its
-        place lies below it. What has no such form is expanded to first order.
+        A bound on a rate reads ``linear <= bound / sqrt(z)``. Its right side is convex, so that its tangent lies below
+        it. Bounds without such a form are expanded to first order.
 
         Parameters
         ----------
         law : array of shape (4, point)
             z and its derivatives.
         eased : float, default 1
-            What the bounds of the fourth order are multiplied by, while a search comes near them.
+            Factor of the bounds of fourth order, while a search approaches them.
 
         Returns
         -------
         slopes : ndarray of shape (4, point, row)
-            Of z, z', z'', z'''.
+            Coefficients of z, z', z'', z'''.
         right : ndarray of shape (point, row)
-            Bound on the sum, about 1; infinite where there is none.
+            Bound on the sum, about 1; infinite for no limit.
         curve : ndarray of shape (row,)
-            Which curve of `Labels.every` each row belongs to.
+            Number of the curve in `Labels.every` of each row.
         """
         q = self.quantities
         z, z1, z2, _ = (x[:, None] for x in law)
@@ -211,7 +211,7 @@ class Curves:
             size = bound / w
             slopes = (sign * (square + mixed[0]) / size + 1 / (2 * z), sign * (slope / 2 + mixed[1]) / size)
             made.append((*slopes, sign * top / 2 / size, none, 1.5 - sign * (constant + rest) / size))
-        # outer + z' inner / (2 z) <= bound / z, whose last part on the left is expanded
+        # outer + z' inner / (2 z) <= bound / z, with the second term on the left expanded
         a, b, c, d = self.fourth
         inner, share = a * z2 / 2 + 1.5 * b * z1 + c * z, z1 / (2 * z)
         mixed = (share * c - share * inner / z, inner / (2 * z) + share * 1.5 * b, share * a / 2)
@@ -233,27 +233,27 @@ class Curves:
 
 
 def _over(values: Array, bounds: Array) -> Array:
-    """Return values over positive bounds; of a bound that is not positive, how far beyond it they are."""
+    """Return the ratios of values to positive bounds; for other bounds, 1 plus the excess of the values."""
     safe = np.where(bounds > 0, bounds, 1.0)
     return np.where(bounds > 0, values / safe, values - bounds + 1.0)
 
 
 @runtime_checkable
 class Source(Protocol):
-    """Gives the quantities at values of s.
+    """Function from values of s to the limited quantities of a path.
 
     Attributes
     ----------
     changes : array of shape (change,)
-        Values of s at which quantities jump; at these they are those after the jump.
+        Values of s at which quantities jump; at such a value they are those after the jump.
     """
 
     changes: Float[np.ndarray, " change"]
 
     def __call__(self, s: Float[np.ndarray, " point"]) -> PathQuantities:
-        """Return the quantities."""
+        """Return the quantities at values of s."""
         ...
 
     def location(self, s: float) -> str:
-        """Say where on the path a value of s is."""
+        """Return a description of a place on the path for messages."""
         ...

@@ -1,1 +1,1 @@
-"""The rate along a path as a spline, its motion in time, and the convex programs that it comes from."""
+"""The rate along a path as a spline, its motion in time, and the convex programs that determine it."""

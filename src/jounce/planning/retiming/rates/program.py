@@ -10,30 +10,30 @@ from jounce.planning.solver import cone_solver
 
 TOLERANCE = 1e-7
 
-_Points = Float[np.ndarray, " _"]  # of any length
+_Points = Float[np.ndarray, " _"]
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Program:
-    """Least ``sum weights / sqrt(z)`` over the coefficients x of z.
+    """Minimization of ``sum weights / sqrt(z)`` over the coefficients x of z.
 
     Parameters
     ----------
     weights : ndarray of shape (node,)
-        Of a quadrature over u.
+        Weights of a quadrature over u.
     nodes : sparse matrix of shape (node, coefficient)
-        Makes z at its nodes.
+        Matrix from the coefficients to z at the nodes of the quadrature.
     rows : sparse matrix of shape (row, coefficient), and right : ndarray of shape (row,)
         Bounds: ``rows x <= right``.
     cones : sparse matrix of shape (3 * cone, coefficient), and radii : ndarray of shape (cone,)
-        Vectors, whose length is at most a radius.
+        Vectors, with lengths of at most the radii.
     equal : sparse matrix, and equal_right : ndarray
         ``equal x == equal_right``.
     duration : float, optional
-        What the sum may be at most: then ``sum weights z`` is to be least in its place.
+        Upper bound of the sum; the objective is then ``sum weights z``.
     about : ndarray of shape (node,), optional
-        z of a law near the fastest: the sum is then that of its second order about it, as in Newton's method, which
-        takes a third of the time.
+        z of a law near the fastest. The objective is then expanded to second order about it, as in Newton's method,
+        which takes a third of the time.
     """
 
     weights: _Points
@@ -50,16 +50,16 @@ class Program:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Solution:
-    """What came of a program.
+    """Solution of a program.
 
     Parameters
     ----------
     coefficients : ndarray of shape (coefficient,) or None
-        None where there is none.
+        Coefficients of z; None if the program has no solution.
     prices : ndarray of shape (row,)
-        By how much the sum would fall for each unit that a bound were raised.
+        Dual variables: decrease of the objective per unit by which a bound is raised.
     slack : float
-        By how much bounds must at least be exceeded; 0 where all can be kept.
+        Least excess over the bounds; 0 if all can be kept.
     """
 
     coefficients: _Points | None
@@ -68,7 +68,7 @@ class Solution:
 
 
 def solve_program(program: Program, *, elastic: bool = False) -> Solution:
-    """Solve a program with Clarabel; with `elastic`, find by how little bounds must be exceeded instead."""
+    """Return the solution of a program by Clarabel; with `elastic`, minimize the excess over its bounds instead."""
     from scipy import sparse
 
     clarabel = cone_solver()
@@ -89,7 +89,7 @@ def solve_program(program: Program, *, elastic: bool = False) -> Solution:
         objective = program.nodes.T @ (-1.25 * curved * about)
 
     def widened(matrix: Any, unknowns: Any = None) -> Any:
-        """Return a matrix over the coefficients, with columns for the other unknowns, zero unless given."""
+        """Return a matrix over the coefficients with columns for the other unknowns, zero unless given."""
         if not extra:
             return matrix
         return sparse.hstack([matrix, wide((matrix.shape[0], extra)) if unknowns is None else unknowns])
@@ -111,7 +111,7 @@ def solve_program(program: Program, *, elastic: bool = False) -> Solution:
         kinds.append(clarabel.NonnegativeConeT(1))
     if len(program.radii):
         cone = program.cones.tocoo()
-        row = cone.row + cone.row // 3 + 1  # of four rows each, the first is the radius
+        row = cone.row + cone.row // 3 + 1  # the first of the four rows of a cone is the radius
         shape = (4 * len(program.radii), count + extra)
         blocks.append(sparse.coo_matrix((-cone.data, (row, cone.col)), shape=shape))
         sides.append(np.column_stack([program.radii, np.zeros((len(program.radii), 3))]).reshape(-1))

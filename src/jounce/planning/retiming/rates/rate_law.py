@@ -7,7 +7,7 @@ from jaxtyping import Float
 
 from jounce.planning.retiming.rates.rate_spline import Parametrization, RateBasis
 
-_Points = Float[np.ndarray, " _"]  # of any length
+_Points = Float[np.ndarray, " _"]
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -21,7 +21,7 @@ class RateLaw:
     basis : RateBasis
         Splines over u.
     coefficients : ndarray of shape (coefficient,)
-        Of z, 1/s^2.
+        Coefficients of z, 1/s^2.
     """
 
     parameter: Parametrization
@@ -33,7 +33,7 @@ class RateLaw:
         return np.stack([matrix @ self.coefficients for matrix in self.basis.matrices(u)])
 
     def slowed(self, factor: float) -> "RateLaw":
-        """Return the law of the same shape at a rate smaller by a factor."""
+        """Return the law with its rate divided by a factor."""
         return dataclasses.replace(self, coefficients=self.coefficients / factor**2)
 
     @property
@@ -50,13 +50,13 @@ class Conditions:
     Parameters
     ----------
     order : int
-        Highest derivative by time that is continuous, also where the motion comes from rest.
+        Highest time derivative that is continuous, also at ends at rest.
     rates : tuple of float or None
-        Rates of s at the ends, 1/s; zero is rest, and None is free.
+        Rates of s at the ends, 1/s; zero for rest, and None for a free rate.
     max_rate : float or None
-        Rate of s that is not to be exceeded, 1/s; for a parametrization by s itself.
+        Largest rate of s, 1/s; for a parametrization by s itself.
     further : tuple of float
-        Second and third derivative of s at the start, where they are given in addition to the rate.
+        Second and third time derivatives of s at the start, if given in addition to the rate.
     """
 
     order: int
@@ -66,13 +66,13 @@ class Conditions:
 
     @property
     def rests(self) -> tuple[int, int]:
-        """How many derivatives of s by u vanish at the ends, the value counted."""
+        """Number of levels of s by u, including the value, that are fixed at each end."""
         first, last = (self.order + 1 if rate == 0 else 1 for rate in self.rates)
         return first, last
 
 
 def quadrature(cells: int, count: int) -> tuple[_Points, _Points]:
-    """Return nodes and weights of Gauss on each of some cells from 0 to 1."""
+    """Return the nodes and weights of Gauss quadrature on equal cells from 0 to 1."""
     nodes, weights = np.polynomial.legendre.leggauss(count)
     u = (np.arange(cells)[:, None] + (nodes + 1) / 2) / cells
     return u.reshape(-1), np.tile(weights / 2 / cells, cells)

@@ -1,4 +1,4 @@
-"""The motion of the parameter of a path in time, from the square of its rate: exact to rounding, to any order."""
+"""The motion of the parameter of a path over time, from the square of its rate: exact to rounding, to any order."""
 
 from functools import partial
 from typing import Any
@@ -15,9 +15,9 @@ from jounce.jet.pieces import last_begun
 from jounce.trajectory import AbstractMotion
 from jounce.trajectory.beyond import SLACK
 
-NODES = 16  # of Gauss's quadrature on a piece
-NEWTON = 8  # steps: the time over a piece is smooth and grows everywhere
-EXACT = 1e-13  # of the time over a piece: what halves of it may differ by
+NODES = 16  # nodes of Gauss quadrature on a piece
+NEWTON = 8  # steps: the time over a piece is smooth and increases everywhere
+EXACT = 1e-13  # fraction of the time over a piece by which the sum over its halves may differ
 HALVINGS = 12
 
 
@@ -29,11 +29,11 @@ class RateMotion(AbstractMotion):
     Parameters
     ----------
     begins : array_like of shape (pieces + 1,)
-        Where the pieces begin, and where the last one ends.
+        Start of each piece, and the end of the last one.
     pieces : array_like of shape (powers, pieces)
-        Coefficients of z, 1/s^2, in powers of u less the beginning of the piece, lowest first.
+        Coefficients of z, 1/s^2, in powers of u minus the start of the piece, lowest first.
     exact : bool, default True
-        Halve pieces where the quadrature would not be exact to rounding.
+        Halve pieces on which the quadrature is not exact to rounding.
 
     Raises
     ------
@@ -61,7 +61,7 @@ class RateMotion(AbstractMotion):
 
     @property
     def duration(self) -> float:
-        """Time from the beginning of u to its end, s."""
+        """Time from the start of u to its end, s."""
         return float(np.asarray(self.instants)[-1])
 
     def slower(self, factor: float) -> "RateMotion":
@@ -69,7 +69,7 @@ class RateMotion(AbstractMotion):
         return RateMotion(self.begins, np.asarray(self.pieces) / factor**2)
 
     def check_instants(self, first: float, last: float) -> None:
-        """Raise TrajectoryError if some instants are before the beginning or after the end."""
+        """Raise TrajectoryError if an instant is before the start or after the end."""
         stop = self.duration
         if first < -SLACK * stop or last > (1 + SLACK) * stop:
             message = f"the law is defined from 0 to {stop:.9g} s only; choose instants within"
@@ -86,7 +86,7 @@ class RateMotion(AbstractMotion):
             stacked = jax.vmap(_series, in_axes=(1, 1, 2, 0, None), out_axes=0)
             series = stacked(instants[..., 0], begins[..., 0], pieces[..., 0], shared, order)
         rates = time.coefficients[1:]
-        if all(c is None for c in rates[1:]):  # time that goes evenly
+        if all(c is None for c in rates[1:]):  # time at a constant rate
             rate = 1.0 if not rates else 0.0 if rates[0] is None else rates[0]
             return Jet(a * rate**k for k, a in enumerate(series))
         local = Jet((jnp.zeros_like(at), *rates))
@@ -96,7 +96,7 @@ class RateMotion(AbstractMotion):
         return value
 
 
-@partial(jax.jit, static_argnames="order")  # outside of a program the loop would be compiled at each call
+@partial(jax.jit, static_argnames="order")  # otherwise each call would compile the loop
 def _series(instants: Any, begins: Any, pieces: Any, at: Any, order: int) -> tuple[Any, ...]:
     """Return the Taylor coefficients of u at instants."""
     slack = SLACK * instants[-1]
@@ -116,7 +116,7 @@ def _series(instants: Any, begins: Any, pieces: Any, at: Any, order: int) -> tup
     series = [begin + v]
     if order:
         series.append(jnp.sqrt(shifted[0]))
-    # the powers of u - u(t), whose coefficients are found one after the other as those of u are
+    # coefficients of the powers of u - u(t), which follow one after the other like those of u
     powers: list[list[Any]] = [[None] for _ in range(max(len(shifted) - 2, 1))]
     for k in range(order - 1):
         slope = shifted[1] * (1.0 if k == 0 else 0.0)
@@ -138,7 +138,7 @@ def _value(coefficients: Any, v: Any) -> Any:
 
 
 def _shifted(coefficients: Any, v: Any) -> list[Any]:
-    """Return the coefficients of a polynomial in powers of what its argument exceeds v by (Horner, again and again)."""
+    """Return the coefficients of a polynomial in powers of its argument minus v, by repeated Horner schemes."""
     shifted = list(coefficients)
     for k in range(len(shifted) - 1):
         for j in range(len(shifted) - 2, k - 1, -1):
@@ -159,7 +159,7 @@ def _times(
 
 
 def _halved(begins: np.ndarray, pieces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the pieces, those halved on which the quadrature is not exact to rounding."""
+    """Return the pieces, halved where the quadrature is not exact to rounding."""
     for _ in range(HALVINGS):
         lengths = np.diff(begins)
         whole, halves = _times(pieces, lengths), _times(pieces, lengths, 2)

@@ -1,4 +1,4 @@
-"""The square of the rate along a path as a B-spline, and the parametrization in which it is smooth also at rest."""
+"""The square of the rate along a path as a B-spline, and the parametrization in which it is smooth even at rest."""
 
 import dataclasses
 from functools import cached_property
@@ -14,21 +14,21 @@ from jounce.trajectory.splines import local_powers
 SMOOTHNESS = 9  # degree of the parametrization
 KNOT_INTERVALS = 24  # of the parametrization
 
-_Points = Float[np.ndarray, " _"]  # of any length
+_Points = Float[np.ndarray, " _"]
 
 
 class Parametrization(SplineMotion):
-    """The parameter s of a path over u, which runs from 0 to 1: increasing, with derivatives that vanish at rest ends.
+    """The parameter s of a path over u from 0 to 1: increasing, with derivatives that vanish at ends at rest.
 
-    Where a motion starts from rest with a bounded derivative of order p, s grows as the p-th power of the time. With s
-    growing as the p-th power of u, u grows as the time itself: its rate is smooth, and not zero.
+    If a motion starts from rest with a bounded derivative of order p, s grows as the p-th power of time. If s grows as
+    the p-th power of u, u grows linearly in time: its rate is smooth and not zero.
 
     Parameters
     ----------
     u, s : array_like of shape (samples,)
-        What it is to be near, as of an approximate time law: u from 0 to 1, both increasing.
+        Samples to approximate, such as those of an approximate time law: u from 0 to 1, both increasing.
     rests : tuple of int
-        How many derivatives of s, the value counted, vanish at the two ends; 0 or 1 where it does not rest.
+        Number of levels of s, including the value, that are fixed at each end; 0 or 1 if the end is not at rest.
     """
 
     def __init__(self, u: ArrayLike, s: ArrayLike, rests: tuple[int, int]):
@@ -38,7 +38,7 @@ class Parametrization(SplineMotion):
         knots = clamped(KNOT_INTERVALS, SMOOTHNESS)
         count = len(knots) - SMOOTHNESS - 1
         greville = np.array([knots[k + 1 : k + 1 + SMOOTHNESS].mean() for k in range(count)])
-        # a spline with increasing coefficients increases; as many as are alike at an end, so many derivatives vanish
+        # a spline with increasing coefficients increases; k equal coefficients at an end make k - 1 derivatives vanish
         values = np.interp(greville, u, s)
         for end, resting in zip((slice(None), slice(None, None, -1)), rests, strict=True):
             values[end][: max(resting, 1)] = s[end][0]
@@ -61,7 +61,7 @@ def _derived(powers: np.ndarray, times: int) -> np.ndarray:
 
 
 def clamped(intervals: int, degree: int) -> _Points:
-    """Return evenly spaced knots from 0 to 1, those at the ends repeated."""
+    """Return evenly spaced knots from 0 to 1, repeated at the ends."""
     return np.concatenate([np.zeros(degree), np.linspace(0.0, 1.0, intervals + 1), np.ones(degree)])
 
 
@@ -72,9 +72,9 @@ class RateBasis:
     Parameters
     ----------
     cells : int
-        How many.
+        Number of cells.
     degree : int
-        Of the splines.
+        Degree of the splines.
     """
 
     cells: int
@@ -91,7 +91,7 @@ class RateBasis:
         return self.cells + self.degree
 
     def matrices(self, u: _Points, order: int = 3) -> list[Any]:
-        """Return the sparse matrices that make values and derivatives at points of the coefficients."""
+        """Return the sparse matrices from coefficients to values and derivatives at points."""
         from scipy import sparse
         from scipy.interpolate import BSpline
 
@@ -116,7 +116,7 @@ class RateBasis:
         return matrices
 
     def compact(self, u: _Points, matrices: list[Any]) -> tuple[Any, Any]:
-        """Return of matrices at points the first spline that is not zero at each, and the entries from it on.
+        """Return the first nonzero spline at each point, and the entries of matrices from that spline on.
 
         Returns
         -------
@@ -130,7 +130,7 @@ class RateBasis:
         return first, np.stack(entries)
 
     def pieces(self, coefficients: _Points) -> Float[np.ndarray, "powers cell"]:
-        """Return the polynomials on the cells, as coefficients of powers of u less the beginning, lowest first."""
+        """Return the polynomials on the cells, as coefficients of powers of u minus its start, lowest first."""
         from scipy.interpolate import BSpline
 
         begins = np.linspace(0.0, 1.0, self.cells + 1)[:-1]
