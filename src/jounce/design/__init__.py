@@ -1,4 +1,4 @@
-"""Design: parameters that vary, designs with the least objective, and the spread by tolerances."""
+"""Design: parameter variations, design optimization, and the spread of outputs by tolerances."""
 
 from jounce.design.optimization.optimize import optimize as optimize
 from jounce.design.optimization.result import OptimizedDesign as OptimizedDesign

@@ -6,11 +6,11 @@ from jounce.design.objectives.language import EXERTED, MEASURES, Node, operated
 from jounce.errors import ExpressionError
 from jounce.kinematics.position_analysis.solve import HIGHEST_ORDER
 
-MAX_DERIVATIVE = HIGHEST_ORDER - 2  # of goals: they need its first and second rate, too
+MAX_DERIVATIVE = HIGHEST_ORDER - 2  # of goals, which also need its first and second rate
 
 
 class Arguments:
-    """Reads the arguments of measures, which are the same in all designs.
+    """Reader of the arguments of measures, which are the same in all designs.
 
     Parameters
     ----------
@@ -30,7 +30,7 @@ class Arguments:
         self.instants: list[float] = []
 
     def constant(self, node: Node) -> float | None:
-        """Return the value of a number that is the same in all designs, None for one that may not be."""
+        """Return the value of an expression that is the same in all designs; None if it may vary."""
         if node.kind == "number":
             return float(node.word)
         if node.kind == "name":
@@ -41,7 +41,7 @@ class Arguments:
         return None if None in parts else float(operated(node.word, parts))
 
     def argument(self, node: Node, what: str) -> float:
-        """Return a number that must be the same in all designs."""
+        """Return the value of an argument, which must be the same in all designs."""
         value = self.constant(node)
         if value is None:
             message = f"{what} '{node.text}' must be a number that is the same in all designs"

@@ -1,4 +1,4 @@
-"""Whether the sides of a condition can be compared: a span of an angle is no length."""
+"""Check of dimensions of the sides of a condition: a span of an angle is not a length."""
 
 from jounce.design.objectives.language import EXERTED, MEASURES, OVER_TIME, Node, Relation
 from jounce.design.objectives.quantities import Quantities
@@ -17,7 +17,7 @@ def check_dimensions(relation: Relation, quantities: Quantities) -> None:
 
 
 def _dimension(node: Node, quantities: Quantities) -> Dimension | None:
-    """Return the dimension of a parameter or of a measure of one quantity, or None where it is not known."""
+    """Return the dimension of a parameter or of a measure of one quantity; None if unknown."""
     if node.kind == "name":
         return next(iter(quantities.mechanism.dimensions.get(node.word, ())), None)
     if node.kind != "call" or not node.parts:

@@ -1,4 +1,4 @@
-"""Objectives and conditions as text: ``peak(psi, 4)``, ``span(C_x) <= 2 mm``; parsed as every other expression."""
+"""Objectives and conditions as text: ``peak(psi, 4)``, ``span(C_x) <= 2 mm``; parsed like other expressions."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ OVER_TIME: dict[str, tuple[int, ...]] = dict.fromkeys(
     (1, 2, 4),  # the quantity, its derivative, and the two ends of the window of time
 )
 MEASURES: dict[str, tuple[int, ...]] = {**OVER_TIME, "at": (2, 3), "path_error": (2,), "path_deviation": (2,)}
-"""Measures, which make one number of a quantity that changes in time, with their permitted numbers of arguments."""
+"""Measures, which reduce a time-dependent quantity to one number, with their permitted numbers of arguments."""
 
 EXERTED: dict[str, tuple[int, ...]] = {
     f"{kind}{component}": (1,) for kind in ("force", "torque") for component in ("", "_x", "_y", "_z")
@@ -49,7 +49,7 @@ class Node:
 
     @property
     def text(self) -> str:
-        """The step as it would be written."""
+        """The step as text."""
         words = [part.text for part in self.parts]
         if self.kind != "call":
             return f"{self.word:g}" if self.kind == "number" else self.word
@@ -61,11 +61,11 @@ class Node:
 
     @property
     def is_measured(self) -> bool:
-        """Whether it contains a measure of the motion."""
+        """Whether the expression contains a measure of the motion."""
         return self.word in MEASURES or any(part.is_measured for part in self.parts)
 
     def names(self) -> set[str]:
-        """Return the names in it."""
+        """Return the names in the expression."""
         names = {self.word} if self.kind == "name" else set()
         return names.union(*(part.names() for part in self.parts))
 
@@ -82,7 +82,7 @@ class Relation:
     equal : bool
         Whether both must be equal.
     dimensions : tuple of Dimension or None
-        Dimensions of both sides, where they have a unit.
+        Dimensions of sides with a unit.
     """
 
     text: str
@@ -100,12 +100,12 @@ class Relation:
 
 
 def parsed(text: str) -> Node:
-    """Return an expression of measures as nested steps.
+    """Return a parsed expression of measures as nested steps.
 
     Raises
     ------
     ExpressionError
-        It contains something that is not allowed; the message names it and its column.
+        If the text contains something that is not allowed; the message names it and its column.
     """
     return Expression(text, functions=WORDS).folded(
         lambda number: Node("number", number),
@@ -115,14 +115,14 @@ def parsed(text: str) -> Node:
 
 
 def parsed_relations(text: str) -> list[Relation]:
-    """Return the conditions in a text: ``a <= b``, ``a == b``, or ``a <= b <= c``, which are two.
+    """Return the conditions in a text: ``a <= b``, ``a == b``, or ``a <= b <= c``, which gives two.
 
     A side that is a number may have a unit.
 
     Raises
     ------
     ExpressionError, UnitError
-        It is no comparison, or a side of it cannot be read.
+        If the text is not a comparison, or a side cannot be read.
     """
     if not isinstance(text, str):
         raise ExpressionError("a condition must be text, such as 'span(psi) == 60 deg'", value=text)
@@ -157,7 +157,7 @@ def _side(text: str) -> tuple[Node, Dimension | None]:
 
 
 def folded(node: Node, number: Callable[[Any], Any], name: Callable[[str], Any], call: Callable[..., Any]) -> Any:
-    """Return the result of functions for numbers, names and calls on an expression; calls get their own node."""
+    """Return the fold of an expression by functions of numbers, names and calls; calls get their node."""
     if node.kind == "number":
         return number(node.word)
     if node.kind == "name":
@@ -173,7 +173,7 @@ def operated(word: str, values: list[Any]) -> Any:
     else:
         text = f"{word}({', '.join(names)})" if word in FUNCTIONS else f"x0 {word} x1"
     whole = word == "**" and isinstance(values[1], float)
-    if whole:  # a whole number as exponent is known as such
+    if whole:  # keep a whole exponent as a literal
         return Expression(f"x0 ** ({values[1]!r})").evaluate({"x0": values[0]})
     return Expression(text).evaluate(dict(zip(names, values, strict=True)))
 
@@ -189,7 +189,7 @@ def refuse_name(name: str, known: Mapping[str, str], text: str) -> ExpressionErr
 
 
 def varying_message(text: str) -> MechanismError:
-    """Return the error for a quantity that is compared or minimized though it changes in time."""
+    """Return the error for a time-dependent quantity that is compared or minimized."""
     return MechanismError(
         f"changes in time; reduce it to one number, for example by peak({text}), rms({text}), mean({text}), "
         f"span({text}), "

@@ -1,8 +1,8 @@
-"""Measures, which make one number of a quantity that changes in time: largest value, mean, distance from points.
+"""Measures, which reduce a time-dependent quantity to one number: largest value, mean, distance from points.
 
-A motion has a Taylor series about each instant of a grid, which gives it between instants too: every instant has a
-cell, up to halfway to its neighbors, where its series represents the quantity. The largest value in a cell is a smooth
-function of a design, by the envelope theorem: its slope is that of the value at the fixed instant.
+The Taylor series of a motion about the instants of a grid represent it between the instants as well: each instant has a
+cell, up to halfway to its neighbors, in which its series holds. The largest value in a cell is a smooth function of the
+design: by the envelope theorem, its slope is that of the value at the fixed instant.
 """
 
 import dataclasses
@@ -19,11 +19,11 @@ from jounce.base.shapes import Numbers
 from jounce.jet import Jet
 from jounce.trajectory.law_checks.breaks import with_sides
 
-SAMPLES = 9  # of a cell, from which the search for its largest value starts
-ROUNDS = 6  # of Newton's method from the best of them
+SAMPLES = 9  # samples of a cell in the search for its largest value
+ROUNDS = 6  # of Newton's method from the best sample
 
 NO_KNOTS = np.zeros(0)
-NEAR = 1e-9  # of the duration: instants so near to each other are one
+NEAR = 1e-9  # fraction of the duration: instants nearer to each other coincide
 
 Series = Float[Numbers, "order *cell"]
 """Taylor coefficients about the instants of a grid."""
@@ -31,12 +31,12 @@ Series = Float[Numbers, "order *cell"]
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Cells:
-    """The intervals of time that the series about the instants represent.
+    """The intervals of time in which the series about the instants hold.
 
     Parameters
     ----------
     instants : array of shape (time,)
-        s.
+        Instants, s.
     index : array of int of shape (cells,)
         Indices of the instants whose cells overlap the window.
     low, high : array of shape (cells,)
@@ -55,25 +55,25 @@ class Cells:
         start: float | None = None,
         stop: float | None = None,
     ) -> "Cells":
-        """Return the cells of a grid within a window, all of it unless given.
+        """Return the cells of a grid within a window, by default the whole grid.
 
-        Those of the two instants on both sides of a knot of a motion law meet at the knot.
+        The cells of the two instants on both sides of a knot of a motion law meet at the knot.
         """
         middles, pairs = (instants[1:] + instants[:-1]) / 2, np.diff(instants) < NEAR * (instants[-1] - instants[0])
-        if pairs.any():  # a knot at an end is that end
+        if pairs.any():  # a knot at an end coincides with that end
             middles[0] = instants[0] if pairs[0] else middles[0]
             middles[-1] = instants[-1] if pairs[-1] else middles[-1]
         first, last = instants[0] if start is None else start, instants[-1] if stop is None else stop
         low = np.maximum(np.concatenate([instants[:1], middles]), first)
         high = np.minimum(np.concatenate([middles, instants[-1:]]), last)
         (index,) = np.nonzero((high - low > NEAR * (instants[-1] - instants[0])) | ((high == low) & (first == last)))
-        if not index.size:  # a window of one instant, at which two cells meet
+        if not index.size:  # a window of one instant where two cells meet
             index = np.array([int(np.argmin(np.abs(instants - first)))])
             low[index] = high[index] = first
         return cls(instants, index, low[index] - instants[index], high[index] - instants[index])
 
     def at(self, time: float) -> tuple[int, float]:
-        """Return the nearest instant, and how far a time is from it, s."""
+        """Return the number of the nearest instant, and the distance of a time from it, s."""
         nearest = int(np.argmin(np.abs(self.instants - time)))
         duration = float(self.instants[-1] - self.instants[0])
         if (
@@ -84,7 +84,7 @@ class Cells:
 
 
 def derivative(jet: Jet, order: int) -> Series:
-    """Return the Taylor coefficients of a derivative of a quantity, the order first."""
+    """Return the Taylor coefficients of a derivative of a quantity, order first."""
     coefficients = jnp.stack(jet.dense().coefficients)
     count = len(coefficients) - order
     scale = np.array([math.factorial(k + order) / math.factorial(k) for k in range(count)])
@@ -92,7 +92,7 @@ def derivative(jet: Jet, order: int) -> Series:
 
 
 def value(series: Series, shift: Any) -> Any:
-    """Return the values of series at times seen from their instants."""
+    """Return the values of series at times relative to their instants."""
     result = jnp.zeros_like(series[-1] * shift)
     for coefficient in series[::-1]:
         result = result * shift + coefficient
@@ -107,7 +107,7 @@ def slope_of(series: Series) -> Float[Numbers, "lower *cell"]:
 
 
 def top(series: Float[Numbers, "order cell"], cells: Cells) -> Float[Numbers, " cell"]:
-    """Return when, seen from its instant, each series is largest in its cell; nothing is differentiated."""
+    """Return the time, relative to its instant, at which each series is largest in its cell, as a constant for JAX."""
     series = jax.lax.stop_gradient(series)
     share = np.linspace(0.0, 1.0, SAMPLES)[:, None]
     width = cells.high - cells.low
@@ -148,7 +148,7 @@ def square(series: Series) -> Series:
 
 
 def safe_root(square: Any) -> Any:
-    """Return a square root whose slope is zero, not infinite, where it is zero."""
+    """Return a square root with the slope zero, not infinite, at zero."""
     positive = square > 0
     return jnp.where(positive, jnp.sqrt(jnp.where(positive, square, 1.0)), 0.0)
 
@@ -159,7 +159,7 @@ def gaps(
     times: Float[np.ndarray, " point"] | None,
     cells: Cells,
 ) -> Float[Numbers, "component point"]:
-    """Return the distances of points from a point of the motion at their times, or where it comes nearest."""
+    """Return the vectors from points to a point of the motion, at their times or where it is nearest."""
     if times is not None:
         positions = [cells.at(float(time)) for time in times]
         index, shift = np.array([k for k, _ in positions]), np.array([h for _, h in positions])
@@ -182,14 +182,14 @@ def gaps(
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class PrescribedPath:
-    """Points that a point of a mechanism is to pass, in an order or at times.
+    """Points that a point of a mechanism should pass, at any time or at given times.
 
     Parameters
     ----------
     points : array of shape (points, components)
-        m.
+        Points, m.
     times : array of shape (points,), optional
-        When it is to be there, s; at any time unless given.
+        Instant for each point, s; any instant unless given.
     """
 
     points: Float[np.ndarray, "point component"]
@@ -199,14 +199,14 @@ class PrescribedPath:
 def environment(
     instants: Float[np.ndarray, " time"], parameters: Mapping[str, Any], series: Mapping[str, Any], order: int
 ) -> dict[str, Any]:
-    """Return the values of names: time, to an order, and quantities are jets along the grid, parameters are numbers."""
+    """Return the values of names: jets along the grid for time and quantities, numbers for parameters."""
     return {**parameters, "t": Jet.variable(instants, order), **{name: Jet(tuple(x)) for name, x in series.items()}}
 
 
 def at_instants(
     values: Sequence[float], instants: Float[np.ndarray, " given"], knots: Float[np.ndarray, " knots"] = NO_KNOTS
 ) -> Float[np.ndarray, " time"]:
-    """Return a grid with the instants that measures name, and those on both sides of the knots of laws."""
+    """Return a grid with the instants of measures, and with instants on both sides of the knots of laws."""
     merged = np.unique(np.concatenate([instants, np.asarray(values, float)]))
     gaps = np.diff(merged)
     close = np.concatenate([[False], gaps < NEAR * (merged[-1] - merged[0] or 1.0)])
@@ -219,6 +219,6 @@ def at_instants(
 def _near(
     some: Float[np.ndarray, " some"], others: Float[np.ndarray, " others"], grid: Float[np.ndarray, " time"]
 ) -> Bool[np.ndarray, " some"]:
-    """Return which instants coincide with one of some others."""
+    """Return the mask of instants that coincide with an instant of a second set."""
     distances = np.abs(some[:, None] - others).min(axis=1, initial=np.inf)
     return distances < NEAR * (grid[-1] - grid[0] or 1.0)

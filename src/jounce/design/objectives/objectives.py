@@ -1,4 +1,4 @@
-"""The meaning of objectives and conditions: names become quantities of a mechanism, measures become numbers."""
+"""Evaluation of objectives and conditions: names become quantities of a mechanism, measures become numbers."""
 
 import dataclasses
 from collections.abc import Callable, Mapping, Sequence
@@ -41,10 +41,10 @@ from jounce.kinematics.position_analysis.solve import HIGHEST_ORDER
 from jounce.mechanism import Mechanism
 from jounce.mechanism.laws.output_drivers import with_outputs
 
-BEYOND = 5  # derivatives beyond the requested ones, which give a quantity between instants
+BEYOND = 5  # derivatives beyond the requested ones, for the values between instants
 
 Numbers = Callable[[Mapping[str, Any], Any, Any], Any]
-"""A number of a design: of its parameters, the extremes of quantities, and other measures."""
+"""A number of a design as a function of its parameters, the extremes of quantities, and other measures."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -54,9 +54,9 @@ class Condition:
     Parameters
     ----------
     relation : Relation
-        The condition as the user states it.
+        The condition as stated by the user.
     number : callable
-        Left side less the right one.
+        Left side minus right side.
     left, right : callable
     """
 
@@ -69,9 +69,9 @@ class Condition:
 class Goals:
     """Objective and conditions as functions of the motion of a mechanism.
 
-    Quantities become numbers in two ways. Extremes are the largest of the values in some cells of time; where a goal
-    grows with one, an optimizer may replace it by a variable that none of these values may exceed, which is smooth
-    where the cell of the largest changes. All other measures are smooth as they are.
+    Measures are of two kinds. An extreme is the largest of the values in cells of time; if a goal increases with it, an
+    optimizer may replace it by a variable that bounds these values, so that the goal stays smooth where the cell of the
+    largest value changes. All other measures are smooth themselves.
 
     Parameters
     ----------
@@ -85,27 +85,27 @@ class Goals:
     curves : dict of str to PrescribedPath
         Points for paths, by name.
     instants : array of shape (time,)
-        s.
+        Instants, s.
     knots : array of shape (knots,), optional
         Instants at which derivatives of motion laws jump in all designs, s.
 
     Attributes
     ----------
     mechanism : Mechanism
-        With the outputs that are needed.
+        The mechanism with the required outputs.
     instants : array of shape (time,)
-        The given instants, with those that measures name.
+        The given instants with those of measures.
     order : int
         Order of the motion.
     objective : callable
         The function that an optimizer minimizes.
     objective_value : callable
-        The objective as stated; `objective` may be its square, which is smooth where it is zero.
+        The objective as stated; `objective` may be its square, which is smooth at zero.
     conditions : list of Condition
     bounded : list of bool
-        For each extreme, whether a goal grows with it.
+        Whether a goal increases with each extreme.
     gaps : range, optional
-        Indices of the smooth measures that are the distances, by coordinate, whose mean square is the objective.
+        Indices of the smooth measures whose mean square is the objective: the distances by coordinate.
     """
 
     def __init__(
@@ -142,7 +142,7 @@ class Goals:
         self.mechanism = with_outputs(mechanism, {**outputs_left, **self.quantities.added})
 
     def set_instants(self, instants: Float[np.ndarray, " time"]) -> None:
-        """Change the grid."""
+        """Replace the grid of instants."""
         self.instants = at_instants(self._arguments.instants, instants, self._knots)
         self._cells = [Cells.of(self.instants, *window) for window in self._windows]
         self._whole = Cells.of(self.instants)
@@ -156,14 +156,14 @@ class Goals:
         return series
 
     def measured(self, parameters: Mapping[str, Any], outputs: Mapping[str, Any]) -> tuple[list[Any], Any]:
-        """Return the values whose largest are the extremes, one array for each, and the smooth measures, (measures,).
+        """Return the values of each extreme, of which it is the largest, and the smooth measures, (measures,).
 
         Parameters
         ----------
         parameters : dict of str to number
-            Those that are varied.
+            Parameters that are varied.
         outputs : dict of str to array of shape (time, derivative) or (time, derivative, component)
-            Of a motion.
+            Outputs of a motion.
         """
         names = environment(self.instants, self._values(parameters), self.series(outputs), self.order)
         rows = [extreme(names, cells) for extreme, cells in zip(self._extremes, self._cells, strict=True)]
@@ -171,7 +171,7 @@ class Goals:
         return rows, jnp.concatenate([*smooth, jnp.zeros(0)])
 
     def numbers(self, parameters: Mapping[str, Any], extremes: Any, smooth: Any, *, as_stated: bool = False) -> Any:
-        """Return the objective, then the conditions as numbers that must be zero, or not above it, (goals,)."""
+        """Return the objective, then the conditions as numbers that must be zero, or at most zero, (goals,)."""
         names = self._values(parameters)
         objective = self.objective_value if as_stated else self.objective
         numbers = [objective(names, extremes, smooth), *(c.number(names, extremes, smooth) for c in self.conditions)]
@@ -185,7 +185,7 @@ class Goals:
         ]
 
     def _values(self, parameters: Mapping[str, Any]) -> dict[str, Any]:
-        """Return the values of all parameters, including those that follow from others."""
+        """Return the values of all parameters, including dependent ones."""
         return self._original.with_parameters(**parameters).parameter_values
 
     def _series(self, node: Node, order: int) -> Callable[[Mapping[str, Any]], Any]:
@@ -201,7 +201,7 @@ class Goals:
 
         def series(names: Mapping[str, Any]) -> Any:
             jet = quantity(names)
-            if not hasattr(jet, "coefficients"):  # a number, which does not change
+            if not hasattr(jet, "coefficients"):  # a constant
                 jet = names["t"] * 0.0 + jet
             return derivative(jet, order)
 
@@ -210,7 +210,7 @@ class Goals:
     # numbers
 
     def _number(self, node: Node, sign: int | None) -> Numbers:
-        """Return a number; goals grow with it (`sign` 1), shrink (-1), or neither is known (None)."""
+        """Return a number; goals increase with it (`sign` 1), decrease (-1), or neither is known (None)."""
         if node.kind == "number":
             return lambda *_: float(node.word)
         if node.kind == "name":
@@ -229,7 +229,7 @@ class Goals:
         return lambda names, extremes, smooth: operated(node.word, [part(names, extremes, smooth) for part in parts])
 
     def _signs(self, node: Node, sign: int | None) -> Sequence[int | None]:
-        """Return how goals grow with the parts of an operation, where that holds for all values."""
+        """Return the signs with which goals depend on the operands of an operation; None where values decide."""
         if sign is None:
             return [None] * len(node.parts)
         match node.word:
@@ -282,7 +282,7 @@ class Goals:
         return lambda *known: known[2][index]
 
     def _smooth_block(self, measure: Quantity, count: int) -> range:
-        """Add measures that are evaluated together, and return their indices."""
+        """Add smooth measures that are evaluated together, and return their indices."""
         self._smooth.append(measure)
         self._smooth_count += count
         return range(self._smooth_count - count, self._smooth_count)
@@ -318,7 +318,7 @@ class Goals:
         return lambda *known: known[1][index]
 
     def _path(self, node: Node, sign: int | None) -> Numbers:
-        """Return the error of a path: the root mean square distance of points from it, or the largest distance."""
+        """Return the error of a path: the root mean square or the largest distance of points from it."""
         deviation, _ = self._gaps(node)
 
         def squares(names: Mapping[str, Any]) -> Any:
@@ -329,7 +329,7 @@ class Goals:
         return self._added_extreme(lambda names, _: safe_root(squares(names)), (None, None), sign)
 
     def _gaps(self, node: Node) -> tuple[Quantity, int]:
-        """Return the distances of points of a curve from the path of a point, (component, point), and their count."""
+        """Return the vectors from points of a curve to the path of a point, (component, point), and their count."""
         point, curve = (part.word for part in node.parts)
         output = self._original.outputs.get(point) if isinstance(point, str) else None
         labels = () if output is None else output.component_labels(self._original)
@@ -363,7 +363,7 @@ class Goals:
         return bool(self._original.outputs[name].component_labels(self._original))
 
     def _squared(self, node: Node) -> Numbers | None:
-        """Return the square of an objective that is a root, None for any other: it is smooth where it is zero."""
+        """Return the square of an objective that is a root, which is smooth at zero; None for other objectives."""
         if node.kind != "call" or node.word not in ("rms", "path_error"):
             return None
         subject, *rest = node.parts

@@ -1,4 +1,4 @@
-"""Names in expressions as quantities of a mechanism that change in time: outputs, components, rates, forces."""
+"""Names in expressions as time-dependent quantities of a mechanism: outputs, components, rates, forces."""
 
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
@@ -12,11 +12,11 @@ from jounce.mechanism.laws.driver_outputs import is_turning
 from jounce.trajectory import Expression
 
 Quantity = Callable[[Mapping[str, Any]], Any]
-"""A quantity that changes in time, as a jet along the grid, from what names mean."""
+"""Function from the values of names to a time-dependent quantity, a jet along the grid."""
 
 
 class Quantities:
-    """The meaning of names in expressions of a mechanism, and the quantities that they use.
+    """Resolution of names in expressions of a mechanism, with the quantities in use.
 
     Parameters
     ----------
@@ -31,7 +31,7 @@ class Quantities:
     known : dict of str to str
         Kind of each name.
     atoms : dict of str to (str, int or None, int)
-        Quantities that are used: the output, its component, and how often it is differentiated.
+        Quantities in use: output, component, and order of the derivative.
     added : dict of str to AbstractQuantity
         Outputs that the mechanism does not have, by name.
     text : str
@@ -58,7 +58,7 @@ class Quantities:
         return dimensions
 
     def check_meaning(self, name: str) -> None:
-        """Raise ExpressionError for a name with several meanings: a choice among them could be wrong."""
+        """Raise ExpressionError if a name has several meanings, as a choice could be wrong."""
         stem, order = _derivative_name(name)
         meanings = ["the time"] * (name == "t") + ["a parameter"] * (name in self.mechanism.parameters)
         meanings += ["an output"] * (name in self.mechanism.outputs)
@@ -72,7 +72,7 @@ class Quantities:
             raise ExpressionError(f"'{name}' is {listed} of this mechanism; give one of them another name")
 
     def atom(self, text: str) -> Quantity:
-        """Return a quantity of the mechanism by its name, with a derivative such as ``psi_d2``."""
+        """Return a quantity of the mechanism by its name, which may have a suffix such as ``_d2``."""
         name, lost = (text, 0) if text in self.known else _derivative_name(text)
         if self.known.get(name) == "points and vectors":
             labels = self.mechanism.outputs[name].component_labels(self.mechanism)
@@ -85,14 +85,14 @@ class Quantities:
         return lambda names: names[text]
 
     def output_of(self, name: str) -> tuple[str, int | None]:
-        """Return the output of a quantity, and which of its components it is."""
+        """Return the output of a quantity, and the number of its component."""
         if name in self.mechanism.outputs:
             return name, None
         stem, _, label = name.rpartition("_")
         return stem, self.mechanism.outputs[stem].component_labels(self.mechanism).index(label)
 
     def _exerted(self, node: Node) -> Quantity:
-        """Return a force or torque of a driver or a joint."""
+        """Return the force or torque of a driver or a joint."""
         (subject,) = node.parts
         kind, _, component = node.word.partition("_")
         mechanism = self.mechanism
@@ -124,7 +124,7 @@ class Quantities:
         return text
 
     def jet(self, node: Node) -> Quantity:
-        """Return an expression as a quantity that changes in time."""
+        """Return an expression as a time-dependent quantity."""
         if node.kind == "number":
             return lambda _: float(node.word)
         if node.kind == "name":
@@ -144,13 +144,13 @@ class Quantities:
 
 
 def _derivative_name(text: str) -> tuple[str, int]:
-    """Return the name of a quantity and the order of the derivative of it that a name such as ``psi_d2`` means."""
+    """Return the quantity and the order of the derivative in a name such as ``psi_d2``."""
     stem, _, digits = text.rpartition("_d")
     return (stem, int(digits)) if stem and digits.isdecimal() and len(digits) < 4 else (text, 0)
 
 
 def _independent(mechanism: Mechanism, varied: set[str]) -> dict[str, float]:
-    """Return the values of those parameters that are the same in all designs."""
+    """Return the values of the parameters that are the same in all designs."""
     changing, count = set(varied), -1
     while len(changing) > count:
         count = len(changing)
@@ -162,7 +162,7 @@ def _independent(mechanism: Mechanism, varied: set[str]) -> dict[str, float]:
 
 
 def _exerted_by(mechanism: Mechanism, name: str, kind: str, component: str) -> AbstractQuantity:
-    """Return the output for the force of a driver along its coordinate, or of a joint on its second body."""
+    """Return the output of the force of a driver along its coordinate, or of a joint on its second body."""
     driver = mechanism.drivers.get(name)
     if driver is None or component:
         return JointForceOutput(name) if kind == "force" else JointTorqueOutput(name)
@@ -174,7 +174,7 @@ def _exerted_by(mechanism: Mechanism, name: str, kind: str, component: str) -> A
 
 @contextmanager
 def naming_errors(name: str, whole: bool = False) -> Iterator[None]:
-    """Put a name before the location of errors, or in its place."""
+    """Prefix the location of errors with a name, or replace it by the name."""
     try:
         yield
     except JounceError as error:

@@ -1,1 +1,1 @@
-"""The search for the design with the least objective."""
+"""Design optimization: the search for the design with the least objective."""

@@ -1,4 +1,4 @@
-"""Where derivatives of laws jump, whatever the design: no series about an instant goes on beyond."""
+"""Instants at which derivatives of laws jump in every design, beyond which no Taylor series extends."""
 
 from collections.abc import Mapping
 
@@ -9,24 +9,24 @@ from jounce.mechanism import Mechanism
 from jounce.mechanism.laws.law_breaks import breaks_of_laws
 from jounce.trajectory.law_checks.smoothness import HIGHEST
 
-MOST_KNOTS = 200  # more of them, as of a spline through many samples, are left where they are
-SAME = 2e-11  # of a span of time: kinks of expressions are found to half of that
+MOST_KNOTS = 200  # more knots, as of a spline through many samples, are ignored
+SAME = 2e-11  # fraction of the duration: kinks of expressions are found to half of it
 
 
 def law_knots(
     mechanism: Mechanism, bounds: Mapping[str, tuple[float, float]], first: float, last: float
 ) -> Float[np.ndarray, " knots"]:
-    """Return the instants at which laws of drivers, or of the outputs they follow from, jump in some derivative, s.
+    """Return the instants at which a derivative of a driver law, or of the law of an output driver, jumps, s.
 
-    Laws of forces count where outputs are forces, unless there are too many knots.
+    Laws of forces are included if outputs are forces, unless they have too many knots.
 
     Parameters
     ----------
     mechanism : Mechanism
     bounds : dict of str to (low, high)
-        Of parameters that vary; instants that depend on one are left out.
+        Bounds of the parameters that vary; instants that depend on one are left out.
     first, last : float
-        s.
+        First and last instant, s.
     """
     knots = _common(mechanism, bounds, first, last, None)
     if len(knots) > MOST_KNOTS:
@@ -37,7 +37,7 @@ def law_knots(
 def _common(
     mechanism: Mechanism, bounds: Mapping[str, tuple[float, float]], first: float, last: float, forces: bool | None
 ) -> Float[np.ndarray, " knots"]:
-    """Return the knots of all designs, those of laws of forces as `breaks_of_laws` takes them."""
+    """Return the knots that all designs have; `forces` is as for `breaks_of_laws`."""
     breaks = breaks_of_laws(mechanism, first, last, HIGHEST, forces=forces)
     ends = [mechanism.with_parameters(**{name: bound}) for name, pair in bounds.items() for bound in pair]
     for design in ends if len(breaks) else ():

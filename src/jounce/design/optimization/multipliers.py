@@ -1,4 +1,4 @@
-"""Multipliers of the active constraints of a design, and the residual of its first-order conditions."""
+"""Multipliers of the active constraints of a design, and the residual of its first-order (KKT) conditions."""
 
 from typing import Any, NamedTuple
 
@@ -13,18 +13,18 @@ Vector = Float[np.ndarray, " _"]
 
 
 class Known(NamedTuple):
-    """Scales and indices that multipliers need.
+    """Scales and indices for the computation of multipliers.
 
     Attributes
     ----------
     bounded : array of int
-        Extremes that have a variable of their own.
+        Extremes with a variable of their own.
     equal : array of bool of shape (conditions,)
-        Which conditions are equalities.
+        Whether each condition is an equality.
     sizes : array of shape (conditions,)
     extreme_sizes : array of shape (extremes,)
     owner : array of int of shape (rows,)
-        The extreme that each row belongs to.
+        Extreme of each row.
     clearance : float
         Bound of the smallest singular value.
     scale : float
@@ -41,7 +41,7 @@ class Known(NamedTuple):
 
 
 class Multipliers:
-    """Multipliers of the active constraints of a design, by least squares with the signs that they must have."""
+    """Multipliers of the active constraints of a design, by least squares with the required signs."""
 
     def __init__(
         self, known: Known, here: Evaluation, numbers: Vector, slopes: list[Any], extremes: Vector, chosen: Any
@@ -55,7 +55,7 @@ class Multipliers:
 
     def solved(self) -> tuple[float, Vector, Vector]:
         """Return the residual, and the multipliers of conditions and of bounds."""
-        from scipy.optimize import nnls  # here, to start quickly
+        from scipy.optimize import nnls  # importing SciPy takes half a second
 
         count, extra = len(self.here.point), len(self.known.bounded)
         target = -np.concatenate([self.fixed[0], self.by_extreme[0, self.known.bounded]])
@@ -74,7 +74,7 @@ class Multipliers:
         return residual, multipliers["condition"], multipliers["bound"]
 
     def _conditions(self) -> list[tuple[Vector, str, int]]:
-        """Return the slopes of active conditions, both signs of those that are equalities."""
+        """Return the slopes of active conditions, with both signs for equalities."""
         rows, known = [], self.known
         for k, number in enumerate(self.numbers[1:]):
             slope = np.concatenate([self.fixed[k + 1], self.by_extreme[k + 1, known.bounded]])
@@ -85,7 +85,7 @@ class Multipliers:
         return rows
 
     def _rows(self, extra: int) -> list[tuple[Vector, str, int]]:
-        """Return the slopes of the largest values, less those of the variables that replace them."""
+        """Return the slopes of the largest values minus those of the variables that replace them."""
         known, here = self.known, self.here
         rows = []
         for k, extreme in enumerate(known.bounded):
@@ -95,13 +95,13 @@ class Multipliers:
         return rows
 
     def _bounds(self, size: int) -> list[tuple[Vector, str, int]]:
-        """Return the slopes of the bounds that are reached."""
+        """Return the slopes of the active bounds."""
         point = self.here.point
         lower = [(-np.eye(size)[k], "bound", int(k) + 1) for k in np.flatnonzero(point <= ACTIVE)]
         return lower + [(np.eye(size)[k], "bound", -int(k) - 1) for k in np.flatnonzero(point >= 1.0 - ACTIVE)]
 
     def _singular(self, extra: int) -> list[tuple[Vector, str, int]]:
-        """Return the slopes of the smallest singular values that are at their bound."""
+        """Return the slopes of the smallest singular values at their bound."""
         bound = self.known.clearance**2 * (1 + 1e-4)
         rows = self.here.margin_slopes[self.here.margins < bound]
         return [(np.concatenate([-slope, np.zeros(extra)]), "singular", 1) for slope in rows]

@@ -1,4 +1,4 @@
-"""From a mechanism, an objective and conditions to the best design."""
+"""Optimization of a mechanism for an objective under conditions."""
 
 import dataclasses
 import math
@@ -40,46 +40,46 @@ def optimize(
     iterations: int = 100,
     progress: Callable[[int, int, float], None] | None = None,
 ) -> OptimizedDesign:
-    """Return the design of a mechanism with the least objective for which all conditions hold.
+    """Return the design of a mechanism with the least objective that fulfills all conditions.
 
-    Objective and conditions are expressions of measures: ``peak(psi, 4)`` is the largest magnitude of jounce of the
-    output ``psi``; ``maximum``, ``minimum``, ``span``, ``mean`` and ``rms`` take the same arguments, a quantity, a
+    Objective and conditions are expressions of measures: ``peak(psi, 4)`` is the largest magnitude of the jounce of the
+    output ``psi``; ``maximum``, ``minimum``, ``span``, ``mean`` and ``rms`` take the same arguments: a quantity, a
     derivative (0 unless given) and two instants, the window of time; ``at(psi, 1, 0.5)`` is a rate at 0.5 s. Quantities
     are outputs, components ``C_x``, derivatives ``psi_d2``, ``torque(DRIVER)``, ``force(DRIVER)``, ``force_x(JOINT)``,
-    parameters, ``t``, and expressions of these. ``path_error(C, NAME)`` is the root of the mean square distance of
-    points from the path of an output, ``path_deviation(C, NAME)`` the largest. Peaks are those between instants, too.
+    parameters, ``t``, and expressions of these. ``path_error(C, NAME)`` is the root mean square distance of points from
+    the path of an output, ``path_deviation(C, NAME)`` the largest distance. Peaks between instants count.
 
-    The designs of a low-discrepancy sample are solved side by side; from the best of them and from the mechanism as it
-    is, SciPy's SLSQP searches with exact slopes. It replaces an extreme that goals grow with by a variable that no
-    value may exceed, so that the objective stays smooth where the instant of the extreme jumps.
+    The designs of a low-discrepancy sample are solved side by side. Searches by SciPy's SLSQP, with exact slopes, start
+    from the best of them and from the given mechanism. An extreme with which goals increase is replaced by a variable
+    that bounds its values, so that the objective stays smooth where the instant of the extreme jumps.
 
     Parameters
     ----------
     mechanism : Mechanism
-        As for `jounce.solve`; constraints must not be redundant.
+        A mechanism for `jounce.solve`, without redundant constraints.
     minimize : str
-        The objective to minimize; to maximize, put a minus before it, as ``"-span(psi)"``.
+        The objective; to maximize, use a minus sign, as in ``"-span(psi)"``.
     vary : dict of str to (low, high)
-        Bounds of the parameters that may be changed, SI or text with a unit; ``"12cm:16cm"`` gives both.
+        Bounds of the parameters to vary, SI or text with a unit; ``"12cm:16cm"`` gives both.
     subject_to : sequence of str, optional
         Conditions by ``<=``, ``>=`` and ``==``, such as ``"span(psi) == 60 deg"``; a number may have a unit.
     time : array_like of shape (time,), optional
-        Instants, s, the same in all designs; those of the mechanism unless given.
+        Instants, s, the same in all designs; by default those of the mechanism.
     curves : dict of str to array_like, optional
         Points for paths, (points, components), m; or pairs of times (points,), s, and points.
     assemblies : sequence of int, or "all", optional
-        Numbers of the assemblies to try, as `jounce.assemblies` counts those of the mechanism as it is; only that of
-        the mechanism unless given.
+        Numbers of the assemblies to try, as `jounce.assemblies` numbers those of the given mechanism; by default only
+        that of the mechanism.
     starts : int, default 8
-        Number of searches, one of them from the mechanism as it is.
+        Number of searches, one of them from the given mechanism.
     samples : int, optional
-        Number of designs from which starts are chosen, rounded up to a power of two; 64, or 16 for each parameter,
-        unless given.
+        Number of designs from which starts are chosen, rounded up to a power of two; by default 64, or 16 for each
+        parameter.
     seed : int, default 0
         Seed of the sample.
     clearance : float, default 1e-2
-        Smallest singular value of the scaled Jacobian that a design may have at any instant; it vanishes where one
-        locks. Zero lifts the bound.
+        Lower bound of the smallest singular value of the scaled Jacobian at every instant; the singular value vanishes
+        where a design locks. Zero removes the bound.
     iterations : int, default 100
         Largest number of iterations of a search between two changes of its region.
     progress : callable, optional
@@ -88,16 +88,16 @@ def optimize(
     Returns
     -------
     OptimizedDesign
-        The best design found, compared with the first one, on a finer grid, too.
+        The best design found, compared with the given one, and checked on a finer grid.
 
     Raises
     ------
     MechanismError, ExpressionError, UnitError
-        If a name does not exist, bounds are not two increasing numbers, a parameter cannot have one of them, an
-        expression cannot be read, or instants would differ from design to design.
+        If a name does not exist, bounds are not two increasing numbers, a bound is not admissible, an expression cannot
+        be read, or instants differ from design to design.
     DesignError
-        If no design can be assembled and moved, or conditions cannot be met: the message names them with their
-        violations, and the error has the design that is nearest to meeting them.
+        If no design can be assembled and moved, or conditions cannot be fulfilled; the message names them with their
+        violations, and the error contains the design nearest to fulfilling them.
 
     References
     ----------
@@ -150,7 +150,7 @@ def _bounds(mechanism: Mechanism, vary: Mapping[str, Any]) -> dict[str, tuple[fl
     Raises
     ------
     MechanismError, UnitError, ExpressionError
-        If a parameter does not exist, its bounds are not two increasing numbers, or it cannot have one of them.
+        If a parameter does not exist, or its bounds are not two increasing numbers or not admissible.
     """
     if not isinstance(vary, Mapping) or not vary:
         raise MechanismError("a design differs in at least one parameter", name="vary", value=vary)
@@ -169,7 +169,7 @@ def _bounds(mechanism: Mechanism, vary: Mapping[str, Any]) -> dict[str, tuple[fl
 
 
 def _bound(mechanism: Mechanism, name: str, given: Any) -> float:
-    """Return a bound of a parameter, a value that the mechanism must be able to have."""
+    """Return a bound of a parameter, a value that must be admissible for the mechanism."""
     try:
         changed = mechanism.with_parameters(**{name: given})
         value = float(changed.parameter_values[name])
@@ -198,7 +198,7 @@ def _instants(
 
 
 def _curve(name: str, given: Any) -> PrescribedPath:
-    """Return a prescribed path: points, with times if they are given."""
+    """Return a prescribed path: points, with times if given."""
     timed = isinstance(given, tuple) and len(given) == 2 and np.ndim(given[0]) == 1 and np.ndim(given[1]) == 2
     location, expected = f"curves.{name}", "points, (points, components), or a pair of times and points, all finite"
     times = seconds(location, given[0], MechanismError, expected) if timed else None
@@ -211,7 +211,7 @@ def _curve(name: str, given: Any) -> PrescribedPath:
 
 
 def _assemblies(mechanism: Mechanism, selection: Any) -> list[tuple[int | None, Mechanism]]:
-    """Return the assemblies to try, each with its number, as the starting guess of a mechanism."""
+    """Return the assemblies to try, each as its number and a mechanism with it as starting guess."""
     if selection is None:
         return [(None, mechanism)]
     assemblies = all_assemblies(mechanism, circuits=False)

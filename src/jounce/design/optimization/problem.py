@@ -1,4 +1,4 @@
-"""A design problem in numbers: goals and their slopes from one solution of a design; one that locks is an error."""
+"""A design problem in numbers: goals and slopes from one solution of a design; a design that locks is an error."""
 
 import dataclasses
 from collections.abc import Mapping
@@ -19,12 +19,12 @@ from jounce.kinematics import Status, solve
 from jounce.mechanism import Mechanism
 from jounce.mechanism.system import System
 
-ON_BOUND = 1e-12  # of the distance between bounds: a point so near to a bound is on it
+ON_BOUND = 1e-12  # fraction of the distance between bounds: a point nearer to a bound is on it
 LOCKS = (AssemblyError, MobilityError, SolveError)
 
 
 class Locked(Exception):  # noqa: N818 - not an error of the user
-    """A design cannot be assembled, or locks."""
+    """Raised if a design cannot be assembled, or locks."""
 
     def __init__(self, point: Float[np.ndarray, " parameter"], error: Exception):
         super().__init__(str(error))
@@ -38,9 +38,9 @@ class Evaluation:
     Attributes
     ----------
     point : array of shape (parameters,)
-        From 0 to 1 between the bounds.
+        Parameters, scaled from 0 to 1 between the bounds.
     rows, smooth : array
-        The measures of `Goals.measured`, all rows in one array.
+        Measures from `Goals.measured`, with all rows in one array.
     row_slopes, smooth_slopes : array of shape (rows, parameters), (measures, parameters)
         Slopes by the point.
     margins : array of shape (time,)
@@ -71,7 +71,7 @@ class Problem:
     names : tuple of str
     low, high, width : array of shape (parameters,)
     owner : array of int of shape (rows,)
-        The extreme that each row of the last evaluation belongs to.
+        Extreme of each row of the last evaluation.
     evaluations : int
         Number of designs solved.
     """
@@ -87,40 +87,40 @@ class Problem:
         self._compile()
 
     def _compile(self) -> None:
-        """Compile the measures of a motion and the goals, for the grid of the goals."""
+        """Create the compiled functions of measures and goals for the grid of the goals."""
         self._cached.clear()
-        # as new functions: JAX takes a method for the same function, even where the values of its object have changed
+        # new functions, as JAX treats a method as the same function even if its object has changed
         self._measured = jax.jit(lambda *known: self._with_slopes(*known))
         self._numbers = jax.jit(lambda *known: self._goals_with_slopes(*known))
         self._each = jax.jit(jax.vmap(self._one_design))
 
     def set_instants(self, instants: Float[np.ndarray, " time"]) -> None:
-        """Change the grid."""
+        """Replace the grid of instants."""
         self.goals.set_instants(instants)
         self._compile()
 
     def values(self, point: Float[np.ndarray, " parameter"]) -> dict[str, float]:
-        """Return the parameters at a point, SI; those on a bound to the bit."""
+        """Return the parameters at a point, SI; parameters on a bound have its exact value."""
         parameters = np.where(point >= 1.0 - ON_BOUND, self.high, self.low + self.width * point)
         parameters = np.where(point <= ON_BOUND, self.low, parameters)
         return dict(zip(self.names, parameters.tolist(), strict=True))
 
     def point_of(self, values: Mapping[str, float]) -> Float[np.ndarray, " parameter"]:
-        """Return where parameters are between their bounds, from 0 to 1."""
+        """Return the point of parameters, from 0 to 1 between their bounds."""
         given = np.array([values[name] for name in self.names])
         return np.clip((given - self.low) / self.width, 0.0, 1.0)
 
     def design(self, point: Float[np.ndarray, " parameter"]) -> Mechanism:
-        """Return the mechanism at a point, with the outputs that goals need."""
+        """Return the mechanism at a point, with the outputs for the goals."""
         return self.goals.mechanism.with_parameters(**self.values(point))
 
     def evaluate(self, point: Float[np.ndarray, " parameter"]) -> Evaluation:
-        """Return a design's measures and their slopes.
+        """Return the measures of a design and their slopes.
 
         Raises
         ------
         Locked
-            The design cannot be assembled, or locks.
+            If the design cannot be assembled, or locks.
         """
         key = point.tobytes()
         if key not in self._cached:
@@ -153,7 +153,7 @@ class Problem:
             message = f"at t = {self.goals.instants[failed[0]]:g} s {outcome.advice}"
             raise Locked(point, SolveError(message, status=outcome))
         if not all(np.isfinite(x).all() for x in jax.tree.leaves(outputs)):
-            self._check_friction(point)  # also where no goal looks
+            self._check_friction(point)  # friction may lock in the whole motion
         output_slopes, matrix_slopes = jax.tree.map(lambda x: jnp.moveaxis(x, -1, 0) * _along(self.width, x), slopes)
         (rows, smooth), (row_slopes, smooth_slopes) = self._measured(values, outputs, output_slopes)
         if not all(np.isfinite(x).all() for x in (*rows, smooth, *row_slopes, smooth_slopes)):
@@ -172,7 +172,7 @@ class Problem:
         )
 
     def _check_friction(self, point: Float[np.ndarray, " parameter"]) -> None:
-        """Raise Locked where friction locks, which outputs with slopes do not tell."""
+        """Raise Locked if friction locks the design, which outputs with slopes do not show."""
         motion = solve(self.design(point), self.goals.instants, self.goals.order, strict=False)
         try:
             dict(motion.outputs.items())
@@ -180,14 +180,14 @@ class Problem:
             raise Locked(point, error) from None
 
     def _row_scale(self, matrix: Any) -> Float[np.ndarray, " row"]:
-        """Return factors that make the largest entry of each row one in the first design; fixed, as slopes assume."""
+        """Return constant factors that scale the largest entry of each row to one in the first design."""
         if self._scale is None:
             sizes = np.abs(np.asarray(matrix)).max(axis=(1, 2), initial=0.0)
             self._scale = 1.0 / np.where(sizes > 0, sizes, 1.0)
         return self._scale
 
     def extremes(self, evaluation: Evaluation) -> tuple[Float[np.ndarray, " extreme"], Int[np.ndarray, " extreme"]]:
-        """Return the extremes of a design, and the index of its row for each."""
+        """Return the extremes of a design, and the row of each."""
         count = len(self.goals.bounded)
         values, chosen = np.zeros(count), np.zeros(count, int)
         for k in range(count):
@@ -197,21 +197,21 @@ class Problem:
         return values, chosen
 
     def numbers(self, point: Any, extremes: Any, smooth: Any) -> tuple[np.ndarray, list[np.ndarray]]:
-        """Return objective and conditions, and their slopes by the parameters, extremes and smooth measures."""
+        """Return the objective and conditions, and their slopes by parameters, extremes and smooth measures."""
         values = jnp.asarray(list(self.values(point).values()))
         goals, slopes = self._numbers(values, jnp.asarray(extremes), jnp.asarray(smooth))
         by_parameter, *others = (np.asarray(x) for x in slopes)
         return np.asarray(goals), [by_parameter * self.width, *others]
 
     def stated(self, point: Any, evaluation: Evaluation) -> tuple[float, np.ndarray, list[tuple[float, float]]]:
-        """Return the objective as the user states it, the conditions as numbers, and both sides of each condition."""
+        """Return the objective as stated by the user, the conditions as numbers, and both sides of each condition."""
         values, smooth = self.values(point), jnp.asarray(evaluation.smooth)
         extremes = jnp.asarray(self.extremes(evaluation)[0])
         numbers = np.asarray(self.goals.numbers(values, extremes, smooth, as_stated=True))
         return float(numbers[0]), numbers[1:], self.goals.sides(values, extremes, smooth)
 
     def sampled(self, rows: Any, outputs: Mapping[str, Any]) -> Float[np.ndarray, "design goal"]:
-        """Return objective and conditions of many designs, from their outputs, the design first."""
+        """Return the objective and conditions of many designs from their outputs, design first."""
         return np.asarray(self._each(jnp.asarray(rows), {name: jnp.asarray(x) for name, x in outputs.items()}))
 
     def _one_design(self, values: Any, outputs: Any) -> Any:
@@ -242,13 +242,13 @@ def _along(width: Float[np.ndarray, " parameter"], like: Any) -> Any:
 
 
 def _bare(system: System) -> System:
-    """Return a system without forces and outputs, which a Jacobian does not need."""
+    """Return a system without forces and outputs, which the Jacobian does not need."""
     return with_fields(system, forces=(), outputs=())
 
 
 @partial(jax.jit, static_argnames=("pose_type",))
 def _jacobian(system: System, coordinates: Any, instants: Any, *, pose_type: type) -> Float[Any, "row column time"]:
-    """Return the Jacobian at all instants; its columns are scaled by the size of the mechanism, its rows are not."""
+    """Return the Jacobian at all instants, with columns scaled by the size of the mechanism and unscaled rows."""
     return system.jacobian(pose_of(coordinates, pose_type), Jet((instants[None],)))
 
 
@@ -257,7 +257,7 @@ def _margins(
     slopes: Float[np.ndarray, "parameter row column time"],
     scale: Float[np.ndarray, " row"],
 ) -> tuple[Float[np.ndarray, " time"], Float[np.ndarray, "time parameter"]]:
-    """Return squares of the smallest singular values, which are smooth up to where a design locks, and their slopes."""
+    """Return the squares of the smallest singular values, smooth up to locking designs, and their slopes."""
     left, values, right = np.linalg.svd(np.moveaxis(matrix * scale[:, None, None], -1, 0))
     least = values[:, -1]
     u, v = left[:, :, -1] * scale, right[:, -1]

@@ -12,7 +12,7 @@ from jounce.mechanism import Mechanism
 
 @dataclasses.dataclass(frozen=True)
 class Comparison:
-    """One quantity before and after.
+    """One quantity before and after the optimization.
 
     Attributes
     ----------
@@ -21,11 +21,11 @@ class Comparison:
     name : str
         The text of the objective or condition, or the name of a parameter.
     before, after : float
-        SI; of a condition, the side that is a measure; NaN where the first design locks.
+        Values, SI; for a condition, those of the side that is a measure; NaN if the first design locks.
     low, high : float or None
         Lower and upper bound; the same for an equality.
     multiplier : float
-        Change of the objective by one unit of the bound; zero where no bound is active.
+        Change of the objective per unit of the bound; zero if no bound is active.
     """
 
     kind: str
@@ -49,14 +49,14 @@ class OptimizedDesign(Displayed):
     Attributes
     ----------
     mechanism : Mechanism
-        The given mechanism with the parameters found.
+        The given mechanism with the optimized parameters.
     parameters : dict of str to float
-        The parameters that were varied, SI.
+        The varied parameters, SI.
     objective : float
         The objective of this design, refined between instants, SI.
     status : str
-        ``"optimal"``: no design nearby is better, to the first order, and all conditions hold; ``"feasible"``: all
-        conditions hold, and the search ended before no better one was near; ``"infeasible"``: conditions do not hold.
+        ``"optimal"``: to first order no design nearby is better, and all conditions hold; ``"feasible"``: all
+        conditions hold, but the search ended before optimality; ``"infeasible"``: conditions do not hold.
     message : str
         The status in words.
     comparisons : tuple of Comparison
@@ -66,9 +66,9 @@ class OptimizedDesign(Displayed):
     residual : float
         Residual of the first-order conditions, relative to the slope of the objective.
     grid_error : float
-        Difference of objective and conditions on a grid four times as fine, relative.
+        Relative difference of objective and conditions on a grid four times as fine.
     searches : tuple of float
-        The objective that each search ended with; NaN where conditions did not hold.
+        Final objective of each search; NaN if conditions did not hold.
     evaluations : int
         Number of designs solved with their slopes.
     notes : tuple of str
@@ -90,12 +90,12 @@ class OptimizedDesign(Displayed):
 
     @property
     def success(self) -> bool:
-        """Whether the design is optimal, to the first order, and all conditions hold."""
+        """Whether the design is optimal to first order and all conditions hold."""
         return self.status == "optimal"
 
     @property
     def multipliers(self) -> dict[str, float]:
-        """Change of the objective by one unit of each active condition or bound, by name."""
+        """Change of the objective per unit of each active condition or bound, by name."""
         return {row.name: row.multiplier for row in self.comparisons if row.active}
 
     @cached_property

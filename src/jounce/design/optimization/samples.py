@@ -11,25 +11,25 @@ from jounce.design.optimization.problem import Problem
 from jounce.errors import MechanismError, whole_number
 from jounce.kinematics import Status, solve_batch
 
-FEWER = 3  # derivatives that samples do not need
-PENALTY = 10.0  # of a broken condition against the objective, each over its usual size
-MIN_DISTANCE = 0.05  # of starts from each other, over the diagonal between bounds
+FEWER = 3  # number of derivatives that samples omit
+PENALTY = 10.0  # weight of a violated condition against the objective, each relative to its typical size
+MIN_DISTANCE = 0.05  # distance of starts from each other, relative to the diagonal between bounds
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Samples:
-    """Points of designs, how far they move, and their merits.
+    """Sampled designs with their outcomes and merits.
 
     Attributes
     ----------
     names : tuple of str
         Names of the parameters.
     points : array of shape (designs, parameters)
-        From 0 to 1 between the bounds.
+        Parameters, scaled from 0 to 1 between the bounds.
     status : array of int of shape (designs,)
-        Outcome at the first instant that is not solved, `Status.OK` where all are.
+        Outcome at the first instant that is not solved, or `Status.OK`.
     merits : array of shape (designs,)
-        Smaller is better; infinite for those that do not move.
+        Merit of each design, smaller for better ones; infinite for designs that do not move.
     """
 
     names: tuple[str, ...]
@@ -39,7 +39,7 @@ class Samples:
 
     @property
     def moving(self) -> Bool[np.ndarray, " design"]:
-        """Which designs move at all instants."""
+        """Whether each design moves at all instants."""
         return self.status == Status.OK
 
     @property
@@ -48,7 +48,7 @@ class Samples:
         return len(self.points)
 
     def best(self, count: int) -> list[Float[np.ndarray, " parameter"]]:
-        """Return the best points that have a least distance from each other."""
+        """Return the best points with a minimum distance from each other."""
         selected: list[np.ndarray] = []
         least = MIN_DISTANCE * math.sqrt(self.points.shape[1])
         for k in np.argsort(self.merits):
@@ -59,7 +59,7 @@ class Samples:
         return selected
 
     def notes(self, bounds: Mapping[str, tuple[float, float]]) -> list[str]:
-        """Return words for designs that cannot be assembled or lock, and the ranges of those that move."""
+        """Return a note on designs that cannot be assembled or lock, with the ranges of designs that move."""
         stuck = self.count - int(self.moving.sum())
         if not stuck or not self.moving.any():
             return []
@@ -81,10 +81,10 @@ def sampled(problem: Problem, count: int | None, seed: int) -> Samples:
     ----------
     problem : Problem
     count : int, optional
-        Rounded up to a power of two.
+        Number of designs, rounded up to a power of two.
     seed : int
     """
-    from scipy.stats import qmc  # here, to start quickly
+    from scipy.stats import qmc  # importing SciPy takes half a second
 
     size = len(problem.names)
     count = max(64, 16 * size) if count is None else whole_number("samples", count, 1, error=MechanismError)
@@ -111,7 +111,7 @@ def _flat(values: Float[np.ndarray, "design time derivative *axes"]) -> Float[np
 
 
 def _merits(numbers: Float[np.ndarray, "design goal"], equal: Bool[np.ndarray, " condition"]) -> np.ndarray:
-    """Return the merits of designs: the objective plus broken conditions, each over its usual size."""
+    """Return the merits of designs: the objective plus violations, each relative to its typical size."""
     objective, conditions = numbers[:, 0], numbers[:, 1:]
     broken = np.where(equal, np.abs(conditions), np.maximum(conditions, 0.0))
     sizes = np.median(np.abs(conditions), axis=0)

@@ -1,9 +1,9 @@
-"""One search from one start: sequential quadratic programming with exact slopes, in regions where no design locks.
+"""A search from one start: sequential quadratic programming with exact slopes, in regions where no design locks.
 
-SciPy's SLSQP works on the parameters and on one number for each extreme that a goal grows with, which none of the
-values in the cells of time may exceed. A step that leads to a design that locks is not taken: the search continues from
-the best design so far, in a smaller region. A constraint keeps designs away from there: the smallest singular value of
-the Jacobian, which vanishes where a mechanism locks, stays above a bound at every instant.
+The variables of SciPy's SLSQP are the parameters and, for each extreme with which a goal increases, a bound of the
+values in the cells of time. A step to a design that locks is rejected: the search continues from the best design so
+far, in a smaller region. A constraint keeps designs from locking: the smallest singular value of the Jacobian, which
+vanishes where a mechanism locks, stays above a bound at every instant.
 """
 
 import dataclasses
@@ -17,30 +17,30 @@ from jounce.design.optimization.multipliers import ACTIVE, Known, Multipliers, V
 from jounce.design.optimization.problem import Evaluation, Locked, Problem
 
 ACCURACY = 1e-13  # of SLSQP, relative
-EACH = 2  # most designs evaluated for each permitted iteration
-ROUNDS = 12  # most regions
-SMALLEST_REGION = 1e-7  # of the width between bounds
+EACH = 2  # largest number of designs evaluated for each permitted iteration
+ROUNDS = 12  # largest number of regions
+SMALLEST_REGION = 1e-7  # fraction of the width between bounds
 CONDITION_TOLERANCE = 1e-7  # permitted violation of a condition, relative to its size
-SMALL = 1e-6  # of the first objective: a smaller one counts as zero
-FITTED = 1e-6  # of the residual of the first-order conditions after least squares
-LOCKED = 1e3  # value that SLSQP gets for a design that locks, relative: its line search then goes back
+SMALL = 1e-6  # fraction of the first objective: a smaller objective counts as zero
+FITTED = 1e-6  # tolerance of the residual of the first-order conditions after least squares
+LOCKED = 1e3  # relative value of a design that locks, from which the line search of SLSQP retreats
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class SearchResult:
-    """The end of a search.
+    """The result of a search.
 
     Attributes
     ----------
     point : array of shape (parameters,)
-        From 0 to 1 between the bounds.
+        Parameters, scaled from 0 to 1 between the bounds.
     evaluation : Evaluation
     objective : float
         The objective of the optimizer, which may be the square of the stated one.
     broken : array of shape (conditions,)
         Violation of each condition, relative to its size.
     near_singular : float
-        How far the smallest singular value is below its bound, relative.
+        Relative distance of the smallest singular value below its bound.
     residual : float
         Residual of the conditions of Karush, Kuhn and Tucker, relative to the slope of the objective.
     multipliers : array of shape (conditions,)
@@ -69,7 +69,7 @@ class SearchResult:
 
 
 class _EvaluationLimitError(Exception):
-    """A run has evaluated its largest number of designs."""
+    """Raised if a run has evaluated its largest number of designs."""
 
 
 class Search:
@@ -83,7 +83,7 @@ class Search:
     iterations : int
         Largest number of iterations of SLSQP in one region.
     watch : callable, optional
-        Called at every design that is evaluated, with its objective and the worst broken condition.
+        Called for every evaluated design, with its objective and its worst violation.
     """
 
     def __init__(
@@ -105,7 +105,7 @@ class Search:
         Parameters
         ----------
         elastic : bool, default False
-            Minimize the worst broken condition, instead of the objective.
+            Minimize the worst violation instead of the objective.
         """
         here = self.problem.evaluate(point)
         self._set_scales(here)
@@ -127,14 +127,14 @@ class Search:
             elif inside or (not better and moved < ACTIVE):
                 if elastic or radius <= SMALLEST_REGION or self.result_at(best).residual <= FITTED:
                     break
-                radius /= 4  # no optimum: shorter steps lock less
+                radius /= 4  # not optimal: shorter steps are less likely to lock
             else:
                 radius *= 4
         return self.result_at(best)
 
     def _fitted(self, point: Vector) -> Vector:
-        """Return a better point by least squares, which uses each distance from a point, not only their sum."""
-        from scipy.optimize import least_squares  # here, to start quickly
+        """Return a better point by nonlinear least squares, which uses each distance, not only their sum."""
+        from scipy.optimize import least_squares  # importing SciPy takes half a second
 
         chosen = np.array(self.problem.goals.gaps)
 
@@ -157,7 +157,7 @@ class Search:
         return min((point, fit.x, near), key=self._fitness)
 
     def _fitness(self, point: Vector) -> tuple[float, float]:
-        """Return the key that compares points: how near they are to a singular position, then the objective."""
+        """Return the key that compares points: the worst violation, then the objective."""
         try:
             here = self.problem.evaluate(point)
         except Locked:
@@ -167,7 +167,7 @@ class Search:
         return (worst if worst > CONDITION_TOLERANCE else 0.0), float(numbers[0])
 
     def result_at(self, point: Vector) -> SearchResult:
-        """Return the result at a point: values, broken conditions, multipliers."""
+        """Return the result at a point: values, violations, multipliers."""
         here = self.problem.evaluate(point)
         extremes, chosen = self.problem.extremes(here)
         numbers, slopes = self.problem.numbers(point, extremes, here.smooth)
@@ -178,23 +178,23 @@ class Search:
 
     def _known(self, objective: float) -> Known:
         goals, size = self.problem.goals, abs(objective)
-        if goals.objective is not goals.objective_value:  # a square, the slope of which is proportional to the root
+        if goals.objective is not goals.objective_value:  # a square, whose slope is proportional to the root
             size = float(np.sqrt(size * self.scale))
         scales = self.clearance, max(size, SMALL * self.scale)
         return Known(self.bounded, self.equal, self.sizes, self.extreme_sizes, self.problem.owner, *scales)
 
     def broken(self, numbers: Vector, sizes: Vector | None = None) -> Vector:
-        """Return the violations of conditions, relative to their sizes, those of the start unless given."""
+        """Return the violations of conditions relative to their sizes, by default those at the start."""
         excess = np.where(self.equal, np.abs(numbers), np.maximum(numbers, 0.0))
         return excess / (self.sizes if sizes is None else sizes)
 
     def _sizes_at(self, here: Evaluation) -> Vector:
-        """Return the sizes of conditions at a design; where one side is zero, those at the start."""
+        """Return the sizes of conditions at a design, or those at the start if a side is zero."""
         pairs = np.abs(np.array(self.problem.stated(here.point, here)[2])).reshape(-1, 2)
         return np.where((pairs > 0).all(axis=1), np.minimum(pairs.max(axis=1, initial=0.0), self.sizes), self.sizes)
 
     def near_singular(self, here: Evaluation) -> float:
-        """Return how far the smallest singular value is below its bound, relative."""
+        """Return the relative distance of the smallest singular value below its bound."""
         least = float(np.sqrt(here.margins.min(initial=np.inf)))
         return max(0.0, 1.0 - least / self.clearance) if self.clearance else 0.0
 
@@ -213,7 +213,7 @@ def _size(rows: Vector) -> float:
 
 
 class _Run:
-    """SLSQP in one region: variables are the point, and one number for each extreme that has a bound of its own."""
+    """SLSQP in one region; its variables are the point and one bound for each replaced extreme."""
 
     def __init__(self, search: Search, start: Vector, radius: float, *, elastic: bool):
         self.search, self.problem, self.start, self.radius, self.elastic = (
@@ -235,8 +235,8 @@ class _Run:
         self._last = self._inequalities(self.first)[0]
 
     def run(self) -> tuple[Locked | None, bool]:
-        """Return the design that locked, if one did, and whether the end is free of the region's bounds."""
-        from scipy.optimize import minimize  # here, to start quickly
+        """Return the design that locked, if any, and whether the result is off the bounds of the region."""
+        from scipy.optimize import minimize  # importing SciPy takes half a second
 
         bounds = [*zip(self.low, self.high, strict=True)] + [(None, None)] * (len(self.first) - self.count)
         constraints: list[Any] = [{"type": "ineq", "fun": self._above, "jac": self._above_slopes}]
@@ -264,19 +264,19 @@ class _Run:
     # designs compared
 
     def merit_parts(self, here: Evaluation) -> tuple[float, float]:
-        """Return the objective and the worst broken condition, both relative."""
+        """Return the objective and the worst violation, both relative."""
         numbers, _ = self.problem.numbers(here.point, self._extremes(here), here.smooth)
         broken = self.search.broken(numbers[1:])
         worst = max(float(broken.max(initial=0.0)), self.search.near_singular(here))
         return float(numbers[0]) / self.search.scale, worst
 
     def merit_of(self, point: Vector) -> tuple[float, float]:
-        """Return the key that compares designs: the worst broken condition, then the objective."""
+        """Return the key that compares designs: the worst violation, then the objective."""
         objective, worst = self.merit_parts(self.problem.evaluate(point))
         return (worst, 0.0) if self.elastic else (worst if worst > CONDITION_TOLERANCE / 2 else 0.0, objective)
 
     def _locks(self, variables: Vector) -> bool:
-        """Return whether a design locks, so that it has no slopes."""
+        """Return whether a design locks, and therefore has no slopes."""
         try:
             self._split(variables)
         except Locked:
@@ -303,7 +303,7 @@ class _Run:
         return self.problem.extremes(here)[0]
 
     def _split(self, variables: Vector) -> tuple[Evaluation, Vector]:
-        """Return the design, and the extremes, in which the variables of SLSQP replace those that they stand for."""
+        """Return the evaluated design, and the extremes, some replaced by the variables of SLSQP."""
         here = self._seen(np.clip(variables[: self.count], self.low, self.high))
         extremes = self._extremes(here)
         own = variables[self.count : self.count + len(self.extremes)]
@@ -311,7 +311,7 @@ class _Run:
         return here, extremes
 
     def _goals(self, variables: Vector) -> tuple[Vector, Float[np.ndarray, "goal variable"]]:
-        """Return objective and conditions, and their slopes by the variables."""
+        """Return the objective and conditions, and their slopes by the variables."""
         here, extremes = self._split(variables)
         numbers, (by_parameter, by_extreme, by_smooth) = self.problem.numbers(here.point, extremes, here.smooth)
         slopes = by_parameter + by_smooth @ here.smooth_slopes
@@ -332,13 +332,13 @@ class _Run:
         return self._goals(variables)[1][0] / self.search.scale
 
     def _inequalities(self, variables: Vector) -> tuple[Vector, Float[np.ndarray, "row variable"]]:
-        """Return the rows that must not be negative: conditions, variables of extremes less rows, singular values."""
+        """Return the rows that must not be negative: conditions, bounds of extremes minus rows, singular values."""
         search, here = self.search, self._split(variables)[0]
         numbers, slopes = self._goals(variables)
         scaled, scaled_slopes = numbers[1:] / search.sizes, slopes[1:] / search.sizes[:, None]
         unequal = ~search.equal
         parts = [(-scaled[unequal], -scaled_slopes[unequal])]
-        if self.elastic:  # an equality is two inequalities here
+        if self.elastic:  # two inequalities replace an equality
             parts += [(-scaled[search.equal], -scaled_slopes[search.equal])]
             parts += [(scaled[search.equal], scaled_slopes[search.equal])]
             parts = [(v + variables[-1], np.concatenate([s[:, :-1], np.ones((len(v), 1))], axis=1)) for v, s in parts]

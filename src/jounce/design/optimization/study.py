@@ -1,4 +1,4 @@
-"""The search for the best design of one assembly: starts, searches, conditions that cannot be met, finer grids."""
+"""The search for the best design of one assembly: starts, searches, infeasible conditions, finer grids."""
 
 import dataclasses
 import math
@@ -21,12 +21,12 @@ from jounce.kinematics import Motion, Status, assemblies as all_assemblies, solv
 from jounce.mechanism import Mechanism
 from jounce.mechanism.laws.output_drivers import with_outputs
 
-GRID = 121  # most instants of a search at first
-FINER = 4  # times as many instants, on which its end is checked
-AGREED = 1e-6  # of objective and conditions on both grids, relative
+GRID = 121  # largest number of instants of the first grid
+FINER = 4  # ratio of the numbers of instants of the grid for checks and the grid of the search
+AGREED = 1e-6  # relative difference of objective and conditions on both grids
 REFINEMENTS = 3
-OPTIMAL = 1e-5  # of the residual of the first-order conditions
-SAME_POSITION = 1e-6  # of the spread of the bodies, or rad
+OPTIMAL = 1e-5  # residual of the first-order conditions
+SAME_POSITION = 1e-6  # fraction of the spread of the bodies, or rad
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -60,12 +60,12 @@ class Study:
         self.problem = Problem(self.goals, request.bounds)
         self.search = Search(self.problem, clearance, iterations, self._watch)
         self.done, self.total, self.least = 0, 1, math.inf
-        self.size = math.inf  # of the objective, as searches begin with it
+        self.size = math.inf  # of the objective at the start of searches
         self.notes: list[str] = []
         self.searches: list[float] = []
 
     def _watch(self, objective: float, broken: float) -> None:
-        """Report an evaluated design by the objective as the user states it and its worst broken condition."""
+        """Report an evaluated design by the objective as stated by the user and its worst violation."""
         if broken <= CONDITION_TOLERANCE:
             self.least = min(self.least, objective)
         if self.progress is not None:
@@ -73,17 +73,17 @@ class Study:
 
     @property
     def here(self) -> Float[np.ndarray, " parameter"]:
-        """The mechanism as it is, within the bounds."""
+        """The point of the given mechanism, clipped to the bounds."""
         values = self.mechanism.parameter_values
         return self.problem.point_of({name: values[name] for name in self.problem.names})
 
     def best(self, starts: int, samples: int | None) -> SearchResult:
-        """Return the best design that searches from several starts end with.
+        """Return the best result of searches from several starts.
 
         Raises
         ------
         DesignError
-            If none can be assembled and moved, or conditions cannot be met.
+            If no design can be assembled and moved, or conditions cannot be fulfilled.
         """
         self._note_bounds()
         points, lock = [self.here], None
@@ -113,7 +113,7 @@ class Study:
         for point in points:
             try:
                 end = self.search.from_point(point)
-            except Locked:  # a sample that moves may be in another assembly when it is solved individually
+            except Locked:  # a sample that moved may be in another assembly when solved individually
                 continue
             self.size = min(self.size, self.search.stated_scale)
             objective = self.problem.stated(end.point, end.evaluation)[0]
@@ -124,12 +124,12 @@ class Study:
             yield end
 
     def _made_feasible(self, ends: Sequence[SearchResult]) -> list[SearchResult]:
-        """Return designs that meet the conditions, from searches that minimize the worst broken condition first.
+        """Return designs that fulfill the conditions, from searches that minimize the worst violation first.
 
         Raises
         ------
         DesignError
-            If there is none; the error has the design that breaks the worst condition least.
+            If there is none; the error contains the design with the smallest worst violation.
         """
         nearest = sorted(ends, key=lambda end: max(float(end.broken.max(initial=0.0)), end.near_singular))[:3]
         met = [self.search.from_point(end.point, elastic=True) for end in nearest]
@@ -144,7 +144,7 @@ class Study:
         )
 
     def _violated_conditions(self, least: SearchResult) -> str:
-        """Return words for the conditions that the nearest design breaks."""
+        """Return a description of the conditions that the nearest design violates."""
         _, numbers, sides = self.problem.stated(least.point, least.evaluation)
         words = []
         for condition, number, broken, (left, right) in zip(
@@ -169,32 +169,32 @@ class Study:
             self.problem.set_instants(_split(instants, 2))
             try:
                 result = self.search.from_point(result.point)
-            except Locked:  # between the instants, as `_judged` tells
+            except Locked:  # between the instants; `_judged` reports it
                 self.problem.set_instants(instants)
                 break
         return result
 
     def grid_error(self, result: SearchResult) -> float:
-        """Return by how much objective and conditions differ on a finer grid, relative; infinite if that one locks."""
+        """Return the relative difference of objective and conditions on a finer grid; infinite if the design locks."""
         coarse, numbers, _ = self.problem.stated(result.point, result.evaluation)
         values = self.problem.values(result.point)
         try:
             objective, fine, _ = self._on(_split(self.goals.instants, FINER), self.goals.mechanism, values)
         except LOCKS:
             return math.inf
-        scale = abs(coarse) if abs(coarse) > SMALL * self.size else self.size  # zero has no size of its own
+        scale = abs(coarse) if abs(coarse) > SMALL * self.size else self.size  # zero has no size
         errors = [abs(objective - coarse) / scale, *(np.abs(fine - numbers) / self.search.sizes)]
         return float(max(errors))
 
     def _on(
         self, instants: Any, mechanism: Mechanism, values: dict[str, float]
     ) -> tuple[float, np.ndarray, list[tuple[float, float]]]:
-        """Return objective and conditions of a design of a mechanism, with the outputs of the goals, on another grid.
+        """Return the objective and conditions of a design of a mechanism on another grid.
 
         Raises
         ------
         AssemblyError, MobilityError, SolveError
-            The design cannot be assembled, or locks.
+            If the design cannot be assembled, or locks.
         """
         goals, previous = self.goals, self.goals.instants
         try:
@@ -211,7 +211,7 @@ class Study:
             goals.set_instants(previous)
 
     def _note_bounds(self) -> None:
-        """Note the parameters that the mechanism has outside their bounds."""
+        """Add a note on parameters of the mechanism outside their bounds."""
         values = self.mechanism.parameter_values
         for name, (low, high) in self.request.bounds.items():
             if not low <= values[name] <= high:
@@ -220,7 +220,7 @@ class Study:
     def result(
         self, original: Mechanism, end: SearchResult, *, assembly: int | None = None, infeasible: bool = False
     ) -> OptimizedDesign:
-        """Return the design of a search, compared with the mechanism as it is, on a finer grid."""
+        """Return the design of a search, compared with the given mechanism, on a finer grid."""
         fine = _split(self.goals.instants, FINER)
         error = self.grid_error(end)
         parameters = self.problem.values(end.point)
@@ -270,17 +270,17 @@ class Study:
     def _comparisons(
         self, original: Mechanism, end: SearchResult, after: tuple[float, np.ndarray, list[Any]]
     ) -> Iterator[Comparison]:
-        """Return objective, conditions and parameters, of the mechanism as it was given and of the design."""
-        known = original.parameter_values  # also outside of the bounds
+        """Yield objective, conditions and parameters of the given mechanism and of the design."""
+        known = original.parameter_values  # possibly outside of the bounds
         given = {name: float(known[name]) for name in self.problem.names}
-        as_given = with_outputs(original, self.goals.mechanism.outputs)  # assembled as it is, not as this study does
+        as_given = with_outputs(original, self.goals.mechanism.outputs)  # in its own assembly, not that of this study
         try:
             before = self._on(_split(self.goals.instants, FINER), as_given, given)
         except LOCKS:
             nothing = [(math.nan, math.nan)] * len(self.goals.conditions)
             before = math.nan, np.full(len(self.goals.conditions), math.nan), nothing
         root = end.objective and after[0] and self.goals.objective is not self.goals.objective_value
-        factor = 0.5 / after[0] if root else 1.0  # of the slopes of a root, by those of its square
+        factor = 0.5 / after[0] if root else 1.0  # from slopes of a square to slopes of its root
         yield Comparison("objective", self.request.minimize, before[0], after[0])
         rows = zip(self.goals.conditions, before[2], after[2], end.multipliers, strict=True)
         for condition, first, last, multiplier in rows:
@@ -297,7 +297,7 @@ class Study:
             yield Comparison("parameter", name, given[name], values[name], low, high, slope)
 
     def _assembled(self, mechanism: Mechanism, end: SearchResult, assembly: int | None) -> Mechanism:
-        """Return a mechanism that selects the optimized assembly, by its number in the design found."""
+        """Return a mechanism that selects the optimized assembly, by its number in the optimized design."""
         if assembly is None:
             return mechanism
         first = self.goals.instants[:1]
@@ -311,7 +311,7 @@ class Study:
 
 
 def _infeasible_error(lock: Locked | None, taken: Samples) -> DesignError:
-    """Return the error where no design can be assembled and moved."""
+    """Return the error for the case that no design can be assembled and moved."""
     why = "" if lock is None else f"; the mechanism as it is: {lock}"
     if (taken.status == Status.LOCKED).all():
         locks = f"friction locks in all {taken.count} designs within the bounds"
@@ -328,21 +328,21 @@ def _configuration(motion: Motion) -> Float[np.ndarray, " entry"]:
     coordinates = {name: np.asarray(x[0]) for name, x in motion.poses[1].items()}
     if "angle" in coordinates:
         attitude = np.stack([np.cos(coordinates["angle"]), np.sin(coordinates["angle"])])
-    else:  # a quaternion and its negative are one attitude
+    else:  # a quaternion and its negative are the same attitude
         attitude = coordinates["quaternion"][:, None] * coordinates["quaternion"]
     position = coordinates["position"]
     return np.concatenate([position.ravel() / (np.ptp(position) or 1.0), attitude.ravel()])
 
 
 def _thinned(instants: Float[np.ndarray, " given"], most: int) -> Float[np.ndarray, " time"]:
-    """Return a number of the instants at most, evenly chosen, with both ends."""
+    """Return at most a number of the instants, evenly chosen, with both ends."""
     if len(instants) <= most:
         return instants
     return instants[np.unique(np.linspace(0, len(instants) - 1, most).round().astype(int))]
 
 
 def _split(instants: Float[np.ndarray, " given"], parts: int) -> Float[np.ndarray, " time"]:
-    """Return the instants, with further ones evenly between each two of them."""
+    """Return the instants with each interval divided into equal parts."""
     share = np.arange(parts) / parts
     between = instants[:-1, None] + np.diff(instants)[:, None] * share
     return np.concatenate([between.ravel(), instants[-1:]])

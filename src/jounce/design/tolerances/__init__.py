@@ -1,1 +1,1 @@
-"""The spread of outputs by deviations of parameters."""
+"""Tolerance analysis: the spread of outputs by deviations of parameters."""

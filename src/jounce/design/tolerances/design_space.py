@@ -13,18 +13,18 @@ from jounce.design.tolerances.variations import Interval, Values, Variation, spr
 from jounce.errors import MechanismError
 
 MOST_DESIGNS = 10**10
-BITS = 30  # of a Sobol sequence: as many points as there are
-SEED = 20260101  # of its scrambling, the same for all, so that a sweep can be continued
+BITS = 30  # of a Sobol sequence, which has 2**BITS points
+SEED = 20260101  # of the scrambling; constant, so that a sweep can be continued
 
 
 @dataclasses.dataclass(frozen=True)
 class Grid:
-    """Every combination of the values of some parameters; the last parameter changes fastest.
+    """All combinations of the values of parameters; the last parameter changes fastest.
 
     Parameters
     ----------
     variations : dict of str to Interval or Values
-        With a count each.
+        Variations, each with a count.
     """
 
     variations: Mapping[str, Variation]
@@ -64,9 +64,9 @@ class Sobol:
     Parameters
     ----------
     variations : dict of str to Interval, Normal or Uniform
-        Without counts.
+        Variations without counts.
     nominal : dict of str to float
-        Values about which they are spread, SI.
+        Nominal values of the parameters, SI.
     count : int
         Number of designs; powers of two are best.
     """
@@ -100,12 +100,12 @@ def sobol_shares(dimension: int, start: int, stop: int) -> Float[np.ndarray, "po
     """
     from scipy.stats.qmc import Sobol as Sequence
 
-    settings: dict[str, Any] = {"scramble": True, "bits": BITS, "seed": SEED}  # newer releases call it rng, too
+    settings: dict[str, Any] = {"scramble": True, "bits": BITS, "seed": SEED}  # rng in newer releases
     sequence = Sequence(dimension, **settings)
     if start:
         sequence.fast_forward(start)
         return sequence.random(stop - start) + 2.0 ** -(BITS + 1)
-    whole = sequence.random(power_of_two(stop))  # SciPy warns for other numbers of first points
+    whole = sequence.random(power_of_two(stop))  # SciPy warns if the first points are not a power of two
     return whole[:stop] + 2.0 ** -(BITS + 1)
 
 
@@ -115,7 +115,7 @@ def sample_space(variations: Mapping[str, Variation], sample: Any, nominal: Mapp
     Raises
     ------
     MechanismError
-        The sample is of no known kind, or does not fit the variations.
+        If the kind of the sample is unknown, or it does not fit the variations.
     """
     if sample is None:
         return Grid(variations)

@@ -1,4 +1,4 @@
-"""Tolerances: how far every output and derivative spreads when parameters deviate, and which parameter matters."""
+"""Tolerance analysis: the spread of outputs and derivatives by deviations of parameters, and the share of each."""
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -27,7 +27,7 @@ from jounce.mechanism.time import TimeLike
 if TYPE_CHECKING:
     import xarray
 
-TOGETHER = 256  # designs that are solved in one program
+TOGETHER = 256  # designs solved in one program
 MOST_NUMBERS = 100_000_000  # of the histories of all samples: 0.8 GB
 PERCENTILES = (2.5, 97.5)
 BAND = {"low": PERCENTILES[0], "high": PERCENTILES[1]}
@@ -49,10 +49,10 @@ def tolerance(
     indices: bool = False,
     progress: Progress | None = None,
 ) -> "xarray.Dataset":
-    """Return how far outputs and their derivatives spread where parameters deviate independently of one another.
+    """Return the spread of outputs and their derivatives by independent deviations of parameters.
 
-    It is computed twice: to first order, by exact gradients; and by a Monte Carlo method on a scrambled Sobol sequence
-    with a fixed seed, which solves every design and so includes nonlinear effects.
+    It is computed to first order, by exact gradients, and by a Monte Carlo method on a scrambled Sobol sequence with a
+    fixed seed, which solves every design and thus includes nonlinear effects.
 
     Parameters
     ----------
@@ -62,30 +62,30 @@ def tolerance(
         Parameters by name: ``"normal:0.1mm"`` (a standard deviation), ``"uniform:0.1mm"`` (a half-width), both about
         the nominal value, or the ends of a range of equally likely values, ``"14.1cm:14.3cm"`` or (0.141, 0.143).
     time : array_like of shape (time,), optional
-        Instants, s; those of the mechanism unless given.
+        Instants, s; by default those of the mechanism.
     order : int, default 4
         Highest derivative, unless `of` is given.
     of : sequence of str, optional
-        Names of the columns to compute: ``"psi"``, ``"psi_d3"``, ``"C_x_d2"``; all unless given.
+        Names of the columns to compute: ``"psi"``, ``"psi_d3"``, ``"C_x_d2"``; all by default.
     samples : int, default 1024
-        Designs that are solved; powers of two fill the ranges best. 0 leaves the Monte Carlo method out.
+        Number of designs to solve; powers of two fill the ranges best. 0 omits the Monte Carlo method.
     linear : bool, default True
-        Whether gradients are computed.
+        Whether to compute gradients.
     indices : bool, default False
-        Whether SALib estimates Sobol's indices of the peaks, from ``samples * (parameters + 2)`` further designs.
+        Whether to estimate Sobol indices of the peaks with SALib, from ``samples * (parameters + 2)`` further designs.
     progress : callable, optional
         Called with the number of designs done and their total.
 
     Returns
     -------
     xarray.Dataset
-        For each output NAME, of the dimensions time and derivative (and component), SI: NAME itself, of the nominal
-        design; NAME_linear_std, a standard deviation to first order; NAME_mean, NAME_std, NAME_low and NAME_high, the
+        For each output NAME, with the dimensions time and derivative (and component), SI: NAME itself, of the nominal
+        design; NAME_linear_std, the standard deviation to first order; NAME_mean, NAME_std, NAME_low and NAME_high, the
         mean, the standard deviation, and the percentiles 2.5 and 97.5 of the samples. NAME_gradient (parameter, ...)
-        has its derivatives by the parameters, NAME_share (parameter, ...) the part of the variance that each causes to
-        first order. NAME_peak, NAME_peak_mean, and so on are for the largest magnitude at the instants; with indices
-        NAME_peak_first_order and NAME_peak_total_order (Saltelli 2010). ``solved`` (time) is the number of samples
-        solved: means leave out the others, which lock or cannot be assembled.
+        has its derivatives by the parameters, NAME_share (parameter, ...) the share of each in the variance to first
+        order. NAME_peak, NAME_peak_mean, and so on refer to the largest magnitude at the instants; with indices also
+        NAME_peak_first_order and NAME_peak_total_order (Saltelli 2010). ``solved`` (time) is the number of solved
+        samples; statistics omit the others, which lock or cannot be assembled.
 
     Raises
     ------
@@ -94,7 +94,7 @@ def tolerance(
     SolveError
         If the nominal design is not solved at all instants.
     UnsupportedError
-        SALib is not installed.
+        If SALib is required but not installed.
 
     Notes
     -----
@@ -138,12 +138,12 @@ def tolerance(
 
 
 def column_of(mechanism: Mechanism, name: str) -> tuple[str, str, int]:
-    """Return the output, the component (or nothing), and the derivative that the name of a column means.
+    """Return the output, the component (or an empty string), and the derivative in the name of a column.
 
     Raises
     ------
     MechanismError
-        There is no such column.
+        If the column does not exist.
 
     Examples
     --------
@@ -163,7 +163,7 @@ def column_of(mechanism: Mechanism, name: str) -> tuple[str, str, int]:
 
 
 def check_salib(samples: int) -> None:
-    """Raise an error unless Sobol's indices can be estimated."""
+    """Raise an error unless Sobol indices can be estimated."""
     from importlib.util import find_spec
 
     if find_spec("SALib") is None:
@@ -196,7 +196,7 @@ class _Spread:
             self._put(f"{name}_peak", dims, peak, name, "largest magnitude of {} at the instants and breaks of laws")
 
     def add_gradients(self) -> None:
-        """Differentiate by the parameters, all in one pass forward."""
+        """Add the derivatives by all parameters, from one forward pass."""
         start = jnp.array([self.space[name] for name in self.names])
 
         def outputs(values: Any) -> dict[str, Any]:
@@ -216,7 +216,7 @@ class _Spread:
             self._put(f"{name}_share", ("parameter", *dims), share, "", "part of the variance of {}", name)
 
     def add_samples(self, count: int, progress: Progress | None) -> None:
-        """Solve designs that are drawn from the distributions."""
+        """Add the statistics of designs drawn from the distributions."""
         shapes = [self._variables[name].shape for name in self._outputs]
         numbers = count * sum(math.prod(shape) for shape in shapes)
         if numbers > MOST_NUMBERS:
@@ -243,7 +243,7 @@ class _Spread:
             self._add_statistics(f"{name}_peak", name, dims[1:], peaks[name][solved.all(axis=1)])
 
     def add_indices(self, count: int, progress: Progress | None) -> None:
-        """Estimate the part of the variance of the peaks that each parameter causes, alone and with others."""
+        """Add Sobol indices: the share of each parameter in the variance of the peaks, alone and with others."""
         from SALib.analyze import sobol as analyze
         from SALib.sample import sobol as sample
 
@@ -291,7 +291,7 @@ class _Spread:
         return xarray.Dataset(variables, coordinates, {"title": whole.attrs.get("title", ""), "source": "jounce"})
 
     def _solved_designs(self, values: Mapping[str, np.ndarray]) -> tuple[Any, Sides]:
-        """Return designs solved side by side, always the same number, so that programs are compiled once."""
+        """Return designs solved side by side, padded to a constant number so that programs compile once."""
         count = len(next(iter(values.values())))
         designs = {name: padded(x, TOGETHER) for name, x in values.items()}
         solved, sides = solve_with_sides(self.mechanism, designs, self.nominal.time, self.nominal.order)
@@ -300,22 +300,22 @@ class _Spread:
     def _peaks(
         self, name: str, values: Float[np.ndarray, "sample time derivative *axes"], sides: Sides
     ) -> Float[np.ndarray, "sample derivative *axes"]:
-        """Return the largest magnitudes of samples of an output, at the instants and on both sides of breaks."""
+        """Return the largest magnitudes of an output in each sample, at instants and on both sides of breaks."""
         peaks = np.abs(values).max(axis=1)
         one_sided = sides.values.get(name)
         if one_sided is None or not one_sided.shape[1]:
             return peaks
         one_sided = np.abs(one_sided[: len(values)].reshape(len(values), -1, *values.shape[2:]))
         if np.any(getattr(self.mechanism.outputs[name], "wraps", ())):
-            one_sided[:, :, 0] = np.nan  # no derivative, and counted from where the motion begins
+            one_sided[:, :, 0] = np.nan  # an angle itself, counted from the start of the motion
         return np.where(np.isnan(peaks), peaks, np.fmax(peaks, np.fmax.reduce(one_sided, axis=1)))
 
     def _near_nominal(
         self, name: str, values: Float[np.ndarray, "sample time derivative *axes"]
     ) -> Float[np.ndarray, "sample time derivative *axes"]:
-        """Return samples of an output with the whole turns that begin nearest to the nominal motion.
+        """Return samples of an output with whole turns added so that they start nearest to the nominal motion.
 
-        Euler angles begin within half a turn of zero in every design, so that next to half a turn both signs occur.
+        Euler angles start within half a turn of zero in every design, so that both signs occur near half a turn.
         """
         wraps = np.array(getattr(self.mechanism.outputs[name], "wraps", ()))
         if wraps.any():
@@ -324,11 +324,11 @@ class _Spread:
         return values
 
     def _add_statistics(self, name: str, of: str, dims: tuple[str, ...], values: np.ndarray) -> None:
-        """Store the statistics of samples, without those that were not solved."""
+        """Store the statistics of the solved samples."""
         import warnings
 
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore", RuntimeWarning)  # where no sample is known: NaN
+            warnings.simplefilter("ignore", RuntimeWarning)  # NaN where no sample is solved
             statistics = {"mean": np.nanmean(values, axis=0), "std": np.nanstd(values, axis=0, ddof=1)}
             bounds = (
                 np.nanpercentile(values, PERCENTILES, axis=0)
@@ -354,7 +354,7 @@ class _Spread:
 
 
 def _batches(count: int, progress: Progress | None) -> Iterator[tuple[int, int]]:
-    """Yield the bounds of designs that are solved together, and report how many are done."""
+    """Yield the bounds of batches of designs, and report the number of designs done."""
     for start in range(0, count, TOGETHER):
         stop = min(start + TOGETHER, count)
         yield start, stop

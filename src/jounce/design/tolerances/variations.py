@@ -1,4 +1,4 @@
-"""Variations of the parameters of a design: forms such as ``3cm:5cm:101``, ``12cm:16cm`` and ``normal:0.1mm``."""
+"""Variations of parameters of a design, written as ``3cm:5cm:101``, ``12cm:16cm`` or ``normal:0.1mm``."""
 
 import dataclasses
 import math
@@ -16,19 +16,19 @@ FORMS = "LOW:HIGH, LOW:HIGH:COUNT, normal:SIGMA or uniform:HALFWIDTH"
 MOST_VALUES = 10_000_000  # of one parameter
 
 Reader = Callable[[str, str], float]
-"""Reads one value of a parameter, given the name of the parameter and a text with or without a unit; SI."""
+"""Function from the name of a parameter and a text, with or without a unit, to a value, SI."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Interval:
-    """All values between two bounds, or evenly spaced ones with both ends.
+    """All values between two bounds, or evenly spaced values with both ends.
 
     Parameters
     ----------
     low, high : float
-        SI.
+        Bounds, SI.
     count : int, optional
-        Number of values; unless given, any value between the bounds.
+        Number of values; by default the interval is continuous.
     """
 
     low: float
@@ -42,23 +42,23 @@ class Interval:
         return np.linspace(self.low, self.high, self.count)
 
     def quantile(self, share: Float[np.ndarray, "*batch"], nominal: float) -> Float[np.ndarray, "*batch"]:
-        """Return the quantiles of shares of all values."""
+        """Return the quantiles for probabilities."""
         del nominal
         return self.low + (self.high - self.low) * share
 
     def deviation(self) -> float:
-        """Return the standard deviation of a value anywhere in the interval, all being equally likely."""
+        """Return the standard deviation of the uniform distribution over the interval."""
         return (self.high - self.low) / math.sqrt(12)
 
 
 @dataclasses.dataclass(frozen=True)
 class Uniform:
-    """Values within a half-width of the nominal one, all equally likely."""
+    """Uniform distribution within a half-width of the nominal value."""
 
     halfwidth: float
 
     def quantile(self, share: Float[np.ndarray, "*batch"], nominal: float) -> Float[np.ndarray, "*batch"]:
-        """Return the quantiles of shares of all values."""
+        """Return the quantiles for probabilities."""
         return nominal + self.halfwidth * (2 * share - 1)
 
     def deviation(self) -> float:
@@ -68,12 +68,12 @@ class Uniform:
 
 @dataclasses.dataclass(frozen=True)
 class Normal:
-    """Values normally distributed about the nominal one."""
+    """Normal distribution about the nominal value."""
 
     sigma: float
 
     def quantile(self, share: Float[np.ndarray, "*batch"], nominal: float) -> Float[np.ndarray, "*batch"]:
-        """Return the quantiles of shares of all values."""
+        """Return the quantiles for probabilities."""
         from scipy.special import ndtri
 
         return nominal + self.sigma * ndtri(share)
@@ -85,13 +85,13 @@ class Normal:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Values:
-    """Values given one by one."""
+    """A list of values."""
 
     values: Float[np.ndarray, " value"]
 
     @property
     def count(self) -> int:
-        """How many values there are."""
+        """Number of values."""
         return len(self.values)
 
 
@@ -99,7 +99,7 @@ Variation = Interval | Uniform | Normal | Values
 
 
 def read_variations(given: Any, read: Reader) -> dict[str, Variation]:
-    """Return how parameters vary.
+    """Return the variations of parameters.
 
     Parameters
     ----------
@@ -107,12 +107,12 @@ def read_variations(given: Any, read: Reader) -> dict[str, Variation]:
         For each parameter, by name: a text of one of the forms, a pair of bounds, bounds and a count, or a list or an
         array of values; numbers SI.
     read : callable
-        Reads one value of a parameter from a text, and refuses unknown names.
+        Function that reads a value of a parameter from a text, and raises an error for unknown names.
 
     Raises
     ------
     JounceError
-        There is none, a form or a value cannot be read, or bounds are reversed.
+        If no parameter varies, a form or a value cannot be read, or bounds are reversed.
     """
     if not isinstance(given, Mapping) or not given:
         raise MechanismError(f"say what varies, as {FORMS} for each parameter", name="vary", value=given)
@@ -125,7 +125,7 @@ def named_forms(texts: Iterable[str]) -> dict[str, str]:
     Raises
     ------
     MechanismError
-        A text has no name or no form, or a name is given twice.
+        If a text has no name or no form, or a name occurs twice.
 
     Examples
     --------
@@ -144,7 +144,7 @@ def named_forms(texts: Iterable[str]) -> dict[str, str]:
 
 
 def reader_of(mechanism: Mechanism) -> Reader:
-    """Return a reader of values of the parameters of a mechanism, with the units that they may have.
+    """Return a function that reads values of the parameters of a mechanism, with or without units.
 
     Examples
     --------
@@ -238,7 +238,7 @@ def spreads(variations: Mapping[str, Variation]) -> dict[str, Normal | Uniform |
     Raises
     ------
     MechanismError
-        One is a list of values, or has a count.
+        If a variation is a list of values, or has a count.
     """
     distributions: dict[str, Normal | Uniform | Interval] = {}
     for name, variation in variations.items():
