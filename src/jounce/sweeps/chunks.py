@@ -1,4 +1,4 @@
-"""The work of one chunk of designs: computed, summarized and written where it is computed, by one worker or another."""
+"""The work of one chunk of designs: a worker computes, summarizes and writes it."""
 
 import dataclasses
 import os
@@ -23,13 +23,13 @@ from jounce.sweeps.statistics import Variable, stored_values, variables_of
 from jounce.sweeps.store import Store
 
 _computing = threading.Lock()
-"""One chunk at a time is computed in a process, whose threads share it: memory is bounded by the processes."""
+"""Lock under which a process computes one chunk at a time, with all its threads, to bound memory."""
 _DESIGN = re.compile(r"\(design (\d+):")
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Plan:
-    """What is computed, of which designs, and where it goes.
+    """Plan of a sweep: the problem, the designs, and the folder of the results.
 
     Parameters
     ----------
@@ -37,15 +37,15 @@ class Plan:
     space : Grid or Sobol
         Designs.
     quantities : tuple of Quantity
-        Of the problem.
+        Quantities of the problem.
     folder : Path
-        Of the sweep, which is there.
+        Existing folder of the sweep.
     chunk : int
-        Designs that are computed together.
+        Number of designs computed together.
     histories : bool
-        Whether all instants are kept.
+        Whether to keep all instants.
     identity : str
-        Of the folder's manifest.
+        Identity in the manifest of the folder.
     """
 
     problem: Problem
@@ -57,18 +57,18 @@ class Plan:
     identity: str
 
     def __getstate__(self) -> dict[str, Any]:
-        """Return what another process is given, which finds out by itself whether it sees the folder."""
+        """Return the fields for another process, which itself checks whether it sees the folder."""
         return {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}
 
     @cached_property
     def variables(self) -> list[Variable]:
-        """Arrays over the designs, those of the parameters first."""
+        """Arrays over the designs, parameters first."""
         of = (self.quantities, list(self.space.variations), self.problem.levels, len(self.problem.instants))
         return variables_of(*of, histories=self.histories)
 
     @cached_property
     def names(self) -> list[str]:
-        """Arrays in which the parameters are kept."""
+        """Names of the arrays of the parameters."""
         return [variable.name for variable in self.variables[: len(self.space.variations)]]
 
     def files(self, manifest: Mapping[str, Any]) -> dict[str, bytes]:
@@ -78,21 +78,21 @@ class Plan:
 
     @property
     def chunks(self) -> int:
-        """How many chunks there are."""
+        """Number of chunks."""
         return -(-self.space.count // self.chunk)
 
     def size(self, chunk: int) -> int:
-        """Return how many designs a chunk has; the last one may have fewer."""
+        """Return the number of designs of a chunk, which may be smaller for the last one."""
         return min(self.chunk, self.space.count - chunk * self.chunk)
 
     @cached_property
     def store(self) -> Store:
-        """Where the results go.
+        """Store of the results.
 
         Raises
         ------
         OutputError
-            This process sees another folder than the one that began the sweep, or none, or rounds otherwise.
+            If this process sees no folder or another one than the process that began the sweep, or rounds differently.
         """
         self._check_there()
         store = Store(self.folder)
@@ -110,26 +110,26 @@ class Plan:
             raise OutputError(message, path=str(self.folder))
 
     def compute(self, chunk: int, threads: int | None = None) -> None:
-        """Compute a chunk and write it, unless it is there.
+        """Compute a chunk and write it, unless it exists.
 
         Raises
         ------
         JounceError
-            No mechanism may have the parameters, or a result cannot be written.
+            If the parameters are not admissible, or a result cannot be written.
         """
         if self.store.is_done(chunk):
             return
         start = chunk * self.chunk
         designs = self.space.values(start, start + self.size(chunk))
-        with _computing:  # and another one is computed while this one is written
+        with _computing:  # the next chunk is computed while this one is written
             arrays = self._computed(designs, start, thread_count(threads))
-        self._check_there()  # still: a client that was killed may have been followed by one with another sweep
+        self._check_there()  # again, as a new client may have replaced the sweep of a killed one
         self.store.write(chunk, start, arrays)
 
     def _computed(self, designs: Designs, start: int, threads: int) -> dict[str, np.ndarray]:
-        """Return all arrays of some designs, the first of which has a number."""
+        """Return all arrays of some designs, the first of which has the number `start`."""
         count = len(designs[next(iter(designs))])
-        length = self.chunk if self.chunks > 1 else count  # one shape of all chunks compiles once
+        length = self.chunk if self.chunks > 1 else count  # chunks of one shape share a compiled program
         try:
             histories = self.problem.histories({k: padded(x, length) for k, x in designs.items()}, threads)
         except JounceError as error:
@@ -166,7 +166,7 @@ def _unpickled(content: bytes) -> Any:
 
     try:
         return pickle.loads(content)
-    except Exception as error:  # noqa: BLE001 - whatever it needs and does not find
+    except Exception as error:  # noqa: BLE001 - unpickling runs code of the user
         text = " ".join(f"{type(error).__name__}: {error}".split())
         message = (
             f"a worker cannot load what is to be computed ({text}); it needs the same release of jounce as the client, "
@@ -176,7 +176,7 @@ def _unpickled(content: bytes) -> Any:
 
 
 def compute_on_worker(content: bytes, chunk: int, threads: int | None) -> int:
-    """Compute a chunk of a pickled plan in a worker of a cluster, with some threads or all that it has."""
+    """Compute a chunk of a pickled plan in a worker of a cluster, by default with all its threads."""
     from distributed import get_worker
 
     _loaded(content).compute(chunk, get_worker().state.nthreads if threads is None else threads)

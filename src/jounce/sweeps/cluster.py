@@ -1,4 +1,4 @@
-"""Workers: the cores of this machine, or a Dask cluster that has an address; what one loses another one computes."""
+"""Workers of a sweep: the cores of this machine or a Dask cluster; chunks of a lost worker are computed by others."""
 
 import logging
 import multiprocessing
@@ -16,23 +16,23 @@ from jounce.execution.threads import thread_count
 from jounce.sweeps.chunks import Plan, compute_on_worker
 from jounce.sweeps.manifest import versions
 
-AHEAD = 2  # chunks that wait for each thread of the cluster
+AHEAD = 2  # queued chunks for each thread of the cluster
 POLL = 5.0  # s
 PATIENCE = 60.0  # s without any worker
 FOR_WORKERS = {
-    "PJRT_NPROC": "1",  # a worker has one core: threads of XLA would take it from the others
-    "PYTHONSAFEPATH": "1",  # it starts by `python -c`, which would import signal.py from its folder
+    "PJRT_NPROC": "1",  # a worker has one core, and more threads of XLA would take those of other workers
+    "PYTHONSAFEPATH": "1",  # workers start by `python -c`, which would import a signal.py from the current folder
 }
 GUARD = "put what it does below 'if __name__ == \"__main__\":', or sweep with workers=0, in this process"
 MISSING = "needs {}, which is not installed; install it with: pip install 'jounce[sweep]'"
 
 
 class ClusterError(JounceError):
-    """The cluster does not answer, or was lost."""
+    """Raised if the cluster does not answer, or is lost."""
 
 
 def check_installed(*packages: str) -> None:
-    """Raise UnsupportedError unless packages are there."""
+    """Raise UnsupportedError unless packages are installed."""
     from importlib.util import find_spec
 
     missing = [package for package in packages if find_spec(package) is None]
@@ -52,34 +52,34 @@ def compute_on_cluster(
     user_files: Mapping[str, str] | None = None,
     prepare: Callable[[], object] | None = None,
 ) -> None:
-    """Compute chunks on the workers of a cluster; results stay where they are written.
+    """Compute chunks on the workers of a cluster, which write their results.
 
     Parameters
     ----------
     plan : Plan
     chunks : iterable of int
-        Those that are not there yet.
+        Chunks to compute.
     done : callable
-        Called with each chunk that is on the disk.
+        Called with each chunk once it is on the disk.
     scheduler : str, optional
-        Address of a cluster; that of this machine is started unless given.
+        Address of a cluster; by default one is started on this machine.
     workers : int, optional
         Processes on this machine.
     timeout : float
-        Of an answer, s.
+        Longest time to wait for an answer, s.
     scratch : Path
-        Folder for what workers on this machine keep meanwhile.
+        Folder for temporary files of workers on this machine.
     user_files : dict of str to str, optional
-        Digests of Python files with the user's own classes, by their paths.
+        Digests of Python files with classes of the user, by their paths.
     prepare : callable, optional
-        What each worker calls first.
+        Function that each worker calls first.
 
     Raises
     ------
     ClusterError
-        It does not answer, or is lost on the way.
+        If the cluster does not answer, or is lost.
     JounceError
-        A chunk cannot be computed or written.
+        If a chunk cannot be computed or written.
     """
     import cloudpickle
 
@@ -91,16 +91,16 @@ def compute_on_cluster(
 
 
 def _check_releases(client: Any, timeout: float) -> None:
-    """Raise ClusterError unless all workers have the packages that compute in the releases of this process.
+    """Raise ClusterError unless all workers have the same releases of numerical packages as this process.
 
-    What a worker that joins later has, is compared with the manifest where it computes.
+    Workers that join later compare their releases with the manifest.
     """
     names = list(versions())
     try:
         releases = client.sync(client._get_versions, packages=names, callback_timeout=max(timeout, PATIENCE))
     except (OSError, TimeoutError) as error:
         raise _lost(error) from None
-    own = {name: releases["client"]["packages"].get(name) for name in names}  # listed in the same way
+    own = {name: releases["client"]["packages"].get(name) for name in names}  # in the same format
     for address, worker in sorted(releases["workers"].items()):
         packages = worker["packages"] if isinstance(worker, dict) else {}
         for name, release in own.items():
@@ -113,11 +113,11 @@ def _check_releases(client: Any, timeout: float) -> None:
 def _compute(
     client: Any, content: bytes, chunks: Iterator[int], done: Callable[[int], None], *, threads: int | None
 ) -> None:
-    """Keep a bounded number of chunks on their way."""
+    """Compute chunks, with a bounded number submitted at a time."""
     import distributed
 
     wait: Any = distributed.wait
-    plan = client.submit(bytes, content, pure=False)  # a task, so that the cluster makes it again for new workers
+    plan = client.submit(bytes, content, pure=False)  # a task, which the cluster repeats for new workers
     ahead = max(2, AHEAD * sum(client.nthreads().values()))
 
     def submitted(count: int) -> set[Any]:
@@ -144,7 +144,7 @@ def _compute(
 
 
 def _reason(future: Any) -> Exception:
-    """Return the error of a task, in words of this package where it is none of its own."""
+    """Return the error of a task, with errors of Dask translated."""
     if future.status != "error":
         return _lost(future.status)
     error = future.exception()
@@ -162,7 +162,7 @@ def _lost(reason: object) -> ClusterError:
 
 @contextmanager
 def _client(scheduler: str | None, workers: int | None, timeout: float, scratch: Path) -> Iterator[Any]:
-    """Give a client of a cluster, which is started on this machine unless it has an address."""
+    """Yield a client of a cluster, which is started on this machine unless an address is given."""
     from distributed import Client
 
     with _dask_silenced(), ExitStack() as closing:
@@ -187,7 +187,7 @@ def _client(scheduler: str | None, workers: int | None, timeout: float, scratch:
 
 @contextmanager
 def _environment() -> Iterator[None]:
-    """Set what workers inherit, which Dask leaves set, for as long as they run."""
+    """Set environment variables for workers, and restore them afterwards, which Dask does not."""
     before = {name: os.environ.get(name) for name in FOR_WORKERS}
     os.environ.update({name: os.environ.get(name) or value for name, value in FOR_WORKERS.items()})
     try:
@@ -208,13 +208,13 @@ def _local(count: int, scratch: Path) -> Any:
     if getattr(multiprocessing.current_process(), "_inheriting", False):
         raise UnsupportedError(f"a worker process runs the script that starts it: {GUARD}")
     settings: dict[str, Any] = {"dashboard_address": None, "memory_limit": 0, "silence_logs": logging.CRITICAL}
-    # no page of the cluster is served, but its server is started: on any port, for this machine only
+    # the dashboard is off, but its server starts: on any port, for this machine only
     settings["scheduler_kwargs"] = {"dashboard": False, "dashboard_address": "127.0.0.1:0"}
     lean = {
         "temporary-directory": str(scratch),
-        "distributed.worker.use-file-locking": False,  # nobody else has this folder
-        "distributed.worker.profile.enabled": False,  # it looks at all stacks a hundred times a second
-        # Dask's own MALLOC_TRIM_THRESHOLD_ is left out, which gives every large array new pages
+        "distributed.worker.use-file-locking": False,  # no other process uses this folder
+        "distributed.worker.profile.enabled": False,  # it samples all stacks a hundred times a second
+        # without MALLOC_TRIM_THRESHOLD_ of Dask, with which every large array gets new pages
         "distributed.nanny.pre-spawn-environ": {name: os.environ[name] for name in FOR_WORKERS},
     }
     try:
@@ -226,9 +226,9 @@ def _local(count: int, scratch: Path) -> Any:
 
 
 def _track_quietly() -> None:
-    """Start the process that removes semaphores after this one, unless it runs: it shall not tell that there were any.
+    """Start the resource tracker, which removes semaphores after this process, with its warnings silenced.
 
-    Where a signal ends this process at once they are left to it, as they should be.
+    If a signal kills this process, semaphores are left to the tracker.
     """
     from multiprocessing import resource_tracker
 
@@ -242,7 +242,7 @@ def _track_quietly() -> None:
 
 @contextmanager
 def _dask_silenced() -> Iterator[None]:
-    """Leave what Dask tells of lost connections to this package."""
+    """Silence the messages of Dask on lost connections, which this package reports itself."""
     names = [name for name in logging.root.manager.loggerDict if name.partition(".")[0] == "distributed"]
     before = {name: logging.getLogger(name).level for name in names}
     for name in names:

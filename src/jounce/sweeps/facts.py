@@ -1,4 +1,4 @@
-"""What a sweep came to, as plain facts: how many designs were solved, and which have extreme peaks."""
+"""Results of a sweep as plain facts: the number of solved designs, and the designs with extreme peaks."""
 
 import itertools
 from collections import Counter
@@ -14,7 +14,7 @@ from jounce.sweeps.chunks import Plan
 
 
 def sweep_facts(plan: Plan, checksum: str) -> dict[str, Any]:
-    """Return the facts of a sweep that is done, with its checksum; one chunk at a time is read."""
+    """Return the facts of a finished sweep, with its checksum; chunks are read one at a time."""
     import zarr
 
     group: Any = zarr.open_group(plan.folder, mode="r")
@@ -54,7 +54,7 @@ def sweep_facts(plan: Plan, checksum: str) -> dict[str, Any]:
 
 
 def sweep_summary(facts: dict[str, Any], name: str) -> str:
-    """Word how a sweep went."""
+    """Return the summary of a sweep as text."""
     count, bad = facts["designs"], sum(facts["failed"].values())
     lines = [f"{name}: {count} designs ({', '.join(facts['vary'])}) at {facts['instants']} instants"]
     kinds = ", ".join(f"{number} {word.replace('_', ' ')}" for word, number in facts["failed"].items())
@@ -64,7 +64,7 @@ def sweep_summary(facts: dict[str, Any], name: str) -> str:
 
 
 def sweep_table(facts: dict[str, Any]) -> Table:
-    """Return a table of the least and the largest peaks, and of the designs that have them."""
+    """Return a table of the smallest and largest peaks with their designs."""
 
     def at(values: dict[str, float] | None) -> str:
         return "-" if values is None else " ".join(f"{name}={number(value)}" for name, value in values.items())
@@ -88,7 +88,7 @@ def _columns(quantity: Any, levels: int) -> list[tuple[str, int, str]]:
 
 
 def _running_best(before: tuple[float, int] | None, values: np.ndarray, start: int) -> tuple[float, int] | None:
-    """Return the least value so far and its design; of equal ones the first."""
+    """Return the least value so far and its design, the first one of equal values."""
     known = np.where(np.isnan(values), np.inf, values)
     index = int(np.argmin(known))
     if not np.isfinite(known[index]) or (before is not None and before[0] <= known[index]):

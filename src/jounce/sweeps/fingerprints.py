@@ -1,4 +1,4 @@
-"""Digests of models and files: what distinguishes one sweep from another."""
+"""Digests of models and files, which distinguish sweeps."""
 
 import dataclasses
 import enum
@@ -11,7 +11,7 @@ import numpy as np
 
 
 def fingerprint(thing: Any) -> str:
-    """Return a digest of all values that an object is made of: the same in every process, another for another value.
+    """Return a digest of all values in an object: the same in every process, and different for different values.
 
     Examples
     --------
@@ -24,7 +24,7 @@ def fingerprint(thing: Any) -> str:
 
 
 def _add(thing: Any, put: Callable[[bytes], object], above: tuple[int, ...]) -> None:
-    """Put the bytes of a thing; `above` are the objects that hold it, so that a circle ends."""
+    """Add the bytes of an object to a digest; `above` are the objects that contain it, to end cycles."""
     put(f"<{type(thing).__module__}.{type(thing).__qualname__}>".encode())
     if thing is None or isinstance(thing, bool | int | str | bytes | enum.Enum):
         put(repr(thing).encode())
@@ -41,7 +41,7 @@ def _add(thing: Any, put: Callable[[bytes], object], above: tuple[int, ...]) -> 
 
 
 def _parts(thing: Any) -> list[Any]:
-    """Return what an object is made of."""
+    """Return the parts of an object."""
     if isinstance(thing, Mapping):
         return [part for pair in thing.items() for part in pair]
     if isinstance(thing, list | tuple):

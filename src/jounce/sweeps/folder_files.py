@@ -1,4 +1,4 @@
-"""Files in the folder of a sweep: read with care, and written whole, where no link leads out of the folder."""
+"""Files in the folder of a sweep: read with checks, written atomically, and without following links."""
 
 import json
 import os
@@ -13,17 +13,17 @@ from jounce.errors import JounceError, OutputError
 from jounce.io.files.reading import read_file, reason_of
 
 ROOT = "zarr.json"
-LARGEST_ROOT = 200_000_000  # bytes of the descriptions of all arrays
+LARGEST_ROOT = 200_000_000  # bytes of the metadata of all arrays
 REMOVE = "remove it, and what it held is computed again"
 
 
 def attributes_in(path: Path) -> dict[str, Any]:
-    """Return the attributes in the description of a group.
+    """Return the attributes in the metadata of a group.
 
     Raises
     ------
     OutputError
-        It cannot be read.
+        If the metadata cannot be read.
     """
     attributes = parsed(read_file(path, LARGEST_ROOT, error=OutputError, is_input=False), path).get("attributes", {})
     if not isinstance(attributes, dict):
@@ -32,7 +32,7 @@ def attributes_in(path: Path) -> dict[str, Any]:
 
 
 def parsed(text: Any, path: Path) -> dict[str, Any]:
-    """Return what a text in JSON says, by name."""
+    """Return the mapping in a JSON text, or raise OutputError."""
     try:
         data = json.loads(text)
     except (TypeError, ValueError, RecursionError):
@@ -43,7 +43,7 @@ def parsed(text: Any, path: Path) -> dict[str, Any]:
 
 
 def is_sweep(folder: Path) -> bool:
-    """Tell whether a folder says that it is that of a sweep."""
+    """Return whether the metadata of a folder is that of a sweep."""
     try:
         return "manifest" in attributes_in(folder / ROOT)
     except JounceError:
@@ -51,7 +51,7 @@ def is_sweep(folder: Path) -> bool:
 
 
 def is_blank(folder: Path) -> bool:
-    """Tell whether the folder of an array, or of a group, has nothing but descriptions and coordinates."""
+    """Return whether the folder of an array or a group contains nothing but metadata and coordinates."""
     inside = [path.relative_to(folder) for path in folder.rglob("*") if path.is_symlink() or not path.is_dir()]
     others = [path for path in inside if path.name != ROOT]
     if not others:
@@ -65,7 +65,7 @@ def is_blank(folder: Path) -> bool:
 
 @contextmanager
 def naming_path(path: Path) -> Iterator[None]:
-    """Name the file in what the system says, or a folder where it names none."""
+    """Raise OutputError for an OSError, with the file that the system names, or else a given path."""
     try:
         yield
     except (IsADirectoryError, NotADirectoryError) as error:
@@ -78,7 +78,7 @@ def naming_path(path: Path) -> Iterator[None]:
 
 
 def put(path: Path, content: bytes) -> None:
-    """Put a whole file in its place, of which no link is followed; a folder there stays, and is an error."""
+    """Write a file atomically, without following links; a folder in its place is an error."""
     scratch = path.with_name(f"{path.name}.{secrets.token_hex(6)}.partial")
     try:
         with cleanup_on_signal(lambda: scratch.unlink(missing_ok=True)):
@@ -91,7 +91,7 @@ def put(path: Path, content: bytes) -> None:
 
 
 def sync(path: Path) -> None:
-    """Bring a file, or the entries of a folder, onto the disk; what equals the fill value has no file."""
+    """Synchronize a file, or the entries of a folder, with the disk; chunks of fill values have no file."""
     with suppress(FileNotFoundError, PermissionError):
         descriptor = os.open(path, os.O_RDONLY)
         try:

@@ -1,4 +1,4 @@
-"""What the folder of a sweep holds before anything is computed, file by file, and how large it becomes."""
+"""The initial files in the folder of a sweep, and the size of its results."""
 
 import json
 import math
@@ -19,10 +19,10 @@ AXES = {
     "time": {"units": "s", "long_name": "time"},
     "derivative": {"long_name": "order of the time derivative"},
 }
-DIGEST = 32  # bytes of one
+DIGEST = 32  # bytes
 SHRINKS = 4
-"""How many times smaller than their numbers results may become: those of four-bars side by side 1.1 times, but designs
-that cannot be assembled take next to nothing."""
+"""Largest assumed compression ratio of results: 1.1 for those of four-bars, but designs that cannot be assembled take
+almost no space."""
 
 
 def files_of(
@@ -33,20 +33,20 @@ def files_of(
     count: int,
     chunk: int,
 ) -> dict[str, bytes]:
-    """Return the files of a Zarr hierarchy that has all arrays and nothing in them, by their names in the folder.
+    """Return the files of a Zarr hierarchy with all arrays, still empty, by their names in the folder.
 
     Parameters
     ----------
     manifest : dict
-        What the sweep is.
+        Manifest of the sweep.
     variables : sequence of Variable
-        Arrays over the designs, those of the parameters first.
+        Arrays over the designs, parameters first.
     axes : dict of str to array
-        Coordinates of their other dimensions.
+        Coordinates of the other dimensions.
     count : int
-        Designs.
+        Number of designs.
     chunk : int
-        Designs that are computed together.
+        Number of designs computed together.
     """
     import zarr
     from zarr.storage import MemoryStore
@@ -84,7 +84,7 @@ def files_of(
 
 
 def axes_of(quantities: Sequence[Quantity], instants: np.ndarray, levels: int) -> dict[str, np.ndarray]:
-    """Return the coordinates of the dimensions of a sweep besides the design, by name."""
+    """Return the coordinates of the dimensions of a sweep other than the design, by name."""
     labels = {axis: names for quantity in quantities for axis, names in quantity.axes}
     named = {axis: np.array(names, np.dtypes.StringDType()) for axis, names in labels.items()}
     return {"time": np.asarray(instants, float), "derivative": np.arange(levels)} | named
@@ -96,7 +96,7 @@ def _axis(root: Any, name: str, values: np.ndarray) -> None:
         shape=values.shape,
         chunks=values.shape,
         dtype=values.dtype,
-        compressors=None,  # the same bytes by every release of a compressor
+        compressors=None,  # compressed bytes would depend on the release of the compressor
         dimension_names=(name,),
         attributes=AXES.get(name, {}),
     )
@@ -104,7 +104,7 @@ def _axis(root: Any, name: str, values: np.ndarray) -> None:
 
 
 def check_room(folder: Path, variables: Sequence[Variable], count: int, chunk: int) -> None:
-    """Raise OutputError if the results of a sweep cannot have room on the disk of the folder above, however small."""
+    """Raise OutputError if the results of a sweep cannot fit on the disk, even if compressed."""
     each = sum(math.prod(variable.shape) * np.dtype(variable.dtype).itemsize for variable in variables)
     files = -(-count // chunk) * (len(variables) + 1)
     above = folder.absolute().parent
@@ -121,7 +121,7 @@ def check_room(folder: Path, variables: Sequence[Variable], count: int, chunk: i
 def _free_files(folder: Path) -> float:
     if not hasattr(os, "statvfs"):
         return math.inf
-    return float(os.statvfs(folder).f_favail) or math.inf  # some file systems have no bound, and say 0
+    return float(os.statvfs(folder).f_favail) or math.inf  # some file systems have no limit, and report 0
 
 
 def _size(count: int | float) -> str:

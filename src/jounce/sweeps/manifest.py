@@ -1,4 +1,4 @@
-"""What a sweep is, in words and digests: whether the same command goes on with it, or means another one."""
+"""The manifest of a sweep, in words and digests, which decides whether a command continues it."""
 
 import dataclasses
 import importlib.metadata
@@ -18,10 +18,10 @@ from jounce.execution.backends import uses_machine_code
 from jounce.execution.device import on_processor
 from jounce.sweeps.fingerprints import fingerprint
 
-FORMAT = 3  # of 1, digests did not cover the sweep and the place of a chunk; of 2, coordinates were compressed
-LARGEST_CHUNK = 2**20  # that may be requested
+FORMAT = 3  # in 1, digests did not cover the sweep and the place of a chunk; in 2, coordinates were compressed
+LARGEST_CHUNK = 2**20  # largest chunk that may be requested
 COMPARED = ("vary", "options", "versions", "arithmetic")  # groups of a manifest, value by value
-LIBRARIES = ("jax", "jaxlib", "numpy")  # other versions may give other last bits
+LIBRARIES = ("jax", "jaxlib", "numpy")  # the last bits may depend on their versions
 MOST_SHOWN = 200  # characters of a value of a manifest
 
 
@@ -33,21 +33,21 @@ def manifest_of(
     instants: np.ndarray,
     options: Mapping[str, Any],
 ) -> dict[str, Any]:
-    """Return what a sweep is.
+    """Return the manifest of a sweep.
 
     Parameters
     ----------
     title : str
     model : object
-        Mechanism, or robot and trajectory, with all that they were made of.
+        Mechanism, or robot and trajectory, with all their parts.
     files : dict of str to str
-        Digests of the files that were read, by their real paths, that of the model first.
+        Digests of the files that were read, by their real paths, the file of the model first.
     space : Grid or Sobol
         Designs.
     instants : array of shape (time,)
-        s.
+        Instants, s.
     options : dict
-        What was chosen besides.
+        Other settings.
     """
     attributes = {
         "format": FORMAT,
@@ -64,23 +64,23 @@ def manifest_of(
         "arithmetic": arithmetic(),
         "checksum": None,
     }
-    attributes = json.loads(json.dumps(attributes))  # as it is read again
+    attributes = json.loads(json.dumps(attributes))  # as after reading
     return attributes | {"identity": _identity(attributes)}
 
 
 def _identity(manifest: Mapping[str, Any]) -> str:
-    """Return a digest of all that is known when a sweep begins."""
+    """Return a digest of the content of a manifest at the start of a sweep."""
     left_out = {"checksum": None, "identity": None}
     return fingerprint({name: value for name, value in manifest.items() if name not in left_out} | left_out)
 
 
 def intact(manifest: Mapping[str, Any], path: str) -> dict[str, Any]:
-    """Return a manifest that was read from a file.
+    """Return a manifest read from a file, after checking that it is unchanged.
 
     Raises
     ------
     OutputError
-        Another release wrote it, or it was changed since it was written.
+        If another release wrote the manifest, or it was changed since.
     """
     before = manifest.get("format")
     if isinstance(before, int) and before != FORMAT:
@@ -97,7 +97,7 @@ def intact(manifest: Mapping[str, Any], path: str) -> dict[str, Any]:
 
 
 def versions() -> dict[str, str]:
-    """Return the releases of this package and of those that compute in this process.
+    """Return the releases of this package and of the numerical packages in this process.
 
     Examples
     --------
@@ -110,7 +110,7 @@ def versions() -> dict[str, str]:
 
 
 def arithmetic() -> dict[str, str]:
-    """Return what computes in this process: it rounds as it will, so that chunks of one sweep must have the same.
+    """Return what computes in this process, and thus how results round; it must be the same for all chunks of a sweep.
 
     Examples
     --------
@@ -125,7 +125,7 @@ def arithmetic() -> dict[str, str]:
 
 
 def check_same_arithmetic(there: Mapping[str, Any], folder: str) -> None:
-    """Raise OutputError, with what differs, unless this process computes as the one that began a sweep."""
+    """Raise OutputError, with the differences, unless this process computes like the one that began a sweep."""
     own = versions()
     if differences := _others(there.get("versions", own), own) + _others(there["arithmetic"], arithmetic()):
         message = f"a worker rounds otherwise than what began the sweep: {'; '.join(differences)}"
@@ -133,7 +133,7 @@ def check_same_arithmetic(there: Mapping[str, Any], folder: str) -> None:
 
 
 def _named(files: Mapping[str, str]) -> dict[str, str]:
-    """Return digests by names of files as seen from the folder of the first one."""
+    """Return digests by file names relative to the folder of the first file."""
     if not files:
         return {}
     folder = Path(next(iter(files))).parent
@@ -141,7 +141,7 @@ def _named(files: Mapping[str, str]) -> dict[str, str]:
 
 
 def check_same(there: Mapping[str, Any], expected: Mapping[str, Any], folder: str) -> None:
-    """Raise OutputError, with what differs, unless a sweep that was begun has the requested settings."""
+    """Raise OutputError, with the differences, unless an existing sweep has the requested settings."""
     differences = list(_differences(there, expected))
     if differences:
         message = (
@@ -152,7 +152,7 @@ def check_same(there: Mapping[str, Any], expected: Mapping[str, Any], folder: st
 
 
 def _differences(there: Mapping[str, Any], expected: Mapping[str, Any]) -> list[str]:
-    """Word what differs."""
+    """Return the differences of two manifests in words."""
     differences = []
     for name in there["files"] | expected["files"]:
         before, now = there["files"].get(name), expected["files"].get(name)
@@ -171,7 +171,7 @@ def _differences(there: Mapping[str, Any], expected: Mapping[str, Any]) -> list[
 
 
 def _others(before: Mapping[str, Any], now: Mapping[str, Any]) -> list[str]:
-    """Word what differs in a group of a manifest, value by value."""
+    """Return the differences in a group of two manifests, value by value, in words."""
     names = [name for name in {**before, **now} if before.get(name) != now.get(name)]
     return [f"{n} is {_shown(before.get(n))} there, and {_shown(now.get(n))} here" for n in names]
 
@@ -181,7 +181,7 @@ def _shown(value: Any) -> str:
 
 
 def _exact_description(variation: Any) -> str:
-    """Return a variation in words that tell every bit of it."""
+    """Return a description of a variation that determines every bit of it."""
     if isinstance(variation, Values):
         return f"{variation.count} values, digest {fingerprint(variation.values)[:16]}"
     numbers = [repr(value) for value in dataclasses.astuple(variation) if value is not None]

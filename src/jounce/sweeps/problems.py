@@ -1,4 +1,4 @@
-"""What is swept: motions and simulations of a mechanism, and torques of a robot on a trajectory, for many designs."""
+"""Problems of a sweep: motions and simulations of a mechanism, and torques of a robot on a trajectory."""
 
 import abc
 import dataclasses
@@ -41,12 +41,12 @@ from jounce.trajectory.law_checks.breaks import both_sides, law_breaks
 from jounce.units.values import parse_value
 
 Designs = Mapping[str, Float[np.ndarray, " design"]]
-MORE_INSTANTS = 4  # times the requested ones, at most, at which designs are simulated side by side
+MORE_INSTANTS = 4  # largest ratio of simulated to requested instants of designs side by side
 
 
 @dataclasses.dataclass(frozen=True)
 class Quantity:
-    """What is computed of every design: its name, unit and, where it is more than one number, the axes of these.
+    """A quantity computed for every design: its name, unit and, unless it is a scalar, its axes.
 
     Attributes
     ----------
@@ -60,7 +60,7 @@ class Quantity:
 
     @property
     def shape(self) -> tuple[int, ...]:
-        """How many numbers it has along each of its axes."""
+        """Number of components along each axis."""
         return tuple(len(labels) for _, labels in self.axes)
 
 
@@ -71,13 +71,13 @@ class Histories:
     Attributes
     ----------
     values : dict of str to array of shape (designs, time, order + 1, ...)
-        SI; NaN where they are not known.
+        Values, SI; NaN where unknown.
     status : array of int, shape (designs, time)
         See `Status`.
     pace : array of shape (designs,), optional
-        How many times faster than the instants say each design moves.
+        Factor by which each design moves faster than at the instants.
     sides : Sides, optional
-        The quantities on both sides of where laws jump or bend, at the pace of the instants.
+        The quantities on both sides of jumps and kinks of laws, at the pace of the instants.
     """
 
     values: dict[str, Float[np.ndarray, "design time derivative *axes"]]
@@ -87,7 +87,7 @@ class Histories:
 
 
 class Problem(abc.ABC):
-    """What is computed of every design of a sweep."""
+    """The computation for every design of a sweep."""
 
     @property
     @abc.abstractmethod
@@ -97,40 +97,40 @@ class Problem(abc.ABC):
     @property
     @abc.abstractmethod
     def levels(self) -> int:
-        """Number of derivatives, the quantity itself counted."""
+        """Number of levels: the quantity itself and its derivatives."""
 
     @property
     @abc.abstractmethod
     def nominal(self) -> Mapping[str, float]:
-        """Values of what may vary, SI."""
+        """Nominal values of the parameters that may vary, SI."""
 
     @property
     @abc.abstractmethod
     def reader(self) -> Reader:
-        """Reads values of what may vary, and refuses other names."""
+        """Function that reads values of parameters, and refuses unknown names."""
 
     @abc.abstractmethod
     def quantities(self) -> tuple[Quantity, ...]:
-        """Return what is computed."""
+        """Return the quantities."""
 
     @abc.abstractmethod
     def options(self) -> dict[str, Any]:
-        """Return what was chosen besides the model, in words and numbers."""
+        """Return the settings other than the model, in words and numbers."""
 
     @abc.abstractmethod
     def histories(self, designs: Designs, threads: int) -> Histories:
-        """Compute some designs side by side."""
+        """Return the histories of some designs, computed side by side."""
 
 
 class _OfMechanism(Problem):
-    """What follows from the parameters of a mechanism."""
+    """A problem whose parameters are those of a mechanism."""
 
     mechanism: Mechanism
     order: int
 
     @property
     def levels(self) -> int:
-        """Number of derivatives, the quantity itself counted."""
+        """Number of levels: the quantity itself and its derivatives."""
         return self.order + 1
 
     @property
@@ -140,7 +140,7 @@ class _OfMechanism(Problem):
 
     @property
     def reader(self) -> Reader:
-        """Reads values of parameters, with the units that they may have."""
+        """Function that reads values of parameters, with or without units."""
         return reader_of(self.mechanism)
 
     def quantities(self) -> tuple[Quantity, ...]:
@@ -166,11 +166,11 @@ class Motions(_OfMechanism):
         return time_grid(self.mechanism.time if self.time is None else self.time, self.mechanism.parameter_values)
 
     def options(self) -> dict[str, Any]:
-        """Return order and tolerance."""
+        """Return the order and the tolerance."""
         return {"kind": "motions", "order": self.order, "tolerance": self.tolerance}
 
     def histories(self, designs: Designs, threads: int) -> Histories:
-        """Solve some designs side by side."""
+        """Return the histories of some designs, solved side by side."""
         settings = {"tolerance": self.tolerance, "threads": threads}
         solved, sides = solve_with_sides(self.mechanism, designs, self.instants, self.order, **settings)
         values = {str(name): array.values for name, array in solved.data_vars.items() if name != "status"}
@@ -202,14 +202,14 @@ class Simulations(_OfMechanism):
         return instants_of(self.mechanism.time if self.time is None else self.time, self.mechanism.parameter_values)
 
     def options(self) -> dict[str, Any]:
-        """Return order, tolerance and method."""
+        """Return the order, the tolerance and the method."""
         longest = None if np.isinf(self.longest_step) else float(self.longest_step)
         method = "Taylor()" if self.method is None else repr(self.method)
         chosen = {"order": self.order, "tolerance": self.tolerance, "method": method, "longest_step": longest}
         return {"kind": "simulations", **chosen}
 
     def histories(self, designs: Designs, threads: int) -> Histories:
-        """Simulate some designs side by side; their threads are as many as the machine has cores."""
+        """Return the histories of some designs, simulated side by side with a thread for each core."""
         del threads
         first, last = sorted((float(self.instants[0]), float(self.instants[-1])))
         breaks, side_times = sides_of_designs(self.mechanism, designs, first, last, self.order, forces=True)
@@ -223,7 +223,7 @@ class Simulations(_OfMechanism):
     def _simulated(
         self, designs: Designs, side_times: Float[np.ndarray, "design side"]
     ) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray], Int[np.ndarray, "design time"]]:
-        """Return outputs at the instants and beside the breaks of laws, and the status at the instants."""
+        """Return the outputs at the instants and on both sides of breaks of laws, and the status at the instants."""
         settings = {"method": self.method, "tolerance": self.tolerance, "longest_step": self.longest_step}
         every, forward = np.union1d(self.instants, side_times), self.instants[0] <= self.instants[-1]
         grid = every if forward else every[::-1]
@@ -241,7 +241,7 @@ class Simulations(_OfMechanism):
 
 
 def _chunks(side_times: Float[np.ndarray, "design side"], most: int) -> Iterator[slice]:
-    """Yield designs that are simulated together, since each is at the instants of all: these are not many."""
+    """Yield batches of designs to simulate together, limited so that the union of their instants stays small."""
     start, known = 0, set()
     for k, own in enumerate(side_times.tolist()):
         known.update(own)
@@ -256,7 +256,7 @@ def _joined(parts: Sequence[Mapping[str, np.ndarray]]) -> dict[str, np.ndarray]:
 
 
 def outputs_of(mechanism: Mechanism, instants: Float[np.ndarray, " time"], order: int) -> tuple[Quantity, ...]:
-    """Return the outputs of a mechanism as quantities; it is solved only where there are forces or energies."""
+    """Return the outputs of a mechanism as quantities; forces and energies require a solution."""
     if not mechanism.outputs:
         raise MechanismError("the mechanism has no outputs, so that there is nothing to keep", name="outputs")
     model = build(with_output_drivers(mechanism))
@@ -270,7 +270,7 @@ def outputs_of(mechanism: Mechanism, instants: Float[np.ndarray, " time"], order
         if isinstance(output, AbstractMotionOutput):
             values = known[name]
             count = values.shape[2] if values.ndim == 3 else 1
-        elif getattr(output, "turning", False):  # counted from where the mechanism is assembled
+        elif getattr(output, "turning", False):  # counted from the assembled configuration
             count = 1
         else:
             assert isinstance(output, AbstractOutput)
@@ -289,8 +289,8 @@ _PARAMETER = re.compile(rf"(payload|{'|'.join(DRIVES)})\.(.+)")
 class Torques(Problem):
     """The torques of the joints of a robot on a trajectory, with rates, for many loads, drives and speeds.
 
-    Varied are ``payload.LINK``, a point mass in the origin of a link, kg; ``armature.JOINT``, ``damping.JOINT`` and
-    ``friction.JOINT``, in the place of those of the robot; and ``speed``, how many times faster the trajectory is run.
+    Parameters are ``payload.LINK``, a point mass in the origin of a link, kg; ``armature.JOINT``, ``damping.JOINT`` and
+    ``friction.JOINT``, which replace those of the robot; and ``speed``, a factor of the speed of the trajectory.
     """
 
     robot: Robot
@@ -305,18 +305,18 @@ class Torques(Problem):
 
     @property
     def levels(self) -> int:
-        """Number of rates, the torque itself counted."""
+        """Number of levels: the torque itself and its rates."""
         return self.rates + 1
 
     @property
     def nominal(self) -> Mapping[str, float]:
-        """What the robot holds, has and does, SI."""
+        """Nominal loads, drives and speed of the robot, SI."""
         drives = {f"{kind}.{n}": getattr(self.robot.joints[n], kind) for n in self.robot.joint_names for kind in DRIVES}
         return {"speed": 1.0, **{f"payload.{link}": 0.0 for link in self.robot.links}, **drives}
 
     @property
     def reader(self) -> Reader:
-        """Reads values with units."""
+        """Function that reads values of parameters, with or without units."""
 
         def read(name: str, text: str) -> float:
             check_name("parameter of a robot", name, tuple(self.nominal), RobotError, name="vary")
@@ -332,16 +332,16 @@ class Torques(Problem):
         return tuple(Quantity(n, "N*m" if self.robot.joints[n].turning else "N") for n in self.robot.joint_names)
 
     def options(self) -> dict[str, Any]:
-        """Return how many rates are computed."""
+        """Return the number of rates."""
         return {"kind": "torques", "rates": self.rates}
 
     def histories(self, designs: Designs, threads: int) -> Histories:
-        """Compute some designs: torques are linear in loads and drives, so that one more robot stands for each of them.
+        """Return the histories of some designs, from one robot for each load and drive, in which torques are linear.
 
         Raises
         ------
         RobotError
-            A speed is not above zero, or another value is negative.
+            If a speed is not greater than zero, or another value is negative.
         """
         del threads
         count = len(next(iter(designs.values())))
@@ -367,7 +367,7 @@ class Torques(Problem):
 
     @functools.cached_property
     def _instants_looked_at(self) -> tuple[Float[np.ndarray, " look"], Float[np.ndarray, " side"]]:
-        """The instants, then those on both sides of where laws jump or bend; and of which of these they are."""
+        """Return the instants, then those on both sides of breaks of laws, and the breaks of the latter."""
         first, last = float(self.instants[0]), float(self.instants[-1])
         breaks = law_breaks(self.trajectory.laws.values(), first, last, self.rates + 2)
         sides, which = both_sides(breaks, first, last)
@@ -384,7 +384,7 @@ class Torques(Problem):
 
 
 def _with(values: Mapping[str, float], robot: Robot) -> Robot:
-    """Return a robot with other loads and drives; a load of zero is none."""
+    """Return a robot with other loads and drives; a load of zero is omitted."""
     joints = dict(robot.joints)
     for name, value in values.items():
         match = _PARAMETER.fullmatch(name)

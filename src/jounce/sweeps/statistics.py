@@ -1,4 +1,4 @@
-"""What is kept of every design: peaks, where they are, root mean squares, least and largest values, and the outcome."""
+"""Stored results of every design: peaks with their instants, root mean squares, minima, maxima, and the outcome."""
 
 import dataclasses
 import warnings
@@ -30,7 +30,7 @@ class Variable:
     dims : tuple of str
         Dimensions after the first one.
     shape : tuple of int
-        Their sizes.
+        Sizes of these dimensions.
     """
 
     name: str
@@ -43,12 +43,12 @@ class Variable:
 def variables_of(
     quantities: Sequence[Quantity], parameters: Sequence[str], levels: int, instants: int, *, histories: bool
 ) -> list[Variable]:
-    """Return the arrays to store: of parameters, outcomes and statistics, and of histories where requested.
+    """Return the arrays to store: parameters, outcomes, statistics, and histories if requested.
 
     Raises
     ------
     MechanismError
-        Two of them would have the same name.
+        If two arrays would have the same name.
     """
     flags = {"flag_values": [int(s) for s in Status], "flag_meanings": " ".join(s.name.lower() for s in Status)}
     variables = [
@@ -80,7 +80,7 @@ def variables_of(
 def stored_values(
     histories_given: Histories, quantities: Sequence[Quantity], levels: int, instants: np.ndarray, *, histories: bool
 ) -> dict[str, np.ndarray]:
-    """Return the arrays of some designs, by name; a design that was not solved at all instants has no statistics."""
+    """Return the arrays of some designs, by name; designs not solved at all instants have no statistics."""
     count = len(histories_given.status)
     bad = histories_given.status != Status.OK
     first = np.take_along_axis(histories_given.status, np.argmax(bad, axis=1)[:, None], axis=1)[:, 0]
@@ -92,7 +92,7 @@ def stored_values(
         stored["status"] = histories_given.status.astype("i1")
     for quantity in quantities:
         values = histories_given.values.get(quantity.name)
-        if values is None:  # no design of them was solved
+        if values is None:  # none of the designs was solved
             values = np.full((count, len(instants), levels, *quantity.shape), np.nan)
         sides = (
             None
@@ -114,17 +114,17 @@ def statistics(
     pace: np.ndarray | None = None,
     sides: tuple[np.ndarray, np.ndarray] | None = None,
 ) -> dict[str, Float[np.ndarray, "design *rest"]]:
-    """Return statistics of histories over time; NaN where a value is not known.
+    """Return statistics of histories over time; NaN where a value is unknown.
 
     Parameters
     ----------
     values : array of shape (designs, time, ...)
     instants : array of shape (time,)
-        s; the mean of squares is over time, by trapezia.
+        Instants, s; the mean of squares over time uses the trapezoidal rule.
     pace : array of shape (designs,), optional
-        How many times faster each design moves than the instants say.
+        Factor by which each design moves faster than at the instants.
     sides : tuple of arrays of shape (designs, sides, ...) and (designs, sides), optional
-        More values that count for extremes, those on both sides of where laws jump or bend, and their instants, s.
+        Further values for extremes, on both sides of breaks of laws, and their instants, s.
 
     Examples
     --------
@@ -132,7 +132,7 @@ def statistics(
     >>> {name: value.tolist() for name, value in found.items() if name != "rms"}
     {'peak': [3.0], 'peak_time': [1.0], 'min': [-3.0], 'max': [2.0]}
     """
-    series = np.moveaxis(values, (0, 1), (-2, -1))  # as families have them in memory, so that nothing is copied
+    series = np.moveaxis(values, (0, 1), (-2, -1))  # the memory layout of families, so that nothing is copied
     low, high, size = series.min(axis=-1), series.max(axis=-1), np.abs(series)
     at = np.argmax(size, axis=-1)
     peak = np.take_along_axis(size, at[..., None], axis=-1)[..., 0]
@@ -165,7 +165,7 @@ def statistics(
 
 
 def _weights(instants: np.ndarray) -> Float[np.ndarray, " time"]:
-    """Return weights of a mean over time."""
+    """Return the weights of a mean over time by the trapezoidal rule."""
     if len(instants) == 1:
         return np.ones(1)
     step = np.diff(instants)

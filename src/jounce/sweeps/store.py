@@ -1,11 +1,11 @@
-"""The folder of a sweep: a Zarr hierarchy that appears whole, is filled by chunks, and knows which are on the disk.
+"""The folder of a sweep: a Zarr hierarchy created atomically and filled by chunks, which records finished chunks.
 
-The array ``chunks/digest`` has the digest of every chunk, in a file of its own that is written last, when the arrays of
-the chunk are on the disk: what it names is whole. What a process that was killed has left half done has no digest, and
-is computed again.
+The array ``chunks/digest`` has the digest of every chunk, each in a file written after the arrays of the chunk are on
+the disk, so that a chunk with a digest is complete. A chunk that a killed process left incomplete has no digest, and is
+computed again.
 
-Nothing in the folder is taken on trust: each file is compared with what it must hold, no link is followed where
-something is written, and nothing is opened that is no regular file.
+Nothing in the folder is trusted: each file is compared with its expected content, writing follows no links, and only
+regular files are opened.
 """
 
 import asyncio
@@ -47,31 +47,31 @@ SCRATCH = ".scratch-"
 
 
 class Store:
-    """The folder of a sweep that is there.
+    """The existing folder of a sweep.
 
     Parameters
     ----------
     folder : Path
-        Ends in .zarr.
+        Path that ends in .zarr.
     """
 
     def __init__(self, folder: Path):
         self.folder = folder
-        self._written: dict[str, Any] | None = None  # arrays over the designs, opened when they are first written
+        self._written: dict[str, Any] | None = None  # arrays over the designs, opened at the first write
 
     @cached_property
     def manifest(self) -> dict[str, Any]:
-        """What the sweep is, as it was written when it began.
+        """Manifest of the sweep, as written at its start.
 
         Raises
         ------
         OutputError
-            It is not there, or was changed since.
+            If the manifest does not exist, or was changed since.
         """
         return self.reread()
 
     def reread(self) -> dict[str, Any]:
-        """Return the manifest that is there now."""
+        """Return the manifest that is in the folder now."""
         path = self.folder / ROOT
         try:
             manifest = parsed(attributes_in(path)["manifest"], path)
@@ -81,22 +81,22 @@ class Store:
 
     @cached_property
     def _arrays(self) -> dict[str, Any]:
-        """Arrays over the designs, whose descriptions were compared before."""
+        """Arrays over the designs, with metadata checked before."""
         import zarr
 
         arrays: dict[str, Any] = dict(zarr.open_group(self.folder, mode="r+", use_consolidated=True).arrays())
         return {name: x for name, x in arrays.items() if (x.metadata.dimension_names or ("",))[0] == "design"}
 
     def write(self, chunk: int, start: int, arrays: Mapping[str, np.ndarray]) -> None:
-        """Write the arrays of a chunk, whose first design is `start`; it is done once all is on the disk.
+        """Write the arrays of a chunk, whose first design is `start`, and mark it as done once all are on the disk.
 
         Raises
         ------
         OutputError
-            The disk is full, or what else the system says.
+            If the disk is full, or another error of the system occurs.
         """
         with naming_path(self.folder):
-            with ThreadPoolExecutor(1) as pool:  # whose thread has no event loop yet, as that of a notebook has
+            with ThreadPoolExecutor(1) as pool:  # a thread without a running event loop, unlike that of a notebook
                 pool.submit(asyncio.run, self._put(start, arrays)).result()
             for name in arrays:
                 _sync(self._part(name, chunk))
@@ -104,7 +104,7 @@ class Store:
             put(self._mark(chunk), self._digest(chunk, arrays))
 
     async def _put(self, start: int, arrays: Mapping[str, np.ndarray]) -> None:
-        """Put the arrays of a chunk to their files all at once: one after another takes twice as long."""
+        """Write the arrays of a chunk concurrently; one after another takes twice as long."""
         import zarr.api.asynchronous
 
         if self._written is None:
@@ -114,28 +114,28 @@ class Store:
         await asyncio.gather(*(whole[name].setitem(slice(start, start + len(x)), x) for name, x in arrays.items()))
 
     def is_done(self, chunk: int) -> bool:
-        """Tell whether a chunk is on the disk."""
+        """Return whether a chunk is on the disk."""
         return self._mark(chunk).is_file()
 
     def is_whole(self, chunk: int, start: int, count: int) -> bool:
-        """Tell whether the arrays of a chunk that is done, of so many designs, are those that were written."""
+        """Return whether the arrays of a finished chunk of `count` designs are unchanged."""
         parts = [self._part(name, chunk) for name in self._arrays]
         try:
-            if any(part.exists() and not part.is_file() for part in parts):  # what equals the fill value has no file
+            if any(part.exists() and not part.is_file() for part in parts):  # chunks of fill values have no file
                 return False
             arrays = {name: array[start : start + count] for name, array in self._arrays.items()}
             digest = read_file(self._mark(chunk), DIGEST, is_input=False)
             return self._digest(chunk, arrays) == digest
-        except Exception:  # noqa: BLE001 - whatever is wrong with its files, it is computed again
+        except Exception:  # noqa: BLE001 - a chunk with any defect is computed again
             return False
 
     def restore(self, files: Mapping[str, bytes]) -> list[str]:
-        """Write files that were there before any chunk again unless they hold what they must; return whose they are.
+        """Rewrite initial files with unexpected content, and return the names of their arrays.
 
         Raises
         ------
         OutputError
-            Something else has the place of a file or a folder, and would have to be removed.
+            If the place of a file or folder is taken, and its content would have to be removed.
         """
         restored = []
         with naming_path(self.folder):
@@ -151,7 +151,7 @@ class Store:
         return list(dict.fromkeys(restored))
 
     def _folders(self, files: Mapping[str, bytes]) -> Iterator[Path]:
-        """Yield the folders that hold the files of a sweep, now or when it is done."""
+        """Yield the folders of the files of a sweep, now or when it is finished."""
         for name in files:
             parents = Path(name).parents[:-1]
             yield from (self.folder / parent for parent in parents)
@@ -159,7 +159,7 @@ class Store:
                 yield self.folder / parents[0] / "c"
 
     def _expected_content(self, path: Path, content: bytes) -> bytes | None:
-        """Return what a file must hold, None where it does; what others wrote about the whole sweep stays."""
+        """Return the content that a file must have; None if it has it. Attributes added to the whole sweep stay."""
         try:
             there = read_file(path, LARGEST_ROOT, error=OutputError, is_input=False)
         except OutputError:
@@ -179,24 +179,24 @@ class Store:
         return None if present == expected else json.dumps(expected, indent=1).encode()
 
     def forget(self, chunk: int) -> None:
-        """Have a chunk computed again.
+        """Mark a chunk as not done, so that it is computed again.
 
         Raises
         ------
         OutputError
-            Its digest cannot be removed.
+            If its digest cannot be removed.
         """
         with naming_path(self._mark(chunk)):
             self._mark(chunk).unlink(missing_ok=True)
 
     def done(self, count: int) -> np.ndarray:
-        """Tell which of the chunks were put on the disk."""
+        """Return the mask of chunks on the disk."""
         done = np.zeros(count, bool)
         done[[chunk for chunk in map(int, self._marked()) if chunk < count]] = True
         return done
 
     def is_empty(self) -> bool:
-        """Tell whether there is nothing but what was there before any chunk."""
+        """Return whether the folder contains only its initial files."""
         if next(self._marked(), None) is not None:
             return False
         with naming_path(self.folder):
@@ -205,17 +205,17 @@ class Store:
         return all(own.get(entry.name, False) for entry in entries)
 
     def remove(self) -> None:
-        """Remove the folder, which no other process may be writing to."""
+        """Remove the folder; no other process may be writing to it."""
         with self.locked(), naming_path(self.folder):
             shutil.rmtree(self.folder)
 
     def finish(self, count: int) -> str:
-        """Return the digest of the digests of all chunks, and put it into the manifest, whatever is there.
+        """Return the digest of the digests of all chunks, and write it to the manifest.
 
         Raises
         ------
         OutputError
-            A digest is gone, or the manifest cannot be written.
+            If a digest is missing, or the manifest cannot be written.
         """
         digest = hashlib.sha256()
         for chunk in range(count):
@@ -231,15 +231,15 @@ class Store:
                 put(path, json.dumps(content, indent=1).encode())
         self.__dict__["manifest"] = manifest
         with suppress(OSError):
-            for left in self.folder.rglob("*.partial"):  # by processes that were killed
+            for left in self.folder.rglob("*.partial"):  # left by killed processes
                 left.unlink(missing_ok=True)
         return checksum
 
     @contextmanager
     def scratch(self) -> Iterator[Path]:
-        """Give a folder for what workers keep meanwhile; it goes also where a signal ends the process.
+        """Yield a folder for temporary files of workers, which is removed even if a signal ends the process.
 
-        Only what kills the process at once leaves it behind, for the next one to remove.
+        If the process is killed at once, the next process removes the folder.
         """
         with naming_path(self.folder):
             path = Path(tempfile.mkdtemp(prefix=SCRATCH, dir=self.folder))
@@ -250,7 +250,7 @@ class Store:
             shutil.rmtree(path, ignore_errors=True)
 
     def clear(self) -> None:
-        """Remove what processes that were killed have left for their workers."""
+        """Remove the temporary folders that killed processes have left."""
         for left in self.folder.glob(f"{SCRATCH}*"):
             shutil.rmtree(left, ignore_errors=True)
 
@@ -261,11 +261,11 @@ class Store:
         Raises
         ------
         OutputError
-            One does.
+            If another process is writing.
         """
         try:
             import fcntl
-        except ImportError:  # there is none on Windows
+        except ImportError:  # Windows has no fcntl
             yield
             return
         with naming_path(self.folder):
@@ -276,16 +276,16 @@ class Store:
             except BlockingIOError:
                 message = "another process is computing this sweep; wait for it, or end it first"
                 raise OutputError(message, path=str(self.folder)) from None
-            except OSError:  # a file system without locks
+            except OSError:  # the file system has no locks
                 pass
             yield
         finally:
             os.close(descriptor)
 
     def _digest(self, chunk: int, arrays: Mapping[str, np.ndarray]) -> bytes:
-        """Return the digest of the arrays of a chunk by name; what is not a number is NaN, whatever bits it has.
+        """Return the digest of the arrays of a chunk by name, with all NaN values treated as equal.
 
-        It is that of the chunk in its place in this sweep: no other one, of this or of another sweep, may take it.
+        It covers the sweep and the place of the chunk, so that no other chunk has the same digest.
         """
         digest = hashlib.sha256(f"{self.manifest['identity']} {chunk} ".encode())
         for name in sorted(arrays):
@@ -295,7 +295,7 @@ class Store:
         return digest.digest()
 
     def _part(self, name: str, chunk: int) -> Path:
-        """Return the file of a chunk of an array, which is whole along all other dimensions."""
+        """Return the file of a chunk of an array, which is undivided along all other dimensions."""
         array = self._arrays[name]
         return self.folder / name / array.metadata.encode_chunk_key((chunk, *[0] * (array.ndim - 1)))
 
@@ -303,7 +303,7 @@ class Store:
         return self.folder / "chunks" / "digest" / "c" / str(chunk)
 
     def _marked(self) -> Iterator[str]:
-        """Yield the names of the digests that are there."""
+        """Yield the names of the existing digests."""
         folder = self._mark(0).parent
         try:
             with os.scandir(folder) as entries:
@@ -316,13 +316,13 @@ class Store:
 
 
 def find(folder: Path) -> Store | None:
-    """Return the sweep in a folder, None where it may be made.
+    """Return the sweep in a folder; None if a new one may be created.
 
     Raises
     ------
     OutputError
-        The name does not end in .zarr, the folder above does not exist or belongs to another sweep, or what is there is
-        no sweep.
+        If the name does not end in .zarr, the parent folder does not exist or belongs to another sweep, or the folder
+        is not that of a sweep.
     """
     if folder.suffix.lower() != SUFFIX:
         raise OutputError(f"a sweep is written to a folder whose name ends in {SUFFIX}", path=str(folder))
@@ -349,17 +349,17 @@ def find(folder: Path) -> Store | None:
         message = f"what is there is not a sweep of jounce, or is a damaged one ({reason}); give another name"
         raise OutputError(message, path=str(folder))
     store = Store(folder)
-    store.manifest  # noqa: B018 - it is compared with its digest
+    store.manifest  # noqa: B018 - checks its digest
     return store
 
 
 def create(folder: Path, files: Mapping[str, bytes]) -> Store:
-    """Make the folder of a sweep, with some files in it; it appears whole or not at all.
+    """Create the folder of a sweep with its initial files, atomically.
 
     Raises
     ------
     OutputError
-        It cannot be written.
+        If the folder cannot be written.
     """
     real = Path(os.path.realpath(folder))
     scratch = real.with_name(f".jounce-{secrets.token_hex(6)}")

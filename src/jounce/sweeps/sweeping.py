@@ -1,4 +1,4 @@
-"""A sweep: all designs of a grid or a sample, on all cores or on a cluster, to a folder that a call goes on with."""
+"""A sweep over all designs of a grid or a sample, on all cores or on a cluster, into a folder that can be continued."""
 
 import math
 import warnings
@@ -32,8 +32,8 @@ if TYPE_CHECKING:
     import xarray
 
 USUAL_CHUNK, SMALLEST_CHUNK = 1024, 16
-NUMBERS = 4_000_000  # of the histories of a chunk
-LEAST_CHUNKS = 8  # so that several workers have something to do
+NUMBERS = 4_000_000  # in the histories of a chunk
+LEAST_CHUNKS = 8  # so that several workers have work
 
 
 def sweep(
@@ -55,68 +55,68 @@ def sweep(
     chunk: int | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> "xarray.Dataset":
-    """Compute designs by the million and keep what each comes to, in a Zarr folder that the same call goes on with.
+    """Compute up to millions of designs and store their results in a Zarr folder, which the same call can continue.
 
-    Chunks of designs are computed by worker processes, which write them as they finish; memory does not grow with the
-    number of designs. What is on the disk is not computed again, whatever was killed. Results do not depend, to the
-    last bit, on the number of workers and on what is computed first.
+    Worker processes compute chunks of designs and write them as they finish; memory does not grow with the number of
+    designs. Chunks on the disk are not computed again, even after a process was killed. To the last bit, results do not
+    depend on the number of workers or the order of the chunks.
 
     Parameters
     ----------
     model : Mechanism, Robot or path
-        Or the file of one.
+        The model, or its file.
     vary : dict of str to object
-        What varies: parameters of the mechanism; of a robot ``payload.LINK`` (kg, in the origin of the link),
-        ``armature.JOINT``, ``damping.JOINT``, ``friction.JOINT`` and ``speed``, a factor on that of the trajectory.
-        Each as text, ``"3cm:5cm:101"``, or as (low, high, count) or a list of values, SI; with a sample as
-        ``"LOW:HIGH"`` or (low, high), ``"normal:SIGMA"`` or ``"uniform:HALFWIDTH"``.
+        Variations of parameters: those of the mechanism, or for a robot ``payload.LINK`` (kg, in the origin of the
+        link), ``armature.JOINT``, ``damping.JOINT``, ``friction.JOINT`` and ``speed``, a factor on that of the
+        trajectory. Each is a text such as ``"3cm:5cm:101"``, (low, high, count), or a list of values, SI; with a
+        sample, ``"LOW:HIGH"`` or (low, high), ``"normal:SIGMA"`` or ``"uniform:HALFWIDTH"``.
     out : path
-        A folder, its name ending in .zarr. One that holds the beginning of the same sweep is continued.
+        A folder with a name ending in .zarr. An unfinished sweep with the same settings in it is continued.
     time : array_like of shape (time,), optional
-        Instants, s; those of the mechanism or the trajectory unless given.
+        Instants, s; by default those of the mechanism or the trajectory.
     order : int, default 4
         Highest derivative of the motion; torques of a robot have two less.
     trajectory : JointTrajectory or path, optional
-        What a robot does.
+        Motion of a robot.
     sample : str, optional
         ``sobol:COUNT`` draws designs from the ranges; otherwise all combinations of the values are computed.
     simulate : bool, default False
         Move the mechanism by its forces, see `simulate_batch`, rather than by its drivers, see `solve_batch`.
     method : AbstractMethod, optional
-        Of a simulation.
+        Integrator of simulations.
     tolerance : float, optional
-        As for `solve_batch` or `simulate_batch`.
+        Tolerance of `solve_batch` or `simulate_batch`.
     histories : bool, default False
-        Keep all instants, too, not only statistics over time.
+        Store all instants in addition to statistics over time.
     workers : int, optional
-        Processes on this machine; as many as it has cores unless given. 0 computes in this process, without Dask.
+        Number of processes on this machine, by default one for each core. 0 computes in this process, without Dask.
     scheduler : str, optional
         Address of a Dask cluster, such as ``tcp://host:8786``, whose workers share the folder.
     timeout : float, default 10
-        How long to wait for an answer of the cluster, s.
+        Longest time to wait for an answer of the cluster, s.
     chunk : int, optional
-        Designs that are computed together; chosen by the size of the results unless given.
+        Number of designs computed together; by default chosen by the size of the results.
     progress : callable, optional
-        Called with the number of designs that are on the disk and their total.
+        Called with the number of designs on the disk and their total.
 
     Returns
     -------
     xarray.Dataset
-        Opened, not read: for each output NAME the arrays NAME_peak, NAME_peak_time, NAME_rms, NAME_min and NAME_max of
-        the dimensions design and derivative, SI; failed_instants and first_status of every design, see `Status`: one
-        that was not solved at all instants has no statistics. With histories NAME (design, time, derivative) and
-        status (design, time) as well. The attribute ``checksum`` identifies the sweep.
+        Lazily opened results: for each output NAME the arrays NAME_peak, NAME_peak_time, NAME_rms, NAME_min and
+        NAME_max with the dimensions design and derivative, SI; failed_instants and first_status of every design, see
+        `Status`. A design that was not solved at all instants has no statistics. With histories also NAME (design,
+        time, derivative) and status (design, time). The attribute ``checksum`` identifies the sweep.
 
     Raises
     ------
     OutputError
-        The folder holds another sweep, or something else, or cannot be written; what is done is kept.
+        If the folder contains another sweep or other files, or cannot be written; finished chunks are kept.
     MechanismError, RobotError, TrajectoryError
-        There is no such parameter, or the model cannot be computed.
+        If a parameter does not exist, or the model cannot be computed.
     JounceError
-        The cluster does not answer.
+        If the cluster does not answer.
     UnsupportedError
-        Zarr or Dask are not installed.
+        If Zarr or Dask is not installed.
 
     Examples
     --------
@@ -147,19 +147,19 @@ def prepare(
     histories: bool = False,
     chunk: int | None = None,
 ) -> Plan:
-    """Return what is to be computed, in a folder that is there: made now, or that of the same sweep begun before.
+    """Return the plan of a sweep, in a new folder or in that of the same sweep begun before.
 
     Raises
     ------
     JounceError
-        As `sweep`, of what is not the fault of a worker.
+        As for `sweep`, except for errors of workers.
     """
     check_installed("zarr")
     there = find(folder)
     variations = read_variations(vary, problem.reader)
     unknown = [name for name in variations if name not in problem.nominal]
     if unknown:
-        problem.reader(unknown[0], "0")  # says which names there are
+        problem.reader(unknown[0], "0")  # raises the error with the known names
     space = sample_space(variations, sample, problem.nominal)
     quantities = problem.quantities()
     instants = problem.instants
@@ -170,7 +170,7 @@ def prepare(
     if there is None or (there.is_empty() and _differs(there, manifest, folder)):
         check_room(folder, plan.variables, space.count, chunk)
         if there is not None:
-            there.remove()  # an attempt of which nothing was computed
+            there.remove()  # an earlier attempt without results
         create(folder, plan.files(manifest))
     else:
         check_same(there.manifest, manifest, str(folder))
@@ -187,12 +187,12 @@ def run(
     user_files: Mapping[str, str] | None = None,
     prepare_worker: Callable[[], object] | None = None,
 ) -> str:
-    """Compute what is not on the disk yet, and return the checksum of the whole.
+    """Compute the missing chunks, and return the checksum of the sweep.
 
     Raises
     ------
     JounceError
-        As `sweep`; what is done is kept.
+        As for `sweep`; finished chunks are kept.
     """
     store = plan.store
     with store.locked():
@@ -217,9 +217,9 @@ def run(
 
 
 def _whole(plan: Plan) -> Bool[np.ndarray, " chunk"]:
-    """Tell which chunks are on the disk as they were written; others are forgotten, with a warning.
+    """Return the mask of complete chunks on the disk; defective chunks are discarded with a warning.
 
-    So are descriptions and coordinates, which are written again.
+    Defective metadata and coordinates are rewritten, also with a warning.
     """
     store = plan.store
     if changed := store.restore(plan.files(store.manifest)):
@@ -238,7 +238,7 @@ def _whole(plan: Plan) -> Bool[np.ndarray, " chunk"]:
 
 
 def opened(folder: Path) -> "xarray.Dataset":
-    """Return the result of a sweep, of which nothing is read yet."""
+    """Return the lazily opened result of a sweep."""
     import xarray
 
     return xarray.open_zarr(folder, consolidated=True, chunks={} if _has_dask() else None)
@@ -253,7 +253,7 @@ def _differs(there: Store, manifest: Mapping[str, Any], folder: Path) -> bool:
 
 
 class _Progress:
-    """How far a sweep is."""
+    """Progress of a sweep."""
 
     def __init__(self, plan: Plan, done: int, progress: Callable[[int, int], None] | None):
         self.plan, self.done, self.progress = plan, done, progress
@@ -267,7 +267,7 @@ class _Progress:
 
     @contextmanager
     def resumable(self) -> Any:
-        """Say in errors that nothing is lost."""
+        """Add to errors that finished chunks are kept."""
         try:
             yield
         except JounceError as error:
@@ -280,7 +280,7 @@ class _Progress:
 def _problem(
     model: Any, trajectory: Any, time: Any, order: int, simulate: bool, method: Any, tolerance: float | None
 ) -> tuple[Problem, str]:
-    """Return what is computed of each design, and what to call it."""
+    """Return the problem of a sweep, and its title."""
     model = _read(model) if isinstance(model, str | PathLike) else model
     given = {} if tolerance is None else {"tolerance": tolerance}
     if isinstance(model, Robot):
@@ -297,7 +297,7 @@ def _problem(
 def robot_problem(
     robot: Robot, trajectory: JointTrajectory | str | PathLike[str] | None, time: TimeLike | None, order: int
 ) -> Torques:
-    """Return the torques of a robot as what is computed, to rates of two orders less than the motion."""
+    """Return the problem of the torques of a robot, with rates to two orders less than the motion."""
     order = whole_number("order", order, 2, 30, error=MechanismError)
     if trajectory is None:
         raise TrajectoryError("a robot is swept on a trajectory: give trajectory", name="trajectory")
@@ -320,7 +320,7 @@ def _title(mechanism: Mechanism) -> str:
 
 
 def _chunk(given: int | None, there: Store | None, count: int, quantities: Sequence[Quantity], rows: int) -> int:
-    """Return how many designs are computed together: as many as before, or by how much each of them gives."""
+    """Return the number of designs of a chunk: the given one, that of a begun sweep, or by the size of results."""
     if given is not None:
         return whole_number("chunk", given, 1, LARGEST_CHUNK, error=MechanismError)
     if there is not None:
