@@ -1,4 +1,4 @@
-"""What changes of the load do to a robot in motion, in words and as data."""
+"""Effects of load changes on a robot in motion, in words and as data."""
 
 from __future__ import annotations
 
@@ -6,11 +6,11 @@ from typing import Any
 
 from jounce.dynamics.limits.limit_report import LimitReport
 
-STILL = 1e-6  # m/s: slower stands still; instants and rows of files have so many digits
+STILL = 1e-6  # m/s: lower speeds count as zero, as instants and rows of files have about six digits
 
 
 def load_words(report: LimitReport) -> list[str]:
-    """Word what changes, how fast it moves, and by how much the largest torque steps."""
+    """Return the load changes in words: masses, speeds, and the largest steps of torques."""
     units = {row.joint: row.unit for row in report.rows if row.unit in ("N", "N m")}
     lines = []
     for change in report.loads:
@@ -26,7 +26,7 @@ def load_words(report: LimitReport) -> list[str]:
 
 
 def load_facts(report: LimitReport) -> list[dict[str, Any]]:
-    """Return the changes as plain data."""
+    """Return the load changes as plain data."""
     return [
         {"time": change.time, "masses": dict(change.masses), "speed": change.speed, "steps": dict(change.steps)}
         for change in report.loads

@@ -1,4 +1,4 @@
-"""Where curves are largest that come chunk by chunk, and are not kept."""
+"""Maxima of curves that arrive in chunks and are not stored."""
 
 from __future__ import annotations
 
@@ -10,20 +10,20 @@ from jounce.dynamics.limits.local_maxima import largest_indices, local_heights
 Times = Float[np.ndarray, " time"]
 Curves = Float[np.ndarray, "time curves"]
 Peaks = Float[np.ndarray, "peaks curves"]
-ALIKE = 1e-6  # of the largest value of a curve
+ALIKE = 1e-6  # fraction of the largest value of a curve
 
 
 class RunningMaxima:
-    """The largest values and a number of the largest local maxima of curves that come chunk by chunk.
+    """The largest values and the highest local maxima of curves that arrive in chunks.
 
-    A curve is -inf where it is not known.
+    Curves are -inf where unknown.
 
     Attributes
     ----------
     times, sizes : array of shape (2 curves,)
-        Where each curve is largest, s, and how large.
+        Instant, s, and size of the largest value of each curve.
     scales : array of shape (2 curves,)
-        The largest of the sizes that came with the chunks.
+        Largest scale of each curve, from the scales of the chunks.
     """
 
     times: Float[np.ndarray, " curves"]
@@ -32,11 +32,11 @@ class RunningMaxima:
 
     def __init__(self, count: int) -> None:
         self._count = count
-        self._ends: tuple[Times, Curves] | None = None  # of what came: its last two instants
+        self._ends: tuple[Times, Curves] | None = None  # the last two instants so far
         self._maxima: list[Peaks] = []  # heights, and the instants before and after
 
     def add(self, time: Times, values: Curves, scales: Float[np.ndarray, " curves"]) -> None:
-        """Look at the next chunk."""
+        """Add the next chunk."""
         top, every = np.argmax(values, axis=0), np.arange(values.shape[1])
         largest = values[top, every]
         if self._ends is None:
@@ -49,14 +49,14 @@ class RunningMaxima:
         self._ends = time[-2:], values[-2:].copy()
 
     def around_maxima(self) -> tuple[Peaks, Peaks]:
-        """Return the instants before and after the highest local maxima of each curve, once all has come."""
+        """Return the instants before and after the highest local maxima of each curve, after the last chunk."""
         assert self._ends is not None
         height, low, high = self._local_maxima(*self._ends, ends=True)
         usable = np.isfinite(height)
         return np.where(usable, low, low[0]), np.where(usable, high, high[0])
 
     def _local_maxima(self, time: Times, values: Curves, *, ends: bool) -> list[Peaks]:
-        """Return the highest of the local maxima so far; the first and the last instant are some only at the ends."""
+        """Return the highest local maxima so far; the first and last instant of a chunk count only at the ends."""
         inner = slice(1 if self._maxima else 0, None if ends else -1)
         height = local_heights(values)[inner]
         if not len(height):
@@ -65,7 +65,7 @@ class RunningMaxima:
         top = largest_indices(height, self._count)
         index = indices[top]
         heights = np.take_along_axis(height, top, axis=0)
-        for k in range(1, self._count):  # one that is listed twice, for lack of others, counts once
+        for k in range(1, self._count):  # a maximum listed twice for lack of others counts once
             heights[k, (top[:k] == top[k]).any(axis=0)] = -np.inf
         candidates = [
             heights,
@@ -74,13 +74,13 @@ class RunningMaxima:
         ]
         if self._maxima:
             both = [np.concatenate(pair) for pair in zip(self._maxima, candidates, strict=True)]
-            order = np.argsort(-both[0], axis=0, kind="stable")[: self._count]  # of equal ones the earlier
+            order = np.argsort(-both[0], axis=0, kind="stable")[: self._count]  # the earlier one of equal maxima
             candidates = [np.take_along_axis(x, order, axis=0) for x in both]
         return candidates
 
 
 def alike(first: Curves, second: Curves) -> bool:
-    """Tell whether two samples of the same curves differ by no more than rounding and solving make of them."""
+    """Return whether two samples of the same curves agree up to rounding and the tolerance of solving."""
     size = np.max(np.abs(second), axis=0, initial=0.0, where=np.isfinite(second))
-    with np.errstate(invalid="ignore"):  # where both are unknown
+    with np.errstate(invalid="ignore"):  # both may be unknown
         return bool(np.all((first == second) | (np.abs(first - second) <= ALIKE * size)))

@@ -1,4 +1,4 @@
-"""Facts of the ends of a trajectory, and of what it is assumed to do between the given points."""
+"""Facts of the ends of a trajectory, and of the assumed motion between given points."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from jounce.planning.smoothing.smooth import SmoothedTrajectory, sampled
 from jounce.trajectory import HermiteMotion, HermiteSplineMotion, JointTrajectory, SplineMotion
 
 WITH_VELOCITIES = 5  # degree of splines through positions and velocities
-LOOKS = 8  # between two points
+LOOKS = 8  # sample intervals between two points
 NEGLIGIBLE = 1e-9  # rad or m: less is rounding
-SHOWN = 3  # joints of an end
+SHOWN = 3  # largest number of joints listed at an end
 UNITS = {"velocities": "rad/s or m/s", "accelerations": "rad/s^2 or m/s^2"}
 
 
 def ends_words(ends: Iterable[TrajectoryEnd]) -> list[str]:
-    """Word what a controller meets at both ends: one line for each, or one where both are at rest."""
+    """Return the state at both ends in words: one line for each, or a single one if both are at rest."""
     sentences = list(ends)
     if all(end.at_rest for end in sentences):
         return ["starts and stops at rest"] if sentences else []
@@ -40,7 +40,7 @@ def _moving(end: TrajectoryEnd) -> str:
 
 
 def breaks_words(ends: Iterable[TrajectoryEnd]) -> list[str]:
-    """Word which limits a jump from rest, or to it, breaks at both ends."""
+    """Return the limits that a jump from or to rest breaks at both ends, in words."""
     lines = []
     for end in ends:
         if not end.breaks:
@@ -55,7 +55,7 @@ def breaks_words(ends: Iterable[TrajectoryEnd]) -> list[str]:
 
 
 def ends_facts(ends: Iterable[TrajectoryEnd]) -> list[dict[str, Any]]:
-    """Return what is met at both ends as plain data."""
+    """Return the state at both ends as plain data."""
     return [
         {
             "end": end.end,
@@ -70,10 +70,10 @@ def ends_facts(ends: Iterable[TrajectoryEnd]) -> list[dict[str, Any]]:
 
 
 def between_facts(trajectory: JointTrajectory) -> Mapping[str, Any] | None:
-    """Return what was taken to happen between the points of a trajectory; None where its laws say it.
+    """Return the assumed motion between the points of a trajectory; None if its laws define it.
 
-    ``words``, and how far from the straight lines between the points that leads at most: ``deviation``, rad or m, the
-    ``joint`` and the instant ``at``, s.
+    The keys are ``words``, and the largest distance from the straight lines between the points: ``deviation``, rad or
+    m, its ``joint`` and its instant ``at``, s.
     """
     by_words = {words: None for law in trajectory.laws.values() if (words := _words(law)) is not None}
     if not by_words:
@@ -97,7 +97,7 @@ def _words(law: object) -> str | None:
 
 
 def _largest_deviation(trajectory: JointTrajectory) -> tuple[float, str | None, float | None]:
-    """Return how far laws are from straight lines between their samples, which one, and where."""
+    """Return the largest distance of laws from straight lines between samples, with its joint and instant."""
     lines = lines_of(trajectory)
     assert lines is not None
     share = np.arange(1, LOOKS) / LOOKS
@@ -112,7 +112,7 @@ def _largest_deviation(trajectory: JointTrajectory) -> tuple[float, str | None, 
 
 
 def between_words(trajectory: JointTrajectory) -> list[str]:
-    """Word what was taken to happen between the points of a trajectory; nothing where its laws say it."""
+    """Return the assumed motion between the points of a trajectory in words; empty if its laws define it."""
     if isinstance(trajectory, SmoothedTrajectory):
         away = max(joint.away for joint in trajectory.joints.values())
         bound = f"within {trajectory.deviation:.3g} rad or m of each of {len(trajectory.times)} samples"

@@ -1,4 +1,4 @@
-"""How mechanisms, motions, robots, trajectories and batches show themselves in a notebook: small HTML tables."""
+"""Display of mechanisms, motions, robots, trajectories and batches in a notebook: small HTML tables."""
 
 from __future__ import annotations
 
@@ -30,8 +30,8 @@ from jounce.reporting.text.tables import Table, limits_table, mechanism_tables, 
 from jounce.robot import Robot
 from jounce.trajectory import JointTrajectory
 
-ROWS = 30  # of a table, before the rest is counted
-# Colors are left to the page, so that light and dark themes both fit; lines are see-through gray.
+ROWS = 30  # of a table; further rows are only counted
+# Colors are those of the page, for light and dark themes; lines are translucent gray.
 STYLE = (
     "<style scoped>.jounce{font-size:90%}.jounce table{border-collapse:collapse;margin:.3em 0 .6em}"
     ".jounce th,.jounce td{text-align:left;padding:.15em .8em .15em 0;border-bottom:1px solid rgba(128,128,128,.3);"
@@ -43,7 +43,7 @@ STYLE = (
 
 
 def shown(thing: Displayed) -> str:
-    """Return the HTML that a notebook shows of an object of this package, such as a mechanism or a motion.
+    """Return the HTML with which a notebook shows an object of this package, such as a mechanism or a motion.
 
     Examples
     --------
@@ -86,7 +86,7 @@ def shown(thing: Displayed) -> str:
 
 
 def _others(thing: Displayed) -> list[str]:
-    """Return what there is to show of results that are seen less often."""
+    """Return the HTML of the less common results."""
     match thing:
         case Assemblies():
             return _assemblies(thing)
@@ -111,7 +111,7 @@ def _title(title: str, *lines: str) -> list[str]:
 
 
 def _tables(tables: Iterable[Table]) -> list[str]:
-    """Return tables as HTML; names are escaped, long ones are cut at ROWS rows."""
+    """Return tables as HTML, with names escaped and at most ROWS rows each."""
     return [_table(each) for each in tables if each.rows]
 
 
@@ -128,7 +128,7 @@ def _table(table: Table) -> str:
 
 
 def _written(value: Any) -> str:
-    """Word a value as it was given: a number, an expression of parameters, or a list of them."""
+    """Return a value as it was given, as text: a number, an expression of parameters, or a list of them."""
     if value is None or isinstance(value, str):
         return value or "-"
     if np.shape(value):
@@ -151,7 +151,7 @@ def _mechanism(mechanism: Mechanism) -> list[str]:
     )
     try:
         return [*title, *_tables(mechanism_tables(mechanism_facts(mechanism), guessed))]
-    except JounceError as error:  # of parameters that go in a circle
+    except JounceError as error:  # of circular parameters
         return [*title, *_title(str(error)), *_tables([guessed])]
 
 
@@ -248,7 +248,7 @@ def _joint_poses(poses: JointPoses) -> list[str]:
 
 
 def _ranges(dataset: Any) -> Table:
-    """Return the ranges of the variables of a dataset; of those with derivatives, that of the quantity itself."""
+    """Return the table of ranges of the variables of a dataset, without their derivatives."""
     rows = []
     for name, variable in dataset.data_vars.items():
         values = variable.isel(derivative=0) if "derivative" in variable.dims else variable

@@ -1,4 +1,4 @@
-"""Smallest and largest values of the outputs of a motion and of their derivatives, with their times and units."""
+"""Peaks: smallest and largest values of the outputs of a motion and of their derivatives, with times and units."""
 
 from __future__ import annotations
 
@@ -25,28 +25,28 @@ if TYPE_CHECKING:
     import xarray
 
 NAMES = ("position", "velocity", "acceleration", "jerk", "jounce")
-LEAST = 200  # instants that are looked at, at least
-PEAKS, POINTS, ROUNDS = 2, 7, 3  # highest maxima of each curve, instants around each, and how often these close in
+LEAST = 200  # least number of sampled instants
+PEAKS, POINTS, ROUNDS = 2, 7, 3  # refined maxima of each curve, instants around each, and number of refinements
 CHUNK, COMPARED = 1000, 50  # instants solved together, and compared
-SMALLEST, ALIKE, ROUNDING = 1e-15, 1e-12, 1e-9  # shares of the size of an output
+SMALLEST, ALIKE, ROUNDING = 1e-15, 1e-12, 1e-9  # fractions of the size of an output
 _Around = Float[np.ndarray, "points peaks curves"]
 
 
 @dataclasses.dataclass(frozen=True)
 class Peak:
-    """Extreme values of one derivative of one output, on the instants that were solved and between them.
+    """Extreme values of one derivative of one output, at the solved instants and between them.
 
     Parameters
     ----------
     output : str
-        Name of the output, with its component where it has some: ``C_x``.
+        Name of the output, with its component if it has any: ``C_x``.
     derivative : str
         ``position``, ``velocity``, ..., or ``torque``, ``yank``, ..., see `rate_name`.
     unit : str
     minimum, maximum, minimum_at, maximum_at : float
-        In the unit, NaN where no instant was solved, and when they are reached, s.
+        Extreme values, in the unit, and their instants, s; NaN if no instant was solved.
     size : float
-        The largest magnitude that any component of the output has in this derivative.
+        Largest magnitude of this derivative among all components of the output.
     """
 
     output: str
@@ -60,7 +60,7 @@ class Peak:
 
     @property
     def shown(self) -> tuple[float, float]:
-        """The minimum and the maximum, 0 where they are no more than rounding of the other components."""
+        """The minimum and the maximum, replaced by 0 if they are rounding relative to other components."""
         low, high = (0.0 if abs(x) < SMALLEST * self.size else x for x in (self.minimum, self.maximum))
         return low, high
 
@@ -71,13 +71,13 @@ class Peak:
 
     @property
     def largest(self) -> tuple[bool, bool]:
-        """Whether the minimum and the maximum have the largest magnitude; both where they differ by rounding only."""
+        """Whether the minimum and the maximum have the largest magnitude; both if they differ only by rounding."""
         low, high, near = abs(self.minimum), abs(self.maximum), ALIKE * self.size
         return self.varies and low >= high - near, self.varies and high >= low - near
 
 
 def derivative_name(order: int) -> str:
-    """Name a time derivative of a position or an angle.
+    """Return the name of a time derivative of a position or an angle.
 
     Examples
     --------
@@ -91,7 +91,7 @@ def derivative_name(order: int) -> str:
 
 
 def rate_name(output: AbstractQuantity, order: int) -> str:
-    """Name a time derivative of an output: velocity, jerk, ..., or for a force yank, second rate, ...
+    """Return the name of a time derivative of an output: velocity, jerk, ..., or for a force yank, second rate, ...
 
     Examples
     --------
@@ -108,12 +108,12 @@ def rate_name(output: AbstractQuantity, order: int) -> str:
 
 
 def scalar_outputs(motion: Motion) -> dict[str, tuple[str, Float[np.ndarray, "time derivative"]]]:
-    """Return the outputs of a motion one component at a time.
+    """Return the components of the outputs of a motion.
 
     Returns
     -------
     dict
-        For each name, as in the columns of a CSV file, the name of its output and its values, shape (time, order + 1).
+        By name, as in the columns of a CSV file: the name of the output and the values, shape (time, order + 1).
     """
     outputs = {}
     for name, values in motion.outputs.items():
@@ -131,11 +131,11 @@ def peaks(motion: Motion | ChunkedMotion, *, refine: bool = True) -> list[Peak]:
     Parameters
     ----------
     motion : Motion or ChunkedMotion
-        What was solved; of chunks, those that `parts_with_peaks` found; else they are solved for it.
+        The motion. Peaks of chunks are those found by `parts_with_peaks`; otherwise the chunks are solved again.
     refine : bool, default True
-        Find peaks between its instants too: the motion is solved at more instants where it has few, and then, as often
-        as it takes, around the highest of them. Otherwise only its own instants count, and both sides of the instants
-        at which its laws jump or bend. Where users' code has changed since it was solved, only its own ones do.
+        Find peaks between the instants as well: the motion is solved at more instants if it has few, and then again
+        around the highest values. Otherwise only its instants and both sides of the breaks of its laws count. If code
+        of the user has changed since the motion was solved, only its instants count.
 
     Returns
     -------
@@ -157,7 +157,7 @@ def peaks(motion: Motion | ChunkedMotion, *, refine: bool = True) -> list[Peak]:
 
 
 def parts_with_peaks(motion: Motion | ChunkedMotion, *, refine: bool = True) -> Iterator[Motion]:
-    """Yield the chunks of a motion, for what else is to be done with them, and keep their `peaks` in the end."""
+    """Yield the chunks of a motion for other uses, and store their `peaks` after the last one."""
     search = _PeakSearch()
     for part in motion if isinstance(motion, ChunkedMotion) else (motion,):
         search.add(part)
@@ -170,14 +170,14 @@ def _name(refine: bool) -> str:
 
 
 def table_peaks(dataset: xarray.Dataset, one_sided: xarray.Dataset | None = None) -> list[Peak]:
-    """Return the peak values of torques and their rates, or of coordinates, at the instants of a dataset only.
+    """Return the peak values of torques and their rates, or of coordinates, at the instants of a dataset.
 
     Parameters
     ----------
     dataset : xarray.Dataset
-        Of variables of dimensions time and derivative, with the attribute ``units``: N, N*m, m or rad.
+        Variables with the dimensions time and derivative, and the attribute ``units``: N, N*m, m or rad.
     one_sided : xarray.Dataset, optional
-        The same on both sides of where laws jump or bend.
+        The same variables on both sides of breaks of laws.
     """
     peaks_found, coords = [], ("time", "derivative")
     times = np.concatenate([x["time"].values for x in (dataset, one_sided) if x is not None])
@@ -199,7 +199,7 @@ def table_peaks(dataset: xarray.Dataset, one_sided: xarray.Dataset | None = None
 
 
 def shown_peaks(given: Sequence[Peak], units: ShownUnits) -> list[Peak]:
-    """Return peaks in the units in which they are shown.
+    """Return peaks in the shown units.
 
     Examples
     --------
@@ -219,7 +219,7 @@ def shown_peaks(given: Sequence[Peak], units: ShownUnits) -> list[Peak]:
 
 
 def effort_name(unit: str, order: int) -> str:
-    """Name a torque or a force, or one of its rates.
+    """Return the name of a torque or a force, or of one of its rates.
 
     Examples
     --------
@@ -232,20 +232,20 @@ def effort_name(unit: str, order: int) -> str:
 
 
 class _PeakSearch:
-    """A search for the peaks of a motion, which may come chunk by chunk and is not kept."""
+    """A search for the peaks of a motion, which may arrive in chunks that are not stored."""
 
     def __init__(self) -> None:
-        self._columns: dict[str, tuple[str, int]] = {}  # the output and the number of derivatives of each
+        self._columns: dict[str, tuple[str, int]] = {}  # output and number of derivatives of each column
         self._maxima = RunningMaxima(PEAKS)
 
     def add(self, part: Motion) -> None:
-        """Look at the instants of a motion, or at those of its next stretch."""
+        """Add the instants of a motion, or of its next chunk."""
         self._columns = {column: (name, x.shape[1]) for column, (name, x) in scalar_outputs(part).items()}
         if self._columns:
             self._maxima.add(part.time, _curves(part), _scales(part))
 
     def peaks_of(self, motion: Motion | ChunkedMotion, *, refine: bool) -> list[Peak]:
-        """Return the peaks of a motion of which all instants were looked at, as `peaks` does."""
+        """Return the peaks of a motion, as `peaks` does, after all its instants were added."""
         rows = [(column, name, order) for column, (name, orders) in self._columns.items() for order in range(orders)]
         if not rows:
             return []
@@ -265,10 +265,10 @@ class _PeakSearch:
 def _extremes(
     motion: Motion | ChunkedMotion, maxima: RunningMaxima, refine: bool
 ) -> tuple[Float[np.ndarray, " curves"], Float[np.ndarray, " curves"]]:
-    """Return where each curve is largest and how large, (2 curves,): all curves upside down, then as they are.
+    """Return the instant and size of the maximum of each curve, (2 curves,): negated curves first, then curves.
 
-    Around the highest instants, the best of a few becomes the middle of a shorter interval, again and again; the last
-    look is at the vertex of the parabola through three of them.
+    Around the highest instants, the best of a few points becomes the center of a shorter interval, repeatedly; the last
+    evaluation is at the vertex of the parabola through three points.
     """
     times, sizes = maxima.times.copy(), maxima.sizes.copy()
     rounding = ROUNDING * maxima.scales
@@ -294,7 +294,7 @@ def _extremes(
 
 
 def _has_changed(motion: Motion | ChunkedMotion) -> bool:
-    """Tell whether code of users computes something else by now than when the motion was solved."""
+    """Return whether code of the user gives other results than when the motion was solved."""
     elements = (element for part in motion.mechanism.elements.values() for element in part.values())
     if type(motion) is not Motion or not len(motion.time) or not holds_users_code(elements):
         return False
@@ -304,12 +304,12 @@ def _has_changed(motion: Motion | ChunkedMotion) -> bool:
 
 
 def _one_sided(motion: Motion | ChunkedMotion) -> tuple[Times, Times, Curves]:
-    """Return where the laws of a motion jump or bend, at both sides of each, these sides, and the curves there."""
+    """Return the breaks of the laws of a motion, the instants on both sides of each, and the curves at these."""
     if not len(motion.time):
         return np.zeros(0), np.zeros(0), np.zeros((0, 0))
     first, last = sorted((float(motion.time[0]), float(motion.time[-1])))  # a simulation may go backward
     lost = lost_orders(motion.mechanism.outputs.values())
-    forces = isinstance(motion, Simulation) or None  # they move all bodies
+    forces = isinstance(motion, Simulation) or None  # forces determine the motion of all bodies
     breaks = breaks_of_laws(motion.mechanism, first, last, motion.order + lost, forces=forces)
     if isinstance(motion, Simulation):
         breaks = np.unique(np.concatenate([breaks, [time for time, _ in motion.kinks]]))
@@ -318,7 +318,7 @@ def _one_sided(motion: Motion | ChunkedMotion) -> tuple[Times, Times, Curves]:
 
 
 def _around_maxima(motion: Motion | ChunkedMotion, maxima: RunningMaxima) -> tuple[Peaks, Peaks]:
-    """Return the instants before and after the highest local maxima, of a motion with few instants at more of them."""
+    """Return the instants before and after the highest local maxima, after adding instants if there are few."""
     steps = -(-LEAST // (len(motion.time) - 1))
     if steps == 1 or isinstance(motion, ChunkedMotion):
         return maxima.around_maxima()
@@ -328,7 +328,7 @@ def _around_maxima(motion: Motion | ChunkedMotion, maxima: RunningMaxima) -> tup
 
 
 def _denser(motion: Motion, steps: int) -> tuple[Float[np.ndarray, " denser"], Float[np.ndarray, "denser curves"]]:
-    """Return instants and curves with so many steps between instants that no peak is missed that is no needle."""
+    """Return instants and curves with a number of steps between instants, so that only needle-like peaks are missed."""
     time = motion.time
     between = (time[:-1, None] + np.diff(time)[:, None] * np.arange(1, steps) / steps).ravel()
     whole = np.concatenate([time, between])
@@ -337,7 +337,7 @@ def _denser(motion: Motion, steps: int) -> tuple[Float[np.ndarray, " denser"], F
 
 
 def _own(motion: Motion | ChunkedMotion, around: _Around) -> _Around:
-    """Return the values of curves at instants of their own, (points, peaks, curves)."""
+    """Return the values of each curve at its own instants, (points, peaks, curves)."""
     instants, inverse = np.unique(around, return_inverse=True)
     values = _at(motion, instants)
     return values[inverse.reshape(around.shape), np.arange(around.shape[-1])]
@@ -351,22 +351,22 @@ def _at(motion: Motion | ChunkedMotion, instants: Times) -> Curves:
         if isinstance(motion, Simulation):
             parts.append(_curves(motion.at(chunk)))
             continue
-        whole = np.unique(np.append(chunk, motion.time[0]))  # from the same start, on the same branch
+        whole = np.unique(np.append(chunk, motion.time[0]))  # with the same start, to stay on the same branch
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore", SampleWarning)  # warned of when the motion was solved
+            warnings.simplefilter("ignore", SampleWarning)  # the first solution of the motion has warned
             solved = solve(motion.mechanism, whole, motion.order, strict=False)
         parts.append(_curves(solved)[np.searchsorted(whole, chunk)])
     return np.concatenate(parts)
 
 
 def _curves(motion: Motion) -> Curves:
-    """Return all derivatives of all outputs, upside down and as they are, (time, 2 curves); -inf where unknown."""
+    """Return all derivatives of all outputs, negated and as they are, (time, 2 curves); -inf where unknown."""
     whole = np.concatenate([values for _, values in scalar_outputs(motion).values()], axis=1)
     return np.nan_to_num(np.concatenate([-whole, whole], axis=1), nan=-np.inf, posinf=-np.inf, neginf=-np.inf)
 
 
 def _scales(motion: Motion) -> Float[np.ndarray, " curves"]:
-    """Return the largest magnitude that any component of the output of a curve has in its derivative, (2 curves,)."""
+    """Return the largest magnitude among all components of the output of each curve, (2 curves,)."""
     scales = []
     for name, values in scalar_outputs(motion).values():
         whole = np.nan_to_num(motion.outputs[name]).reshape(*values.shape, -1)
@@ -381,7 +381,7 @@ def _keep_best(
     around: Float[np.ndarray, "..."],
     own: Float[np.ndarray, "..."],
 ) -> None:
-    """Take over what is larger than what was found before, by more than rounding: requested instants are round."""
+    """Replace maxima by values that are larger by more than rounding, so that requested instants are preferred."""
     flat = own.reshape(-1, own.shape[-1])
     every = np.arange(own.shape[-1])
     top = np.argmax(flat, axis=0)
@@ -392,7 +392,7 @@ def _keep_best(
 
 
 def _vertex(low: Peaks, high: Peaks, *near: Peaks) -> Peaks:
-    """Return where the parabola through three evenly spaced values is largest, between the outer two."""
+    """Return the vertex of the parabola through three evenly spaced values, between the outer two."""
     left, middle, right = near
     with np.errstate(invalid="ignore", divide="ignore"):
         shift = 0.5 * (left - right) / (left - 2 * middle + right)

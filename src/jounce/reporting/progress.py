@@ -1,4 +1,4 @@
-"""A line that says what is being computed, once that takes longer than a moment: on a terminal, or in a notebook."""
+"""A progress line for computations that take longer than two seconds, on a terminal or in a notebook."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from typing import Any
 from jounce.base.activity import Activity, now
 from jounce.base.interrupts import cleanup_on_signal
 
-PATIENCE = 2.0  # s, before anything is shown
-PACE = 0.2  # s between two looks
-SHOW_CURSOR = b"\r\x1b[2K\x1b[?25h"  # on a cleared line; a line of progress hides it
+PATIENCE = 2.0  # s before the line appears
+PACE = 0.2  # s between updates
+SHOW_CURSOR = b"\r\x1b[2K\x1b[?25h"  # clears the line and shows the cursor, which the progress line hides
 
 _shown: Display | None = None
 
@@ -27,18 +27,18 @@ def in_notebook() -> bool:
 
 
 def pause() -> None:
-    """Take the line away, as something else is written; it comes back if work goes on for as long again."""
+    """Remove the line while other output is written; it returns if the work takes as long again."""
     if _shown is not None:
         _shown.pause()
 
 
 class Display:
-    """A line with a bar, a count and the time that is left, shown by a thread of its own while work goes on.
+    """A line with a bar, a count and the remaining time, shown by a thread during work.
 
     Parameters
     ----------
     task : str, optional
-        What is said where nothing more is known; unless given, nothing is shown then.
+        Text for work without an activity of its own; without it, such work shows no line.
     """
 
     def __init__(self, task: str = ""):
@@ -61,7 +61,7 @@ class Display:
         self._thread.join()
 
     def pause(self) -> None:
-        """Take the line away."""
+        """Remove the line."""
         with self._lock:
             self._since = time.monotonic()
             self._close()
@@ -92,7 +92,7 @@ class Display:
 
 
 class _TerminalLine:
-    """A line of rich on standard error."""
+    """A progress line of rich on standard error."""
 
     def __init__(self) -> None:
         from rich.console import Console
@@ -121,7 +121,7 @@ class _TerminalLine:
 
 
 class _NotebookLine:
-    """A line below the cell that runs."""
+    """A progress line below the running cell of a notebook."""
 
     def __init__(self) -> None:
         from IPython.core.display import HTML
@@ -140,7 +140,7 @@ class _NotebookLine:
 
 
 def _counts(activity: Activity) -> str:
-    """Word how much is done.
+    """Return the finished part of an activity as text.
 
     Examples
     --------

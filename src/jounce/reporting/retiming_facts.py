@@ -1,4 +1,4 @@
-"""Facts of a trajectory that was retimed: how long it takes, and which limits bind it."""
+"""Facts of a retimed trajectory: its duration, and the limits that bind it."""
 
 from __future__ import annotations
 
@@ -17,13 +17,14 @@ from jounce.reporting.motion_ends import ends_words
 from jounce.reporting.text.summaries import count
 from jounce.reporting.text.tables import Table, number
 
-NEGLIGIBLE = 1e-9  # rad or m: a smaller distance of a path from a trajectory is rounding, and is not shown
+NEGLIGIBLE = 1e-9  # rad or m: smaller distances of a path from a trajectory are rounding, and are not shown
 
 
 def binding_facts(retimed: RetimedTrajectory) -> list[dict[str, Any]]:
-    """Return the limits that bind, the dearest first: for how long, s, and by how much the duration would fall, s.
+    """Return the limits that bind, by decreasing price, with the time for which they bind, s.
 
-    The price is for a limit raised by a share of 1; a hundredth of it is what a percent more brings.
+    The price is the decrease of the duration per relative increase of the limit, s; an increase by a percent gains a
+    hundredth of it.
     """
     active = retimed.active
     at = active["time"].values
@@ -59,7 +60,7 @@ def binding_table(retimed: RetimedTrajectory) -> Table:
 def retimed_words(
     retimed: RetimedTrajectory, before: float | None, free: float, files: list[str], read: LimitReport | None
 ) -> str:
-    """Word how long the motion takes, and that it keeps its limits."""
+    """Return the summary of a retimed trajectory: its duration, and that it keeps its limits."""
     was = "" if before is None else f", {before:.6g} s before"
     what = "joint" if retimed.report.held or len(retimed.report.values[0, 0]) else "driver"
     lines = [f"{retimed.report.robot}: {count(len(retimed.names), what)} ({', '.join(files)})", f"{free:.6g} s{was}"]
@@ -83,7 +84,7 @@ def retimed_words(
 
 
 def path_words(path: JointPath) -> list[str]:
-    """Word what a path is between the points that were given, and how far it is from the straight lines there."""
+    """Return the path between given points in words, with its distance from the straight lines between them."""
     if path.words.startswith("within"):
         return [f"path: {path.words}; at most {path.deviation:.2g} from them"]
     if path.words:

@@ -1,4 +1,4 @@
-"""Facts of a log that was smoothed: noise, distances, what was followed, and where it stands still."""
+"""Facts of a smoothed log: noise, distances, cutoff frequencies and dwells."""
 
 from __future__ import annotations
 
@@ -8,17 +8,17 @@ from typing import Any
 from jounce.planning.smoothing.smooth import SmoothedTrajectory
 from jounce.reporting.text.tables import Table
 
-FOLLOWED = 3.0  # times the noise: within less, the motion follows noise
-SHOWN = 3  # dwells in the table
+FOLLOWED = 3.0  # ratio of deviation to noise below which the motion follows noise
+SHOWN = 3  # largest number of dwells in the table
 
 
 def noisy_joints(motion: SmoothedTrajectory) -> list[str]:
-    """Return the joints whose noise is so large beside the deviation that the motion follows it."""
+    """Return the joints whose noise is so large, relative to the deviation, that the motion follows it."""
     return [name for name, own in motion.joints.items() if motion.deviation < FOLLOWED * own.noise]
 
 
 def smoothing_table(motion: SmoothedTrajectory) -> Table:
-    """Return what was made of the samples of each joint as a table."""
+    """Return the table of the smoothing results of each joint."""
     rows = [
         [
             name,
@@ -34,7 +34,7 @@ def smoothing_table(motion: SmoothedTrajectory) -> Table:
 
 
 def smoothing_words(motion: SmoothedTrajectory) -> str:
-    """Word that the motion follows noise, where it does."""
+    """Return a remark on joints whose motion follows noise, or an empty string."""
     loud = noisy_joints(motion)
     if not loud:
         return ""

@@ -1,4 +1,4 @@
-"""What a command shows: tables, a progress bar, messages; in color on a terminal, plain text elsewhere."""
+"""Output of commands: tables and messages, in color on a terminal, as plain text elsewhere."""
 
 from __future__ import annotations
 
@@ -39,8 +39,8 @@ OURS = (
     RobotWarning,
     SampleWarning,
     UnitWarning,
-)  # warnings of this package, which nobody may turn off by mistake
-WIDTH = 80  # of tables that do not go to a terminal
+)  # warnings of this package, which filters of the user do not hide
+WIDTH = 80  # of tables in plain text
 WIDEST = 9999
 
 
@@ -55,14 +55,14 @@ def show_peaks(given: Sequence[Peak]) -> None:
 
 
 def show_table(table: Table, style: str = "bold") -> None:
-    """Print a table, in color on a terminal that is wide enough for its numbers; marked cells have a style there."""
+    """Print a table, in color and with styled marks on a terminal that is wide enough for its numbers."""
     pause()
     if not (sys.stdout.isatty() and _show_colored(table, style)):
         print_text("\n" + "\n".join(_plain_lines(table)))
 
 
 def _plain_lines(table: Table) -> list[str]:
-    """Return the lines of a table in plain text; where names are too long for it, they stand on lines of their own."""
+    """Return the lines of a table in plain text, with names on separate lines if they are too long."""
     starred = [
         [cell + ("*" if k in marked else " ") if k in table.markable else cell for k, cell in enumerate(cells)]
         for cells, marked in zip(table.rows, table.marks or [[]] * len(table.rows), strict=True)
@@ -88,7 +88,7 @@ def _plain_lines(table: Table) -> list[str]:
 
 
 def _show_colored(table: Table, style: str) -> bool:
-    """Print a table in color, unless the terminal cannot show marks or is so narrow that rich would cut numbers."""
+    """Print a table in color and return True, unless the terminal cannot show marks or is too narrow for numbers."""
     from rich import box
     from rich.console import Console
     from rich.table import Table as Grid
@@ -121,7 +121,7 @@ def _show_colored(table: Table, style: str) -> bool:
 
 
 def show_columns(pairs: Sequence[tuple[str, str]]) -> None:
-    """Print names and what they mean, in two columns."""
+    """Print names and their descriptions in two columns."""
     pause()
     width = max(len(name) for name, _ in pairs)
     colored = sys.stdout.isatty()
@@ -136,7 +136,7 @@ def show_columns(pairs: Sequence[tuple[str, str]]) -> None:
 
 
 def _clean(text: str) -> str:
-    """Replace control characters, with which a file could steer the terminal."""
+    """Return text with control characters replaced, with which a file could control the terminal."""
     return "".join(c if c.isprintable() or c == "\n" else "?" for c in text)
 
 
@@ -157,30 +157,30 @@ def say_json(command: str, data: Mapping[str, Any]) -> None:
 
 
 def print_error(error: object, *, json: bool = False) -> None:
-    """Print an error on standard error, in one line: of words, or of JSON."""
+    """Print an error on standard error in one line, as text or JSON."""
     _write_message("error", "bold red", error, json)
 
 
 def detail(words: str, *, json: bool = False) -> None:
-    """Print what more there is to know of an error on standard error, in one line; JSON has it in no other."""
+    """Print a detail of an error on standard error in one line; with JSON, nothing is printed."""
     if not json:
         _write_message("note", "bold", words, json)
 
 
 def print_warning(warning: object, *, json: bool = False) -> None:
-    """Print a warning on standard error, in one line: of words, or of JSON."""
+    """Print a warning on standard error in one line, as text or JSON."""
     _write_message("warning", "bold yellow", warning, json)
 
 
 def recorded_cautions(caught: Sequence[warnings.WarningMessage], *, json: bool = False) -> None:
-    """Print warnings that were recorded, each once."""
+    """Print recorded warnings, each once."""
     for message in {str(warning.message): warning.message for warning in caught}.values():
         print_warning(message, json=json)
 
 
 @contextmanager
 def cautions(*, json: bool = False) -> Iterator[None]:
-    """Print warnings as the command prints its errors, each once and without its place in the code."""
+    """Print warnings like the errors of the command, each once and without its place in the code."""
     shown: set[str] = set()
 
     def show(message: Any, *_: Any, **__: Any) -> None:
@@ -213,7 +213,7 @@ def _write_message(kind: str, style: str, message: object, json: bool) -> None:
 
 
 def unexpected(error: Exception) -> str:
-    """Word an error that no check foresaw, with the innermost line that is the user's or this package's own."""
+    """Return an unexpected error as text, with the innermost line in code of the user or of this package."""
     import traceback
 
     message = shortened(str(error).strip().partition("\n")[0])

@@ -1,6 +1,7 @@
-"""Outputs that grow without bound toward the change points of a motion, so that no largest value says anything.
+"""Outputs that grow without bound toward the change points of a motion, for which a largest value is meaningless.
 
-A motion passes a change point smoothly. What follows from its factored Jacobian can have a pole there: reactions do.
+A motion passes a change point smoothly, but quantities computed from the factored Jacobian, such as reactions, can have
+a pole at it.
 """
 
 from __future__ import annotations
@@ -13,18 +14,18 @@ from jaxtyping import Bool, Float
 from jounce.kinematics import ChunkedMotion, Motion, solve
 from jounce.mechanism import AbstractMotionOutput
 
-DISTANCES = 4.0 ** -np.arange(5, 9)  # radii of the Taylor series from a change point; forces have three digits there
-POLE = 3.0  # least growth of a pole from one distance to the next; one of first order grows fourfold
-LIKENESS = 0.05  # of these growths
+DISTANCES = 4.0 ** -np.arange(5, 9)  # distances from a change point, in radii of the Taylor series
+POLE = 3.0  # least growth of a pole from one distance to the next; a pole of first order grows fourfold
+LIKENESS = 0.05  # relative tolerance of the growth
 
 
 def unbounded_outputs(motion: Motion | ChunkedMotion) -> dict[str, list[float]]:
-    """Return the outputs that grow without bound, and toward which instants, s, where a motion passes change points.
+    """Return the outputs that grow without bound toward change points of a motion, with the instants, s.
 
     Parameters
     ----------
     motion : Motion or ChunkedMotion
-        Solved; it is solved again near its change points.
+        The solved motion, which is solved again near its change points.
     """
     first, last = float(motion.time[0]), float(motion.time[-1])
     points = [point for point in motion.passages if first <= point.instant <= last]
@@ -33,8 +34,8 @@ def unbounded_outputs(motion: Motion | ChunkedMotion) -> dict[str, list[float]]:
         return {}
     sides = np.array([[p.instant + side * p.radius * DISTANCES for side in (-1, 1)] for p in points])
     inside = (sides >= first) & (sides <= last)
-    instants = np.unique(np.append(sides[inside], (first, last)))  # the same motion, from its start through all points
-    # the value alone: derivatives are all rounding so near, and grow where it does
+    instants = np.unique(np.append(sides[inside], (first, last)))  # the whole motion, to stay on its branch
+    # order 0, as derivatives lose all digits so near to a change point, and have the same poles
     near = solve(dataclasses.replace(motion.mechanism, outputs=forces), instants, order=0, strict=False)
     indices = np.searchsorted(instants, np.where(inside, sides, first))
     unbounded: dict[str, list[float]] = {}
@@ -47,7 +48,7 @@ def unbounded_outputs(motion: Motion | ChunkedMotion) -> dict[str, list[float]]:
 
 
 def _poles(sizes: Float[np.ndarray, "point side distance component"]) -> Bool[np.ndarray, "point side"]:
-    """Tell where a magnitude grows as that of a pole does: by the same factor from each distance to the next."""
+    """Return whether a magnitude grows like a pole: by the same factor from each distance to the next."""
     with np.errstate(invalid="ignore", divide="ignore"):
         growth = sizes[:, :, 1:] / sizes[:, :, :-1]
         alike = np.abs(growth / growth[:, :, -1:] - 1.0) < LIKENESS

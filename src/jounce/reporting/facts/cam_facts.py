@@ -1,4 +1,4 @@
-"""What there is to know of a plate cam, as plain data in SI units, and in words."""
+"""Facts of a plate cam, as plain data in SI units, and in words."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ ROUNDING = 1e-12  # rad
 
 
 class ExtremeFacts(TypedDict):
-    """A value, m or rad, and the cam angle where it is, rad."""
+    """A value, m or rad, and its cam angle, rad."""
 
     value: float
     angle: float
 
 
 class UndercutFacts(TypedDict):
-    """Between which cam angles lift is lost, where most and how much."""
+    """A range of cam angles in which lift is lost, with the largest loss and its angle."""
 
     start: float
     stop: float
@@ -51,7 +51,7 @@ class CamFacts(TypedDict):
 
 
 def cam_facts(cam: PlateCam) -> dict[str, Any]:
-    """Return what there is to know of a cam: CamFacts.
+    """Return the facts of a cam: CamFacts.
 
     Examples
     --------
@@ -86,7 +86,7 @@ def _extreme(extreme: Extreme | None) -> dict[str, float] | None:
 
 
 def cam_words(facts: dict[str, Any], units: ShownUnits) -> str:
-    """Word what there is to know of a cam, in the units in which it is shown."""
+    """Return the facts of a cam in words, in the shown units."""
 
     def worded(value: float, unit: str, name: str = "") -> str:
         label, factor = units.of(unit, name)
@@ -112,7 +112,7 @@ def cam_words(facts: dict[str, Any], units: ShownUnits) -> str:
         low, high = facts["face"]
         width = worded(high["value"] - low["value"], "m")
         lines.append(f"face: at least {width} wide, from {extreme_words(low, 'm')} to {extreme_words(high, 'm')}")
-    unit, factor = (lift, 1.0) if lift == "rad" else units.of(lift, "lift")  # a derivative by rad is none of degrees
+    unit, factor = (lift, 1.0) if lift == "rad" else units.of(lift, "lift")  # never per degree
     jumps = [{**x, "largest": x["largest"] and x["largest"] * factor} for x in facts["derivatives"]]
     law = {
         "of": "the follower",

@@ -1,4 +1,4 @@
-"""What there is to know of a curve of configurations, as plain data in SI units, in tables and in words."""
+"""Facts of a curve of configurations, as plain data in SI units, in tables and in words."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from jounce.kinematics import Curve
 from jounce.reporting.text.summaries import Facts, count
 from jounce.reporting.text.tables import Table, table
 
-SMALL = 1e-6  # of a unit of arc length: a body that moves less does not move
+SMALL = 1e-6  # fraction of a unit of arc length: smaller motions of a body count as zero
 
 
 class LimitFacts(TypedDict):
@@ -24,7 +24,7 @@ class LimitFacts(TypedDict):
 
 
 class BranchFacts(TypedDict):
-    """A branch between limit positions; without any, the driver makes whole turns."""
+    """A branch between limit positions; without bounds, the driver makes whole turns."""
 
     start: float
     stop: float
@@ -33,7 +33,7 @@ class BranchFacts(TypedDict):
 
 
 class BodyDirection(TypedDict):
-    """How a body moves along a branch, for a unit of arc length: m and rad."""
+    """Motion of a body along a branch per unit of arc length: m and rad."""
 
     body: str
     shift: list[float]
@@ -41,7 +41,7 @@ class BodyDirection(TypedDict):
 
 
 class ChangePointFacts(TypedDict):
-    """Where branches cross: the direction of each, that of the curve itself first."""
+    """A crossing of branches: the direction of each branch, that of the curve itself first."""
 
     arc_length: float
     value: float | None
@@ -68,7 +68,7 @@ class CurveFacts(TypedDict):
 
 
 def curve_facts(curve: Curve) -> dict[str, Any]:
-    """Return what there is to know of a curve: CurveFacts.
+    """Return the facts of a curve: CurveFacts.
 
     Examples
     --------
@@ -114,7 +114,7 @@ def curve_facts(curve: Curve) -> dict[str, Any]:
 
 
 def curve_summary(facts: Facts, file: str) -> str:
-    """Word what a curve is like: closed or not, and how far the driver goes on it."""
+    """Return the summary of a curve: whether it is closed, and the range of the driver."""
     shape = "closed" if facts["closed"] else "open"
     lines = [
         facts["title"] or file,
@@ -134,7 +134,7 @@ def curve_summary(facts: Facts, file: str) -> str:
 
 
 def curve_tables(facts: Facts) -> list[Table]:
-    """Return limit positions, branches and change points of a curve."""
+    """Return the tables of limit positions, branches and change points of a curve."""
     unit = facts["unit"]
     limits = [[f"{x['arc_length']:.9g}", value_words(x["value"], unit), x["kind"]] for x in facts["limits"]]
     branches = [
@@ -160,7 +160,7 @@ def curve_tables(facts: Facts) -> list[Table]:
 
 
 def value_words(value: float | None, unit: str) -> str:
-    """Word a value of a driver; an angle in degrees too."""
+    """Return the value of a driver as text, with an angle in degrees as well."""
     if value is None:
         return ""
     if unit == "rad":
@@ -169,7 +169,7 @@ def value_words(value: float | None, unit: str) -> str:
 
 
 def _direction_words(direction: list[BodyDirection]) -> str:
-    """Word how bodies move along a branch: those that turn by their turns, others by their shifts."""
+    """Return the motion of bodies along a branch in words: the rotations of turning bodies, else the shifts."""
     parts = []
     for body in direction:
         turn = np.array(body["turn"])

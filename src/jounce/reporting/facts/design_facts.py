@@ -1,4 +1,4 @@
-"""Facts, words and a table before and after of an optimized design."""
+"""Facts of an optimized design, with words and a table of values before and after."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from jounce.reporting.text.tables import Table
 
 
 class ComparisonFacts(TypedDict):
-    """One quantity before and after; SI."""
+    """One quantity before and after the optimization; SI."""
 
     kind: str
     name: str
@@ -45,7 +45,7 @@ class DesignFacts(TypedDict):
 
 
 def design_facts(design: OptimizedDesign, file: str | PathLike[str]) -> DesignFacts:
-    """Return what is known of an optimized design."""
+    """Return the facts of an optimized design."""
     assembly = design.mechanism.assembly
     rows: Any = [dataclasses.asdict(row) for row in design.comparisons]
     return {
@@ -67,7 +67,7 @@ def design_facts(design: OptimizedDesign, file: str | PathLike[str]) -> DesignFa
 
 
 def design_words(facts: DesignFacts) -> str:
-    """Return what became of an optimization, in a few lines."""
+    """Return the result of an optimization in a few lines."""
     lines = [facts["title"] or Path(facts["file"]).name, f"{facts['status']}: {facts['message']}"]
     lines += [f"note: {note}" for note in facts["notes"]]
     if facts["assembly"] is not None:
@@ -77,7 +77,7 @@ def design_words(facts: DesignFacts) -> str:
 
 
 def design_table(facts: DesignFacts) -> Table:
-    """Return objective, conditions and parameters before and after, with what bounds them."""
+    """Return the table of objective, conditions and parameters before and after, with their bounds."""
     rows = [
         [
             row["name"],

@@ -1,4 +1,4 @@
-"""Facts of a feedforward: drives, how far the expansion in the damping goes, and where links end up."""
+"""Facts of a feedforward: drives, errors of the expansion in the damping, and errors of links."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from jounce.planning.elastic.motor_motion import Feedforward
 from jounce.reporting.text.summaries import count
 from jounce.reporting.text.tables import Table, number
 
-REST = 1e-6  # of the largest velocity of a motor: less is at rest
+REST = 1e-6  # fraction of the largest velocity of a motor: slower motors are at rest
 
 
 def feedforward_words(motion: Feedforward, resting: Mapping[str, float]) -> str:
-    """Word what has drives, when, and with which velocities motors begin."""
+    """Return the summary of a feedforward: its drives, its time, and the start velocities of motors."""
     elastic = [name for name, drive in motion.drives.items() if drive.elastic]
     rigid = [name for name in motion.names if name not in elastic]
     lines = [
@@ -37,7 +37,7 @@ def feedforward_words(motion: Feedforward, resting: Mapping[str, float]) -> str:
 
 
 def drives_table(report: LimitRows) -> Table:
-    """Return the worst instant of each quantity of each drive; broken limits stand out."""
+    """Return the table of the worst instants of each quantity of each drive, with broken limits marked."""
     rows = [
         [
             row.joint,
@@ -56,7 +56,7 @@ def drives_table(report: LimitRows) -> Table:
 
 
 def expansion_table(motion: Feedforward) -> Table | None:
-    """Return what the regular expansion in the damping misses after each order; None where nothing is damped."""
+    """Return the table of errors of the regular expansion in the damping by order; None without damping."""
     rows = [
         [name, f"{1e3 * drive.time_constant:.4g}", *(f"{x:.1e}" for x in motion.expansion_errors[:, k])]
         for k, name in enumerate(motion.names)
@@ -70,7 +70,7 @@ def expansion_table(motion: Feedforward) -> Table | None:
 
 
 def drives_verdict(report: LimitRows) -> str:
-    """Word whether limits of drives are kept, and the quantity nearest to one, or that breaks one most."""
+    """Return the verdict on the limits of drives, with the quantity nearest to a limit or with the largest excess."""
     worst = report.worst
     if worst is None:
         return "No limits are given."
@@ -81,7 +81,7 @@ def drives_verdict(report: LimitRows) -> str:
 
 
 def link_error_words(errors: LinkErrors) -> str:
-    """Word how far links go astray in a simulation."""
+    """Return the errors of links in a simulation, in words."""
     lines = ["Simulated with its springs, from the start, without feedback:"]
     lines += [f"  links err by at most {_largest(errors.exact, errors)} under these torques"]
     if errors.rigid is not None:

@@ -1,4 +1,4 @@
-"""The forces of drivers that hold a mechanism at rest, over all positions of a motion: facts and a table."""
+"""Facts and a table of the driver forces that hold a mechanism at rest, over all positions of a motion."""
 
 from __future__ import annotations
 
@@ -22,8 +22,8 @@ STAYS = {True: "everywhere", False: "nowhere", None: "in places"}
 
 class HoldingFacts(TypedDict):
     """The least and the greatest force or torque of a driver that hold the mechanism at rest in the positions of a
-    motion, None where it is infinite or not known; the instants of these positions, s; whether friction locks one way;
-    whether the mechanism stays without the driver, None where it does in some of the positions only.
+    motion, None if infinite or unknown; the instants of these positions, s; whether friction locks in one direction;
+    and whether the mechanism stays at rest without the driver, None if it does in some positions only.
     """
 
     driver: str
@@ -38,12 +38,12 @@ class HoldingFacts(TypedDict):
 
 
 def holding_facts(dataset: xarray.Dataset) -> list[dict[str, Any]]:
-    """Return between which forces each driver holds a mechanism at rest, over a motion: HoldingFacts.
+    """Return the range of forces with which each driver holds a mechanism at rest, over a motion: HoldingFacts.
 
     Parameters
     ----------
     dataset : xarray.Dataset
-        As `jounce.dynamics.holding_forces` returns it.
+        Result of `jounce.dynamics.holding_forces`.
 
     Examples
     --------
@@ -57,10 +57,10 @@ def holding_facts(dataset: xarray.Dataset) -> list[dict[str, Any]]:
 
 
 def write_holding(dataset: xarray.Dataset, path: str | PathLike[str], *, overwrite: bool = False) -> None:
-    """Write the forces that hold a mechanism at rest to a .csv file, a row for each position, whole or not at all.
+    """Write the forces that hold a mechanism at rest to a .csv file, one row for each position, atomically.
 
-    A driver has three columns, ``DRIVER_least``, ``DRIVER_frictionless`` and ``DRIVER_greatest``, N m or N; they are
-    ``inf`` where friction locks that way, and ``nan`` where they are not known.
+    A driver has three columns, ``DRIVER_least``, ``DRIVER_frictionless`` and ``DRIVER_greatest``, N m or N. Values are
+    ``inf`` if friction locks in that direction, and ``nan`` if unknown.
     """
     names = [f"{name}_{bound}" for name in dataset.data_vars for bound in dataset["bound"].values.tolist()]
     values = np.concatenate([dataset[name].values for name in dataset.data_vars], axis=1)
@@ -87,7 +87,7 @@ def _of_driver(name: str, array: Any, time: np.ndarray) -> dict[str, Any]:
 
 
 def holding_table(facts: list[dict[str, Any]], units: ShownUnits) -> Table:
-    """Return the forces that hold a mechanism at rest, a row for each driver, in the units that are shown."""
+    """Return the table of forces that hold a mechanism at rest, one row for each driver, in the shown units."""
     rows = []
     for each in facts:
         unit, factor = units.of(each["unit"], each["driver"])

@@ -1,4 +1,4 @@
-"""Facts, words, tables and a file of shapes of an equilibrium and of the modes about it."""
+"""Facts, words and tables of an equilibrium and of the modes about it, and a file of mode shapes."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class EquilibriumFacts(TypedDict):
 
 
 class ModeFacts(TypedDict):
-    """One natural motion; frequencies in Hz, the eigenvalue in 1/s."""
+    """One mode; frequencies in Hz, the eigenvalue in 1/s."""
 
     mode: int
     kind: str
@@ -43,7 +43,7 @@ class ModeFacts(TypedDict):
 
 
 class ModesFacts(TypedDict):
-    """An equilibrium, unless a mechanism is in motion, and the modes about it."""
+    """An equilibrium, unless the mechanism is in motion, and the modes about it."""
 
     title: str
     file: str
@@ -53,7 +53,7 @@ class ModesFacts(TypedDict):
 
 
 def modes_facts(small: Linearization, file: str | PathLike[str], without: list[str]) -> ModesFacts:
-    """Return what is known of a mechanism in its equilibrium, or in motion, and of its modes."""
+    """Return the facts of a mechanism in equilibrium or in motion, and of its modes."""
     rest = small.equilibrium
     modes: Any = [{**row, "eigenvalue": [row["eigenvalue"].real, row["eigenvalue"].imag]} for row in small.modes.rows]
     return {
@@ -66,7 +66,7 @@ def modes_facts(small: Linearization, file: str | PathLike[str], without: list[s
 
 
 def equilibrium_facts(rest: Equilibrium, without: list[str]) -> EquilibriumFacts:
-    """Return what is known of an equilibrium; components of outputs one after the other."""
+    """Return the facts of an equilibrium, with the components of outputs one after the other."""
     return {
         "time": rest.time,
         "stability": rest.stability,
@@ -87,7 +87,7 @@ def equilibrium_words(facts: EquilibriumFacts) -> str:
 
 
 def equilibrium_tables(rest: Equilibrium) -> list[Table]:
-    """Return where the bodies stand, and the values of the outputs."""
+    """Return the tables of the poses of bodies and the values of outputs."""
     attitude = "angle/rad" if rest.mechanism.space == "planar" else "quaternion"
     key = "angle" if rest.mechanism.space == "planar" else "orientation"
     bodies = [
@@ -106,7 +106,7 @@ def equilibrium_tables(rest: Equilibrium) -> list[Table]:
 
 
 def modes_table(modes: Modes) -> Table:
-    """Return frequencies, damping and what moves most, one row for each mode."""
+    """Return the table of frequencies, damping and largest motions, one row for each mode."""
     rows = []
     for row in modes.rows:
         swings, rate = row["kind"] == "oscillation" or row["damped_frequency"] > 0, abs(row["eigenvalue"].real)
@@ -126,10 +126,10 @@ def modes_table(modes: Modes) -> Table:
 
 
 def write_modes(modes: Modes, space: str, path: str | PathLike[str], *, overwrite: bool = False) -> None:
-    """Write eigenvalues and shapes to a .csv file, one row for each mode, whole or not at all.
+    """Write eigenvalues and mode shapes to a .csv file, one row for each mode, atomically.
 
-    A coordinate of a body has two columns, ``BODY.x_re`` and ``BODY.x_im``; the largest of each mode has the size 1
-    and no imaginary part. Shifts of the origin in m, turns in rad.
+    A coordinate of a body has two columns, ``BODY.x_re`` and ``BODY.x_im``; the largest coordinate of each mode has the
+    magnitude 1 and no imaginary part. Displacements of the origin are in m, rotations in rad.
     """
     names = [f"{body}.{column}" for body in modes.bodies for column in COLUMNS[space]]
     head = ["mode", "frequency_hz", "damping_ratio", "eigenvalue_re", "eigenvalue_im"]

@@ -1,4 +1,4 @@
-"""What there is to know of a motion that was solved or simulated, as plain data in SI units."""
+"""Facts of a solved or simulated motion, as plain data in SI units."""
 
 from __future__ import annotations
 
@@ -48,13 +48,13 @@ class MotionFacts(TypedDict):
     equations_of_joints: int
     equations_of_drivers: int
     change_points: list[float]
-    backend: str  # which arithmetic gave the numbers
+    backend: str  # compiler that gave the numbers
     coordinates: int
     remarks: list[str]
 
 
 class EnergyFacts(TypedDict):
-    """Energy of a simulation, J; None where no instant was reached."""
+    """Energy of a simulation, J; None if no instant was reached."""
 
     start: float | None
     largest_change: float | None
@@ -62,7 +62,7 @@ class EnergyFacts(TypedDict):
 
 
 class Kink(TypedDict):
-    """Where a force has a kink or jumps."""
+    """An instant at which a force has a kink or jumps."""
 
     time: float
     name: str
@@ -79,12 +79,12 @@ class SimulationFacts(MotionFacts):
 
 
 def motion_facts(motion: Motion | ChunkedMotion) -> dict[str, Any]:
-    """Return what was solved or simulated: MotionFacts, or SimulationFacts.
+    """Return the facts of a motion: MotionFacts, or SimulationFacts.
 
     Parameters
     ----------
     motion : Motion or ChunkedMotion
-        Of chunks, all must have been solved.
+        The motion; all chunks must have been solved.
 
     Examples
     --------
@@ -122,7 +122,7 @@ def motion_facts(motion: Motion | ChunkedMotion) -> dict[str, Any]:
 
 
 def _remarks(motion: Motion | ChunkedMotion) -> list[str]:
-    """Return what is to be said of the instants, and of outputs, such as why their values are NaN, each once."""
+    """Return the remarks on the instants and on outputs, such as the reason of NaN values, each once."""
     names: dict[str, list[str]] = {}
     for name, values in (motion.outputs if isinstance(motion, Motion) else {}).items():  # chunks are not kept
         output = motion.mechanism.outputs[name]

@@ -1,4 +1,4 @@
-"""Facts of a tolerance analysis: how far each column spreads at most, and which parameter causes it."""
+"""Facts of a tolerance analysis: the largest spread of each column, and the parameters that cause it."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ if TYPE_CHECKING:
     import xarray
 
 Column = tuple[str, str, int]
-"""An output, a component or nothing, and a derivative."""
+"""An output, a component or an empty string, and a derivative."""
 
 
 def columns_of(spread: xarray.Dataset, selection: Sequence[Column] | None) -> list[Column]:
-    """Return the columns that are meant, one for each component; all of the outputs unless some are requested."""
+    """Return the requested columns, one for each component; by default all columns of the outputs."""
     outputs = [str(name) for name in spread.data_vars if f"{name}_peak" in spread.data_vars]
     levels = [int(order) for order in spread["derivative"].values]
     selected = [(name, "", order) for name in outputs for order in levels] if selection is None else list(selection)
@@ -41,7 +41,7 @@ def spread_facts(spread: xarray.Dataset, columns: Sequence[Column]) -> dict[str,
 
 
 def _facts(spread: Any, column: Column, names: Sequence[str]) -> dict[str, Any]:
-    """Return the facts of a column, at the instant at which it spreads most."""
+    """Return the facts of a column at the instant of its largest spread."""
     name, component, order = column
 
     def of(kind: str) -> np.ndarray | None:
@@ -72,7 +72,7 @@ def _facts(spread: Any, column: Column, names: Sequence[str]) -> dict[str, Any]:
 
 
 def chosen(spread: xarray.Dataset, variable: str, column: Column) -> np.ndarray:
-    """Return what a variable holds of a column: numbers over time, for each parameter, or one."""
+    """Return the values of a variable for a column: over time, for each parameter, or a single one."""
     _, component, order = column
     data = spread[variable].sel(derivative=order)
     axes = [dim for dim in data.dims if dim not in ("time", "parameter")]
@@ -83,7 +83,7 @@ def chosen(spread: xarray.Dataset, variable: str, column: Column) -> np.ndarray:
 
 
 def spread_summary(facts: dict[str, Any], name: str, samples: int) -> str:
-    """Word what was varied, and how many designs were solved."""
+    """Return the summary of a tolerance analysis: the variations, and the number of solved designs."""
     parts = [f"{key} {number(value)}" for key, value in facts["deviations"].items()]
     lines = [f"{name}: standard deviations (SI) {', '.join(parts)}"]
     if samples:
@@ -98,7 +98,7 @@ def spread_summary(facts: dict[str, Any], name: str, samples: int) -> str:
 
 
 def spread_table(facts: dict[str, Any]) -> Table:
-    """Return a table of the widest spread of each column, and of what causes it."""
+    """Return a table of the largest spread of each column, with the shares of the parameters."""
     rows = []
     for x in facts["spread"]:
         numbers = [number(x[key]) for key in ("at", "nominal", "linear_std", "std", "low", "high")]
@@ -109,7 +109,7 @@ def spread_table(facts: dict[str, Any]) -> Table:
 
 
 def index_table(facts: dict[str, Any]) -> Table:
-    """Return a table of Sobol's indices of the peaks."""
+    """Return a table of the Sobol indices of the peaks."""
     rows = []
     for x in facts["spread"]:
         first, total = x["peak_first_order"], x["peak_total_order"]
@@ -121,7 +121,7 @@ def index_table(facts: dict[str, Any]) -> Table:
 
 
 def _causes(share: dict[str, float] | None) -> str:
-    """Word the parts of the variance, the largest first, those below a percent left out."""
+    """Return the shares of the variance in words, the largest first, without those below half a percent."""
     if share is None:
         return "-"
     ordered = sorted(share.items(), key=lambda item: -item[1])

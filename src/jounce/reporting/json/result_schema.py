@@ -1,4 +1,4 @@
-"""The JSON Schema of what commands print with ``--json``, made from the types of the facts."""
+"""The JSON Schema of the results that commands print with ``--json``, generated from the types of the facts."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ class SimulateResult(Result, SimulationFacts, Written):
 
 
 class SimulateRobotResult(Result):
-    """jounce simulate --json of a robot file; energies in J, null where the motion was not followed."""
+    """jounce simulate --json of a robot file; energies in J, null if the motion did not reach the instant."""
 
     command: Literal["simulate"]
     robot: str
@@ -80,7 +80,7 @@ class TraceResult(Result):
 
 
 class ServoPeak(Extremes):
-    """Extreme values, at the rows of a drive, of a derivative of the coordinate of a driver."""
+    """Extreme values of a derivative of the coordinate of a driver, at the rows of the servo file."""
 
     output: str
 
@@ -106,7 +106,7 @@ class CamResult(Result, CamFacts):
 
 
 class SweptPeak(TypedDict):
-    """The least and the largest peak that a derivative of an output has among designs, and the designs."""
+    """The least and the largest peak of a derivative of an output among all designs, with their designs."""
 
     output: str
     derivative: int
@@ -133,7 +133,7 @@ class SweepResult(Result):
 
 
 class Spread(TypedDict):
-    """How far a derivative of an output spreads, at the instant at which it spreads most, and its peak."""
+    """Spread of a derivative of an output at the instant of its largest spread, and spread of its peak."""
 
     output: str
     derivative: int
@@ -181,7 +181,7 @@ class OptimizeResult(Result, DesignFacts):
 
 
 class Starter(TypedDict):
-    """A mechanism to begin from, and the command that writes it."""
+    """A starter mechanism, and the command that writes it."""
 
     name: str
     about: str
@@ -205,7 +205,7 @@ class NewResult(Result):
 
 
 class Problem(TypedDict):
-    """An error or a warning, taken apart."""
+    """The parts of an error or a warning."""
 
     kind: str
     message: str
@@ -253,7 +253,7 @@ RESULTS: dict[str, Any] = {
 
 
 class _Closed(GenerateJsonSchema):
-    """No keys but the known ones."""
+    """Schema generator that allows only known keys."""
 
     def typed_dict_schema(self, schema: Any) -> dict[str, Any]:
         return super().typed_dict_schema(schema) | {"additionalProperties": False}
@@ -277,7 +277,7 @@ def result_schema() -> dict[str, Any]:
 
 
 def _schema(kind: Any) -> dict[str, Any]:
-    """Return the schema of a type, whole: each part in its place."""
+    """Return the schema of a type with all references replaced by their definitions."""
     json_schema = TypeAdapter(kind).json_schema(mode="serialization", schema_generator=_Closed)
     parts = json_schema.pop("$defs", {})
 

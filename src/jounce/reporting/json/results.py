@@ -1,4 +1,4 @@
-"""Results of commands as JSON: SI units, null for what is not a number, keys that stay."""
+"""Results of commands as JSON: SI units, null for values that are not finite, stable keys."""
 
 from __future__ import annotations
 
@@ -27,11 +27,11 @@ if TYPE_CHECKING:
     from jounce.integrate.results.robot_simulation import RobotSimulation
 
 VERSION = 1
-"""Number of the form of the results; it grows where a key changes or goes."""
+"""Version of the format of the results; it increases if a key changes or is removed."""
 
 
 def plain(value: Any) -> Any:
-    """Return a value as JSON has it: None for numbers that are not finite, lists for arrays, text for paths.
+    """Return a value for JSON: None for numbers that are not finite, lists for arrays, text for paths.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""What commands about robots and their energies print with ``--json``, as types."""
+"""Types of the results that commands on robots and energies print with ``--json``."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from jounce.reporting.json.schema_parts import Result, TorquePeak
 
 
 class LimitRow(TypedDict):
-    """The worst instant of a joint and quantity; without a limit, its ratio is null, and both where it is infinite."""
+    """The worst instant of a quantity of a joint; ratio is null without a limit, worst and ratio if infinite."""
 
     joint: str
     quantity: str
@@ -24,14 +24,14 @@ class LimitRow(TypedDict):
 
 
 class BrokenAtEnd(TypedDict):
-    """A joint or a link, and a quantity of it that has a limit and is infinite at an end."""
+    """A joint or a link, and a limited quantity of it that is infinite at an end."""
 
     name: str
     quantity: str
 
 
 class EndFacts(TypedDict):
-    """What is met at the start or the stop of a trajectory: what does not rest, SI, and the limits that this breaks."""
+    """The start or stop of a trajectory: nonzero velocities and accelerations, SI, and the limits that they break."""
 
     end: Literal["start", "stop"]
     time: float
@@ -42,7 +42,7 @@ class EndFacts(TypedDict):
 
 
 class BetweenFacts(TypedDict):
-    """What was taken to happen between points, and how far, where, that leads from the straight lines between them."""
+    """The assumed motion between points, and its largest distance from the straight lines between them."""
 
     words: str
     deviation: float
@@ -51,7 +51,7 @@ class BetweenFacts(TypedDict):
 
 
 class TrajectoryResult(Result):
-    """The check of a robot on a trajectory; between is null where its laws say what happens between points."""
+    """The check of a robot on a trajectory; between is null if laws define the motion between points."""
 
     robot: str
     file: str
@@ -63,7 +63,7 @@ class TrajectoryResult(Result):
 
 
 class LoadChangeFacts(TypedDict):
-    """What a change of the load does: kg by link, the speed of the load, m/s, and the steps of torques by joint, SI."""
+    """Effect of a load change: mass by link, kg, speed of the load, m/s, and steps of torques by joint, SI."""
 
     time: float
     masses: dict[str, float]
@@ -95,7 +95,7 @@ class TorquesResult(TrajectoryResult):
 
 
 class EnergyPeak(TypedDict):
-    """Extreme values of a rate of an energy of all bodies, where the body is null, or of one, with their times."""
+    """Extreme values of a rate of the energy of a body, or of all bodies if the body is null, with their times."""
 
     body: str | None
     rate: int
@@ -120,7 +120,7 @@ class EnergiesResult(Result):
 
 
 class DriveFacts(TypedDict):
-    """A drive: time constant of its spring, s, what the expansion in it misses, and how its motor begins."""
+    """A drive: time constant of its spring, s, errors of the expansion in it, and start velocity of its motor."""
 
     name: str
     elastic: bool
@@ -130,7 +130,7 @@ class DriveFacts(TypedDict):
 
 
 class SimulatedLink(TypedDict):
-    """By how much a link errs in a simulation, under all of the torques, and without what accelerates the springs."""
+    """Error of a link in a simulation under the full torques, and without those that accelerate the deflections."""
 
     name: str
     unit: str
@@ -154,7 +154,7 @@ class FeedforwardResult(Result):
 
 
 class BindingLimit(TypedDict):
-    """A limit that binds somewhere, for how long, and what it costs."""
+    """A limit that binds on a part of the motion, for how long, and its price."""
 
     limit: str
     unit: str
@@ -187,7 +187,7 @@ class RetimeResult(Result):
 
 
 class SmoothedJointFacts(TypedDict):
-    """What smoothing made of the samples of a joint, SI; followed are frequencies, Hz, from which on nothing is."""
+    """Result of smoothing the samples of a joint, SI; `followed` are the lowest and highest cutoff frequency, Hz."""
 
     joint: str
     noise: float

@@ -1,4 +1,4 @@
-"""What the JSON results of several commands have in common."""
+"""Common parts of the JSON results of several commands."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing_extensions import TypedDict
 
 
 class Result(TypedDict):
-    """What all results begin with."""
+    """First keys of all results."""
 
     jounce: str
     record: Literal[1]
@@ -32,13 +32,13 @@ class OutputPeak(Extremes):
 
 
 class TorquePeak(Extremes):
-    """Extreme values, at the instants of the trajectory, of a torque or force of a joint, or of one of its rates."""
+    """Extreme values of a torque or force of a joint, or of one of its rates, at the instants of the trajectory."""
 
     joint: str
 
 
 class Written(TypedDict):
-    """What a result of a motion has in common with others."""
+    """Common keys of the results of motions."""
 
     file: str
     peaks: list[OutputPeak]

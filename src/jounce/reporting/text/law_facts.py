@@ -1,4 +1,4 @@
-"""To which derivative the laws of the drivers are continuous, as plain data and in words."""
+"""Continuity of the laws of drivers, as plain data and in words."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ WHOLE = 1e-6  # of turns
 
 
 class JumpFacts(TypedDict):
-    """The jumps of a derivative of a law within the time of the file: how many, and the largest one."""
+    """The jumps of a derivative of a law within the time of the file: their number, and the largest one."""
 
     order: int
     jumps: int
@@ -38,7 +38,7 @@ class JumpFacts(TypedDict):
 
 
 class LawFacts(TypedDict):
-    """To which derivative a law is continuous; ``of`` is the driver, or the output that is held to the law."""
+    """The highest continuous derivative of a law; ``of`` is the driver, or the output that follows the law."""
 
     driver: str
     of: str
@@ -50,7 +50,7 @@ class LawFacts(TypedDict):
 
 @under_own_settings
 def law_facts(mechanism: Mechanism, first: float, last: float) -> list[dict[str, Any]]:
-    """Return to which derivative each law of a driver is continuous, from a first to a last instant: LawFacts.
+    """Return the continuity of the law of each driver between two instants: LawFacts.
 
     Examples
     --------
@@ -78,7 +78,7 @@ def law_facts(mechanism: Mechanism, first: float, last: float) -> list[dict[str,
 
 
 def _uneven_repeat(law: AbstractMotion, mechanism: Mechanism) -> str:
-    """Word that a law repeats on a shaft by what is no whole part or multiple of a turn; nothing if it does not."""
+    """Return a remark if the period of a law is not a whole fraction or multiple of a turn of a shaft, else nothing."""
     own, leader = law.parts if isinstance(law, FollowingMotion) and law.parts else (None, None)
     if not isinstance(own, SplineMotion) or own.beyond != "repeat":
         return ""
@@ -94,7 +94,7 @@ def _uneven_repeat(law: AbstractMotion, mechanism: Mechanism) -> str:
 
 
 def _same(motion: Any, law: AbstractMotion | None, parameters: Mapping[str, Any]) -> bool:
-    """Tell whether what a driver has for a law is a law."""
+    """Return whether the motion of a driver equals a law."""
     resolved = resolve_motion(motion, parameters)
     if isinstance(resolved, ExpressionMotion) and isinstance(law, ExpressionMotion):
         return resolved.expression == law.expression
@@ -114,16 +114,16 @@ def _number(value: float) -> float | None:
 
 
 def law_words(laws: Sequence[Mapping[str, Any]], by: str = "s", shown: tuple[str, float] | None = None) -> list[str]:
-    """Word to which derivative laws are continuous, by the time or by an angle, a line for each.
+    """Return the continuity of laws, of time or of an angle, in words, one line for each.
 
     Parameters
     ----------
     laws : sequence of mapping
-        `LawFacts` of each.
+        `LawFacts` of each law.
     by : str
-        Unit of what they are laws of.
+        Unit of the argument of the laws.
     shown : tuple of str and float, optional
-        Another unit in which positions are shown, and how many of it are one of the former.
+        Another unit in which positions are shown, and the factor to it.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Facts in words: of mechanisms, robots and motions, and of a trajectory and the limits of a robot."""
+"""Summaries in words of mechanisms, robots and motions, and of a trajectory and the limits of a robot."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ Facts = Mapping[str, Any]
 
 
 def motion_summary(facts: Facts, file: str) -> str:
-    """Word what was solved or simulated: bodies, degrees of freedom, instants, and how well energy was kept."""
+    """Return the summary of a motion: bodies, degrees of freedom, instants, and conservation of energy."""
     time, title = facts["time"], facts["title"] or file
     interval = (
         f"t = {time['start']:g} s" if time["count"] == 1 else f"from t = {time['start']:g} s to {time['stop']:g} s"
@@ -56,13 +56,13 @@ def motion_summary(facts: Facts, file: str) -> str:
 
 
 def _with_carriages(words: str, facts: Facts, coordinates: int) -> str:
-    """Word how many bodies there are, and how many carriages, which have the hidden coordinates of joints."""
+    """Return the number of bodies in words, with the number of carriages, which have hidden joint coordinates."""
     carriages = coordinates // (3 if facts["space"] == "planar" else 6) - len(facts["bodies"])
     return f"{words} and {count(carriages, 'carriage of a joint', 'carriages of joints')}" if carriages else words
 
 
 def _conservation_lines(facts: Facts) -> list[str]:
-    """Word how well a simulation kept energy and constraints."""
+    """Return the lines on the conservation of energy and constraints in a simulation."""
     if not facts["time"]["solved"]:
         return []
     energy, kinks = facts["energy"], facts["kinks"]
@@ -80,18 +80,18 @@ def _conservation_lines(facts: Facts) -> list[str]:
 
 
 def freedom_words(freedom: int, drivers: Iterable[str]) -> str:
-    """Word degrees of freedom and what drives them."""
+    """Return the degrees of freedom and their drivers in words."""
     words, names = count(freedom, "degree of freedom", "degrees of freedom"), ", ".join(drivers)
     return f"{words}, driven by {names}" if names else words
 
 
 def start_summary(facts: Facts) -> str:
-    """Word how many degrees of freedom a mechanism or a robot has, and whether a motion can start."""
+    """Return the degrees of freedom of a mechanism or a robot in words, and whether a motion can start."""
     return "\n".join(_mechanism_start(facts) if facts["kind"] == "mechanism" else _robot_start(facts))
 
 
 def start_heading(facts: Facts) -> str:
-    """Word what a file holds."""
+    """Return the heading of a file: its title, its kind and its degrees of freedom."""
     freedom = facts["freedom"]["words"]
     if facts["kind"] == "mechanism":
         return f"{facts['title'] or facts['file']}\n{facts['space']} mechanism: {freedom}"
@@ -150,7 +150,7 @@ def _robot_start(facts: Facts) -> list[str]:
 
 
 def limits_summary(report: LimitReport, motion: JointTrajectory, robot: Path, trajectory: Path) -> str:
-    """Word what was compared, which joints stand still, and what has no limits."""
+    """Return the summary of a check of limits: the motion, joints at rest, and quantities without limits."""
     moved = count(len(motion.names), "moving joint")
     lines = [
         f"{report.robot}: {moved} ({robot.name}, {trajectory.name})",
@@ -178,7 +178,7 @@ def limits_summary(report: LimitReport, motion: JointTrajectory, robot: Path, tr
 def torques_summary(
     dataset: xarray.Dataset, motion: JointTrajectory, ends: Sequence[TrajectoryEnd], robot: Path, trajectory: Path
 ) -> str:
-    """Word of which joints torques were computed, when, which stand still, and what is met at the ends."""
+    """Return the summary of torques: the joints, the instants, joints at rest, and the state at the ends."""
     rates, instants = dataset.sizes["derivative"] - 1, dataset["time"].values
     note = f", with {count(rates, 'rate')}" if rates else ""
     lines = [
@@ -196,13 +196,13 @@ def torques_summary(
 
 
 def robot_motion_summary(motion: RobotSimulation, file: Path) -> str:
-    """Word how a robot moved, from when to when, and how its energy changed."""
+    """Return the summary of the motion of a robot: instants, and change of energy."""
     first, *lines = robot_motion_words(motion)
     return "\n".join(wrapped(line) for line in (f"{first} ({file.name})", *lines))
 
 
 def robot_motion_words(motion: RobotSimulation) -> list[str]:
-    """Word how a robot moved, in lines of which the first is a title."""
+    """Return the lines of the summary of the motion of a robot, the first one a title."""
     times, energy, steps = motion.time, motion.energy, count(len(motion.steps.start), "step")
     return [
         f"{motion.robot.name}: motion of {count(len(motion.robot.joint_names), 'moving joint')}",
@@ -212,7 +212,7 @@ def robot_motion_words(motion: RobotSimulation) -> list[str]:
 
 
 def verdict(report: LimitReport) -> str:
-    """Word whether the limits are kept, and the quantity that is nearest to breaking one or breaks one most."""
+    """Return the verdict on limits, with the quantity nearest to its limit or with the largest excess."""
     number, worst = len(report.limited), report.worst
     assert worst is not None
     size = "infinite by a jump" if worst.infinite else f"{worst.ratio:.4g} of its limit"
@@ -229,7 +229,7 @@ def verdict(report: LimitReport) -> str:
 
 
 def wrapped(line: str) -> str:
-    """Break a long line after commas and colons only."""
+    """Return a line wrapped after commas and colons only."""
     import textwrap
 
     glued = re.sub("(?<![,:]) ", "\0", line)
@@ -238,12 +238,12 @@ def wrapped(line: str) -> str:
 
 
 def count(number: int, noun: str, plural: str = "") -> str:
-    """Word a number of things."""
+    """Return a number with its noun in the singular or plural."""
     return f"{number} {noun if number == 1 else plural or f'{noun}s'}"
 
 
 def _train_words(facts: list[dict[str, Any]]) -> list[str]:
-    """Word ratios, a line for each driver."""
+    """Return the speed ratios of gears in words, one line for each driver."""
     by_driver: dict[str, list[str]] = {}
     for each in facts:
         fraction = f" = {each['fraction']}" if "/" in (each["fraction"] or "") else ""
@@ -252,7 +252,7 @@ def _train_words(facts: list[dict[str, Any]]) -> list[str]:
 
 
 def efficiency_words(facts: list[dict[str, Any]]) -> list[str]:
-    """Word what share of power gears with friction pass on, a line for each.
+    """Return the efficiencies of gears with friction in words, one line for each.
 
     Examples
     --------
@@ -269,7 +269,7 @@ def efficiency_words(facts: list[dict[str, Any]]) -> list[str]:
 
 
 def screw_words(facts: list[dict[str, Any]]) -> list[str]:
-    """Word screws with friction, a line for each.
+    """Return screws with friction in words, one line for each.
 
     Examples
     --------
@@ -287,7 +287,7 @@ def screw_words(facts: list[dict[str, Any]]) -> list[str]:
 
 
 def line_words(facts: list[dict[str, Any]]) -> list[str]:
-    """Word belts and ropes, a line for each.
+    """Return belts and ropes in words, one line for each.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""How a mechanism starts: assembled at its first instant, and its degrees of freedom there, as plain data."""
+"""Start of a mechanism: its assembly at the first instant and its degrees of freedom, as plain data."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ TOLERANCE = 1e-12
 
 
 class RepetitionFacts(TypedDict):
-    """A joint or driver whose equations follow from those of others, and of how many."""
+    """A joint or driver with equations that follow from those of others, and their number."""
 
     kind: str
     name: str
@@ -39,7 +39,7 @@ class RepetitionFacts(TypedDict):
 
 
 class FreedomFacts(TypedDict):
-    """Coordinates, equations and what they leave."""
+    """Numbers of coordinates and equations, and the remaining degrees of freedom."""
 
     coordinates: int
     equations: int
@@ -57,7 +57,7 @@ class FreedomFacts(TypedDict):
 
 
 class AssemblyFacts(TypedDict):
-    """Whether the bodies can be assembled, at which instant, and how far joints are open."""
+    """Whether the bodies can be assembled, at which instant, and the largest gap of the joints."""
 
     status: Literal["assembled", "open"]
     message: str | None
@@ -66,7 +66,7 @@ class AssemblyFacts(TypedDict):
 
 
 class BranchFacts(TypedDict):
-    """A family of motions: how each body begins to move, m and rad up to a factor."""
+    """A family of motions: the tangent of each body, m and rad up to a factor."""
 
     freedom: int
     cusp: bool
@@ -74,7 +74,7 @@ class BranchFacts(TypedDict):
 
 
 class MobilityFacts(TypedDict):
-    """How a mechanism can move with its drivers released: see `jounce.kinematics.Mobility`."""
+    """Mobility of a mechanism with its drivers released: see `jounce.kinematics.Mobility`."""
 
     count: int
     instantaneous: int
@@ -87,7 +87,7 @@ class MobilityFacts(TypedDict):
 
 
 class StartingState:
-    """The mechanism assembled at its first instant, and its degrees of freedom there."""
+    """The mechanism assembled at its first instant, with its degrees of freedom."""
 
     def __init__(self, mechanism: Mechanism, model: Model, instant: float):
         self.mechanism, self.model, self.instant = mechanism, model, instant
@@ -100,8 +100,8 @@ class StartingState:
         self.ok = self.assembly["status"] == "assembled" and possible
 
     def mobility(self) -> dict[str, Any] | None:
-        """Return how it can move with its drivers released; None where it cannot be assembled."""
-        rolling = any(joint.nonholonomic for joint in self.mechanism.joints.values())  # where it is tells no motions
+        """Return the mobility with drivers released; None if the mechanism cannot be assembled."""
+        rolling = any(joint.nonholonomic for joint in self.mechanism.joints.values())  # motions depend on rates
         if self.coordinates is None or self.here is None or rolling:
             return None
         joints = self.here.take(np.array([name.startswith("joints.") for name in self.model.rows], bool))

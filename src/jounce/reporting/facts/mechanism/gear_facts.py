@@ -1,4 +1,4 @@
-"""How fast the gears of a mechanism turn for a turn of each driver, from the Jacobian, and what their teeth lose."""
+"""Speed ratios of the gears of a mechanism to each driver, from the Jacobian, and efficiencies of their teeth."""
 
 from collections.abc import Sequence
 from fractions import Fraction
@@ -17,13 +17,13 @@ from jounce.mechanism.transmissions.axis_angles import turned
 from jounce.mechanism.transmissions.gear_frames import carriers
 from jounce.reporting.facts.mechanism.freedom_facts import StartingState
 
-LARGEST_TEETH = 1000  # of ratios that are given as fractions
+LARGEST_TEETH = 1000  # largest denominator of ratios shown as fractions
 WHOLE = 1e-9
 STILL = 1e-12
 
 
 class TrainFacts(TypedDict):
-    """Speed of a gear over that of a driver, the other drivers held, and as a fraction where it is one."""
+    """Ratio of the speed of a gear to that of a driver, the other drivers held, also as a fraction if it is one."""
 
     body: str
     driver: str
@@ -32,8 +32,8 @@ class TrainFacts(TypedDict):
 
 
 class EfficiencyFacts(TypedDict):
-    """Share of the power that gears with friction pass on, where the first of two bodies drives the second, and where
-    the second drives the first: zero or less where they lock themselves.
+    """Efficiency of gears with friction if the first of two bodies drives the second, and if the second drives the
+    first; zero or less if they are self-locking.
     """
 
     joint: str
@@ -48,7 +48,7 @@ def efficiency_facts(state: StartingState) -> list[dict[str, Any]]:
     Parameters
     ----------
     state : StartingState
-        Of a mechanism.
+        Start of the mechanism.
 
     Examples
     --------
@@ -76,14 +76,14 @@ def efficiency_facts(state: StartingState) -> list[dict[str, Any]]:
 
 
 def train_facts(state: StartingState) -> list[dict[str, Any]]:
-    """Return the speed ratios of all bodies that mesh, have a belt or carry gears, where it is assembled: TrainFacts.
+    """Return the speed ratios of all bodies that mesh, have a belt or carry gears, as assembled: TrainFacts.
 
-    In space a speed is the angular velocity along the axis of a gear, or along that of a gear that the body carries.
+    In space, a speed is the angular velocity along the axis of a gear, or of a gear that the body carries.
 
     Parameters
     ----------
     state : StartingState
-        Of a mechanism whose drivers determine it; else nothing is reported.
+        Start of the mechanism; the result is empty unless the drivers determine its motion.
 
     Examples
     --------
@@ -117,7 +117,7 @@ def train_facts(state: StartingState) -> list[dict[str, Any]]:
 
 
 def _meshing(state: StartingState) -> dict[str, list[Any]]:
-    """Return the moving bodies that gears and belts turn, and that carry them, with axes of their own about which."""
+    """Return the moving bodies that gears and belts turn, or that carry them, with their axes in body frames."""
     mechanism = state.mechanism
     meshing: dict[str, list[Any]] = {}
     for joint in mechanism.joints.values():
@@ -138,7 +138,7 @@ def _meshing(state: StartingState) -> dict[str, list[Any]]:
 
 
 def _seen_from(state: StartingState, bodies: Sequence[str], slot: int, axis: Any) -> Any:
-    """Return an axis of one of the bodies of gears, by its slot, in the frame of the third."""
+    """Return an axis on one of the bodies of gears, given by its slot, in the frame of the third body."""
     index = ["ground", *state.mechanism.bodies]
     if state.coordinates is None:
         return axis
@@ -153,7 +153,7 @@ def _unit_vector(given: Any) -> Any:
 
 
 def _unit(state: StartingState, driver: str) -> float:
-    """Return how far a driver goes while its row of the residual changes by one."""
+    """Return the change of a driver for a unit change of its row of the residual."""
     return 1.0 / float(np.asarray(state.row_scale)[state.model.rows.index(f"drivers.{driver}"), 0])
 
 

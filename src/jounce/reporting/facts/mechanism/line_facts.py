@@ -1,4 +1,4 @@
-"""How long belts and ropes are and where they run, in the assembled position."""
+"""Lengths and courses of belts and ropes in the assembled position."""
 
 from itertools import pairwise
 from typing import Any
@@ -16,8 +16,8 @@ from jounce.reporting.facts.mechanism.freedom_facts import StartingState
 
 
 class LineFacts(TypedDict):
-    """A belt, or a rope: its length, m; of a belt, the angles on both pulleys, rad, and what carries them, if anything
-    does; of a rope, the distances from point to point, m.
+    """A belt or a rope: its length, m; for a belt, the wrap angles of both pulleys, rad, and the body that carries
+    them, if any; for a rope, the distances between successive points, m.
     """
 
     joint: str
@@ -29,12 +29,12 @@ class LineFacts(TypedDict):
 
 
 def line_facts(state: StartingState) -> list[dict[str, Any]]:
-    """Return the belts and ropes of a mechanism, as it is assembled: LineFacts; none where it is not.
+    """Return the belts and ropes of a mechanism as assembled: LineFacts; none if it cannot be assembled.
 
     Parameters
     ----------
     state : StartingState
-        Of a mechanism.
+        Start of the mechanism.
 
     Examples
     --------

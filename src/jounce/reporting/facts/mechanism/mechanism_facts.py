@@ -1,4 +1,4 @@
-"""What a mechanism file holds, counted and assembled: what ``jounce inspect`` and a notebook show."""
+"""Contents of a mechanism file, counted and assembled, as ``jounce inspect`` and a notebook show them."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ BASES = {"mass": "kg", "length": "m", "angle": "rad", "time": "s", "ampere": "A"
 
 
 class ParameterFacts(TypedDict):
-    """A parameter: its value in SI units, and as it was written where that is another."""
+    """A parameter: its value in SI units, and as written if that differs."""
 
     name: str
     value: float
@@ -49,7 +49,7 @@ class ParameterFacts(TypedDict):
 
 
 class Pose(TypedDict):
-    """Where a body is: m, rad, Euler parameters."""
+    """Pose of a body: m, rad, Euler parameters."""
 
     position: list[float]
     angle: NotRequired[float]
@@ -57,14 +57,14 @@ class Pose(TypedDict):
 
 
 class Shift(TypedDict):
-    """How far a body was moved from its guess, m and rad."""
+    """Displacement of a body from its guess, m and rad."""
 
     distance: float
     angle: float
 
 
 class BodyFacts(TypedDict):
-    """A body: mass, and where it was guessed and put."""
+    """A body: mass, guessed pose and assembled pose."""
 
     name: str
     mass: float | None
@@ -76,7 +76,7 @@ class BodyFacts(TypedDict):
 
 
 class ElementFacts(TypedDict):
-    """A joint, driver, force or initial condition, with what it has of equations and laws."""
+    """A joint, driver, force or initial condition, with its equations and laws."""
 
     name: str
     type: str
@@ -101,11 +101,11 @@ class Grid(TypedDict):
     start: float
     stop: float
     count: int
-    remark: NotRequired[str]  # that the last step is shorter
+    remark: NotRequired[str]  # on a shorter last step
 
 
 class MechanismFacts(TypedDict):
-    """What a mechanism file holds."""
+    """Contents of a mechanism file."""
 
     kind: Literal["mechanism"]
     title: str
@@ -121,7 +121,7 @@ class MechanismFacts(TypedDict):
 
 
 class InspectedMechanism(MechanismFacts):
-    """What a mechanism file holds, and how it starts; ``ok`` is whether a solve or a simulation can."""
+    """Contents of a mechanism file, and its start; ``ok`` is whether a solve or a simulation can start."""
 
     file: str | None
     bodies: list[BodyFacts]
@@ -139,13 +139,13 @@ class InspectedMechanism(MechanismFacts):
 
 
 def mechanism_facts(mechanism: Mechanism, path: str | PathLike[str] | None = None) -> dict[str, Any]:
-    """Return the contents of a mechanism, before anything is assembled: MechanismFacts.
+    """Return the contents of a mechanism without assembling it: MechanismFacts.
 
     Parameters
     ----------
     mechanism : Mechanism
     path : optional
-        Its file, which says how parameters are written.
+        Its file, for the values of parameters as written.
     """
     return {
         "kind": "mechanism",
@@ -160,14 +160,14 @@ def mechanism_facts(mechanism: Mechanism, path: str | PathLike[str] | None = Non
 
 
 def inspected(mechanism: Mechanism, path: str | PathLike[str] | None = None) -> dict[str, Any]:
-    """Return what there is to know of a mechanism before it moves, as plain data in SI units: InspectedMechanism.
+    """Return the facts of a mechanism before it moves, as plain data in SI units: InspectedMechanism.
 
     Parameters
     ----------
     mechanism : Mechanism
-        One that cannot be assembled is reported too.
+        The mechanism, which need not be assemblable.
     path : optional
-        Its file, which says how parameters are written.
+        Its file, for the values of parameters as written.
 
     Examples
     --------
@@ -204,7 +204,7 @@ def inspected(mechanism: Mechanism, path: str | PathLike[str] | None = None) -> 
 
 
 def _remarks(mechanism: Mechanism) -> list[str]:
-    """Return what is to be said of forces: what reactions leave out."""
+    """Return the remarks on forces: effects that reactions neglect."""
     if not mechanism.forces and all(body.mass is None for body in mechanism.bodies.values()):
         return []
     joints = mechanism.joints.items()
@@ -222,7 +222,7 @@ def _time(mechanism: Mechanism) -> dict[str, Any] | None:
 
 
 def grid_facts(instants: Float[np.ndarray, " time"]) -> dict[str, Any]:
-    """Return instants as plain data, with what is to be said of them, if anything.
+    """Return instants as plain data, with a remark if necessary.
 
     Examples
     --------
@@ -240,13 +240,13 @@ def _numbers(mechanism: Mechanism, value: Any, size: int) -> list[float] | None:
 
 
 def parameter_facts(mechanism: Mechanism, path: str | PathLike[str] | None) -> list[ParameterFacts]:
-    """Return the parameters of a mechanism, with the texts of its file where the values still are those of the file."""
+    """Return the parameters of a mechanism, with the texts of its file if the values are unchanged."""
     given = read_source(path).data.get("parameters") or {} if path is not None else mechanism.parameters
     values, rows = mechanism.parameter_values, {}
     for name, value in values.items():
         written, uses = given.get(name), mechanism.dimensions.get(name, ())
         text = written if isinstance(written, str) else getattr(written, "text", None)
-        dimension = uses[0] if len(uses) == 1 else None  # by where it is used
+        dimension = uses[0] if len(uses) == 1 else None  # from the use of the parameter
         try:
             quantity = parse_value(written, "any", mechanism.parameters)
         except JounceError:
@@ -307,7 +307,7 @@ def _pose(coordinates: dict[str, Any], k: int, attitude: str) -> dict[str, Any]:
 
 
 def _moved(guess: dict[str, Any], pose: dict[str, Any], attitude: str) -> dict[str, float]:
-    """Return how far a body was moved and turned from its guess."""
+    """Return the distance and angle of a body from its guess."""
     distance = float(np.linalg.norm(np.subtract(pose["position"], guess["position"])))
     if attitude == "angle":
         return {"distance": distance, "angle": abs(pose["angle"] - guess["angle"])}
@@ -329,7 +329,7 @@ def _element(name: str, element: Any) -> dict[str, Any]:
 
 
 def _law_words(law: Any) -> str:
-    """Word a law: its expression, or what kind it is."""
+    """Return a law in words: its expression, or its kind."""
     if isinstance(law, (list, tuple, np.ndarray)):
         return "[" + ", ".join(map(_law_words, law)) + "]"
     if isinstance(law, OutputMotion):

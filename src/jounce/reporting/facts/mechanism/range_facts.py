@@ -1,4 +1,4 @@
-"""How far a driver can go from where a mechanism starts, and how well it transmits motion there, as plain data."""
+"""Range of a driver from the start of a mechanism, and the quality of motion transmission, as plain data."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from jounce.mechanism import Mechanism
 from jounce.reporting.facts.curve_facts import value_words
 from jounce.reporting.text.summaries import Facts
 
-POOR_ANGLE = math.radians(40.0)  # of transmission, below which forces and play grow (VDI 2123)
-POOR_SHARE = 0.05  # smallest singular value, of its median on the branch
+POOR_ANGLE = math.radians(40.0)  # transmission angle below which forces and play grow (VDI 2123)
+POOR_SHARE = 0.05  # smallest singular value, as a fraction of its median on the branch
 
 
 class TransmissionFacts(TypedDict):
-    """Extremes of the transmission angle, rad, with the driver's values there."""
+    """Extremes of the transmission angle, rad, with the values of the driver."""
 
     smallest: float
     smallest_at: float
@@ -28,7 +28,7 @@ class TransmissionFacts(TypedDict):
 
 
 class RangeFacts(TypedDict):
-    """The branch that a mechanism starts on: null bounds are those of a driver that makes whole turns."""
+    """The branch of the start of a mechanism; bounds are null if the driver makes whole turns."""
 
     driver: str
     unit: str
@@ -46,14 +46,14 @@ class RangeFacts(TypedDict):
 
 
 def range_facts(mechanism: Mechanism, driver: str | None = None) -> dict[str, Any] | None:
-    """Return how far the driver can go on the branch of the start: RangeFacts; None where nothing is driven.
+    """Return the range of the driver on the branch of the start: RangeFacts; None without drivers.
 
     Parameters
     ----------
     mechanism : Mechanism
-        Driven.
+        The driven mechanism.
     driver : str, optional
-        Whose value is free, where there are several.
+        Name of the driver to vary, if there are several.
     """
     curve = trace(mechanism, driver=driver, order=0)
     if curve.driver is None:
@@ -85,12 +85,12 @@ def range_facts(mechanism: Mechanism, driver: str | None = None) -> dict[str, An
 
 
 def _is_limit(curve: Curve, value: float) -> bool:
-    """Tell whether the driver turns back at a value: an open curve may end elsewhere."""
+    """Return whether the driver reverses at a value; an open curve may end for another reason."""
     return any(abs(x.value - value) <= 1e-9 * max(abs(value), 1e-300) for x in curve.turning_points)
 
 
 def _on_branch(curve: Curve) -> tuple[np.ndarray, np.ndarray]:
-    """Return the smallest singular values on the branch of the start, and the driver's values there."""
+    """Return the smallest singular values on the branch of the start, with the values of the driver."""
     points, branch = curve.arc_lengths, curve.branches[0]
     inside = (points >= branch.start) & (points <= branch.stop)
     if curve.closed:
@@ -120,7 +120,7 @@ def _warnings(facts: Facts, whole: bool, median: float) -> list[str]:
 
 
 def range_words(facts: Facts) -> str:
-    """Word the range of a driver and how well it transmits."""
+    """Return the range of a driver and the quality of its transmission in words."""
     unit, driver = facts["unit"], facts["driver"]
     lines = ["Range"]
     if facts["low"] is None:

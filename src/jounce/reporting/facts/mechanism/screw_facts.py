@@ -1,4 +1,4 @@
-"""How well screws with friction turn a rotation into an advance and back, and whether they lock by themselves."""
+"""Efficiencies of screws with friction in both directions, and whether they are self-locking."""
 
 from typing import Any
 
@@ -11,8 +11,8 @@ from jounce.reporting.facts.mechanism.freedom_facts import StartingState
 
 
 class ScrewFacts(TypedDict):
-    """A screw with friction: its lead angle at the radius of the thread, rad; which part of the work of turning it does
-    along its axis, and which of the work along the axis it does in turning: none where it locks by itself.
+    """A screw with friction: its lead angle at the radius of the thread, rad; its efficiency from turning to advance,
+    and from advance to turning, zero if it is self-locking.
     """
 
     joint: str
@@ -25,14 +25,14 @@ class ScrewFacts(TypedDict):
 def screw_facts(state: StartingState) -> list[dict[str, Any]]:
     """Return the screws with friction of a mechanism: ScrewFacts.
 
-    With the lead angle alpha and the angle of friction phi they are ``tan(alpha) / tan(alpha + phi)`` and
-    ``tan(alpha - phi) / tan(alpha)``, those of a square thread (Budynas and Nisbett 2015, Shigley's Mechanical
-    Engineering Design, section 8-2), where slip is far above the speed of the friction.
+    With the lead angle alpha and the friction angle phi, the efficiencies are those of a square thread,
+    ``tan(alpha) / tan(alpha + phi)`` and ``tan(alpha - phi) / tan(alpha)`` (Budynas and Nisbett 2015, Shigley's
+    Mechanical Engineering Design, section 8-2), for slip far above the characteristic speed of the friction law.
 
     Parameters
     ----------
     state : StartingState
-        Of a mechanism.
+        Start of the mechanism.
     """
     records: list[dict[str, Any]] = []
     for group, members in named_groups(state.model):
@@ -49,7 +49,7 @@ def screw_facts(state: StartingState) -> list[dict[str, Any]]:
 
 
 def _efficiencies(rise: float, mu: float) -> dict[str, Any]:
-    """Return what follows from the slopes of the thread and of its cone of friction.
+    """Return the facts of a screw from the slope of its thread and its coefficient of friction.
 
     Examples
     --------
