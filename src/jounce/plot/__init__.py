@@ -1,4 +1,4 @@
-"""Figures of publication quality; matplotlib is imported when one is drawn, not before."""
+"""Figures of publication quality; matplotlib is imported when a figure is drawn."""
 
 from jounce.plot.animation import animate as animate, check_animation as check_animation
 from jounce.plot.charts.bands import draw_bands as draw_bands

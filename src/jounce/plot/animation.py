@@ -1,4 +1,4 @@
-"""Animations of a motion: the sketch, moved, as GIF or MP4."""
+"""Animations of a motion: the moving sketch as GIF or MP4."""
 
 from __future__ import annotations
 
@@ -25,19 +25,19 @@ from jounce.plot.machine_sketch import SketchFigure, check_names, paths_of
 from jounce.plot.style import GRAY, style
 
 ANIMATION_SUFFIXES = (".gif", ".mp4")
-FRAMES_PER_SECOND = 25  # a GIF counts in hundredths of a second
-LONGEST, SHORTEST = 20.0, 2.0  # s, of an animation whose speed is not given
+FRAMES_PER_SECOND = 25  # the frame time of a GIF is a multiple of a hundredth of a second
+LONGEST, SHORTEST = 20.0, 2.0  # s, of an animation without a given speed
 MOST_FRAMES = 3000
 RESOLUTION = 110  # dots per inch
 
 
 def check_animation(path: str | PathLike[str], *, overwrite: bool = False) -> None:
-    """Raise OutputError unless an animation can be written to a path; meant to be asked before a long computation.
+    """Raise OutputError unless an animation can be written to a path; to be called before a long computation.
 
     Raises
     ------
     OutputError
-        The ending is not .gif or .mp4, the folder does not exist, or there is no ffmpeg, which .mp4 needs.
+        If the suffix is not .gif or .mp4, the folder does not exist, or ffmpeg, which .mp4 needs, is not installed.
     """
     check_target(path, ANIMATION_SUFFIXES, "an animation", overwrite=overwrite)
     if Path(fspath(path)).suffix.lower() == ".mp4" and _ffmpeg() is None:
@@ -46,7 +46,7 @@ def check_animation(path: str | PathLike[str], *, overwrite: bool = False) -> No
 
 
 def _ffmpeg() -> str | None:
-    """Return the program ffmpeg: that of the system, or the one that comes with imageio-ffmpeg."""
+    """Return the path of ffmpeg, that of the system or of imageio-ffmpeg."""
     program = shutil.which("ffmpeg")
     if program is None:
         with suppress(ImportError, RuntimeError):
@@ -59,27 +59,27 @@ def _ffmpeg() -> str | None:
 def frame_instants(
     time: Sequence[float] | Float[np.ndarray, " time"], *, speed: float | None = None, fps: int = FRAMES_PER_SECOND
 ) -> Float[np.ndarray, " frames"]:
-    """Return the times that the frames of an animation show.
+    """Return the instants of the frames of an animation.
 
     Parameters
     ----------
     time : array_like of shape (time,)
         Instants of a motion, s.
     speed : float, optional
-        Seconds of motion in a second of the animation. Real time unless given, or where that would be very short or
-        long, such that it takes 2 s or 20 s.
+        Seconds of motion per second of the animation. By default real time, limited so that the animation lasts 2 s to
+        20 s.
     fps : int, default 25
-        Frames in a second.
+        Frames per second.
 
     Returns
     -------
     numpy.ndarray of shape (frames,)
-        s, evenly spaced.
+        Evenly spaced instants, s.
 
     Raises
     ------
     MechanismError
-        The speed or the rate is not above zero, or the animation would have more than 3000 frames.
+        If the speed or the frame rate is not positive, or the animation would have more than 3000 frames.
 
     Examples
     --------
@@ -121,20 +121,20 @@ def animate(
     progress: Callable[[int, int], None] | None = None,
     overwrite: bool = False,
 ) -> None:
-    """Write the moving sketch of a motion to a .gif or .mp4 file.
+    """Write an animation of the sketch of a motion to a .gif or .mp4 file.
 
     Parameters
     ----------
     motion : Motion
-        Each frame shows its nearest instant; those that were not solved are left out.
+        The motion; each frame shows the nearest solved instant.
     path : str or path
-        The ending tells the kind; .mp4 needs ffmpeg, of the system or of the extra ``viewer``.
+        File with the suffix .gif or .mp4, which needs ffmpeg, of the system or of the extra ``viewer``.
     speed : float, optional
-        Seconds of motion in a second of the animation; see `frame_instants`.
+        Seconds of motion per second of the animation; see `frame_instants`.
     fps : int, default 25
-        Frames in a second; a GIF rounds their time to hundredths of a second.
+        Frames per second; a GIF rounds the frame time to hundredths of a second.
     names : str, default "bodies"
-        Which names are written: ``"all"``, ``"bodies"``, ``"joints"``, ``"outputs"`` or ``"none"``.
+        Names to write: ``"all"``, ``"bodies"``, ``"joints"``, ``"outputs"`` or ``"none"``.
     paths, order, view
         As for `sketch`.
     progress : callable, optional
@@ -145,9 +145,9 @@ def animate(
     Raises
     ------
     MechanismError
-        An option is not valid, or no instant was solved.
+        If an option is not valid, or no instant was solved.
     OutputError
-        The file cannot be written.
+        If the file cannot be written.
 
     Examples
     --------
@@ -191,7 +191,7 @@ def animate(
 
 
 def _stop(writer: Any) -> None:
-    """End the encoder, which would put the file back that is being removed."""
+    """Stop the encoder, which would otherwise write the file again after its removal."""
     encoder = getattr(writer, "_proc", None)
     if encoder is not None:
         encoder.kill()
@@ -199,7 +199,7 @@ def _stop(writer: Any) -> None:
 
 
 def _even_pixels(figure: Any) -> None:
-    """Make width and height even numbers of pixels, which video needs."""
+    """Set width and height to even numbers of pixels, as video requires."""
     size = np.ceil(figure.get_size_inches() * RESOLUTION / 2) * 2 / RESOLUTION
     figure.set_size_inches(*(size + 1e-6))
 

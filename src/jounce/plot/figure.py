@@ -1,4 +1,4 @@
-"""Outputs of a motion and their derivatives over time: stacked panels, position on top, one column for each output."""
+"""Outputs of a motion and their derivatives over time: stacked panels, position on top, a column for each output."""
 
 from __future__ import annotations
 
@@ -26,11 +26,11 @@ Column = tuple[AbstractQuantity, Float[np.ndarray, "time derivative *component"]
 
 
 SUFFIXES = (".png", ".svg", ".pdf")
-COLUMNS = 5  # of outputs beside each other, at most
-COST_OF_ROW = 0.03  # beside the share of empty places
+COLUMNS = 5  # largest number of columns
+COST_OF_ROW = 0.03  # relative to the fraction of empty places
 PANEL, SINGLE_PANEL = (3.5, 1.25), (4.8, 1.25)  # inches
 LEGEND = {"borderaxespad": 0.1, "handlelength": 1.2, "handletextpad": 0.5, "columnspacing": 1.2}
-STROKES = ("-", "--", ":")  # of more components than there are colors
+STROKES = ("-", "--", ":")  # for more components than colors
 
 
 def draw(motion: Motion, outputs: Sequence[str] | None = None) -> Figure:
@@ -39,20 +39,20 @@ def draw(motion: Motion, outputs: Sequence[str] | None = None) -> Figure:
     Parameters
     ----------
     motion : Motion
-        Instants that were not solved are left out and shaded.
+        The motion; unsolved instants are omitted and shaded.
     outputs : sequence of str, optional
-        Names of the outputs; all unless given.
+        Names of the outputs; all by default.
 
     Returns
     -------
     matplotlib.figure.Figure
-        Each output has a column of panels: the position, the velocity, ... as far as the order of the motion. Forces,
-        which have two derivatives fewer, stand below each other where that leaves fewer places empty.
+        Each output has a column of panels: position, velocity, ... to the order of the motion. Forces, which have two
+        derivatives fewer, share columns if that leaves fewer places empty.
 
     Raises
     ------
     MechanismError
-        No output has one of the names, or there is none.
+        If a name does not exist, or the mechanism has no outputs.
 
     Examples
     --------
@@ -71,7 +71,7 @@ def draw(motion: Motion, outputs: Sequence[str] | None = None) -> Figure:
 
 
 def draw_columns(motion: Motion, columns: Mapping[str, Column]) -> Figure:
-    """Draw outputs of a motion, each as a column of its derivatives, in as many columns as leave few places empty."""
+    """Draw outputs of a motion, each as a column of its derivatives, arranged to leave few places empty."""
     rows = {name: motion.order + 1 - output.lost_orders for name, (output, _) in columns.items()}
     heights = {name: max(count, 1) for name, count in rows.items()}
     columns_and_rows = stacked(heights)
@@ -94,9 +94,9 @@ def draw_columns(motion: Motion, columns: Mapping[str, Column]) -> Figure:
 
 
 def stacked(heights: Mapping[str, int]) -> dict[str, tuple[int, int]]:
-    """Return column and first row of outputs that take some rows each, so that the figure is full and not too tall.
+    """Return the column and first row of outputs with given numbers of rows, for a full figure of moderate height.
 
-    The tallest come first, each in the column that is shortest so far.
+    Outputs are placed by decreasing height, each in the column that is shortest so far.
 
     Examples
     --------
@@ -116,7 +116,7 @@ def stacked(heights: Mapping[str, int]) -> dict[str, tuple[int, int]]:
 
 
 def _draw_column(motion: Motion, name: str, column: Column, panels: Any) -> None:
-    """Draw one output: panel by panel its derivatives, with its components over each other."""
+    """Draw the derivatives of an output, one panel each, with all components in the same panel."""
     output, values = column
     unit, factor = motion.mechanism.shown_units.of(output.unit, name)
     values = (values[:, :, None] if values.ndim == 2 else values) * factor
@@ -143,7 +143,7 @@ def _draw_column(motion: Motion, name: str, column: Column, panels: Any) -> None
     top.set_title(shown_name(name), loc="left", pad=6)
     if vector:
         lines = panels[-1].get_lines()[: values.shape[2]]
-        at_side = len(lines) > len(COLORS)  # too many for a line above
+        at_side = len(lines) > len(COLORS)  # too many for a legend above
         count = -(-len(lines) // 4) if at_side else len(lines)
         legend_position = {"loc": "upper left" if at_side else "lower right", "ncols": count}
         top.legend(handles=lines, bbox_to_anchor=(1.0, 1.0), **legend_position, **LEGEND)
@@ -152,7 +152,7 @@ def _draw_column(motion: Motion, name: str, column: Column, panels: Any) -> None
 
 
 def finish(axes: Any, motion: Motion, scaled: Float[np.ndarray, "time *lines"]) -> None:
-    """Set limits, ticks and grid, and shade the time that no solved instant borders."""
+    """Set limits, ticks and grid, and shade the intervals of unsolved instants."""
     set_ticks(axes.yaxis, 4, least=3)
     axes.ticklabel_format(axis="y", useOffset=False, style="plain")
     set_ticks(axes.xaxis, 6)
@@ -170,12 +170,12 @@ def finish(axes: Any, motion: Motion, scaled: Float[np.ndarray, "time *lines"]) 
 
 
 def check_figure(path: str | PathLike[str], *, overwrite: bool = False) -> None:
-    """Raise OutputError unless a figure can be written to a path; meant to be asked before a long computation.
+    """Raise OutputError unless a figure can be written to a path; to be called before a long computation.
 
     Raises
     ------
     OutputError
-        The ending is not .png, .svg or .pdf, the folder does not exist, or nothing may be written there.
+        If the suffix is not .png, .svg or .pdf, the folder does not exist, or it is not writable.
     """
     check_target(path, SUFFIXES, "a figure", overwrite=overwrite)
 
@@ -186,7 +186,7 @@ def save(figure: Any, path: str | PathLike[str], *, overwrite: bool = False) -> 
     Raises
     ------
     OutputError
-        It cannot be written.
+        If the file cannot be written.
     """
     check_figure(path, overwrite=overwrite)
     metadata = {".svg": {"Date": None}, ".pdf": {"CreationDate": None}}.get(Path(fspath(path)).suffix.lower())

@@ -21,7 +21,7 @@ from jounce.plot.style import BLUE, GREEN, ORANGE, PURPLE, VERMILION, blank_figu
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-NOTHING = 1e-9  # of the largest force times the size: moments below it are rounding
+NOTHING = 1e-9  # fraction of the largest force times the size: smaller moments are rounding
 LINES = {
     "kinetic": BLUE,
     "potential": VERMILION,
@@ -42,9 +42,9 @@ def draw_reactions(motion: Motion, names: Sequence[str] | None = None) -> Figure
     Parameters
     ----------
     motion : Motion
-        Of a mechanism with masses or applied forces, solved to order 2 at least.
+        Motion of a mechanism with masses or applied forces, solved to order 2 at least.
     names : sequence of str, optional
-        Joints, drivers and forces; all unless given.
+        Names of joints, drivers and forces; all by default.
 
     Returns
     -------
@@ -55,7 +55,7 @@ def draw_reactions(motion: Motion, names: Sequence[str] | None = None) -> Figure
     Raises
     ------
     MechanismError
-        No joint, driver or force has one of the names, nothing has a mass, or the order is too low.
+        If a name does not exist, no body has a mass, or the order is too low.
 
     Examples
     --------
@@ -102,22 +102,22 @@ def _largest(values: Float[np.ndarray, "..."]) -> float:
 
 
 def draw_energy(motion: Motion) -> Figure:
-    """Draw the energies of a mechanism: kinetic, potential in gravity, stored in springs, and all together.
+    """Draw the energies of a mechanism: kinetic, gravitational, elastic, and total.
 
     Parameters
     ----------
     motion : Motion
-        Of a mechanism whose bodies have masses, solved to order 1 at least.
+        Motion of a mechanism with masses, solved to order 1 at least.
 
     Returns
     -------
     matplotlib.figure.Figure
-        Springs are left out where there are none.
+        The energies, without that of springs if there are none.
 
     Raises
     ------
     MechanismError
-        No body has a mass, or the order is too low.
+        If no body has a mass, or the order is too low.
 
     Examples
     --------
@@ -145,22 +145,22 @@ def draw_energy(motion: Motion) -> Figure:
 
 
 def draw_power(motion: Motion) -> Figure:
-    """Draw where the power in a mechanism comes from and goes to, with its rates.
+    """Draw the power balance of a mechanism, with its rates.
 
     Parameters
     ----------
     motion : Motion
-        Of a mechanism with masses or applied forces, solved to order 2 at least.
+        Motion of a mechanism with masses or applied forces, solved to order 2 at least.
 
     Returns
     -------
     matplotlib.figure.Figure
-        What drivers and applied forces put in, and what kinetic and potential energy gain; rows are derivatives.
+        Power of drivers and applied forces, and rates of kinetic and potential energy; rows are derivatives.
 
     Raises
     ------
     MechanismError
-        Nothing has a mass and no force is applied, or the order is too low.
+        If no body has a mass and no force is applied, or the order is too low.
 
     Examples
     --------
@@ -172,7 +172,7 @@ def draw_power(motion: Motion) -> Figure:
     """
     balance = power_balance(motion)
     rows = min(balance.sizes["derivative"], max(motion.order - 1, 1))
-    named = [name for name in WORDS if _largest(balance[name].values[:, 0])] or list(WORDS)  # nothing has power: all
+    named = [name for name in WORDS if _largest(balance[name].values[:, 0])] or list(WORDS)  # all if none has power
     with style():
         figure = blank_figure(PANEL[0], PANEL[1] * rows + 0.9, motion.mechanism.title)
         panels = np.atleast_1d(figure.subplots(rows, 1, sharex=True))

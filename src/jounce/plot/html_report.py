@@ -1,4 +1,4 @@
-"""A page to explore a motion in: one HTML file that needs no network and nothing but a browser."""
+"""An interactive report of a motion: one HTML file that needs a browser only, and no network."""
 
 from __future__ import annotations
 
@@ -38,23 +38,23 @@ from jounce.units.shown_units import ShownUnits, derivative_unit
 from jounce.written_equations.report_section import equations_section
 
 MOST_INSTANTS = 2001  # of the plots
-MOST_FRAMES = 240  # of the sketch, which goes on evenly between them
-STEPS = 20000  # of places across the sketch
-WIDTHS = (360.0, 620.0)  # pixels of the sketch, for each of which names have their places
+MOST_FRAMES = 240  # of the sketch, which is interpolated between them
+STEPS = 20000  # resolution of positions across the sketch
+WIDTHS = (360.0, 620.0)  # pixels of the sketch, each with its own placement of names
 TALLEST, LEAST = 560.0, 220.0  # pixels of the sketch
 LETTER, LINE = 7.2, 16.0  # pixels that a letter and a line of a name take
-DIGITS = 9  # of plotted values; peaks are taken of all instants in full
+DIGITS = 9  # of plotted values; peaks use all instants in full precision
 KINDS = {"joints": "joint", "drivers": "driver", "forces": "force", "initial": "at the start"}
 SPEEDS = (0.001, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 100.0)
 
 
 def check_report(path: str | PathLike[str], *, overwrite: bool = False) -> None:
-    """Raise OutputError unless a report can be written to a path; meant to be asked before a long computation.
+    """Raise OutputError unless a report can be written to a path; to be called before a long computation.
 
     Raises
     ------
     OutputError
-        The ending is not .html, the folder does not exist, or nothing may be written there.
+        If the suffix is not .html, the folder does not exist, or it is not writable.
     """
     check_target(path, (".html", ".htm"), "a report", overwrite=overwrite)
 
@@ -69,35 +69,35 @@ def report(
     at: Real | None = None,
     overwrite: bool = False,
 ) -> None:
-    """Write a page to explore a motion in: a moving sketch, plots of all outputs, peak values, and what was solved.
+    """Write an interactive report of a motion: a moving sketch, plots of all outputs, peak values, and the model.
 
-    The page is one file. It asks for nothing over the network, and opens with a double click.
+    The page is a single file, which uses no network and opens with a double click.
 
     Parameters
     ----------
     motion : Motion
-        The report lists instants that were not solved.
+        The motion; the report lists unsolved instants.
     path : str or path
         An .html file.
     view : tuple of float, default (-60, 25)
-        Azimuth and elevation from which a spatial mechanism is seen, degrees.
+        Azimuth and elevation of the viewer of a spatial mechanism, degrees.
     source : str or path, optional
-        The file that the mechanism came from. Its name is in the foot of the page; where it exists, the table of
-        parameters shows how they are written in it.
+        The file of the mechanism. The foot of the page has its name; if it exists, the table of parameters shows their
+        values as written in it.
     equations : bool, default False
-        Whether the page ends with the constraint equations: joints with their numbers in Sommer 2024, the pattern of
-        the Jacobian, and right sides.
+        Whether to include the constraint equations: joints with their equation numbers in Sommer 2024, the pattern of
+        the Jacobian, and right-hand sides.
     at : float, optional
-        Instant of these, s: the nearest of the motion; its first one unless given.
+        Instant of these equations, s, rounded to the nearest one of the motion; by default its first one.
     overwrite : bool, default False
         Whether the page may replace a file that this process has read as an input.
 
     Raises
     ------
     OutputError
-        The file cannot be written.
+        If the file cannot be written.
     MechanismError
-        The equations are asked for where the motion was not solved.
+        If the equations are requested at an unsolved instant.
 
     Examples
     --------
@@ -117,9 +117,9 @@ def report(
         "STYLE": _part("report.css"),
         "EQUATIONS": equations_section(motion, at) if equations else "",
         "SCRIPT": _part("report.js") + _part("plots.js"),
-        "DATA": data.replace("<", "\\u003c"),  # no name can end the script early
+        "DATA": data.replace("<", "\\u003c"),  # so that no name ends the script
     }
-    page = re.sub("@([A-Z]+)@", lambda match: parts[match[1]], _part("report.html"))  # once: titles are not looked at
+    page = re.sub("@([A-Z]+)@", lambda match: parts[match[1]], _part("report.html"))  # one pass skips titles
     with replacing(path, overwrite=overwrite) as temporary:
         temporary.write_text(page, encoding="utf-8")
 
@@ -129,7 +129,7 @@ def _part(name: str) -> str:
 
 
 def _data(motion: Motion, view: View, file: str | PathLike[str]) -> dict[str, Any]:
-    """Return all that the page shows."""
+    """Return the data of the page."""
     from jounce.version import __version__
 
     mechanism, source = motion.mechanism, Path(file).name
@@ -171,7 +171,7 @@ def _data(motion: Motion, view: View, file: str | PathLike[str]) -> dict[str, An
 
 
 def _speed(duration: float) -> float:
-    """Return the speed, of those offered, with which a motion takes some seconds."""
+    """Return the offered speed with which a motion takes some seconds."""
     if duration <= 0 or SHORTEST <= duration <= LONGEST:
         return 1.0
     target = duration / (2 * SHORTEST if duration < SHORTEST else LONGEST)
@@ -179,7 +179,7 @@ def _speed(duration: float) -> float:
 
 
 def _number(value: float | np.ndarray) -> float | None:
-    """Return a number that JSON can hold: to some digits, nothing where it is not finite."""
+    """Return a rounded number for JSON, or None if it is not finite."""
     return float(f"{value:.{DIGITS}g}") if np.isfinite(value) else None
 
 
@@ -189,7 +189,7 @@ def _output(
     values: Float[np.ndarray, "time derivative *component"],
     units: ShownUnits,
 ) -> dict[str, Any]:
-    """Return the values of an output by derivative and component, with words and units."""
+    """Return the values of an output by derivative and component, with names and units."""
     unit, factor = units.of(output.unit, name)
     columns = (values[..., None] if values.ndim == 2 else values) * factor
     orders, components = range(columns.shape[1]), columns.shape[2]
@@ -210,7 +210,7 @@ def _peak(peak: Peak) -> dict[str, Any]:
 
 
 def _messages(motion: Motion) -> list[str]:
-    """Word which instants were not solved, and why, one line for each run of them."""
+    """Return messages on unsolved instants with their reasons, one for each run of instants."""
     lines = []
     for run in unsolved_runs(motion):
         first, last = motion.time[run[0]], motion.time[run[-1]]
@@ -238,7 +238,7 @@ def _scene(
     view: View,
     outputs: list[str],
 ) -> dict[str, Any]:
-    """Return the shapes of the sketch at evenly spread instants, in whole steps of length."""
+    """Return the shapes of the sketch at evenly spaced instants, in whole steps of length."""
     solved = rising[np.asarray(motion.status)[rising] == 0]
     chosen = evenly_chosen(solved if solved.size else rising[:1], MOST_FRAMES)
     scene, paths = scene_of(motion, view=view, instants=chosen), paths_of(motion, None, 0, view)
@@ -287,7 +287,7 @@ def _scene(
 def _name_positions(
     labels: Sequence[Label], scene: Scene, limits: Sequence[float], width: float
 ) -> list[list[Any] | None]:
-    """Return direction and distance of names in a sketch of some pixels, placed as those of `sketch` are."""
+    """Return the directions and distances of names in a sketch of a given width, placed as in `sketch`."""
     left, right, lower, upper = limits
     height = min(max(width * (upper - lower) / (right - left), LEAST), TALLEST)
     scale = min(width / (right - left), height / (upper - lower))
@@ -297,7 +297,7 @@ def _name_positions(
         return np.array([width, height]) / 2 + scale * (points - middle)
 
     halves = [np.array([LETTER * len(label.text) / 2 + 2.0, LINE / 2]) for label in labels]
-    corner = np.array([[0.0, 0.0, 0.25 * width, 24.0]])  # the scale
+    corner = np.array([[0.0, 0.0, 0.25 * width, 24.0]])  # box of the scale bar
     frame = np.array([0.0, 0.0, width, height])
     names = place_names(labels, halves, scene, to_pixels, frame, corner)
     return [

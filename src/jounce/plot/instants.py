@@ -1,4 +1,4 @@
-"""Which instants of a motion are drawn."""
+"""Selection of the instants of a motion to draw."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ Indices = Int[np.ndarray, " chosen"]
 
 
 def evenly_chosen(indices: Int[np.ndarray, " some"], most: int) -> Indices:
-    """Return all of some indices, or as many as there may be, evenly spread, the first and the last among them.
+    """Return at most a number of indices, evenly chosen, with the first and the last one.
 
     Examples
     --------
@@ -23,12 +23,12 @@ def evenly_chosen(indices: Int[np.ndarray, " some"], most: int) -> Indices:
 
 
 def solved_instants(motion: Motion) -> Indices:
-    """Return the indices of the instants that were solved.
+    """Return the indices of the solved instants.
 
     Raises
     ------
     MechanismError
-        There is none.
+        If no instant was solved.
     """
     solved = np.flatnonzero(np.asarray(motion.status) == 0)
     if not solved.size:
@@ -37,6 +37,6 @@ def solved_instants(motion: Motion) -> Indices:
 
 
 def unsolved_runs(motion: Motion) -> list[Indices]:
-    """Return the indices of the instants that were not solved, in runs."""
+    """Return the indices of the unsolved instants, in runs."""
     failed = np.flatnonzero(np.asarray(motion.status))
     return np.split(failed, np.flatnonzero(np.diff(failed) > 1) + 1) if failed.size else []

@@ -1,4 +1,4 @@
-"""Words, symbols and units of quantities and their derivatives, in matplotlib's mathtext, and the ranges of axes."""
+"""Names, symbols and units of quantities and their derivatives in mathtext of matplotlib, and the ranges of axes."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ PREFIXES = {-3: "m", -6: r"\mu ", -9: "n"}
 
 
 def symbol(name: str, order: int = 0, component: str = "") -> str:
-    r"""Return the symbol of a derivative of an output in mathtext; empty where the name is a word and no symbol.
+    r"""Return the symbol of a derivative of an output in mathtext; empty if the name is a word rather than a symbol.
 
     Examples
     --------
@@ -45,7 +45,7 @@ def symbol(name: str, order: int = 0, component: str = "") -> str:
 
 
 def quantity_word(output: AbstractQuantity, order: int) -> str:
-    """Name a derivative of an output: as `rate_name`, but what is an angle is called so.
+    """Return the name of a derivative of an output, like `rate_name`, but with "angle" for angles.
 
     Examples
     --------
@@ -79,7 +79,7 @@ def unit_label(unit: str, order: int, exponent: int = 0) -> str:
 
 
 def scale_of(values: Float[np.ndarray, "..."]) -> int:
-    """Return the power of ten, a multiple of three, by which an axis is divided so that its numbers are short.
+    """Return the exponent of ten, a multiple of three, that makes the numbers of an axis short.
 
     Examples
     --------
@@ -94,16 +94,16 @@ def scale_of(values: Float[np.ndarray, "..."]) -> int:
 
 
 def axis_range(values: Float[np.ndarray, "..."], margin: float = 0.0, size: float | None = None) -> tuple[float, float]:
-    """Return the ends of an axis for values; a constant gets some room, so that its rounding is not magnified.
+    """Return the ends of an axis for values, with room about a constant so that its rounding is not magnified.
 
     Parameters
     ----------
     values : numpy.ndarray
-        Those that are not finite do not count.
+        Values; only finite ones count.
     margin : float, default 0
-        Room on either side, in spans of the values.
+        Room on either side, relative to the span of the values.
     size : float, optional
-        What rounding is small against; the largest value unless given.
+        Size relative to which rounding is small; by default the largest value.
 
     Examples
     --------
@@ -122,7 +122,7 @@ def axis_range(values: Float[np.ndarray, "..."], margin: float = 0.0, size: floa
 
 
 def bar_length(extent: float) -> float:
-    """Return the round length, 1, 2, 2.5 or 5 times a power of ten, that is a tenth to a fifth of what is drawn.
+    """Return the round length, 1, 2, 2.5 or 5 times a power of ten, that is a tenth to a fifth of an extent.
 
     Examples
     --------
@@ -134,7 +134,7 @@ def bar_length(extent: float) -> float:
 
 
 def rounded_down(value: float) -> float:
-    """Return the largest of 1, 2, 5, 10, 20, ... that is not above a value.
+    """Return the largest number of the form 1, 2 or 5 times a power of ten that is not above a value.
 
     Examples
     --------

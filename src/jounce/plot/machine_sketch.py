@@ -26,27 +26,27 @@ if TYPE_CHECKING:
 
 NAMES = ("all", "bodies", "joints", "outputs", "none")
 WIDEST, TALLEST, LEAST = 6.4, 5.2, 2.6  # inches
-LETTER = 0.07  # inches of a title at least, which is then written smaller
-WIDEST_TITLE = 8.0  # inches; what is longer is cut
-AXES_FOOT = 0.16  # of the size of what is drawn, below it, for the axes of a view in space
+LETTER = 0.07  # least width of a letter of a title, inches; longer titles have smaller letters
+WIDEST_TITLE = 8.0  # inches; longer titles are truncated
+AXES_FOOT = 0.16  # space below the drawing for the axes of a spatial view, as a fraction of its size
 LETTERING = {"bodies": {"fontweight": "bold"}, "outputs": {"fontstyle": "italic"}}
-MOST = 400  # instants that a drawing is made for; more would not be seen
-PATH_MAP = "cividis"  # rises evenly in lightness, for the color-blind too
+MOST = 400  # largest number of instants of a drawing
+PATH_MAP = "cividis"  # uniform in lightness, and suitable for the color-blind
 
 
 class Paths:
-    """Paths of points over a motion, with the size of a derivative.
+    """Paths of points over a motion, with the magnitude of a derivative.
 
     Parameters
     ----------
     motion : Motion
-        What moves.
+        The motion.
     names : sequence of str
         Outputs that are positions of points; at least one.
     order : int
-        Derivative by whose size they are colored; 0 for none.
+        Derivative whose magnitude gives the color; 0 for none.
     view : tuple of float
-        From where a spatial mechanism is seen.
+        Azimuth and elevation of the viewer of a spatial mechanism, degrees.
     """
 
     def __init__(self, motion: Motion, names: Sequence[str], order: int, view: View):
@@ -61,17 +61,17 @@ class Paths:
 
 
 def check_names(names: str) -> None:
-    """Raise MechanismError unless a choice of names is known."""
+    """Raise MechanismError unless a choice of names is valid."""
     check_choice("choice", names, NAMES, MechanismError, name="names")
 
 
 def paths_of(motion: Motion, selection: Sequence[str] | None, order: int, view: View) -> Paths | None:
-    """Return the paths of outputs of a motion: those requested, or of all points; None where there are none.
+    """Return the paths of the requested outputs of a motion, by default of all points; None if there are none.
 
     Raises
     ------
     MechanismError
-        An output is no position of a point, or the order is above that of the motion.
+        If an output is not the position of a point, or the order is above that of the motion.
     """
     points = [name for name, output in motion.mechanism.outputs.items() if isinstance(output, PointOutput)]
     for name in selection or ():
@@ -86,7 +86,7 @@ def paths_of(motion: Motion, selection: Sequence[str] | None, order: int, view: 
 
 
 def limits_with(scene: Scene, paths: Paths | None) -> tuple[float, float, float, float]:
-    """Return left, right, lower and upper end of a scene and of paths, m."""
+    """Return the left, right, lower and upper end of a scene and its paths, m."""
     left, right, lower, upper = scene.limits
     for flat in paths.flat.values() if paths else ():
         known = flat[np.isfinite(flat).all(axis=1)]
@@ -97,20 +97,20 @@ def limits_with(scene: Scene, paths: Paths | None) -> tuple[float, float, float,
 
 
 class SketchFigure:
-    """A scene as a figure that can be moved from instant to instant.
+    """A figure of a scene, which can be moved from instant to instant.
 
     Parameters
     ----------
     scene : Scene
-        What is drawn.
+        The scene.
     paths : Paths or None
-        Behind it.
+        Paths behind the scene.
     title : str
-        Above it.
+        Title above the scene.
     view : tuple of float, or None
-        Of a spatial mechanism, for its axes.
+        View of a spatial mechanism, for its axes.
     axes : matplotlib.axes.Axes, optional
-        Where to draw; a figure of its own unless given.
+        Axes to draw on; by default those of a new figure.
     """
 
     def __init__(self, scene: Scene, paths: Paths | None, title: str, view: View | None, axes: Any = None):
@@ -134,7 +134,7 @@ class SketchFigure:
 
     @staticmethod
     def _blank(wide: float, tall: float, bar: float, title: str) -> Any:
-        """Return the axes of an empty figure for what is wide and tall, m, with a bar of colors, inches, beside it."""
+        """Return the axes of an empty figure for a width and height, m, and a color bar beside it, inches."""
         scale = min((WIDEST - 0.3) / wide, (TALLEST - 0.3) / tall)
         least = max(LEAST, min(LETTER * len(title), WIDEST_TITLE))
         size = max(least, wide * scale + 0.3 + bar), max(LEAST, tall * scale + 0.3 + 0.35 * bool(title))
@@ -165,7 +165,7 @@ class SketchFigure:
                 artist.set_center(points[0])
 
     def write_names(self, names: str, *, fixed: bool = True) -> None:
-        """Write names near what they belong to, clear of the drawing at all instants; lines lead to them in a still."""
+        """Write names near their anchors, clear of the drawing at all instants; still figures have leader lines."""
         from matplotlib.patheffects import withStroke
 
         kinds = {"all": ("bodies", "joints", "outputs"), "none": ()}.get(names, (names,))
@@ -199,12 +199,12 @@ class SketchFigure:
                 axes.plot([begin[0], at[0]], [begin[1], at[1]], **look)
 
     def _placed_renderer(self) -> Any:
-        """Set the places of all panels, and return what measures texts in them."""
+        """Lay out all panels, and return the renderer, which measures texts."""
         self.figure.draw_without_rendering()
         return self.figure.canvas.get_renderer()
 
     def move_names(self, instant: int) -> None:
-        """Let the names go along with what they belong to, to an instant, by index."""
+        """Move the names with their anchors to an instant, by index."""
         for text, label, offset in self.texts:
             text.set_position(label.anchor[min(instant, len(label.anchor) - 1)] + offset)
 
@@ -223,29 +223,29 @@ def sketch(
     Parameters
     ----------
     moving : Motion or Mechanism
-        A mechanism is assembled near its starting guess; a motion is drawn at one instant.
+        A mechanism, assembled near its starting guess, or a motion, drawn at one instant.
     instant : float, optional
-        Time, s; the nearest instant of the motion that was solved is taken, the first unless given.
+        Time, s, rounded to the nearest solved instant of the motion; by default the first one.
     names : str, default "all"
-        Which names are written: ``"all"``, ``"bodies"``, ``"joints"``, ``"outputs"`` (of points) or ``"none"``.
+        Names to write: ``"all"``, ``"bodies"``, ``"joints"``, ``"outputs"`` (of points) or ``"none"``.
     paths : sequence of str, optional
-        Outputs whose paths are drawn; those of all points unless given.
+        Outputs whose paths are drawn, by default all points.
     order : int, default 0
-        Paths are colored by the size of this derivative: 1 velocity, 2 acceleration, 3 jerk, ...
+        Derivative whose magnitude colors the paths: 1 velocity, 2 acceleration, 3 jerk, ...
     view : tuple of float, default (-60, 25)
-        Azimuth and elevation from which a spatial mechanism is seen, degrees.
+        Azimuth and elevation of the viewer of a spatial mechanism, degrees.
 
     Returns
     -------
     matplotlib.figure.Figure
-        With equal scales, a bar that tells them, and for spatial mechanisms the axes.
+        The sketch, with equal scales, a scale bar, and the axes of spatial mechanisms.
 
     Raises
     ------
     MechanismError
-        A name or an order is not valid, or no instant was solved.
+        If a name or an order is not valid, or no instant was solved.
     AssemblyError
-        The mechanism cannot be assembled.
+        If the mechanism cannot be assembled.
 
     Examples
     --------
@@ -266,7 +266,7 @@ def sketch(
         path_lines, solved = paths_of(moving, paths, order, view), solved_instants(moving)
         shown_instants = np.array([moving.time[solved[0]] if instant is None else instant])
         at = solved[nearest_instants(moving.time[solved], shown_instants)[0]]
-        chosen = np.union1d(evenly_chosen(solved, MOST), at)  # what slides goes as far as in the whole motion
+        chosen = np.union1d(evenly_chosen(solved, MOST), at)  # rails cover the whole motion
         scene = scene_of(moving, view=view, instants=chosen).only(int(np.searchsorted(chosen, at)))
     with style():
         figure = SketchFigure(scene, path_lines, mechanism.title, None if mechanism.space == "planar" else view)
@@ -276,7 +276,7 @@ def sketch(
 
 
 def _draw_paths(figure: Any, axes: Any, paths: Paths) -> None:
-    """Draw the paths of points, colored by the size of a derivative where one is asked for."""
+    """Draw the paths of points, colored by the magnitude of a derivative if one is requested."""
     from matplotlib.collections import LineCollection
     from matplotlib.colors import Normalize
 
@@ -298,14 +298,14 @@ def _draw_paths(figure: Any, axes: Any, paths: Paths) -> None:
 
 
 def _box(artist: Any, renderer: Any) -> Float[np.ndarray, "4"]:
-    """Return left, lower, right and upper edge of what is drawn, in pixels."""
+    """Return the left, lower, right and upper edge of an artist, in pixels."""
     return artist.get_window_extent(renderer).extents
 
 
 def draw_scale(axes: Any, extent: float, view: View | None = None) -> None:
-    """Draw the axes of a view in space, and a bar of a round length in the place of the one that is there.
+    """Draw the axes of a spatial view, and a scale bar of a round length, which replaces an existing one.
 
-    The bar is a tenth to a fifth of `extent`, the larger of width and height of the machine, m.
+    The length is a tenth to a fifth of `extent`, the larger of width and height of the mechanism, m.
     """
     for artist in axes.findobj(lambda each: each.get_gid() == "scale"):
         artist.remove()
@@ -329,7 +329,7 @@ def draw_scale(axes: Any, extent: float, view: View | None = None) -> None:
 
 
 def length_text(length: float) -> str:
-    """Word a length.
+    """Return a length as text with a unit.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""The one style of all figures: type, lines and colors that the color-blind tell apart (Okabe and Ito)."""
+"""The style of all figures: type, lines and colors suitable for the color-blind (Okabe and Ito)."""
 
 from __future__ import annotations
 
@@ -14,24 +14,24 @@ if TYPE_CHECKING:
 BLUE, VERMILION, GREEN, ORANGE, PURPLE, SKY = "#0072B2", "#D55E00", "#009E73", "#E69F00", "#CC79A7", "#56B4E9"
 COLORS = (BLUE, VERMILION, GREEN)  # of components
 LINE_COLORS = (BLUE, ORANGE, GREEN, PURPLE, SKY, VERMILION, "#000000")
-"""Of many lines in one panel; the yellow of Okabe and Ito is too pale for lines."""
+"""Colors of many lines in one panel, without the yellow of Okabe and Ito, which is too pale."""
 BODY_COLORS = (BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY)
 GRAY = "#444444"
 TITLE_SIZE, SMALLEST_TITLE = 11.0, 4.0  # points
-LONGEST_NAME = 100  # characters, as files have it
-LETTER = 0.0088  # inches that a bold letter takes for each point of its size
+LONGEST_NAME = 100  # characters, as in files
+LETTER = 0.0088  # width of a bold letter per point of its size, inches
 PALE_GRAY = "#999999"  # of lines through zero
 RESOLUTION = 200  # dots per inch
 
 
 @contextmanager
 def style(**changes: Any) -> Iterator[None]:
-    """Give the settings under which figures are drawn and written; letters that their font lacks become boxes.
+    """Apply the settings for drawing and writing figures; letters missing in the font become boxes.
 
     Parameters
     ----------
     **changes
-        Settings of matplotlib that differ, with underscores in the place of dots.
+        Further settings of matplotlib, with underscores instead of dots.
 
     Examples
     --------
@@ -54,9 +54,9 @@ def style(**changes: Any) -> Iterator[None]:
 
 
 def blank_figure(width: float, height: float, title: str = "", **pads: float) -> Figure:
-    """Return an empty figure, in inches, that lays out its panels itself; no window and no global state.
+    """Return an empty figure, in inches, with automatic layout, without a window or global state.
 
-    A title that is too long for its width is written smaller, or cut where it could not be read any more.
+    A title too long for the width is written smaller, or truncated if it would be illegible.
     """
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
@@ -74,18 +74,18 @@ def blank_figure(width: float, height: float, title: str = "", **pads: float) ->
 
 
 def set_ticks(axis: Any, most: int, least: int = 2) -> None:
-    """Put few ticks, at round numbers, on an axis."""
+    """Set few ticks, at round numbers, on an axis."""
     from matplotlib.ticker import MaxNLocator
 
     axis.set_major_locator(MaxNLocator(nbins=most, steps=[1, 2, 2.5, 5, 10], min_n_ticks=least))
 
 
 def printable(text: str) -> str:
-    """Return text in one line, without characters that steer what shows it, or that an SVG file cannot hold."""
+    """Return text in one line, without control characters or characters that are invalid in SVG files."""
     return "".join(c if c.isprintable() else " " for c in text)
 
 
 def shown_name(name: str) -> str:
-    """Return a name as matplotlib shows it letter by letter, dollar signs included; very long ones are cut."""
+    """Return a name escaped for matplotlib, so that dollar signs show, and truncated if very long."""
     short = name if len(name) <= LONGEST_NAME else f"{name[: LONGEST_NAME - 3]}..."
     return printable(short).replace("$", r"\$")

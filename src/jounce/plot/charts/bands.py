@@ -1,4 +1,4 @@
-"""Bands in which outputs and derivatives lie where parameters deviate, and the part that each parameter has in them."""
+"""Tolerance bands of outputs and derivatives over time, and the shares of the parameters in them."""
 
 from __future__ import annotations
 
@@ -17,33 +17,33 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 WIDTH, ROW = 9.5, 1.9  # inches
-BAND = 0.3  # of a color
-TWO_SIDED = 1.959964  # standard deviations that hold 95 percent of a normal distribution
+BAND = 0.3  # opacity
+TWO_SIDED = 1.959964  # standard deviations within which 95 percent of a normal distribution lie
 MOST_SHARES = 8
 
 
 def draw_bands(spread: xarray.Dataset, columns: Sequence[Column], title: str = "") -> Figure:
-    """Draw the band of each column over time, how far it is from the nominal motion, and which parameter causes it.
+    """Draw the tolerance band of each column over time, its deviation from the nominal motion, and parameter shares.
 
     Parameters
     ----------
     spread : xarray.Dataset
-        As `jounce.tolerance` returns it.
+        Result of `jounce.tolerance`.
     columns : sequence of (str, str, int)
-        Output, component (or an empty text), and derivative of each row.
+        Output, component (or an empty string), and derivative of each row.
     title : str, optional
-        That of the mechanism unless given.
+        Title of the figure, by default that of the mechanism.
 
     Returns
     -------
     matplotlib.figure.Figure
-        Three panels for each column: 95 percent of the samples lie in the band, dashed lines are the same to first
-        order; the parts of the variance are those of first order.
+        Three panels for each column: the band of 95 percent of the samples, with dashed lines for the band to first
+        order, and the shares of the parameters in the variance to first order.
 
     Raises
     ------
     MechanismError
-        If there is no column.
+        If no column is given.
 
     Examples
     --------
@@ -100,7 +100,7 @@ def _draw_row(spread: Any, column: Column, panels: Any, parameters: list[str]) -
     if f"{name}_share" in spread:
         parts = chosen(spread, f"{name}_share", column)
         first = np.argsort(-parts.mean(axis=1), kind="stable")[:MOST_SHARES]
-        ordered = [k for k in range(len(parameters)) if k in first]  # of one color in all rows
+        ordered = [k for k in range(len(parameters)) if k in first]  # one color in all rows
         colors = [LINE_COLORS[k % len(LINE_COLORS)] for k in ordered]
         names = [shown_name(parameters[k]) for k in ordered]
         share.stackplot(time, parts[ordered], labels=names, colors=colors, alpha=0.75, linewidth=0)

@@ -1,4 +1,4 @@
-"""Plate cams: the profile with its follower, and lift, pressure angle and radius of curvature by the cam angle."""
+"""Plate cams: the profile with its follower, and lift, pressure angle and radius of curvature over the cam angle."""
 
 from __future__ import annotations
 
@@ -19,18 +19,18 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 WIDTH, HEIGHT = 8.4, 4.6  # inches
-MOST_RADII = 12  # base radii, to which the axis of radii of curvature goes
+MOST_RADII = 12  # range of the axis of radii of curvature, in base radii
 
 
 def draw_cam(cam: PlateCam, units: Mapping[str, str] | ShownUnits | None = None) -> Figure:
-    """Draw a plate cam with its follower at the cam angle zero, and its lift, pressure angle and radii of curvature.
+    """Draw a plate cam with its follower at cam angle zero, and its lift, pressure angle and radii of curvature.
 
     Parameters
     ----------
     cam : PlateCam
-        Undercut parts are red.
+        The cam; undercut parts are red.
     units : dict of str to str, optional
-        Of lengths and angles; those of the cam unless given.
+        Units of lengths and angles, by default those of the cam.
 
     Returns
     -------
@@ -39,7 +39,7 @@ def draw_cam(cam: PlateCam, units: Mapping[str, str] | ShownUnits | None = None)
     Raises
     ------
     MechanismError
-        If it is no cam.
+        If `cam` is not a cam.
     UnitError
         If a unit does not fit.
 
@@ -67,7 +67,7 @@ def draw_cam(cam: PlateCam, units: Mapping[str, str] | ShownUnits | None = None)
 
 
 def _draw_profile(axes: Any, cam: PlateCam, shown: ShownUnits) -> None:
-    """Draw the cam at the angle zero, with its pitch curve, base circle and follower."""
+    """Draw the cam at cam angle zero, with its pitch curve, base circle and follower."""
     unit, factor = shown.of("m")
     table, turn = cam.table, np.linspace(0, 2 * np.pi, 181)
     base = cam.base_radius * factor
@@ -97,7 +97,7 @@ def _draw_profile(axes: Any, cam: PlateCam, shown: ShownUnits) -> None:
 
 
 def _draw_follower(axes: Any, cam: PlateCam, factor: float) -> None:
-    """Draw a follower where it is at the cam angle zero."""
+    """Draw the follower at cam angle zero."""
     follower, here = cam.follower, cam.at(0.0)
     touch, center = here.profile[:, 0] * factor, here.pitch[:, 0] * factor
     line = {"color": ORANGE, "linewidth": 1.4}
@@ -127,7 +127,7 @@ def _draw_follower(axes: Any, cam: PlateCam, factor: float) -> None:
 
 
 def _draw_curves(panels: Any, cam: PlateCam, shown: ShownUnits) -> None:
-    """Draw lift, pressure angle and radius of curvature by the cam angle."""
+    """Draw lift, pressure angle and radius of curvature over the cam angle."""
     table = cam.table
     angle_unit, by_angle = shown.of("rad", "angle")
     lift_unit, by_lift = shown.of("rad" if cam.follower.turning else "m", "lift")

@@ -22,25 +22,25 @@ PROJECTIONS = ((0, 1), (0, 2), (1, 2))
 
 
 def draw_curves(curves: Curve | Sequence[Curve], outputs: Sequence[str] | None = None) -> Figure:
-    r"""Draw curves of configurations of one mechanism: paths of points, and other outputs against the driver's value.
+    r"""Draw curves of configurations of a mechanism: paths of points, and other outputs against the driver.
 
     Parameters
     ----------
     curves : Curve or sequence of Curve
-        One, or the circuits of a mechanism, each in a color of its own.
+        One curve, or the circuits of a mechanism, each in its own color.
     outputs : sequence of str, optional
-        Which; all unless given.
+        Names of outputs; all by default.
 
     Returns
     -------
     matplotlib.figure.Figure
-        A panel for each output, for a point in space one for each projection. Limit positions are marked by triangles,
-        change points by crosses.
+        One panel for each output, or for each projection of a point in space. Triangles mark limit positions, crosses
+        change points.
 
     Raises
     ------
     MechanismError
-        If there is no output, or none has the name.
+        If there is no output, or a name does not exist.
 
     Examples
     --------
@@ -76,7 +76,7 @@ def draw_curves(curves: Curve | Sequence[Curve], outputs: Sequence[str] | None =
 
 
 Panel = tuple[str, tuple[int, ...]]
-"""An output with the components of a path, or with none."""
+"""An output, with the components of a path if it is a point."""
 
 
 def _panels(curve: Curve, names: Sequence[str]) -> list[Panel]:

@@ -1,4 +1,4 @@
-"""Deflections of springs under a feedforward, and the errors of links that are simulated with it and without."""
+"""Deflections of springs under a feedforward, and errors of links in simulations with and without spring torques."""
 
 from __future__ import annotations
 
@@ -15,28 +15,28 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 WIDTH, PANEL = 7.0, 2.1  # inches
-DRAWN = 4000  # instants at most
-LEAST = 1e-17  # what is exact is drawn there
+DRAWN = 4000  # largest number of instants
+LEAST = 1e-17  # value at which zero errors are drawn
 DASHES = ("-", (0, (4, 1.5)), (0, (1, 1.2)))
 
 
 def draw_feedforward(feedforward: Feedforward, errors: LinkErrors, title: str = "") -> Figure:
-    """Draw deflections of springs, and how far links err in a simulation under the motor torques.
+    """Draw the deflections of springs, and the errors of links in a simulation under the motor torques.
 
     Parameters
     ----------
     feedforward : Feedforward
-        Of a robot or a mechanism, with elastic drives.
+        Feedforward of a robot or a mechanism with elastic drives.
     errors : LinkErrors
-        As `jounce.planning.link_errors` finds them.
+        Result of `jounce.planning.link_errors`.
     title : str, optional
-        That of the robot or mechanism unless given.
+        Title of the figure, by default that of the robot or mechanism.
 
     Returns
     -------
     matplotlib.figure.Figure
-        Deflections above, of what turns in mrad and of what slides in mm; below the largest error of all links, on a
-        logarithmic axis, under the exact torques and under those without what accelerates the springs.
+        Above, the deflections in mrad for turning joints and in mm for sliding ones; below, on a logarithmic axis, the
+        largest error of all links under the exact torques, and without the torques that accelerate the deflections.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Shares of their limits that the joints of a robot use over a trajectory: one panel for each quantity."""
+"""Ratios of quantities of the joints of a robot to their limits along a trajectory: one panel for each quantity."""
 
 from __future__ import annotations
 
@@ -19,29 +19,29 @@ if TYPE_CHECKING:
 DASHES = ("-", (0, (4, 1.5)), (0, (1, 1.2)), (0, (5, 1.2, 1, 1.2)), (0, (8, 2)), (0, (2, 2)))
 BROKEN, FORBIDDEN = "#B22222", "#EDEDED"
 WIDTH, ROW = 7.0, 1.75  # inches
-BEYOND = 1.3  # times what is drawn, where what is infinite is marked
-DRAWN = 4000  # instants at most, or files of lines grow large; the worst ones are marked exactly
+BEYOND = 1.3  # position of marks of infinite values, relative to the drawn range
+DRAWN = 4000  # largest number of instants, to keep vector files small; the worst instants are marked exactly
 
 
 def draw_limits(report: LimitReport, title: str = "") -> Figure:
-    """Draw what each joint uses of its limits over time, from -1 at the lower to 1 at the upper one.
+    """Draw the ratios of the quantities of each joint to their limits over time, from -1 to 1 within the limits.
 
     Parameters
     ----------
     report : LimitReport
-        As `check_limits` returns it.
+        Result of `check_limits`.
     title : str, optional
-        The name of the robot unless given.
+        Title of the figure, by default the name of the robot.
 
     Returns
     -------
     matplotlib.figure.Figure
-        A panel for each quantity that has limits, with the forbidden range shaded and the worst instant marked.
+        One panel for each quantity with limits, with the forbidden range shaded and the worst instant marked.
 
     Raises
     ------
     RobotError
-        If there is no limit.
+        If no quantity has a limit.
 
     Examples
     --------
@@ -69,7 +69,7 @@ def draw_limits(report: LimitReport, title: str = "") -> Figure:
         tall = ROW * lines + 0.75 + legend
         figure = blank_figure(WIDTH, tall, title or report.robot, h_pad=0.06, hspace=0.02, wspace=0.03)
         grid = figure.subplots(lines, columns, sharex=True, squeeze=False)
-        axes_list = [*grid.T.reshape(-1)]  # the derivatives of the position below each other
+        axes_list = [*grid.T.reshape(-1)]  # the derivatives of the position one below the other
         for axes in axes_list[len(rows) :]:
             axes.set_axis_off()
         for quantity, axes in zip(rows.tolist(), axes_list, strict=False):
@@ -83,7 +83,7 @@ def draw_limits(report: LimitReport, title: str = "") -> Figure:
 
 
 def _per_line(report: LimitReport, joints: Any) -> int:
-    """Return how many names of joints stand beside each other."""
+    """Return the number of names of joints in a line of the legend."""
     longest = max(len(report.joint_names[joint]) for joint in joints)
     return max(1, min(len(joints), int(WIDTH / (0.064 * longest + 0.5))))
 
@@ -122,13 +122,13 @@ def _draw_panel(report: LimitReport, quantity: int, joints: list[int], axes: Any
 
 
 def _rows_of(report: LimitReport, quantity: int) -> list[LimitRow]:
-    """Return the rows of a quantity that have a limit."""
+    """Return the rows of a quantity with a limit."""
     words = {FIELDS[quantity].replace("effort", kind).replace("_", " ") for kind in ("torque", "force")}
     return [row for row in report.limited if row.quantity in words]
 
 
 def _is_upper(report: LimitReport, row: LimitRow) -> bool:
-    """Whether the limit that a row tells is the upper one."""
+    """Return whether the limit of a row is the upper one."""
     if row.quantity != "position":
         return (row.limit or 0.0) > 0
     joint = report.joint_names.index(row.joint)

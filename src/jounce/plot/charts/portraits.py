@@ -1,4 +1,4 @@
-"""Hodographs and phase portraits: a derivative by its components, and one derivative against another."""
+"""Hodographs, which show the components of a derivative, and phase portraits, one derivative against another."""
 
 from __future__ import annotations
 
@@ -22,19 +22,19 @@ if TYPE_CHECKING:
 ARROWS = 12  # vectors drawn from the origin of a hodograph
 PROJECTIONS = ((0, 1), (0, 2), (1, 2))
 SIDE = 3.4  # inches
-SMOOTH = 600  # steps of a curve at least
-LEAVING = 0.25  # of the range of the values: what a polynomial may go beyond it
+SMOOTH = 600  # least number of steps of a curve
+LEAVING = 0.25  # fraction of the range of the values by which a polynomial may leave it
 Line = Float[np.ndarray, " time"]
 Table = Float[np.ndarray, "time component"]
 
 
 def hodograph(motion: Motion, output: str, order: int = 1) -> Figure:
-    r"""Draw the curve that the tip of a vector runs through: the hodograph of a point's velocity, acceleration, ...
+    r"""Draw the hodograph of the velocity, acceleration, ... of a point: the curve of the tip of the vector.
 
     Parameters
     ----------
     motion : Motion
-        Instants that were not solved are left out.
+        The motion; unsolved instants are omitted.
     output : str
         Name of an output with components.
     order : int, default 1
@@ -43,12 +43,12 @@ def hodograph(motion: Motion, output: str, order: int = 1) -> Figure:
     Returns
     -------
     matplotlib.figure.Figure
-        One panel in the plane; three projections in space. The start is marked, and vectors at equal steps of time.
+        One panel in the plane, or three projections in space, with the start and vectors at equal steps of time.
 
     Raises
     ------
     MechanismError
-        No output has this name, it has no components, or the order is above that of the motion.
+        If the output does not exist or has no components, or the order is above that of the motion.
 
     Examples
     --------
@@ -90,21 +90,21 @@ def phase_portrait(motion: Motion, output: str, orders: tuple[int, int] = (0, 1)
     Parameters
     ----------
     motion : Motion
-        Instants that were not solved are left out.
+        The motion; unsolved instants are omitted.
     output : str
-        Name of an output; one with components gets a panel for each.
+        Name of an output; each component has a panel.
     orders : tuple of int, default (0, 1)
-        Derivatives along the axes to the right and upward.
+        Derivatives along the horizontal and the vertical axis.
 
     Returns
     -------
     matplotlib.figure.Figure
-        The start is marked, and an arrow shows the sense of time.
+        The portrait, with the start marked and an arrow in the direction of time.
 
     Raises
     ------
     MechanismError
-        No output has this name, or an order is not among those of the motion.
+        If the output does not exist, or an order is not among those of the motion.
 
     Examples
     --------
@@ -130,7 +130,7 @@ def phase_portrait(motion: Motion, output: str, orders: tuple[int, int] = (0, 1)
                 mark = symbol(output, order, component) or rate_name(its_output, order)
                 label(f"{mark}  ({unit_label(unit, order, exponent)})")
                 size = float(np.max(np.abs(values), initial=0.0, where=np.isfinite(values))) * 10.0**-exponent
-                limits(axis_range(dense[-1], 0.06, size))  # where nothing changes but rounding, it is not magnified
+                limits(axis_range(dense[-1], 0.06, size))  # so that rounding of a constant is not magnified
             axes.plot(*dense, color=COLORS[k % len(COLORS)])
             axes.axhline(0.0, color=PALE_GRAY, linewidth=0.7, zorder=1)
             _mark_start(axes, *scaled)
@@ -139,9 +139,9 @@ def phase_portrait(motion: Motion, output: str, orders: tuple[int, int] = (0, 1)
 
 
 def _values(motion: Motion, output: str, orders: tuple[int, ...]) -> tuple[list[Table], list[Table]]:
-    """Return derivatives of an output in its shown unit, at the instants of a motion, and as smooth curves.
+    """Return derivatives of an output in its shown unit, at the instants of a motion and as smooth curves.
 
-    Between instants they are derivatives of the polynomials that have all derivatives of the instants at both ends.
+    Between instants, the curves are Hermite polynomials with all derivatives at both ends.
     """
     check_name("output", output, motion.outputs, MechanismError, name="output")
     _, factor = motion.mechanism.shown_units.of(motion.mechanism.outputs[output].unit, output)
@@ -160,7 +160,7 @@ def _values(motion: Motion, output: str, orders: tuple[int, ...]) -> tuple[list[
 
 
 def _curve(time: Line, jets: Float[np.ndarray, "time levels"], order: int) -> Line:
-    """Return a derivative at the instants and between them; straight where the polynomials leave what is known."""
+    """Return a derivative at and between instants, linear where the polynomials leave the range of the values."""
     known, values = jets[np.isfinite(jets).all(axis=1), order], jets[:, order]
     steps = -(-SMOOTH // max(len(time) - 1, 1))
     if steps == 1 or len(known) < 2:
@@ -186,7 +186,7 @@ def _title(motion: Motion, output: str, orders: tuple[int, ...]) -> str:
 
 
 def _mark_start(axes: Any, x: Float[np.ndarray, " time"], y: Float[np.ndarray, " time"]) -> None:
-    """Mark the first instant, and the sense of time by an arrow on the curve."""
+    """Mark the first instant, and the direction of time by an arrow on the curve."""
     for start in np.flatnonzero(np.isfinite(x) & np.isfinite(y))[:1]:
         axes.plot(x[start], y[start], marker="o", color=GRAY, fillstyle="none", markersize=5, linestyle="", zorder=4)
     spread = np.array([np.nanmax(v) - np.nanmin(v) if np.isfinite(v).any() else 0.0 for v in (x, y)])

@@ -1,4 +1,4 @@
-"""Which limits bind a retimed trajectory, over its time: a bar for each limit, and the rate along the path."""
+"""Active limits of a retimed trajectory over time: a bar for each limit, and the rate along the path."""
 
 from __future__ import annotations
 
@@ -16,26 +16,26 @@ if TYPE_CHECKING:
     from jounce.planning import RetimedTrajectory
 
 WIDTH, BAR, RATE = 7.0, 0.24, 1.7  # inches
-MOST = 24  # bars: those of the highest price
+MOST = 24  # bars, those of the highest prices
 
 
 def draw_retiming(retimed: RetimedTrajectory, title: str = "") -> Figure:
-    """Draw which limits bind a trajectory where, with their prices, above the rate along its path.
+    """Draw the active limits of a trajectory over time, with their prices, above the rate along its path.
 
     Parameters
     ----------
     retimed : RetimedTrajectory
-        As `retime` returns it.
+        Result of `retime`.
     title : str, optional
-        The name of the robot unless given.
+        Title of the figure, by default the name of the robot.
 
     Returns
     -------
     matplotlib.figure.Figure
-        Bars where nothing is left of a limit, one row for each; on the right by how many ms the duration would fall
-        were it one percent higher.
+        One row for each limit, with bars where it binds, and on the right the decrease of the duration, ms, if the
+        limit were one percent higher.
 
-        Where none does, as of a motion that was given more time, the rate alone.
+        If no limit binds, as for a motion with a longer duration, the rate only.
     """
     active = retimed.active
     binds, price = active["binds"].values, active["price"].values.sum(axis=0)
@@ -89,11 +89,11 @@ def _draw_rate(retimed: RetimedTrajectory, axes: Any) -> None:
 
 
 def _quantity(name: str) -> str:
-    """Return the words of a limit after the name of its joint."""
+    """Return the quantity in the name of a limit, after the name of its joint."""
     return name.partition(" ")[2]
 
 
 def _runs(flags: np.ndarray) -> list[tuple[int, int]]:
-    """Return the first and the last index of each run of what is true."""
+    """Return the first and the last index of each run of true values."""
     steps = np.diff(np.concatenate([[0], flags.astype(int), [0]]))
     return list(zip(np.flatnonzero(steps == 1).tolist(), (np.flatnonzero(steps == -1) - 1).tolist(), strict=True))

@@ -1,4 +1,4 @@
-"""What smoothing made of samples: their distance from the motion, and its jerk, with the times of rest."""
+"""Results of smoothing: distances of samples from the motion, and its jerk, with the dwells."""
 
 from __future__ import annotations
 
@@ -15,28 +15,28 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 WIDTH, PANEL = 7.0, 2.0  # inches
-DRAWN = 4000  # samples at most
-NAMED = 14  # joints with a name in the legend
+DRAWN = 4000  # largest number of samples
+NAMED = 14  # largest number of names in the legend
 DASHES = ("-", (0, (4, 1.5)), (0, (1, 1.2)))
 
 
 def draw_smoothing(given: JointTrajectory, motion: SmoothedTrajectory, title: str = "") -> Figure:
-    """Draw how far samples are from a motion within a deviation of them, and the jerk of the motion.
+    """Draw the distances of samples from a smoothed motion, and the jerk of the motion.
 
     Parameters
     ----------
     given : JointTrajectory
-        Through the samples.
+        Trajectory through the samples.
     motion : SmoothedTrajectory
-        As `smooth` returns it.
+        Result of `smooth`.
     title : str, optional
-        The names of the joints unless given.
+        Title of the figure, by default the names of the joints.
 
     Returns
     -------
     matplotlib.figure.Figure
-        Above the distances, as shares of the deviation; below the jerk. Of more samples than can be seen some are
-        drawn. Where all joints stand still the ground is gray.
+        Above, the distances relative to the deviation; below, the jerk. At most 4000 samples are drawn. The background
+        is gray where all joints rest.
     """
     names = list(motion.joints)
     with style():
@@ -74,7 +74,7 @@ def _samples(given: JointTrajectory, name: str) -> tuple[np.ndarray, np.ndarray]
 
 
 def _common_dwells(motion: SmoothedTrajectory) -> list[tuple[float, float]]:
-    """Return the times at which all joints stand still."""
+    """Return the intervals in which all joints rest."""
     common = [(motion.start, motion.stop)]
     for own in motion.joints.values():
         both = [(max(a, c), min(b, d)) for a, b in common for c, d in own.dwells]

@@ -1,4 +1,4 @@
-"""Which bodies of a cam are its disc and its follower, as they are drawn."""
+"""Disc and follower of a plate cam, as drawn."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ Point = Float[np.ndarray, " component"]
 
 
 def cam_disc(mechanism: Mechanism, joint: Any) -> tuple[tuple[str, str], tuple[Point, Point]] | None:
-    """Return the body of a plate cam and that of its follower, and in the frame of each its point, m.
+    """Return the bodies of a plate cam and of its follower, and a point of each in its frame, m.
 
-    The point of the disc is its origin, that of the follower describes the pitch curve on the disc.
+    The point of the disc is its origin; the point of the follower traces the pitch curve on the disc.
 
     Parameters
     ----------
@@ -28,7 +28,7 @@ def cam_disc(mechanism: Mechanism, joint: Any) -> tuple[tuple[str, str], tuple[P
     Returns
     -------
     tuple of two tuples, or None
-        None for other joints, and where no point is known: of followers that turn, in space, and of leaders that do
+        None for other joints, and if the points are unknown: for turning followers, in space, and for leaders that do
         not turn.
 
     Examples
@@ -55,12 +55,12 @@ def cam_disc(mechanism: Mechanism, joint: Any) -> tuple[tuple[str, str], tuple[P
 def pitch_curve(
     visited: Float[np.ndarray, "time components"],
 ) -> tuple[Float[np.ndarray, "point components"], bool]:
-    """Return the points on a disc that a follower visits in a motion, and whether they go all the way around.
+    """Return the points on a disc that a follower visits in a motion, and whether they form a closed curve.
 
     Parameters
     ----------
     visited : array of shape (time, 2)
-        The point of the follower in the frame of the disc, m; NaN where the motion failed.
+        Positions of the point of the follower in the frame of the disc, m; NaN where the motion failed.
 
     Examples
     --------

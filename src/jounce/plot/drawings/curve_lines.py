@@ -1,4 +1,4 @@
-"""The lines of curves and surfaces that joints hold points on, in the frame of the body that has them."""
+"""Lines of the curves and surfaces of joints, in the frame of their body."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from jounce.mechanism.system import POSITION_COMPONENTS
 from jounce.trajectory.curve_checks import derivatives_at
 from jounce.trajectory.curves import HALF_WINDOW, CurveLaw
 
-SAMPLES, ACROSS = 401, 9  # of a curve; lines of a surface in each direction, with as many places
-AROUND = 0.4  # of the way of a point: how far around it an endless curve is shown
-PERIODIC = 1e-6  # of its size: how nearly an endless curve comes back
+SAMPLES, ACROSS = 401, 9  # points of a curve; lines of a surface in each direction
+AROUND = 0.4  # margin of an endless curve around the path of a point, as a fraction of the path
+PERIODIC = 1e-6  # fraction of the size of a curve by which a closed curve may miss its start
 
 
 class CurveLines(NamedTuple):
-    """Lines, each (places, components), m, and whether they are all that there is: those of an endless curve go on."""
+    """Lines, each (places, components), m, and whether they are complete, unlike those of an endless curve."""
 
     lines: tuple[Float[np.ndarray, "place component"], ...]
     whole: bool
@@ -29,7 +29,7 @@ NONE = CurveLines((), True)
 
 
 def curve_lines(mechanism: Mechanism, name: str) -> CurveLines:
-    """Return the lines of the curve or the surface of a joint, by its name; none where it has neither."""
+    """Return the lines of the curve or the surface of a joint, by its name; none for other joints."""
     element: Any = mechanism.joints[name]
     if not element.hidden:
         return NONE
@@ -53,7 +53,7 @@ def curve_lines(mechanism: Mechanism, name: str) -> CurveLines:
 
 
 def _net(curve: CurveLaw, ends: list[float]) -> tuple[Float[np.ndarray, "place component"], ...]:
-    """Return lines of a surface along both of its parameters."""
+    """Return the lines of a surface along both parameters."""
     (first, last), (low, high) = ends[:2], ends[2:]
     u, v = np.linspace(first, last, SAMPLES // 8), np.linspace(low, high, SAMPLES // 8)
     across = [(np.full(len(v), x), v) for x in np.linspace(first, last, ACROSS)]
@@ -62,7 +62,7 @@ def _net(curve: CurveLaw, ends: list[float]) -> tuple[Float[np.ndarray, "place c
 
 
 def shown(lines: CurveLines, visited: Float[np.ndarray, "time component"], least: float) -> list[Any]:
-    """Return lines as they are shown: of an endless curve what is near to the places visited, in the same frame."""
+    """Return the shown parts of lines: for an endless curve, those near the visited places, in the same frame."""
     known = visited[np.isfinite(visited).all(axis=1)]
     if lines.whole or not len(known):
         return list(lines.lines)

@@ -1,4 +1,4 @@
-"""A drawing of a mechanism: bodies at many instants, seen from one side, as flat shapes that move."""
+"""A drawing of a mechanism: moving plane shapes of bodies at many instants, in one projection."""
 
 from __future__ import annotations
 
@@ -16,38 +16,38 @@ from jounce.plot.drawings.geometry import Point, Skeleton, Symbol
 from jounce.plot.style import BODY_COLORS
 
 Flat = Float[np.ndarray, "time 2"]
-"""A place or a vector in the plane of the drawing, as it moves."""
+"""A moving point or vector in the plane of the drawing."""
 Curve = Float[np.ndarray, "time points 2"]
 View = tuple[float, float]
 """Azimuth and elevation of the viewer of a spatial mechanism, degrees."""
 VIEW: View = (-60.0, 25.0)
-UNIT = 0.021  # half a pin, in diagonals of what is drawn
+UNIT = 0.021  # half the size of a pin, relative to the diagonal of the drawing
 INK = "#222222"
 BARS, PLATES, GUIDES, WHEELS, SYMBOLS, MARKS = 4, 3, 2, 1, 6, 7  # layers
 
 
 @dataclass(frozen=True)
 class Shape:
-    """A line, an area or a disc that moves.
+    """A moving line, area or disc.
 
     Parameters
     ----------
     kind : str
         ``line``, ``area`` (closed) or ``disc`` (one point and a radius).
     points : numpy.ndarray of shape (time, points, 2)
-        In the plane of the drawing, m.
+        Points in the plane of the drawing, m.
     stroke, fill : str
-        Colors; empty where there is none.
+        Colors; empty for none.
     width : float
-        Of the line, in points of print.
+        Width of the line, in typographic points.
     dashes : tuple of float
-        Lengths of strokes and gaps, in widths; a full line when empty.
+        Lengths of dashes and gaps, in widths; empty for a solid line.
     layer : int
-        Higher ones hide lower ones.
+        Layer; higher layers hide lower ones.
     radius : float
-        Of a disc, m.
+        Radius of a disc, m.
     owner : str
-        The body or element that it shows, with its kind: ``bodies.crank``.
+        The body or element shown, with its kind: ``bodies.crank``.
     """
 
     kind: str
@@ -63,7 +63,7 @@ class Shape:
 
 @dataclass(frozen=True)
 class Label:
-    """A name and the place it belongs to, (time, 2) m."""
+    """A name and its anchor, (time, 2), m."""
 
     text: str
     anchor: Flat
@@ -72,7 +72,7 @@ class Label:
 
 
 def screen_of(view: View) -> Float[np.ndarray, "3 3"]:
-    """Return unit vectors to the right, upward and toward a viewer, in rows, from azimuth and elevation in degrees.
+    """Return the unit vectors to the right, upward and toward the viewer, in rows, for azimuth and elevation, degrees.
 
     Examples
     --------
@@ -86,25 +86,25 @@ def screen_of(view: View) -> Float[np.ndarray, "3 3"]:
 
 @dataclass
 class Drawing:
-    """Bodies at many instants, seen from one side, and the shapes and names that are drawn of them.
+    """Bodies at many instants in one projection, with their drawn shapes and names.
 
     Parameters
     ----------
     skeleton : Skeleton
-        What the mechanism looks like.
+        Drawn geometry of the mechanism.
     frames : dict of str to numpy.ndarray
-        Of each body, (time, components, 1 + components).
+        Frames of each body, (time, components, 1 + components).
     view : tuple of float
-        Azimuth and elevation of the viewer, degrees; of no account in the plane.
+        Azimuth and elevation of the viewer, degrees; ignored for planar mechanisms.
 
     Attributes
     ----------
     shapes, labels : list
-        What was drawn.
+        Drawn shapes and names.
     supports : list of numpy.ndarray
-        Where stands are.
+        Positions of drawn supports.
     owner : str
-        What is being drawn, unless a shape tells otherwise.
+        Default owner of shapes.
     """
 
     skeleton: Skeleton
@@ -133,7 +133,7 @@ class Drawing:
 
     @cached_property
     def unit(self) -> float:
-        """Half a pin, m: a share of what all links ever cover, but no more than fits the links."""
+        """Half the size of a pin, m: a fraction of the extent of all links, limited by the size of the links."""
         points = [self.flat(self.at(link.body, link.points)).reshape(-1, 2) for link in self.skeleton.links.values()]
         for wheel in self.skeleton.wheels:
             center = self.flat(self.at(wheel.body, wheel.center))
@@ -150,7 +150,7 @@ class Drawing:
         return points_at(self.frames[body], points)
 
     def toward(self, body: str, vector: Point) -> Float[np.ndarray, "time components"]:
-        """Return a unit vector along a vector of a body, in the global frame."""
+        """Return the unit vector along a vector of a body, in the global frame."""
         turned = self.at(body, vector) - self.frames[body][:, :, 0]
         return turned / np.linalg.norm(turned, axis=-1, keepdims=True)
 
@@ -159,28 +159,28 @@ class Drawing:
         return within(self.frames[body], points)
 
     def flat(self, points: np.ndarray) -> np.ndarray:
-        """Return points or vectors, (..., components), as they are seen, (..., 2)."""
+        """Return the projections of points or vectors, (..., components), (..., 2)."""
         return points if self.planar else points @ self.screen[:2].T
 
     def depth(self, vectors: np.ndarray) -> np.ndarray:
-        """Return how far vectors, (..., 3), point toward the viewer, (...)."""
+        """Return the components of vectors, (..., 3), toward the viewer, (...)."""
         return vectors @ self.screen[2]
 
     def frame_along(self, body: str, axis: Float[np.ndarray, "3"]) -> Float[np.ndarray, "time 3 3"]:
-        """Return three global unit vectors, in rows, of which the first is along an axis of a body."""
+        """Return three global unit vectors, in rows, the first one along an axis of a body."""
         return np.stack([self.toward(body, unit) for unit in frame_along(axis)], axis=1)
 
     def global_point(self, symbol: Symbol, slot: int | None = None) -> Float[np.ndarray, "time components"]:
-        """Return the point of a symbol on one of its bodies, a moving one by default, in the global frame."""
+        """Return the point of a symbol on one of its bodies, by default a moving one, in the global frame."""
         slot = symbol.moving_slot if slot is None else slot
         return self.at(symbol.bodies[slot], symbol.points[slot])
 
     def point(self, symbol: Symbol, slot: int | None = None) -> Flat:
-        """Return the point of a symbol on one of its bodies as it is seen."""
+        """Return the projection of the point of a symbol on one of its bodies."""
         return self.flat(self.global_point(symbol, slot))
 
     def ends(self, symbol: Symbol) -> tuple[Flat, Flat]:
-        """Return the points of a symbol on its first two bodies as they are seen."""
+        """Return the projections of the points of a symbol on its first two bodies."""
         return self.point(symbol, 0), self.point(symbol, 1)
 
     def line(self, *points: np.ndarray, **look: Any) -> None:
@@ -196,15 +196,15 @@ class Drawing:
         self._add("area" if closed else "line", points, look)
 
     def disc(self, center: Flat, radius: float, **look: Any) -> None:
-        """Draw a disc around a place."""
+        """Draw a disc around a point."""
         self._add("disc", center[:, None], {"radius": float(radius), **look})
 
     def name(self, text: str, anchor: Flat, color: str) -> None:
-        """Write a name near a place."""
+        """Write a name near an anchor."""
         self.labels.append(Label(text, anchor, color, self.owner))
 
     def move_name(self, owner: str, anchor: Flat) -> None:
-        """Write a name near another place."""
+        """Move a name to another anchor."""
         self.labels = [replace(label, anchor=anchor) if label.owner == owner else label for label in self.labels]
 
     def _joined(self, points: Sequence[np.ndarray]) -> Curve:

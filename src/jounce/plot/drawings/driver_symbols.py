@@ -20,7 +20,7 @@ from jounce.plot.drawings.symbol_parts import (
     unit_vector,
 )
 
-HINGES = ("revolute", "cylindrical", "universal", "screw", "spherical", "slot", "prismatic")  # that have one place
+HINGES = ("revolute", "cylindrical", "universal", "screw", "spherical", "slot", "prismatic")  # joints at one point
 
 
 def _spring(drawing: Drawing, symbol: Symbol) -> None:
@@ -40,7 +40,7 @@ def _cylinder_and_rod(drawing: Drawing, symbol: Symbol) -> None:
 
 
 def _sliding(drawing: Drawing, symbol: Symbol) -> None:
-    """Draw a double arrow along the direction in which a point is driven, beside it."""
+    """Draw a double arrow beside a point, along the direction in which it is driven."""
     if symbol.kind == "coordinate" and symbol.axes[0] is None:
         _turning(drawing, symbol)
         return
@@ -56,12 +56,12 @@ def _sliding(drawing: Drawing, symbol: Symbol) -> None:
 
 
 def _turning(drawing: Drawing, symbol: Symbol) -> None:
-    """Draw an arrow, or a spring, about the axis of a turn, at the joint of its bodies where they have one."""
+    """Draw an arrow or a spring about an axis of rotation, at the joint of the bodies if they have one."""
     turn(drawing, *_pivot(drawing, symbol), spiral=symbol.kind == "spiral")
 
 
 def _pivot(drawing: Drawing, symbol: Symbol) -> tuple[Flat, Float[np.ndarray, "time 2 2"]]:
-    """Return the place about which two bodies turn, and two flat vectors across the axis there."""
+    """Return the point about which two bodies turn, and the projections of two vectors perpendicular to the axis."""
     hinges = [s for s in drawing.skeleton.symbols if s.kind in HINGES]
     between = set(symbol.bodies)
     shared = [s for s in hinges if between - {GROUND} <= set(s.bodies) and between <= {*s.bodies[:2], GROUND}]
@@ -78,7 +78,7 @@ def _pivot(drawing: Drawing, symbol: Symbol) -> tuple[Flat, Float[np.ndarray, "t
 
 
 def _point_force(drawing: Drawing, symbol: Symbol) -> None:
-    """Draw a mark where a force acts: its direction changes with time."""
+    """Draw a mark at the point of application of a force, whose direction varies."""
     point, u = drawing.point(symbol, 0), drawing.unit
     corners = [point + u * np.array(corner) for corner in ((0.0, 0.9), (0.9, 0.0), (0.0, -0.9), (-0.9, 0.0))]
     drawing.area(*corners, fill=INK, width=0.6, layer=MARKS)

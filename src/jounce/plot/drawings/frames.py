@@ -1,6 +1,6 @@
-"""Where bodies and their points are: in a motion, assembled at the start, at the starting guess.
+"""Frames of bodies and positions of their points: in a motion, as assembled at the start, and at the starting guess.
 
-A frame holds the origin of a body, m, and its axes, in columns, at some instants: (time, components, 1 + components).
+A frame consists of the origin of a body, m, and its axes, in columns: (time, components, 1 + components).
 """
 
 from __future__ import annotations
@@ -35,12 +35,12 @@ Frame = Float[np.ndarray, "time components columns"]
 def assembled(mechanism: Mechanism) -> dict[str, Frame]:
     """Return the frames of all bodies, the ground first, assembled near the starting guess at the first instant.
 
-    Degrees of freedom may be left; initial conditions count as drivers.
+    The mechanism need not be fully driven; initial conditions count as drivers.
 
     Raises
     ------
     AssemblyError
-        The bodies cannot be assembled.
+        If the bodies cannot be assembled.
 
     Examples
     --------
@@ -72,7 +72,7 @@ def guessed(mechanism: Mechanism) -> dict[str, Frame]:
 
 
 def frames(motion: Motion) -> dict[str, Frame]:
-    """Return the frames of all bodies of a motion, the ground first; NaN at instants that were not solved."""
+    """Return the frames of all bodies of a motion, the ground first; NaN at unsolved instants."""
     if "frames" not in motion.derived:
         pose_type, coordinates = motion.poses
         first = {name: derivatives[0] for name, derivatives in coordinates.items()}
@@ -88,7 +88,7 @@ def _by_body(mechanism: Mechanism, whole: Any) -> dict[str, Frame]:
 
 @Mapped
 def _frames(_: tuple[()], coordinates: Mapping[str, Any], *, pose_type: Any) -> Any:
-    """Return origin and axes of all bodies, shape (components, 1 + components, bodies, time)."""
+    """Return the origins and axes of all bodies, shape (components, 1 + components, bodies, time)."""
     pose = pose_type.from_coordinates({name: Jet((value,)) for name, value in coordinates.items()})
     columns = [pose.position, *(pose.direction(unit) for unit in np.eye(pose_type.shifts))]
     return jnp.stack([stacked(column)[0] for column in columns], axis=1)
@@ -108,7 +108,7 @@ def within(frame: Frame, points: Float[np.ndarray, "time components"]) -> Float[
 
 
 def frame_along(axis: Float[np.ndarray, "3"]) -> Float[np.ndarray, "3 3"]:
-    """Return three unit vectors, in rows, of which the first is along an axis of any length.
+    """Return three orthogonal unit vectors, in rows, the first one along an axis of any length.
 
     Examples
     --------

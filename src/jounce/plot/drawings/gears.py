@@ -1,4 +1,4 @@
-"""Where gears stand and how large they are: it follows from the pins that hold them and from the ratio of the pair."""
+"""Centers and radii of gears, from the pins that hold them and the ratio of the pair."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from jounce.mechanism.mechanism import GROUND
 from jounce.mechanism.resolve import resolve
 from jounce.plot.drawings.frames import guessed, points_at, within
 
-THINNEST = 0.12  # of the distance of shafts: the radius of a worm, as it is drawn
+THINNEST = 0.12  # drawn radius of a worm, as a fraction of the distance of the shafts
 
 Center = Float[np.ndarray, " component"]
 Pins = list[dict[str, Center]]  # the points of each revolute joint by body
@@ -27,18 +27,18 @@ def pitch_radii(
     Parameters
     ----------
     mechanism : Mechanism
-        Planar.
+        A planar mechanism.
     bodies : tuple of str
-        Gears i and j, and the frame m that carries them; the ground unless named.
+        Gears i and j, and the frame m that carries them, by default the ground.
     ratio : float
-        ``-rho_i / rho_j`` of gears that mesh outside each other, ``rho_i / rho_j`` of one inside the other.
+        ``-rho_i / rho_j`` for an external pair, ``rho_i / rho_j`` for an internal pair.
 
     Returns
     -------
     centers : list of numpy.ndarray
-        Where each is pinned; its origin where it is not.
+        Pin of each gear, or its origin without a pin.
     radii : tuple of float, or None
-        None where no gears with this ratio can stand so: two bodies on one center, or turning alike.
+        None if gears with these centers and this ratio cannot exist: coincident centers, or a ratio of one.
 
     Examples
     --------
@@ -62,7 +62,7 @@ def pitch_radii(
 
 
 def _pins(mechanism: Any) -> Pins:
-    """Return the points of all revolute joints by body."""
+    """Return the points of each revolute joint by body."""
     parameters = mechanism.parameter_values
     return [
         {
@@ -75,7 +75,7 @@ def _pins(mechanism: Any) -> Pins:
 
 
 def _center(pins: Pins, body: str, carrier: str) -> Center:
-    """Return the point of a gear at which it is pinned: to its carrier, to the ground, or to any other body."""
+    """Return the pin of a gear in its frame: to its carrier, to the ground, or to any other body."""
     holding = [pin for pin in pins if body in pin]
     for body_sought in (carrier, GROUND):
         for pin in holding:
@@ -85,7 +85,7 @@ def _center(pins: Pins, body: str, carrier: str) -> Center:
 
 
 def _seen_from(mechanism: Mechanism, pins: Pins, body: str, carrier: str, center: Center) -> Center:
-    """Return the center of a gear in the frame of its carrier: by a pin, by two on one line, else by the guess."""
+    """Return the center of a gear in the frame of its carrier: from a pin, from two coaxial pins, or from the guess."""
     holding = [pin for pin in pins if body in pin and np.array_equal(pin[body], center)]
     for pin in holding:
         if carrier in pin:
@@ -101,17 +101,17 @@ def _seen_from(mechanism: Mechanism, pins: Pins, body: str, carrier: str, center
 
 
 def shaft_wheels(mechanism: Mechanism, gear: Any) -> tuple[list[Center], list[float]]:
-    """Return where wheels of two shafts in space are drawn, each in the frame of its body, and their radii, m.
+    """Return the drawn centers of the wheels of two shafts in space, each in the frame of its body, and their radii, m.
 
-    Their rims touch, of radii in the ratio of the turns, where the axes lie so: about axes that meet, at the distance
-    of the hinges from there, and about others, at the common perpendicular.
+    The rims touch, with radii in the ratio of the gear, if the axes permit: for intersecting axes, at the distance of
+    the hinges from the intersection; for others, at the common perpendicular.
 
     Parameters
     ----------
     mechanism : Mechanism
-        Spatial.
+        A spatial mechanism.
     gear : jounce.spatial.Gear
-        One of its joints.
+        A joint of the mechanism.
 
     Examples
     --------
@@ -169,7 +169,7 @@ def shaft_wheels(mechanism: Mechanism, gear: Any) -> tuple[list[Center], list[fl
 
 
 def _on_axis(mechanism: Mechanism, body: str, axis: Center) -> Center:
-    """Return a point of a body on an axis of it: of a joint that has the axis, else its origin."""
+    """Return a point of a body on one of its axes: that of a joint with this axis, or the origin."""
     for joint in mechanism.joints.values():
         for pair in facts_of(type(joint)).held_parallel:
             for of, name, end in zip(joint.bodies, pair, "ij", strict=False):

@@ -1,7 +1,7 @@
 """Drawn geometry of a mechanism: links through the points of their joints, joints as symbols.
 
-A mechanism holds no shapes. What is drawn follows from the points, axes and radii of its joints, drivers, forces and
-outputs, whatever their types, one's own included.
+A mechanism has no shapes. Its drawing follows from the points, axes and radii of its joints, drivers, forces and
+outputs of all types, including those of users.
 """
 
 from __future__ import annotations
@@ -33,25 +33,25 @@ Points = Float[np.ndarray, "points components"]
 Element = AbstractConstraint | AbstractForce
 Values = Mapping[str, np.ndarray]  # numbers and vectors of an element by field
 
-SLOTS = {"_i": 0, "_j": 1, "_m": 2}  # endings of fields, and the body that each is fixed to
-SAME = 1e-9  # points nearer than this, in sizes of the mechanism, are one
+SLOTS = {"_i": 0, "_j": 1, "_m": 2}  # suffixes of fields, and the body of each
+SAME = 1e-9  # sizes of the mechanism: points nearer to each other coincide
 
 
 @dataclass(frozen=True)
 class DrawnLink:
-    """What a body looks like: the points where something touches it, and the bars between them.
+    """Drawn shape of a body: the points of its joints and other elements, and the bars between them.
 
     Parameters
     ----------
     body : str
-        Its name; ``"ground"`` has no bars.
+        Name of the body; ``"ground"`` has no bars.
     points : numpy.ndarray of shape (points, components)
-        In the frame of the body, m; at least one.
+        Points in the frame of the body, m; at least one.
     names : tuple of tuple of str
-        Joints, drivers, forces and outputs at each point; none at a center of mass or an origin that stands in.
+        Joints, drivers, forces and outputs at each point; none at a center of mass or an origin added as a substitute.
     edges : tuple of tuple of int
-        Pairs of points with a bar between them: one, the closed outline of a plate, with bars to points beside it, or
-        for points that lie in no plane a tree.
+        Pairs of points with a bar between them: a single bar, the closed outline of a plate with bars to further
+        points, or a tree for points that are not in a plane.
     """
 
     body: str
@@ -62,29 +62,29 @@ class DrawnLink:
 
 @dataclass(frozen=True)
 class Symbol:
-    """A joint, driver or force as it is drawn.
+    """Drawn symbol of a joint, driver or force.
 
     Parameters
     ----------
     name, kind : str
-        Its name, and the symbol that its class states; ``gear`` also for a fixed ratio of two angles, ``rack`` for a
+        Name of the element, and symbol of its class; also ``gear`` for a fixed ratio of two angles, ``rack`` for a
         wheel that rolls along x or y, ``cam`` for a plate cam.
     bodies : tuple of str
-        Those it acts on, in the order i, j, m.
+        Bodies of the element, in the order i, j, m.
     points : tuple of numpy.ndarray
-        One on each body, in its frame, m; the center of a gear.
+        A point on each body, in its frame, m; for gears the center.
     axes : tuple of numpy.ndarray or None
-        Axis, direction of travel or normal on each body, in its frame, of any length. Of a rack, the first leads from
-        the center of the wheel to where they touch; the first of a coordinate is its direction, both in the global
+        Axis, direction of travel or normal on each body, in its frame, of any length. The first axis of a rack points
+        from the center of the wheel to the contact, and that of a coordinate is its direction, both in the global
         frame.
     radii : tuple of float or None
-        Pitch radii of gears, the radius of a wheel, of each body, m.
+        Pitch radius of a gear, or radius of a wheel, of each body, m.
     internal : bool, default False
-        Of gears: whether the smaller one turns inside the larger one.
+        Whether gears form an internal pair.
     curve : CurveLines
-        Lines on the first body that the point on the second stays on.
+        Lines on the first body that constrain the point of the second.
     crossed : bool, default False
-        Of belts: whether the strands cross.
+        Whether the strands of a belt cross.
     """
 
     name: str
@@ -99,36 +99,36 @@ class Symbol:
 
     @property
     def moving_slot(self) -> int:
-        """Which of the bodies the symbol is fixed to: one that moves, the last of them."""
+        """Number of the body to which the symbol is fixed: the last one that moves."""
         moving = [k for k, body in enumerate(self.bodies[:2]) if body != GROUND]
         return moving[-1] if moving else 0
 
     @property
     def block_and_rail(self) -> tuple[int, int]:
-        """Which of the bodies slides, and which has the rail: the ground, else the first body."""
+        """Numbers of the sliding body and of the body with the rail: the ground, or else the first body."""
         return (0, 1) if self.bodies[1] == GROUND else (1, 0)
 
     def axis_on(self, slot: int) -> Point:
-        """Return the axis or direction on one of the bodies, in its frame; x where there is none."""
+        """Return the axis or direction on one of the bodies, in its frame; x if it has none."""
         known = [axis for axis in (self.axes[slot], self.axes[1 - slot]) if axis is not None]
         return known[0] if known else np.eye(len(self.points[slot]))[0]
 
 
 @dataclass(frozen=True)
 class Wheel:
-    """A gear, or a wheel that rolls.
+    """A gear, or a rolling wheel.
 
     Parameters
     ----------
     body : str
     center : numpy.ndarray of shape (2,)
-        In the frame of the body, m.
+        Center in the frame of the body, m.
     radius : float
         Pitch radius, m.
     internal : bool
-        Whether it is a ring with its teeth inside.
+        Whether it is a ring gear with internal teeth.
     partner : float or None
-        Pitch radius of the gear it meshes with, m; None for a wheel without teeth.
+        Pitch radius of the meshing gear, m; None for a wheel without teeth.
     """
 
     body: str
@@ -140,16 +140,16 @@ class Wheel:
 
 @dataclass(frozen=True)
 class Skeleton:
-    """Links by body, the ground among them, joints as symbols, and the size of the whole.
+    """Drawn geometry of a mechanism: links by body, including the ground, symbols, and the size.
 
     Parameters
     ----------
     links : dict of str to DrawnLink
-        By name of the body.
+        Links by name of the body.
     symbols, drivers, forces : tuple of Symbol
         Joints, drivers and applied forces, in the order of the mechanism.
     size : float
-        Diagonal of the box around all points at the starting guess, m.
+        Diagonal of the bounding box of all points at the starting guess, m.
     """
 
     links: dict[str, DrawnLink]
@@ -160,12 +160,12 @@ class Skeleton:
 
     @cached_property
     def wheels(self) -> list[Wheel]:
-        """Gears and wheels in the plane, in the order of their joints; a gear of several pairs counts once."""
+        """Gears and wheels in the plane, in the order of their joints; a gear of several pairs occurs once."""
         wheels: list[Wheel] = []
         for symbol in self.symbols:
             radii = [radius for radius in symbol.radii if radius is not None]
             for body, center, radius in zip(symbol.bodies, symbol.points, symbol.radii, strict=True):
-                if radius is None or len(center) > 2:  # those in space are drawn about their axes
+                if radius is None or len(center) > 2:  # spatial wheels are drawn about their axes
                     continue
                 near = SAME * self.size
                 same = (w for w in wheels if w.body == body and np.allclose(w.center, center, rtol=0, atol=near))
@@ -177,7 +177,7 @@ class Skeleton:
 
 @dataclass
 class _Points:
-    """Points of one body as they are found, with the names of what is there."""
+    """Collected points of a body, with the names of the elements at each."""
 
     positions: list[np.ndarray] = field(default_factory=list)
     names: list[list[str]] = field(default_factory=list)
@@ -193,22 +193,22 @@ class _Points:
 
 
 def skeleton(mechanism: Mechanism) -> Skeleton:
-    """Return what a mechanism looks like, with its parameters resolved.
+    """Return the drawn geometry of a mechanism, with its parameters resolved.
 
     Parameters
     ----------
     mechanism : Mechanism
-        Planar or spatial.
+        A planar or spatial mechanism.
 
     Returns
     -------
     Skeleton
-        Lengths in m, in the frames of the bodies.
+        The geometry, lengths in m, in the frames of the bodies.
 
     Raises
     ------
     MechanismError
-        It is no mechanism, or a value in it does not fit.
+        If the argument is not a mechanism, or a value in it is not valid.
 
     Examples
     --------
@@ -245,7 +245,7 @@ def skeleton(mechanism: Mechanism) -> Skeleton:
     for body, points in bodies.items():
         _complete(body, points, mechanism, components, SAME * size)
         positions = np.array(points.positions)
-        is_held = [bool(holding.intersection(names)) for names in points.names]  # others are only watched
+        is_held = [bool(holding.intersection(names)) for names in points.names]  # other points are outputs only
         bars = () if body == GROUND else _bars(positions, SAME * size, is_held)
         links[body] = DrawnLink(body, positions, tuple(map(tuple, points.names)), bars)
     joints, drivers, forces = (
@@ -259,7 +259,7 @@ def skeleton(mechanism: Mechanism) -> Skeleton:
 
 
 def _values(element: Any, parameters: Mapping[str, Any], components: int, name: str) -> dict[str, np.ndarray]:
-    """Return the numbers and vectors of an element by field; laws and words are left out."""
+    """Return the numbers and vectors of an element by field, without laws and words."""
     values, signs = {}, facts_of(type(element)).signs
     for field_name, kind in field_kinds(type(element)).items():
         value = getattr(element, field_name)
@@ -280,7 +280,7 @@ def _slot(field_name: str) -> int:
 
 
 def _element_points(elements: Mapping[str, Any], values: Mapping[str, Values]) -> Iterator[tuple[str, str, Point]]:
-    """Return the name of each element, the body and the place in its frame, for all points of elements."""
+    """Yield the element, the body and the position in its frame of all points of elements."""
     for name, element in elements.items():
         for field_name, value in values[name].items():
             if value.ndim == 2:
@@ -290,7 +290,7 @@ def _element_points(elements: Mapping[str, Any], values: Mapping[str, Values]) -
 
 
 def _complete(body: str, points: _Points, mechanism: Mechanism, components: int, near: float) -> None:
-    """Add the center of mass, or the origin, to a body that has too few points to be seen."""
+    """Add the center of mass, or the origin, to a body with too few points to be visible."""
     if body != GROUND and len(points.positions) < 2:
         center = mechanism.bodies[body].center_of_mass
         if center is not None:
@@ -300,7 +300,7 @@ def _complete(body: str, points: _Points, mechanism: Mechanism, components: int,
 
 
 def _largest(points: list[Point], mechanism: Mechanism, kinds: Mapping[str, Mapping[str, Values]]) -> float:
-    """Return the largest length that is known where all points fall into one."""
+    """Return the largest known length of a mechanism whose points all coincide."""
     lengths = [float(np.linalg.norm(point)) for point in points]
     for kind, values in kinds.items():
         for name, values_of_kind in values.items():
@@ -312,7 +312,7 @@ def _largest(points: list[Point], mechanism: Mechanism, kinds: Mapping[str, Mapp
 
 
 def _bars(points: Points, near: float, is_held: list[bool]) -> tuple[tuple[int, int], ...]:
-    """Return the bars of a link: one between two points, the outline of points in one plane, else a tree."""
+    """Return the bars of a link: one between two points, the outline of points in a plane, or else a tree."""
     count = len(points)
     if count < 2:
         return ()
@@ -331,7 +331,7 @@ def _bars(points: Points, near: float, is_held: list[bool]) -> tuple[tuple[int, 
     corners = np.flatnonzero(is_held)
     if 3 <= len(corners) < count:
         inner = _bars(points[corners], near, [True] * len(corners))
-        if len(inner) >= 3 and inner[-1][1] == inner[0][0]:  # a plate, with what is watched beside it
+        if len(inner) >= 3 and inner[-1][1] == inner[0][0]:  # a plate, with bars to points of outputs
             ring = tuple((int(corners[i]), int(corners[j])) for i, j in inner)
             others = (k for k in range(count) if not is_held[k])
             distance = np.linalg.norm(points[:, None] - points[None, corners], axis=-1)
@@ -380,7 +380,7 @@ def _symbol(
 
 
 def _geared(mechanism: Mechanism, symbol: Symbol, coordinate: str, ratio: float) -> Symbol:
-    """Return the symbol of two gears, or of a wheel on a rack, where a joint of coordinates is one."""
+    """Return the symbol of a joint of coordinates, as two gears or as a wheel on a rack if it is one."""
     if ratio == 0 or symbol.bodies[0] == GROUND:
         return symbol
     if coordinate != "angle":

@@ -39,7 +39,7 @@ def draw_symbols(drawing: Drawing, mechanism: Mechanism) -> None:
             DRIVERS_AND_FORCES.get(symbol.kind, _unknown)(drawing, symbol)
     for name, output in mechanism.outputs.items():
         bodies = getattr(output, "bodies", ())
-        elsewhere = isinstance(output, SymmetricRollCenterOutput)  # its point is that of contact
+        elsewhere = isinstance(output, SymmetricRollCenterOutput)  # its point is the contact point
         if getattr(output, "point", None) is not None and len(bodies) == 1 and not elsewhere:
             link = seen.links[bodies[0]]
             for center in (point for point, names in zip(link.points, link.names, strict=True) if name in names):
@@ -50,13 +50,13 @@ def draw_symbols(drawing: Drawing, mechanism: Mechanism) -> None:
 
 
 def _says(label: Label, name: str, body: str, place: Flat, unit: float) -> bool:
-    """Return whether the name of a body, or of a joint at the place of an output, is that of the output already."""
+    """Return whether an output has the name of its body, or of a joint at its position, which is already written."""
     near = np.linalg.norm(label.anchor - place, axis=1) < 3.0 * unit
     return label.text == name and (label.owner == f"bodies.{body}" or bool(near.all()))
 
 
 def _draw_wheel(drawing: Drawing, wheel: Wheel) -> None:
-    """Draw a wheel with a mark that shows how it turns; one with its teeth inside is hollow."""
+    """Draw a wheel with a mark that shows its rotation; a ring gear is hollow."""
     body, radius, rim = wheel.body, wheel.radius, 1.2 * drawing.unit
     center, color = drawing.flat(drawing.at(body, wheel.center)), drawing.colors.get(body, INK)
     look = {"stroke": color, "layer": WHEELS, "owner": f"bodies.{body}"}
@@ -85,7 +85,7 @@ def _rod(drawing: Drawing, symbol: Symbol) -> None:
 
 
 def _slide(drawing: Drawing, symbol: Symbol, beyond: float) -> tuple[int, str]:
-    """Draw the rail of a joint; return the slot and the body of what slides on it."""
+    """Draw the rail of a joint, and return the slot and the name of the sliding body."""
     block, guide = symbol.block_and_rail
     point, start = drawing.global_point(symbol, block), symbol.points[guide]
     parts.rail(drawing, symbol.bodies[guide], point, symbol.axis_on(guide), beyond=beyond, start=start)
@@ -112,7 +112,7 @@ def _pin_in_slot(drawing: Drawing, symbol: Symbol) -> None:
 
 
 def _curve(drawing: Drawing, symbol: Symbol) -> None:
-    """Draw the curve of a body as a groove, or the lines of a surface, and what is held on it."""
+    """Draw the curve of a body as a groove, or the lines of a surface, with the point held on it."""
     body, held = symbol.bodies[0], drawing.global_point(symbol, 1)
     color = "#888888" if body == GROUND else drawing.colors.get(body, INK)
     for line in shown(symbol.curve, drawing.within(body, held), 4 * drawing.unit):
@@ -126,7 +126,7 @@ def _curve(drawing: Drawing, symbol: Symbol) -> None:
 
 
 def _cam(drawing: Drawing, symbol: Symbol) -> None:
-    """Draw the pitch curve of a plate cam, which a point of its follower describes on it, and the point as a roller."""
+    """Draw the pitch curve of a plate cam, which a point of its follower traces, and the point as a roller."""
     disc, _ = symbol.bodies
     held, color = drawing.global_point(symbol, 1), drawing.colors.get(disc, INK)
     pitch, whole = pitch_curve(drawing.within(disc, held))
@@ -137,7 +137,7 @@ def _cam(drawing: Drawing, symbol: Symbol) -> None:
 
 
 def _coordinate(drawing: Drawing, symbol: Symbol) -> None:
-    """Draw the line along which a body may move whose x or y is fixed; a fixed angle has no symbol."""
+    """Draw the line along which a body with a fixed x or y may move; a fixed angle has no symbol."""
     direction = symbol.axes[0]
     if direction is None or symbol.bodies[0] != GROUND:
         return
@@ -173,7 +173,7 @@ def _belt(drawing: Drawing, symbol: Symbol) -> None:
 
 
 def _rope(drawing: Drawing, symbol: Symbol) -> None:
-    """Draw a rope through its points, with its ends, and the places where it goes round."""
+    """Draw a rope through its points, with its ends and its guides."""
     points = [drawing.point(symbol, slot) for slot in range(len(symbol.bodies))]
     drawing.line(*points, width=1.4, stroke="#8A5A2B", layer=GUIDES)
     for k, (body, point) in enumerate(zip(symbol.bodies, points, strict=True)):
@@ -201,14 +201,14 @@ def _hinge(drawing: Drawing, symbol: Symbol) -> None:
 
 
 def _sliding_body(drawing: Drawing, symbol: Symbol, block: int) -> tuple[Flat, Float[np.ndarray, "time 3 3"], Any]:
-    """Return place, axes and look of what slides in space."""
+    """Return the position, axes and style of a body that slides in space."""
     body = symbol.bodies[block]
     axes, color = drawing.frame_along(body, symbol.axis_on(block)), drawing.colors.get(body, INK)
     return drawing.point(symbol, block), axes, {"stroke": color, "fill": tinted(color, 0.35), "width": 1.2}
 
 
 def _sleeve(drawing: Drawing, symbol: Symbol) -> None:
-    """Draw a sleeve on a shaft, which it may turn about; with a thread it is a nut on a screw."""
+    """Draw a sleeve that may turn on a shaft, or a nut on a screw."""
     block, _ = _slide(drawing, symbol, 3.5)
     point, axes, look = _sliding_body(drawing, symbol, block)
     if symbol.kind == "screw":
@@ -238,7 +238,7 @@ def _universal(drawing: Drawing, symbol: Symbol) -> None:
 
 
 def _shafts(drawing: Drawing, symbol: Symbol) -> None:
-    """Draw the wheels of two shafts, or one that rolls, each with a mark that shows how it turns."""
+    """Draw the wheels of two shafts, or a rolling wheel, each with a mark that shows its rotation."""
     for slot, (body, radius) in enumerate(zip(symbol.bodies[:2], symbol.radii, strict=False)):
         if radius is None or body == GROUND:
             continue
@@ -250,7 +250,7 @@ def _shafts(drawing: Drawing, symbol: Symbol) -> None:
 
 
 def _plane(drawing: Drawing, symbol: Symbol) -> None:
-    """Draw the plane of a body, as large as the point on it travels, and a ball at the point."""
+    """Draw the plane of a body, as large as the travel of the point on it, and a ball at the point."""
     body, point = symbol.bodies[0], drawing.global_point(symbol, 1)
     across = frame_along(symbol.axis_on(0))[1:]
     local = drawing.within(body, point)
@@ -265,11 +265,11 @@ def _plane(drawing: Drawing, symbol: Symbol) -> None:
 
 
 def _nothing(drawing: Drawing, symbol: Symbol) -> None:
-    """Draw nothing: what only keeps a direction has no place, and gears are drawn as wheels."""
+    """Draw nothing, as a constraint of directions has no position, and gears are drawn as wheels."""
 
 
 def _unknown(drawing: Drawing, symbol: Symbol) -> None:
-    """Draw a square at each point, and a dotted line between them: its class states no symbol."""
+    """Draw a square at each point, and a dotted line between them, for a class without a symbol."""
     points = [drawing.point(symbol, slot) for slot in range(len(symbol.bodies))]
     for point in points:
         corners = [point + 0.7 * drawing.unit * np.array(corner) for corner in parts.CORNERS]

@@ -1,4 +1,4 @@
-"""Names put near what they belong to, where they cover neither each other nor, as far as can be, the drawing."""
+"""Placement of names near their anchors, where they do not cover each other and, if possible, not the drawing."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from jounce.plot.drawings.scene import Scene, outline
 
 DIRECTIONS = 16
 DISTANCES = (1.7, 2.6, 3.8, 5.5, 8.0)  # of the nearest edge of a name, in units of the drawing
-LEADER = 3.0  # units, from which on a thin line leads from a name to its place
+LEADER = 3.0  # units: names farther from their anchor have a leader line
 SPACING = 4.0  # pixels between the points along a line that a name should not cover
-MOST_INSTANTS = 9  # at which the names of what moves are tried
-COST_OF_DISTANCE, COST_OF_BAR, COST_OF_SYMBOL = 3.0, 1.5, 4.0  # by unit, by place covered on a bar, on a pin or arrow
-COST_OF_OVERLAP, COST_OF_EDGE, COST_OF_STRANGER = 4.0, 5.0, 30.0  # by pixel of area, by pixel outside, if ambiguous
+MOST_INSTANTS = 9  # instants at which the names of moving elements are tried
+COST_OF_DISTANCE, COST_OF_BAR, COST_OF_SYMBOL = 3.0, 1.5, 4.0  # per unit, per covered point of a bar, of a symbol
+COST_OF_OVERLAP, COST_OF_EDGE, COST_OF_STRANGER = 4.0, 5.0, 30.0  # per pixel of area, per pixel outside, if ambiguous
 
 Pixels = Float[np.ndarray, "2"]
 Points = Float[np.ndarray, "points 2"]
@@ -27,16 +27,16 @@ Boxes = Float[np.ndarray, "boxes 4"]
 
 @dataclasses.dataclass(frozen=True)
 class NamePlace:
-    """Where a name is, seen from what it belongs to.
+    """Position of a name relative to its anchor.
 
     Parameters
     ----------
     direction : tuple of float
         Unit vector from the anchor to the center of the name, upward positive.
     distance : float
-        From the anchor to the edge of the name, in units of the drawing.
+        Distance from the anchor to the edge of the name, in units of the drawing.
     led : bool
-        Whether a thin line leads to it: where it is far, or nearer to the anchor of another name at some instant.
+        Whether the name has a leader line: if it is far, or nearer to the anchor of another name at some instant.
     """
 
     direction: tuple[float, float]
@@ -44,7 +44,7 @@ class NamePlace:
     led: bool
 
     def offset(self, half: Pixels, unit: float) -> Pixels:
-        """Return the vector from the anchor to the center of the name, pixels, by half its size and the unit."""
+        """Return the vector from the anchor to the center of the name, pixels, from half its size and the unit."""
         return _offsets(np.array([self.direction]), np.array([self.distance]), half, unit)[0]
 
 
@@ -56,30 +56,30 @@ def place_names(
     frame: Float[np.ndarray, "4"],
     taken: Boxes,
 ) -> list[NamePlace | None]:
-    """Choose the place of each name, which holds for all instants of a scene.
+    """Return the place of each name for all instants of a scene.
 
-    Names are placed one after the other, each where the sum of its costs at some instants is least: the distance, the
-    parts of the drawing and the other names that it covers, and anchors of other names that are nearer than its own.
+    Names are placed one after the other, each where the sum of its costs over some instants is least: its distance, the
+    parts of the drawing and other names that it covers, and anchors of other names that are nearer than its own.
 
     Parameters
     ----------
     labels : sequence of Label
-        What is written.
+        Names with their anchors.
     halves : sequence of numpy.ndarray of shape (2,)
         Half the width and half the height of each name, pixels.
     scene : Scene
-        What is drawn.
+        The drawn scene.
     to_pixels : callable
-        From points of the scene, (..., 2) m, to pixels, upward positive.
+        Function from points of the scene, (..., 2), m, to pixels, upward positive.
     frame : numpy.ndarray of shape (4,)
         Left, lower, right and upper end of the drawing, pixels.
     taken : numpy.ndarray of shape (boxes, 4)
-        Where other texts are.
+        Boxes of other texts.
 
     Returns
     -------
     list of NamePlace
-        None for a name whose anchor is not known at any instant.
+        Place of each name; None if its anchor is unknown at all instants.
     """
     unit = float(np.diff(to_pixels(np.array([[0.0, 0.0], [scene.unit, 0.0]])), axis=0)[0, 0])
     instants = _spread(max((len(label.anchor) for label in labels), default=1))
@@ -126,7 +126,7 @@ def _offsets(
     half: Pixels,
     unit: float,
 ) -> Float[np.ndarray, "candidate 2"]:
-    """Return vectors from an anchor to centers of a name, so that its edge has a distance from the anchor."""
+    """Return the vectors from an anchor to centers of a name, for distances of its edge from the anchor."""
     reach = np.minimum((half / np.maximum(np.abs(directions), 1e-9)).min(axis=1), half.max())
     return directions * (distances * unit + reach)[:, None]
 
@@ -134,7 +134,7 @@ def _offsets(
 def _drawn(
     scene: Scene, instant: int, to_pixels: Callable[[np.ndarray], np.ndarray]
 ) -> tuple[Points, Float[np.ndarray, " points"]]:
-    """Return covered along all lines that are drawn, pixels, and what covering each one costs."""
+    """Return points along all drawn lines, pixels, and the cost of covering each."""
     points, costs = [np.zeros((0, 2))], [np.zeros(0)]
     for shape in scene.shapes:
         corners = outline(shape, instant)
@@ -155,7 +155,7 @@ def _costs(
     others: Points,
     frame: Float[np.ndarray, "4"],
 ) -> Float[np.ndarray, " candidate"]:
-    """Return what the placements of a name cost at one instant, without their distance."""
+    """Return the costs of the candidate places of a name at one instant, without those of distance."""
     reach = np.abs(offsets).max(axis=0) + half + 2.0
     near = (np.abs(drawn - own) < reach).all(axis=1)
     low, high = own + offsets - half, own + offsets + half
@@ -172,18 +172,18 @@ def _costs(
 def _is_nearer_to_others(
     low: np.ndarray, high: np.ndarray, own: Pixels, anchors: Points
 ) -> Bool[np.ndarray, " candidate"]:
-    """Tell which boxes are nearer to another anchor than to their own, so that a name could be read as another's."""
-    strangers = anchors[np.linalg.norm(anchors - own, axis=1) > 2.0]  # a joint and its body may have one anchor
+    """Return the mask of boxes nearer to another anchor than to their own, whose names would be ambiguous."""
+    strangers = anchors[np.linalg.norm(anchors - own, axis=1) > 2.0]  # a joint and its body may share an anchor
     return np.any(_gap(low, high, strangers) <= _gap(low, high, own[None]) + 1.0, axis=1)
 
 
 def _gap(low: np.ndarray, high: np.ndarray, points: Points) -> Float[np.ndarray, "candidate points"]:
-    """Return how far points are from boxes, pixels."""
+    """Return the distances of points from boxes, pixels."""
     return np.linalg.norm(np.maximum(0.0, np.maximum(low[:, None] - points, points - high[:, None])), axis=2)
 
 
 def _along(corners: Points) -> Points:
-    """Return points along a line of corners, no farther apart than some pixels."""
+    """Return points along a polyline, at most `SPACING` pixels apart."""
     parts = [corners[:1]]
     for first, second in pairwise(corners):
         count = min(500, 1 + int(np.linalg.norm(second - first) / SPACING))

@@ -1,6 +1,6 @@
-"""A mechanism as flat shapes at many instants: what a sketch, an animation and a report draw.
+"""A mechanism as plane shapes at many instants, for sketches, animations and reports.
 
-Every shape has as many points at each instant, so that a drawing is made once and then moved.
+Every shape has the same number of points at each instant, so that a drawing is created once and then moved.
 """
 
 from __future__ import annotations
@@ -29,11 +29,11 @@ class Scene:
     Parameters
     ----------
     shapes : list of Shape
-        In the order in which they are drawn.
+        Shapes in drawing order.
     labels : list of Label
         Names of bodies and joints.
     unit : float
-        Size of half a pin, m.
+        Half the size of a pin, m.
     """
 
     shapes: list[Shape]
@@ -42,12 +42,12 @@ class Scene:
 
     @classmethod
     def of(cls, drawing: Drawing) -> Scene:
-        """Return what was drawn, lower layers first."""
+        """Return the scene of a drawing, lower layers first."""
         return cls(sorted(drawing.shapes, key=lambda shape: shape.layer), drawing.labels, drawing.unit)
 
     @cached_property
     def limits(self) -> tuple[float, float, float, float]:
-        """Left, right, lower and upper end of what is drawn at any instant, m."""
+        """Left, right, lower and upper end of the shapes over all instants, m."""
         low, high = [], []
         for shape in self.shapes:
             flat = shape.points.reshape(-1, 2)
@@ -68,7 +68,7 @@ class Scene:
 
 
 def scene_of(moving: Motion | Mechanism, *, view: View = VIEW, instants: Instants | None = None) -> Scene:
-    """Return the shapes of a mechanism; the arguments are those of `drawing_of`.
+    """Return the scene of a mechanism; the arguments are those of `drawing_of`.
 
     Examples
     --------
@@ -82,16 +82,16 @@ def scene_of(moving: Motion | Mechanism, *, view: View = VIEW, instants: Instant
 
 
 def drawing_of(moving: Motion | Mechanism, *, view: View = VIEW, instants: Instants | None = None) -> Drawing:
-    """Return a mechanism as it is drawn, at the instants of a motion or as it is assembled at the start.
+    """Return the drawing of a mechanism, at the instants of a motion or as assembled at the start.
 
     Parameters
     ----------
     moving : Motion or Mechanism
-        What is drawn.
+        The motion or mechanism to draw.
     view : tuple of float, optional
-        Azimuth and elevation from which a spatial mechanism is seen, degrees.
+        Azimuth and elevation of the viewer of a spatial mechanism, degrees.
     instants : array_like of int, optional
-        Indices of the instants of a motion; all unless given.
+        Indices of instants of the motion; all by default.
     """
     mechanism = moving if isinstance(moving, Mechanism) else moving.mechanism
     frames_of_bodies = assembled(moving) if isinstance(moving, Mechanism) else frames(moving)
@@ -106,7 +106,7 @@ def drawing_of(moving: Motion | Mechanism, *, view: View = VIEW, instants: Insta
 
 
 def _draw_link(drawing: Drawing, link: DrawnLink) -> None:
-    """Draw the bars of a body, or its plate, and write its name."""
+    """Draw the bars or the plate of a body, and write its name."""
     color, drawing.owner = drawing.colors[link.body], f"bodies.{link.body}"
     points = drawing.flat(drawing.at(link.body, link.points))  # time, n, 2
     ring = _ring(link)
@@ -123,7 +123,7 @@ def _draw_link(drawing: Drawing, link: DrawnLink) -> None:
 
 
 def _ring(link: DrawnLink) -> list[int]:
-    """Return the corners of the plate with which the bars of a link begin; none where it has no plate."""
+    """Return the corners of the plate of a link, whose outline is the first of its bars; none without a plate."""
     corners: list[int] = []
     for first, second in link.edges:
         corners.append(first)
@@ -133,7 +133,7 @@ def _ring(link: DrawnLink) -> list[int]:
 
 
 def outline(shape: Shape, instant: int) -> Float[np.ndarray, "points 2"]:
-    """Return the line around a shape at an instant, m."""
+    """Return the outline of a shape at an instant, m."""
     points = shape.points[min(instant, len(shape.points) - 1)]
     if shape.kind == "disc":
         angle = np.linspace(0.0, 2 * np.pi, 13)

@@ -1,4 +1,4 @@
-"""The pieces that symbols are made of: stands, pins, balls, rails, springs, cylinders, boxes, turning arrows."""
+"""Parts of symbols: supports, pins, balls, rails, springs, cylinders, boxes, arrows of rotation."""
 
 from __future__ import annotations
 
@@ -17,23 +17,23 @@ PAPER = "#FFFFFF"
 DASHES = (4.0, 2.0)
 CORNERS = ((-1, -1), (1, -1), (1, 1), (-1, 1))  # of a square
 DASH_DOT = (7.0, 2.0, 1.5, 2.0)
-LARGE = 3.0  # units: a larger circle would be seen to have corners where it has as few points as a pin
+LARGE = 3.0  # units: larger circles need more points than a pin to look round
 
 
 def unit_vector(vectors: Flat) -> Flat:
-    """Return flat vectors of length one; those that point at the viewer are drawn to the right."""
+    """Return plane vectors of unit length; vectors toward the viewer are drawn to the right."""
     length = np.linalg.norm(vectors, axis=-1, keepdims=True)
     small = length < 1e-9
     return np.where(small, np.array([1.0, 0.0]), vectors / np.where(small, 1.0, length))
 
 
 def normal_of(vectors: Flat) -> Flat:
-    """Return flat vectors turned by 90 degrees."""
+    """Return plane vectors rotated by 90 degrees."""
     return np.stack([-vectors[..., 1], vectors[..., 0]], axis=-1)
 
 
 def _hatching(drawing: Drawing, start: Flat, stop: Flat, side: np.ndarray, count: int) -> None:
-    """Draw the line of the ground with short strokes on one side of it."""
+    """Draw the ground as a line with hatching on one side."""
     u = drawing.unit
     drawing.line(start, stop, width=1.3, layer=GUIDES)
     along = unit_vector(stop - start)
@@ -43,7 +43,7 @@ def _hatching(drawing: Drawing, start: Flat, stop: Flat, side: np.ndarray, count
 
 
 def draw_ground_support(drawing: Drawing, symbol: Symbol) -> None:
-    """Draw the stand of a joint whose one body is the ground, once where several joints share it."""
+    """Draw the support of a joint to the ground, once for several joints at the same point."""
     if GROUND not in symbol.bodies[:2]:
         return
     u, point = drawing.unit, drawing.point(symbol, symbol.bodies.index(GROUND))
@@ -77,10 +77,9 @@ def rail(
     beyond: float = 2.6,
     start: Point | None = None,
 ) -> None:
-    """Draw the line of a body along which global points move, hatched where it is the ground.
+    """Draw the line of a body along which global points move, hatched if the body is the ground.
 
-    The points stand on the line, at least about; `beyond` is how far it goes on, in units. A moving body has its line
-    from where it is held, `start` in its frame.
+    The line extends beyond the points by `beyond`, in units. The line of a moving body starts at its joint.
     """
     u = drawing.unit
     local = drawing.within(body, points)
@@ -99,7 +98,7 @@ def rail(
         return
     direction = unit_vector(last - first)
     side = normal_of(direction)
-    side = np.where(side[:, 1:] > 1e-9, -side, side)  # strokes below the line, or to its left where it stands
+    side = np.where(side[:, 1:] > 1e-9, -side, side)  # hatching below the line, or to the left of a vertical one
     side = np.where((np.abs(side[:, 1:]) <= 1e-9) & (side[:, :1] > 0), -side, side)
     if drawing.planar:
         shift, count = 0.9 * u * side, int(np.clip((high - low) / (0.8 * u), 4, 40))
@@ -111,7 +110,7 @@ def rail(
 
 
 def spring(drawing: Drawing, first: Flat, second: Flat, *, turns: int = 6) -> None:
-    """Draw a zigzag between two places."""
+    """Draw a zigzag spring between two points."""
     u = drawing.unit
     share = np.concatenate([[0.0], np.linspace(0.14, 0.86, 2 * turns + 1), [1.0]])
     offset = np.zeros(len(share))
@@ -122,7 +121,7 @@ def spring(drawing: Drawing, first: Flat, second: Flat, *, turns: int = 6) -> No
 
 
 def actuator(drawing: Drawing, first: Flat, second: Flat) -> None:
-    """Draw a cylinder that stands at the first place, and its rod, which reaches to the second."""
+    """Draw a cylinder at the first point, with its rod to the second."""
     u = drawing.unit
     distance = np.linalg.norm(second - first, axis=-1)
     finite = distance[np.isfinite(distance)]
@@ -135,18 +134,18 @@ def actuator(drawing: Drawing, first: Flat, second: Flat) -> None:
 
 
 def turn(drawing: Drawing, center: Flat, plane: Float[np.ndarray, "time 2 2"], *, spiral: bool = False) -> None:
-    """Draw an arrow that turns about a point, or a spiral spring.
+    """Draw an arrow of rotation about a point, or a spiral spring.
 
     Parameters
     ----------
     drawing : Drawing
-        Drawn on.
+        The drawing.
     center : numpy.ndarray of shape (time, 2)
-        Flat.
+        Projected center.
     plane : numpy.ndarray of shape (time, 2, 2)
-        Two unit vectors across the axis, flat, in rows.
+        Projections of two unit vectors perpendicular to the axis, in rows.
     spiral : bool, default False
-        Whether it is a spring.
+        Whether to draw a spring.
     """
     u = drawing.unit
     angle = np.linspace(0.0, 5.0 * np.pi, 61) if spiral else np.radians(np.linspace(-50.0, 195.0, 25))
@@ -169,15 +168,15 @@ def cylinder(drawing: Drawing, center: Flat, axes: Axes, size: tuple[float, floa
     Parameters
     ----------
     drawing : Drawing
-        Drawn on.
+        The drawing.
     center : numpy.ndarray of shape (time, 2)
-        Flat.
+        Projected center.
     axes : numpy.ndarray of shape (time, 3, 3)
         Global unit vectors in rows, the first along the axis.
     size : tuple of float
         Half the length and the radius, in units.
     **look
-        Of the shapes.
+        Style of the shapes.
     """
     half, radius = (value * drawing.unit for value in size)
     axis = half * drawing.flat(axes[:, 0])
@@ -199,7 +198,7 @@ def cylinder(drawing: Drawing, center: Flat, axes: Axes, size: tuple[float, floa
 def box(drawing: Drawing, center: Flat, axes: Axes, size: tuple[float, float, float], **look: Any) -> None:
     """Draw the three sides of a box that face the viewer, in space.
 
-    The arguments are those of `cylinder`; the size is half of each edge, along the three axes, in units.
+    The arguments are those of `cylinder`; the size is half of the edges along the three axes, in units.
     """
     halves = drawing.flat(axes) * np.array(size)[:, None] * drawing.unit  # time, 3, 2
     facing = np.where(drawing.depth(axes) >= 0, 1.0, -1.0)  # time, 3
