@@ -1,9 +1,9 @@
-"""The command ``jounce``: one thin function per command; the work is done by the subpackages below.
+"""The command ``jounce``: one thin function per command; the subpackages below do the work.
 
-Everything that a command needs is imported when it runs, so that none waits for the libraries of another. Results go to
-standard output, messages to standard error; the exit status is 0 for success, 2 for bad input, and 1 where a solve
-failed at some instants (the others are still printed and written), a limit is broken, what is inspected cannot start to
-move, or a result could not be written.
+A command imports its libraries when it runs, so that no command waits for those of another. Results go to standard
+output, messages to standard error. The exit status is 0 for success, 2 for bad input, and 1 if a solve failed at some
+instants (the others are still printed and written), a limit is broken, an inspected mechanism cannot start to move, or
+a result could not be written.
 """
 
 from __future__ import annotations
@@ -80,7 +80,7 @@ COMMANDS = (
     doctor,
 )  # fmt: skip
 LIGHT = (new, example, completion)  # they compute nothing
-GARBAGE = 50_000  # new objects before the collector looks: imports and traces leave none, and 700 take 0.2 s of a run
+GARBAGE = 50_000  # threshold of the collector: imports and traces leave no garbage, and the default costs 0.2 s a run
 FIRST = """\
   jounce new four-bar                          # a commented starter file
   jounce inspect four-bar.yaml                 # what is in it, can it move?
@@ -104,21 +104,21 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Parameters
     ----------
     arguments : sequence of str, optional
-        Those of the process unless given.
+        Arguments, by default those of the process.
 
     Returns
     -------
     int
-        0 success, 2 bad input, 1 a solve or a writing that failed or a limit that is broken, 130 interrupted. As a
-        command, the process ends on signals by itself, see `jounce.base.interrupts`.
+        0 for success, 2 for bad input, 1 if solving or writing failed or a limit is broken, 130 if interrupted. Run as
+        a command, the process ends on signals by itself, see `jounce.base.interrupts`.
     """
     given = list(sys.argv[1:] if arguments is None else arguments)
     if arguments is None:
         end_on_signals()
-        gc.freeze()  # the collector need not look at the libraries again: 0.15 s of a short run
+        gc.freeze()  # exempts the libraries from collection: 0.15 s of a short run
         gc.set_threshold(GARBAGE)
     for name in ("COLUMNS", "LINES"):
-        if not re.fullmatch("[1-9][0-9]{0,3}", os.environ.get(name, "1")):  # 0 is "unknown" to some, nothing to others
+        if not re.fullmatch("[1-9][0-9]{0,3}", os.environ.get(name, "1")):  # the meaning of 0 varies
             del os.environ[name]
     as_json = "--json" in given
     verbose, given = "--verbose" in given, [each for each in given if each != "--verbose"]
@@ -136,7 +136,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _settings() -> AbstractContextManager[Any]:
-    """Return the context for a command in the process of another program; one of its own has it from the start."""
+    """Return the settings for a command in the process of another program; a process of its own already has them."""
     if is_command():
         return nullcontext()
     from jounce.settings import own_settings
@@ -145,7 +145,7 @@ def _settings() -> AbstractContextManager[Any]:
 
 
 def _end_at_once(status: int) -> None:
-    """End the process without waiting for programs that threads still compile, which are not needed any more."""
+    """End the process without waiting for programs that threads still compile but nobody needs."""
     if "jounce.execution.background" not in sys.modules:
         return
     from jounce.execution.background import is_compiling
@@ -157,7 +157,7 @@ def _end_at_once(status: int) -> None:
 
 
 def _status(given: list[str], as_json: bool, verbose: bool) -> int:
-    """Return the exit status of a command, and print its error, with all that is known of it if verbose."""
+    """Run a command, print its error, with all details if verbose, and return the exit status."""
     try:
         with _settings():
             return _dispatch(given)
@@ -216,9 +216,9 @@ def application() -> Any:
 
 
 def _computing(command: Callable[..., int]) -> Callable[..., int]:
-    """Return a command that keeps the programs that it compiles; JAX is imported when it runs, not before.
+    """Return a command that stores the programs that it compiles, and imports JAX only when it runs.
 
-    Where its first file is misspelled, the command says so before that, in a fraction of a second.
+    If its first file does not exist, the command fails before the import, in a fraction of a second.
     """
 
     @functools.wraps(command)

@@ -1,4 +1,4 @@
-"""How words of the command line become values: strictly, as what is rounded or dropped would not be noticed."""
+"""Strict conversion of words of the command line to values, without silent rounding or truncation."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ _WHOLE = re.compile(r"[+-]?[0-9]{1,18}(\.0*)?")
 
 
 def converted(kind: Any, tokens: Sequence[Any]) -> Any:
-    """Return the value of an option; cyclopts alone takes 2.5 as 2, and numbers that are not finite.
+    """Return the value of an option; cyclopts itself converts 2.5 to 2, and accepts numbers that are not finite.
 
     Raises
     ------
     JounceError
-        A number is not whole where it must be, or not finite.
+        If a number must be whole and is not, or is not finite.
     """
     import cyclopts
 
@@ -44,7 +44,7 @@ def _number(kind: type, token: Any) -> int | float:
 
 
 def check_ending(path: Path, valid: Sequence[str]) -> None:
-    """Raise MechanismFileError unless a file has one of the endings; what a folder is, its reader says."""
+    """Raise MechanismFileError unless a file has one of the suffixes; folders are left to their reader."""
     suffix = path.suffix.lower()
     if suffix not in valid and not path.is_dir():
         raise MechanismFileError(

@@ -1,4 +1,4 @@
-"""Compiled programs kept between calls of the command."""
+"""Storage of compiled programs between calls of the command."""
 
 from __future__ import annotations
 
@@ -11,10 +11,7 @@ from jounce.execution.store.folder import ProgramFolder, chosen_folder
 
 
 def keep_programs(folder: PrivateFolder) -> bool:
-    """Have JAX keep its programs in checked files; a release of JAX that works otherwise keeps them in its own.
-
-    Returns whether they are in checked files.
-    """
+    """Configure JAX to store its programs in checked files, and return whether its release supports that."""
     import jax
 
     from jounce.base.jax_internals import use_file_cache
@@ -22,14 +19,14 @@ def keep_programs(folder: PrivateFolder) -> bool:
     jax.config.update("jax_compilation_cache_dir", str(folder.path))
     jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.01)
     jax.config.update("jax_persistent_cache_min_entry_size_bytes", 0)
-    jax.config.update("jax_persistent_cache_enable_xla_caches", "none")  # those are for GPUs
+    jax.config.update("jax_persistent_cache_enable_xla_caches", "none")  # for GPUs only
     return use_file_cache(lambda path: (ProgramFolder(folder), path))
 
 
 def use_compilation_cache(*, quiet: bool = False) -> None:
-    """Keep compiled programs between calls of the command, unless JAX has a folder or this one is out of reach.
+    """Store compiled programs between calls of the command, unless JAX has a folder or ours is not accessible.
 
-    A folder in which others may write is not used, and a line on standard error says so, unless that is to be `quiet`.
+    A folder in which other users may write is not used; a line on standard error reports it, unless `quiet`.
     """
     import warnings
 
@@ -47,7 +44,7 @@ def use_compilation_cache(*, quiet: bool = False) -> None:
         if not quiet:
             sys.stderr.write(f"compiled programs are not stored: {error}\n")
         return
-    except (RuntimeError, ValueError):  # there is no home, or a name that no file can have
+    except (RuntimeError, ValueError):  # without a home folder, or with an invalid name
         return
     store.run_one_command()
     store.use_store(ProgramFolder(folder))

@@ -1,4 +1,4 @@
-"""What a file is that was given for something else, so that a message can say who takes it."""
+"""The kind of a file given in place of another, for messages that name the command for it."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def is_data_file(argument: object) -> bool:
 
 
 def kind_of(path: str | PathLike[str]) -> str | None:
-    """Return ``mechanism``, ``robot``, ``trajectory``, ``cam``, ``drives`` or ``limits``; None if nothing tells it.
+    """Return ``mechanism``, ``robot``, ``trajectory``, ``cam``, ``drives`` or ``limits``; None if unknown.
 
     Examples
     --------
@@ -83,12 +83,12 @@ def _kind_of_data(data: Any) -> str | None:
 
 @contextmanager
 def explaining_other_kinds(path: str | PathLike[str], *kinds: str) -> Iterator[None]:
-    """Where a file of a kind cannot be read, say which kind it is instead, and what takes it.
+    """Replace the error for an unreadable file by one that names its actual kind and the command for it.
 
     Raises
     ------
     JounceError
-        As was raised, or one that names the other kind.
+        The original error, or one that names the other kind.
     """
     try:
         yield

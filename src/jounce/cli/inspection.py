@@ -1,4 +1,4 @@
-"""The command that tells what is in a file before anything moves."""
+"""The command that prints the contents of a file and its start."""
 
 from __future__ import annotations
 
@@ -97,7 +97,7 @@ def inspect(
 
 
 def _robot(file: Path, reading: MechanismReading, of_robot: RobotReading, reader: str | None) -> dict[str, Any]:
-    """Return what is in a robot file, and how another program numbers its coordinates."""
+    """Return the facts of a robot file, and the numbering of its coordinates by another program."""
     reading.refuse_times(file)
     if reading.set_:
         raise JounceError("is for mechanism files; a robot file has no parameters", name="--set", path=file)
@@ -117,7 +117,7 @@ def _robot(file: Path, reading: MechanismReading, of_robot: RobotReading, reader
 
 
 def _mechanism(file: Path, reading: MechanismReading, driver: str | None, *, range_: bool) -> dict[str, Any]:
-    """Return what is in a mechanism file, and how far a driver goes."""
+    """Return the facts of a mechanism file, and the range of a driver."""
     from jounce.reporting.facts.mechanism.mechanism_facts import inspected
 
     mechanism = reading.mechanism(file)

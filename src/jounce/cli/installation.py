@@ -1,4 +1,4 @@
-"""The command that says what an installation has and whether it computes what it should."""
+"""The command that describes an installation and tests its results."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from jounce.reporting.terminal import print_text, say_json, show_columns
 PACKAGES = ("jax", "jaxlib", "numpy", "scipy", "xarray", "llvmlite", "pydantic", "pint", "matplotlib")
 FOR_DEVELOPERS = ("test", "bench", "docs", "all")
 VARIABLES = ("JOUNCE_CACHE_DIR", "JOUNCE_THREADS", "JOUNCE_NATIVE", "JOUNCE_DEBUG", "JAX_PLATFORMS", "XLA_FLAGS")
-LARGEST_ERROR = 1e-12  # of the peak of each derivative
+LARGEST_ERROR = 1e-12  # relative to the peak of each derivative
 
 
 def doctor(*, json: bool = False) -> int:
@@ -106,7 +106,7 @@ def _devices() -> dict[str, str]:
 
 
 def _extras() -> dict[str, str]:
-    """Return which optional packages are there, by extra."""
+    """Return the installed optional packages by extra."""
     extras: dict[str, str] = {}
     needed: dict[str, list[str]] = {}
     for requirement in importlib.metadata.requires("jounce") or ():
@@ -134,7 +134,7 @@ def _environment() -> dict[str, str]:
 
 
 def _tests() -> dict[str, float]:
-    """Return the largest errors, in parts of the peak of each derivative, of what has a closed form."""
+    """Return the largest errors of tests with closed forms, relative to the peak of each derivative."""
     import numpy as np
 
     from jounce.constraints import drivers, planar
@@ -160,7 +160,7 @@ def _tests() -> dict[str, float]:
 
     pendulum = from_screws([JointAxis([0, 1, 0], inertia=Inertia(2.0, [0.5, 0, 0]))])
     q = np.stack([np.sin(time), np.cos(time), -np.sin(time), -np.cos(time)], axis=1)[..., None]
-    weight = 2.0 * 9.81 * 0.5  # m g l; the axis of y turns x down
+    weight = 2.0 * 9.81 * 0.5  # m g l; a rotation about y turns x downward
     torque = np.stack([
         -0.5 * np.sin(time) - weight * np.cos(np.sin(time)),
         -0.5 * np.cos(time) + weight * np.sin(np.sin(time)) * np.cos(time),

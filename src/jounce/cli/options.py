@@ -1,4 +1,4 @@
-"""What commands have in common: how files are read, where results go, and which option or file an error is about."""
+"""Common options of commands: reading of files, output of results, and the option or file named in errors."""
 
 from __future__ import annotations
 
@@ -22,10 +22,10 @@ if TYPE_CHECKING:
     from jounce.units.shown_units import ShownUnits
 
 Overwrite = Annotated[bool, Parameter(alias="--force")]
-"""The option of commands that replace no file unasked; --force is what it was called first."""
+"""The option with which commands may replace files; --force is its former name."""
 
 AMONG_THE_OTHERS = Parameter(name="*")
-"""The fields of a class are options of the command, beside those that it names itself."""
+"""Makes the fields of a class options of the command."""
 
 
 OPTIONS = {
@@ -48,13 +48,13 @@ OPTIONS = {
     "topic",
     "joints",
 }
-"""Arguments that are options of the same name, but those of another."""
+"""Options by the arguments of library functions, which mostly have the same name."""
 
 RENAMED = {"of": "output"}
 
 
 class WritingError(Exception):
-    """A result that was computed could not be written."""
+    """Raised if a computed result could not be written."""
 
 
 @AMONG_THE_OTHERS
@@ -86,12 +86,12 @@ class MechanismReading:
     units: list[str] | None = None
 
     def refuse_times(self, file: Path) -> None:
-        """Refuse other instants for a file that holds no mechanism."""
+        """Raise an error if other instants are given for a file without a mechanism."""
         if self.times is not None:
             raise JounceError("is for mechanism files", name="--times", value=self.times, path=file)
 
     def mechanism(self, file: Path) -> Mechanism:
-        """Return the mechanism of a file, with parameters changed, after the user's own classes were imported."""
+        """Return the mechanism of a file with changed parameters, after importing the classes of the user."""
         from jounce.io import load
 
         import_files(self.import_)
@@ -149,9 +149,9 @@ class RobotReading:
     closures: Path | None = None
 
     def robot(self, file: Path, *, carries: bool = False) -> Robot:
-        """Return the robot of a file, with what it holds all the time.
+        """Return the robot of a file, with its permanent payload.
 
-        With `carries`, what it holds for a part of a motion is left to `loads`; otherwise that is refused.
+        With `carries`, loads during parts of a motion are left to `loads`; otherwise they are refused.
         """
         from jounce.io import load_robot
         from jounce.io.robots.payloads import with_payloads
@@ -163,15 +163,15 @@ class RobotReading:
         return with_payloads(robot, [text for text in self.payload or () if not (carries and "@" in text)])
 
     def loads(self, robot: Robot, *, moving: bool = False) -> list[CarriedLoad]:
-        """Return what a robot carries for parts of a motion."""
+        """Return the loads that a robot carries during parts of a motion."""
         from jounce.io.robots.payloads import parsed_loads
 
         return parsed_loads(robot, [text for text in self.payload or () if "@" in text], moving=moving)
 
     def trajectory(self, file: Path, robot: Robot, *, samples: bool = False) -> JointTrajectory:
-        """Return the trajectory of a file, whose joints are those of a robot where it names none.
+        """Return the trajectory of a file; without names of joints, it is that of the joints of the robot.
 
-        With `samples`, of samples their positions alone with straight lines between them, as where they are smoothed.
+        With `samples`, only the positions of samples are used, with straight lines between them, as for smoothing.
         """
         from jounce.io import load_trajectory
 
@@ -189,7 +189,7 @@ class RobotReading:
 
     @property
     def chosen(self) -> list[str] | None:
-        """Joints of the trajectory that are read; None for all."""
+        """Joints to read from the trajectory; None for all."""
         if self.joints is None:
             return None
         return [name.strip() for text in self.joints for name in text.split(",")]
@@ -229,7 +229,7 @@ class TableOutput:
             written(lambda: write(dataset(), out, overwrite=self.overwrite, header_units=header_units))
 
     def write_parts(self, parts: Iterable[Any], count: int, *, header_units: bool | None = None) -> None:
-        """Write values that come in parts along time, with so many instants in all; if unwanted, only go through."""
+        """Write values that arrive in parts along time, `count` instants in all; without a file, only iterate."""
         if (out := self.out) is None:
             for _ in parts:
                 pass
@@ -261,12 +261,12 @@ class Heading:
 
     @property
     def units(self) -> bool | None:
-        """Whether it says units; None where it does if they are not those of SI.
+        """Whether the heading has units; None if it has them only for units other than SI.
 
         Raises
         ------
         JounceError
-            Both are requested.
+            If both options are given.
         """
         if self.header_units and self.plain_header:
             raise JounceError("cannot be given together with --header-units", name="--plain-header")
@@ -274,7 +274,7 @@ class Heading:
 
 
 def units_chosen(known: ShownUnits, texts: Sequence[str] | None) -> ShownUnits:
-    """Return the units of a file with those of the option --units in their place."""
+    """Return the units of a file, overridden by those of the option --units."""
     from jounce.units.shown_units import units_given
 
     given = units_given(texts or ())
@@ -297,7 +297,7 @@ def print_result(command: str, result: Callable[[], Mapping[str, Any]], out: Pat
 
 
 def import_files(paths: Sequence[Path] | None) -> None:
-    """Run Python files with the user's own classes."""
+    """Run Python files with classes of the user."""
     if paths:
         from jounce.io.mechanisms.user_classes import import_file
 
@@ -306,7 +306,7 @@ def import_files(paths: Sequence[Path] | None) -> None:
 
 
 def allowed(folders: Sequence[Path] | None) -> Sequence[Path]:
-    """Return the folders that named files may be in, each of which must exist."""
+    """Return the folders allowed for files that are named in files; each must exist."""
     from jounce.io.files.reading import check_allowed
 
     try:
@@ -318,7 +318,7 @@ def allowed(folders: Sequence[Path] | None) -> Sequence[Path]:
 
 
 def spare_inputs(out: Path | None, *, overwrite: bool) -> None:
-    """Raise OutputError where a result would replace what has been read; meant to be asked once all is read."""
+    """Raise OutputError if a result would replace a file that was read; to be called after reading."""
     if out is not None:
         from jounce.io.files.writing import check_target
 
@@ -326,7 +326,7 @@ def spare_inputs(out: Path | None, *, overwrite: bool) -> None:
 
 
 def written(write: Callable[[], object]) -> None:
-    """Call a function that writes a result; what fails then is no bad input."""
+    """Call a function that writes a result, with its errors marked as errors of writing rather than of input."""
     try:
         write()
     except OutputError as error:
@@ -335,7 +335,7 @@ def written(write: Callable[[], object]) -> None:
 
 @contextmanager
 def errors_about(file: Path, robot: Path | None = None) -> Iterator[None]:
-    """Give errors the option or the file that they are about."""
+    """Add the option or the file to errors."""
     try:
         yield
     except JounceError as error:
@@ -348,7 +348,7 @@ def errors_about(file: Path, robot: Path | None = None) -> Iterator[None]:
 
 
 def positive_quantity(option: str, text: str, dimensions: Collection[Dimension], words: str) -> float:
-    """Return a number greater than zero in SI units, of a text that may have a unit of one of some dimensions."""
+    """Return the positive number in a text, in SI units; its unit, if any, must have one of the dimensions."""
     from jounce.units.values import parse_value
 
     try:
@@ -371,7 +371,7 @@ CURVE_OPTIONS = {"driver": "--driver", "order": "--order", "count": "--points", 
 
 @contextmanager
 def options_named() -> Iterator[None]:
-    """Give errors about an argument of a trace the option that it came from."""
+    """Add the option to errors about arguments of a trace."""
     try:
         yield
     except JounceError as error:

@@ -1,4 +1,4 @@
-"""The motion of a robot file under forces of its joints, for `jounce simulate`."""
+"""The motion of a robot file under joint forces, for `jounce simulate`."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 @AMONG_THE_OTHERS
 @dataclass(frozen=True, kw_only=True)
 class RobotRun:
-    """How a robot file is simulated.
+    """Settings of the simulation of a robot file.
 
     Parameters
     ----------
@@ -51,7 +51,7 @@ class RobotRun:
     closures: Path | None = None
 
     def given(self) -> list[str]:
-        """Return the names of the options that are given."""
+        """Return the names of the given options."""
         plain = RobotRun()
         return [name for name in self.__dataclass_fields__ if getattr(self, name) != getattr(plain, name)]
 
@@ -61,7 +61,7 @@ class RobotRun:
         Raises
         ------
         JounceError
-            The end or their number cannot be.
+            If the end or the number of instants is not valid.
         """
         import numpy as np
 
@@ -80,7 +80,7 @@ class RobotRun:
         return np.linspace(0.0, stop, self.instants)
 
     def state(self, robot: Robot) -> Any:
-        """Return the coordinates at the start, at rest."""
+        """Return the start state: coordinates, at rest."""
         import numpy as np
 
         from jounce.io.files.assignments import assignments
@@ -119,7 +119,7 @@ def simulate_robot_file(
     tolerance: float,
     longest_step: float,
 ) -> int:
-    """Move a robot by the forces of its joints, print its peaks and energy, and write its coordinates."""
+    """Simulate a robot under joint forces, print its peaks and energy, and write its coordinates."""
     from jounce.integrate import simulate
     from jounce.kinematics.position_analysis.solve import raise_for_status
     from jounce.reporting.json.results import robot_motion_result

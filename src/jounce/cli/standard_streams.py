@@ -1,4 +1,4 @@
-"""Standard output and standard error that may be closed, full, or read by nobody, while the work goes on."""
+"""Standard output and standard error that may be closed, full, or without a reader, while the work continues."""
 
 from __future__ import annotations
 
@@ -11,17 +11,17 @@ from typing import Any
 
 
 class FailSafeStream:
-    """A stream whose first failure is kept, not raised: what else a command does is done all the same.
+    """A stream that records its first failure instead of raising it, so that the command continues.
 
     Parameters
     ----------
     stream : file object, optional
-        None is one that was closed before the process began.
+        The stream; None if it was closed before the process started.
 
     Attributes
     ----------
     failure : Exception or None
-        Why text was lost. That nobody reads any more (``| head``) is no failure.
+        The reason why text was lost. A closed pipe (``| head``) is not a failure.
     """
 
     def __init__(self, stream: Any):
@@ -30,23 +30,23 @@ class FailSafeStream:
         self.failure: Exception | None = None
 
     def write(self, text: str) -> int:
-        """Write text, or lose it."""
+        """Write text; it is lost after a failure."""
         if self._given is None and text:
             self.failure = OSError(errno.EBADF, os.strerror(errno.EBADF))
         self._attempt("write", text)
         return len(text)
 
     def writelines(self, lines: Any) -> None:
-        """Write pieces of text."""
+        """Write several texts."""
         for line in lines:
             self.write(line)
 
     def flush(self) -> None:
-        """Write what is waiting to be written."""
+        """Write buffered text."""
         self._attempt("flush")
 
     def isatty(self) -> bool:
-        """Tell whether it goes to a terminal."""
+        """Return whether the stream is a terminal."""
         return self._given is not None and self._given.isatty()
 
     def _attempt(self, method: str, *arguments: Any) -> None:
@@ -58,7 +58,7 @@ class FailSafeStream:
             if not isinstance(error, BrokenPipeError):
                 self.failure = error
             self._stream = None
-            with suppress(OSError, ValueError, AttributeError):  # or the interpreter tries again when it ends
+            with suppress(OSError, ValueError, AttributeError):  # otherwise the interpreter tries again at exit
                 nowhere = os.open(os.devnull, os.O_WRONLY)
                 os.dup2(nowhere, self._given.fileno())
                 os.close(nowhere)
@@ -71,7 +71,7 @@ class FailSafeStream:
 
 @contextmanager
 def failsafe_streams() -> Iterator[FailSafeStream]:
-    """Give standard output, which lasts meanwhile; characters that cannot be encoded are written as codes."""
+    """Yield a fail-safe standard output; characters that cannot be encoded are written as codes."""
     before: tuple[Any, Any] = (sys.stdout, sys.stderr)
     for stream in before:
         with suppress(AttributeError, ValueError):

@@ -1,4 +1,4 @@
-"""The command that shows a mechanism or a robot in the browser."""
+"""The command that shows a moving mechanism or robot in the browser."""
 
 from __future__ import annotations
 

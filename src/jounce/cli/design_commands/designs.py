@@ -1,4 +1,4 @@
-"""The command that makes a design better, and writes it as a file that runs."""
+"""The command that optimizes a design, and writes it to a mechanism file."""
 
 from __future__ import annotations
 
@@ -148,7 +148,7 @@ def _bounds(given: dict[str, str]) -> dict[str, tuple[Any, Any]]:
 
 
 def _points(name: str, path: str) -> Any:
-    """Return the points of a file, with their times where it has some."""
+    """Return the points of a file, with their times if it has any."""
     from jounce.io.files.samples import read_points
 
     try:
@@ -159,7 +159,7 @@ def _points(name: str, path: str) -> Any:
 
 
 def _numbers(text: str | None) -> str | Sequence[int] | None:
-    """Return numbers of assemblies."""
+    """Return the numbers of assemblies in a text."""
     if text is None or text.strip() == "all":
         return text and text.strip()
     try:
@@ -170,7 +170,7 @@ def _numbers(text: str | None) -> str | Sequence[int] | None:
 
 @contextmanager
 def _errors_about(file: Path) -> Iterator[None]:
-    """Give errors the option or the file that they are about."""
+    """Add the option or the file to errors."""
     try:
         yield
     except DesignError as error:

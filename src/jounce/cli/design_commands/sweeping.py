@@ -1,4 +1,4 @@
-"""The command that computes designs by the million, and goes on where it was interrupted."""
+"""The command that computes up to millions of designs, and resumes interrupted sweeps."""
 
 from __future__ import annotations
 
@@ -107,7 +107,7 @@ def sweep(
     from jounce.sweeps.sweeping import prepare, run
 
     forms = named_forms(vary)
-    find(out)  # before anything is read
+    find(out)  # checks the folder before anything is read
     with recording() as files:
         problem = _problem(file, trajectory, order, reading, payload, simulate, (method, tolerance, longest_step))
     if (mechanism := getattr(problem, "mechanism", None)) is not None:
@@ -146,7 +146,7 @@ def _problem(
     simulate: bool,
     integration: tuple[str | None, float | None, float],
 ) -> Problem:
-    """Return what is computed of every design."""
+    """Return the problem of a sweep."""
     from jounce.io.files import ROBOT_FILES
     from jounce.sweeps.problems import Motions, Simulations
     from jounce.sweeps.sweeping import robot_problem

@@ -1,4 +1,4 @@
-"""The command that tells how far outputs spread where parameters deviate."""
+"""The command for the spread of outputs by deviations of parameters."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""Commands that make files: new, example, convert, export."""
+"""Commands that write files: new, example, convert, export."""

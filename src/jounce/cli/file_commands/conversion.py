@@ -1,4 +1,4 @@
-"""The command that turns a file into one of another format, and a robot into a mechanism file."""
+"""The command that converts a mechanism file to another format, and a robot to a mechanism file."""
 
 from __future__ import annotations
 
@@ -104,7 +104,7 @@ def _mechanism(source: Path, target: Path, imports: list[Path] | None, allow: Se
     with explaining_other_kinds(source, "mechanism"):
         data, samples = converted(source, target, allow)
     text = dumped(data, target.suffix.lower(), str(target))
-    for table_file in samples:  # all, before the first is written
+    for table_file in samples:  # checks all before the first is written
         check_target(table_file, overwrite=overwrite)
         refuse_existing(table_file, overwrite=overwrite)
     for table_file, path in samples.items():
@@ -131,7 +131,7 @@ def _robot(
     with errors_about(source):
         mechanism = robot_mechanism(robot, begin, laws, hold=hold, drives=drives)
         for name, body in mechanism.rigid_bodies.items():
-            body_mass(name, body, {}, 3)  # mechanism files hold bodies as real ones only
+            body_mass(name, body, {}, 3)  # mechanism files allow real bodies only
         data, _ = mechanism_data(mechanism, target.stem)
     _put(dumped(data, target.suffix.lower(), str(target)), target, (), True)
     driven = hold or len(laws) == len(robot.joint_names)
@@ -143,7 +143,7 @@ def _robot(
 
 
 def _put(text: str, target: Path, allow: Sequence[Path], overwrite: bool) -> None:
-    """Write a file, and read it before it takes its place."""
+    """Write a file to a temporary place, read it back, and move it to its place."""
     from jounce.io import load
     from jounce.io.files.writing import replacing
 

@@ -1,4 +1,4 @@
-"""The command that writes a trajectory as a controller takes it."""
+"""The command that writes a trajectory in the format of a controller."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ def export(
     from jounce.reporting.text.summaries import wrapped
 
     frequency = None if rate is None else frequency_of(rate)
-    names = reading.chosen  # in the sequence that the controller wants, also of joints that rest
+    names = reading.chosen  # in the order of the controller, including joints at rest
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always", SampleWarning)
         model = reading.robot(robot, carries=True)

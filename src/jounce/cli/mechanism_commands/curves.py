@@ -95,7 +95,7 @@ def trace(
 def write_curves(
     curves: list[Curve], file: Path, figure: Path | None, show: list[str] | None, output: TableOutput
 ) -> int:
-    """Print the results for curves, write the first of them, draw all, and return the exit status."""
+    """Print the results for curves, write the first one, draw all, and return the exit status."""
     from jounce.reporting.facts.curve_facts import curve_facts, curve_summary, curve_tables
 
     facts = [curve_facts(curve) for curve in curves]

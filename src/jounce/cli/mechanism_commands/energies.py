@@ -15,7 +15,7 @@ from jounce.reporting.terminal import print_text
 if TYPE_CHECKING:
     import xarray
 
-MOST = 28  # of the order and the rates together: the highest derivative is 30
+MOST = 28  # largest sum of order and rates: the highest derivative is 30
 
 
 def energies(
@@ -105,7 +105,7 @@ def energies(
 
 
 def _peaks(dataset: xarray.Dataset, order: int) -> list[dict[str, Any]]:
-    """Return the extreme values of the energies of all bodies together and of each, and of their rates."""
+    """Return the extreme values of the energies, and of their rates, of all bodies together and of each."""
     import numpy as np
 
     from jounce.units.shown_units import derivative_unit
@@ -150,7 +150,7 @@ def _of_mechanism(reading: MechanismReading, file: Path, order: int, rates: int)
 
 
 def _dataset(times: Any, energy: Any) -> xarray.Dataset:
-    """Return the energy of all bodies, and that of each, with rates."""
+    """Return the dataset of the energy of all bodies and of each, with rates."""
     import numpy as np
     import xarray
 

@@ -1,4 +1,4 @@
-"""The commands that draw: figures, sketches and animations of a motion, and its report."""
+"""The commands that draw figures, sketches and animations of a motion, and write its report."""
 
 from __future__ import annotations
 
@@ -111,7 +111,7 @@ def plot(
 
 
 def _kind(kind: Kind | None, out: Path | None) -> str:
-    """Return what is drawn; the ending of an animation tells it too."""
+    """Return the kind of figure, by default from the suffix of the file."""
     suffix = "" if out is None else out.suffix
     moves = suffix.lower() in ANIMATIONS
     if kind is None:
@@ -129,7 +129,7 @@ def _check_target(kind: str, out: Path, overwrite: bool) -> None:
 
 
 def _check_names(mechanism: Mechanism, kind: str, names: Sequence[str], file: Path) -> None:
-    """Raise MechanismError for a name that does not exist, before anything is solved."""
+    """Raise MechanismError if a name does not exist, before anything is solved."""
     known = [*mechanism.outputs]
     if kind == "reactions":
         known = [*mechanism.joints, *mechanism.drivers, *mechanism.forces]
@@ -160,7 +160,7 @@ def _drawn(motion: Motion, kind: str, output: list[str] | None, derivative: int 
 
 
 def _portrait_output(motion: Motion, kind: str, output: list[str] | None) -> str:
-    """Return the output of a portrait: the first that fits unless one is named."""
+    """Return the output of a portrait: the named one, or the first suitable one."""
     if output or kind not in PORTRAITS:
         return output[0] if output else ""
     known = motion.mechanism.outputs

@@ -1,4 +1,4 @@
-"""The commands for mechanism files: solved and simulated; and their schema."""
+"""The commands that solve and simulate mechanism files, and print their schema."""
 
 from __future__ import annotations
 
@@ -149,14 +149,14 @@ def simulate(
         raise JounceError(message, name=option, path=file)
     units = heading.units
     mechanism = reading.mechanism(file)
-    chosen = method_of(method, step)  # a file of --import may have registered it
+    chosen = method_of(method, step)  # after the files of --import, which may register it
     spare_inputs(output.out, overwrite=output.overwrite)
     motion = simulated(mechanism, file, order, method=chosen, tolerance=tolerance, longest_step=longest_step)
     return _finished("simulate", motion, file, output, refine=not no_refine, heading=units)
 
 
 def _refuse_options(file: Path, reading: MechanismReading) -> None:
-    """Refuse options of mechanism files for a robot file."""
+    """Raise an error if an option of mechanism files is given for a robot file."""
     given = {"--set": reading.set_, "--import": reading.import_, "--times": reading.times, "--units": reading.units}
     given["--redundant-reactions"] = reading.redundant_reactions
     for name, value in given.items():
@@ -181,7 +181,7 @@ def _streamed(
     refine: bool,
     heading: bool | None,
 ) -> ChunkedMotion:
-    """Solve chunk by chunk, and write each before the next is solved."""
+    """Solve in chunks, each written before the next one is solved."""
     from jounce.io import in_units
     from jounce.kinematics import solve_in_chunks
     from jounce.reporting.peaks import parts_with_peaks
@@ -236,7 +236,7 @@ def _write_result(
     write: Callable[[], None] = lambda: None,
     held: list[dict[str, Any]] | None = None,
 ) -> int:
-    """Print the results for a motion, write it, and return the exit status."""
+    """Print the results of a motion, write it, and return the exit status."""
     from jounce.reporting.facts.motion_facts import motion_facts
     from jounce.reporting.json.results import motion_result
     from jounce.reporting.peaks import peaks, shown_peaks
@@ -256,7 +256,7 @@ def _write_result(
 
 
 def method_of(name: str, step: float | None) -> AbstractMethod:
-    """Return the integration method of a name."""
+    """Return the integrator with a name."""
     from jounce.integrate import method_named
 
     try:
@@ -293,7 +293,7 @@ def schema(of: Literal["mechanism", "results"] = "mechanism", /) -> int:
 
 
 def solved(mechanism: Mechanism, file: Path, order: int, tolerance: float = 1e-12) -> Motion:
-    """Solve at all instants of the file; those that fail are NaN."""
+    """Return the solution at all instants of the file, NaN where it fails."""
     from jounce.kinematics import solve
 
     with errors_about(file), Count("solving") as bar:
@@ -301,7 +301,7 @@ def solved(mechanism: Mechanism, file: Path, order: int, tolerance: float = 1e-1
 
 
 def simulated(mechanism: Mechanism, file: Path, order: int, **options: Any) -> Motion:
-    """Simulate to all instants of the file; those that are not reached are NaN."""
+    """Return the simulation at all instants of the file, NaN where they are not reached."""
     from jounce.integrate import simulate as integrate
 
     with errors_about(file), Count("simulating") as bar:
@@ -309,12 +309,12 @@ def simulated(mechanism: Mechanism, file: Path, order: int, **options: Any) -> M
 
 
 def solve_or_simulate(mechanism: Mechanism, file: Path, order: int) -> Motion:
-    """Solve a mechanism that is driven; simulate one that has initial conditions."""
+    """Return the simulation of a mechanism with initial conditions, or the solution of any other."""
     return simulated(mechanism, file, order) if mechanism.initial else solved(mechanism, file, order)
 
 
 def outcome(motion: Motion | ChunkedMotion, file: Path) -> int:
-    """Return 0, or raise for the first instant that failed."""
+    """Return 0, or raise the error of the first instant that failed."""
     from jounce.kinematics import raise_for_status
 
     with errors_about(file):

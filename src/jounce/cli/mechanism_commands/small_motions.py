@@ -1,4 +1,4 @@
-"""The command that tells where a mechanism stands still, and how it swings about that place."""
+"""The command for the equilibrium of a mechanism and its modes of small motion."""
 
 from __future__ import annotations
 
@@ -139,7 +139,7 @@ def modes(
 
 
 def _in_motion(subject: Any, time: float | None, coordinates: Sequence[str] | None, settings: dict[str, Any]) -> Any:
-    """Return the small motions about that with which a mechanism starts."""
+    """Return the linearization about the initial motion of a mechanism."""
     from jounce.dynamics import linearize
     from jounce.integrate import simulate
     from jounce.mechanism import Mechanism
@@ -153,7 +153,7 @@ def _in_motion(subject: Any, time: float | None, coordinates: Sequence[str] | No
 
 
 def _subject(file: Path, reading: MechanismReading, without: Sequence[str], hold: Sequence[str]) -> tuple[Any, Any]:
-    """Return the mechanism or the robot of a file, and what is left out or held of it."""
+    """Return the mechanism or the robot of a file, and the setting of omitted drivers or held joints."""
     from jounce.io.files import DATA_FILES, ROBOT_FILES
 
     with explaining_other_kinds(file, "mechanism", "robot"):
@@ -170,14 +170,14 @@ def _subject(file: Path, reading: MechanismReading, without: Sequence[str], hold
 
 
 def _slowly(period: float) -> str:
-    """Word how fast an animation of two seconds a swing goes."""
+    """Return the speed of an animation with two seconds per period, in words."""
     slower = 2.0 / period
     return f"{slower:.3g} times slower than it is" if slower >= 1 else f"{1 / slower:.3g} times faster than it is"
 
 
 @contextmanager
 def _errors_about(file: Path) -> Iterator[None]:
-    """Give errors the option or the file that they are about."""
+    """Add the option or the file to errors."""
     try:
         yield
     except JounceError as error:

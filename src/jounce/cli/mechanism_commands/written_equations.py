@@ -1,4 +1,4 @@
-"""The command that writes the equations of a mechanism or a robot: as code, as text, as values along its motion."""
+"""The command that writes the equations of a mechanism or a robot as code, as text, or as values along its motion."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The command for elastic joints: what motors must do behind springs, so that links move as prescribed."""
+"""The command for elastic joints: motor motions and torques that move links behind springs as prescribed."""
 
 from __future__ import annotations
 
@@ -129,7 +129,7 @@ def _driven(file: Path, trajectory: Path | None, changes: list[str] | None, read
         if kind_of(file) == "mechanism":
             raise JounceError("is a mechanism, which its own drivers move; leave the trajectory out", path=file)
         with explaining_other_kinds(file, "robot"):
-            reading.robot(file)  # says what the file is
+            reading.robot(file)  # raises the error that names the kind of the file
     if reading.payload:
         raise JounceError("belongs to robots; a mechanism has its masses in its file", name="--payload")
     return MechanismReading(set_=changes, allow=reading.allow).mechanism(file), None

@@ -1,4 +1,4 @@
-"""Trajectories of joints as tables: what commands that make trajectories write."""
+"""Tables of trajectories of joints, as written by commands that compute trajectories."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ ROWS = 3  # derivatives that are written
 def joint_table(
     system: Robot | Mechanism, trajectory: JointTrajectory, times: Any, title: str | None = None
 ) -> xarray.Dataset:
-    """Return the positions of joints of a robot, or of drivers, to their jerk at instants."""
+    """Return the dataset of joints of a robot, or of drivers, from position to jerk at instants."""
     import xarray
 
     from jounce.mechanism import Mechanism

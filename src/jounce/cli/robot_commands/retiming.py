@@ -151,7 +151,7 @@ def retime(
 
 
 def deviation_of(text: str, robot: Robot | None = None) -> float:
-    """Return an angle or a length, rad or m, that joints of a robot may deviate by."""
+    """Return the deviation in a text, an angle or a length, rad or m."""
     from jounce.units.dimensions import ANGLE, LENGTH
 
     allowed, words = (ANGLE, LENGTH), "an angle or a length, such as 0.1deg or 1mm"
@@ -164,14 +164,14 @@ def deviation_of(text: str, robot: Robot | None = None) -> float:
 
 
 def duration_of(text: str) -> float:
-    """Return a time, s."""
+    """Return the duration in a text, s."""
     from jounce.units.dimensions import TIME
 
     return positive_quantity("--duration", text, (TIME,), "a time, such as 2.5s")
 
 
 def instant_of(text: str) -> float:
-    """Return an instant, s, that may be zero."""
+    """Return the instant in a text, s, which may be zero."""
     from jounce.units.dimensions import TIME
 
     return (
@@ -268,7 +268,7 @@ def _of_robot(
 
 
 def _write_result(result: _Result, files: tuple[Path, Path | None], figure: Path | None, output: TableOutput) -> None:
-    """Print, draw and write a result."""
+    """Print, draw and write the result of a retiming."""
     from jounce.reporting.retiming_facts import binding_table, retimed_words, retiming_result
 
     retimed = result.retimed
@@ -296,7 +296,7 @@ def _write_result(result: _Result, files: tuple[Path, Path | None], figure: Path
 def _at_rate(
     model: Any, retimed: RetimedTrajectory, bounds: Any, rate: float, degree: int, lasting: bool
 ) -> tuple[Any, Any]:
-    """Return the trajectory that rows at a rate describe, its limits kept by splines through them."""
+    """Return the trajectory in whole periods of a rate, with limits kept by splines through its rows."""
     from jounce.planning.retiming.sampling import fit_to_samples
 
     try:

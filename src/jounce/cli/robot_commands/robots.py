@@ -1,4 +1,4 @@
-"""The commands for robots: a trajectory compared with limits, and the torques that it needs."""
+"""The commands that compare a trajectory with the limits of a robot, and compute its torques."""
 
 from __future__ import annotations
 
@@ -173,7 +173,7 @@ def torques(
 
 
 def _torques_at_breaks(robot: Any, motion: Any, rates: int, loads: Any, *, drives: bool) -> Any:
-    """Return the torques on both sides of where laws jump or bend, or loads change; None without any."""
+    """Return the torques on both sides of breaks of laws and load changes; None if there are none."""
     import numpy as np
 
     from jounce.dynamics.limits.trajectories import trajectory_torques
@@ -194,7 +194,7 @@ def _torques_at_breaks(robot: Any, motion: Any, rates: int, loads: Any, *, drive
 
 
 def _smoothed(motion: Any, robot: Any, deviation: str | None, file: Path) -> Any:
-    """Return a motion within a deviation of the samples of another, where one is given."""
+    """Return a motion smoothed within a deviation, if one is given."""
     if deviation is None:
         return motion
     from jounce.cli.robot_commands.retiming import deviation_of

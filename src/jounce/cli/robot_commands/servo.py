@@ -1,4 +1,4 @@
-"""The command that writes what a servo drive needs: the motion of drivers at its rate, position to jerk."""
+"""The command that writes the motion of drivers at the rate of a servo drive, from position to jerk."""
 
 from __future__ import annotations
 
@@ -95,12 +95,12 @@ def servo(
 
 
 def frequency_of(text: str) -> float:
-    """Return a rate in 1/s."""
+    """Return the frequency in a text, 1/s."""
     return positive_quantity("--rate", text, (PER_TIME,), "a frequency, such as 1kHz")
 
 
 def _at_rate(mechanism: Mechanism, frequency: float, order: int, count: Count) -> Motion:
-    """Solve a mechanism at every period of the drive, from the first instant of its file to the last."""
+    """Return the motion of a mechanism at every period of the drive, over the time of its file."""
     from jounce.kinematics import solve
     from jounce.mechanism import TimeGrid
     from jounce.mechanism.time import instants_of
@@ -112,7 +112,7 @@ def _at_rate(mechanism: Mechanism, frequency: float, order: int, count: Count) -
 
 
 def _values_at_breaks(mechanism: Mechanism, motion: Motion, names: list[str]) -> Any:
-    """Return the coordinates of drivers on both sides of where laws jump or bend; None without any."""
+    """Return the coordinates of drivers on both sides of breaks of laws; None if there are none."""
     import numpy as np
 
     from jounce.kinematics import solve
@@ -139,7 +139,7 @@ def _driven(motion: Motion, names: list[str]) -> Any:
 
 
 def _units_of(mechanism: Mechanism, names: list[str]) -> ShownUnits:
-    """Return the units of a file for its drivers: by their kind, or by the name of an output that a driver shares."""
+    """Return the units of a file for its drivers: by kind, or by the name of an output with the same name."""
     from jounce.mechanism.laws.driver_outputs import is_turning
     from jounce.units.shown_units import QUANTITIES, ShownUnits
 

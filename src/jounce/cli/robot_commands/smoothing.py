@@ -1,4 +1,4 @@
-"""The command that makes a smooth motion within a deviation of noisy samples."""
+"""The command that fits a smooth motion within a deviation of noisy samples."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from jounce.robot import Robot
     from jounce.trajectory import JointTrajectory
 
-BLOCK = 50_000  # rows at once
+BLOCK = 50_000  # rows per part
 
 
 def smooth(
@@ -98,6 +98,6 @@ def smooth(
 
 
 def _parts(model: Robot, motion: JointTrajectory, times: Any) -> Iterator[Any]:
-    """Yield positions of the joints, and their derivatives to jerk, some instants at a time."""
+    """Yield the positions of the joints and their derivatives to jerk, in parts along time."""
     for first in range(0, len(times), BLOCK):
         yield joint_table(model, motion, times[first : first + BLOCK])
