@@ -1,10 +1,10 @@
 """Exact time derivatives of any order of mechanisms and robots: jerk, jounce and beyond, torques and their rates.
 
-Importing this package has no side effect but a mark that a process gets when it is forked: `jounce.base.interrupts`.
-The settings of JAX are left alone; everything is computed in double precision all the same, see `jounce.settings`.
-The stub beside this file, ``__init__.pyi``, lists what the package offers, and each name of it is imported when it
-is first used: importing the package alone takes no time, and a command that computes nothing, such as
-``jounce --help``, does not wait for JAX either. Names of release 0.4 work for one release, with a DeprecationWarning.
+The only side effect of importing this package is the detection of forks (`jounce.base.interrupts`). The settings of JAX
+are not changed; everything is computed in double precision all the same, see `jounce.settings`. The stub beside this
+file, ``__init__.pyi``, lists the public names, which are imported at first use: importing the package takes no time,
+and a command that computes nothing, such as ``jounce --help``, does not wait for JAX. Names of release 0.4 work for one
+release, with a DeprecationWarning.
 """
 
 import functools
@@ -31,13 +31,13 @@ from jounce.version import __version__ as __version__
 
 if _is_command():
     _end_on_signals()  # before the libraries, which take a second
-    # The process is the command's own; JAX reads its options there when it is imported.
+    # The process belongs to the command; JAX reads its options from the environment at import.
     os.environ.update({name.upper(): str(value) for name, value in _OPTIONS.items() if value is not None})
 _mark_forks()
 
 
 def __getattr__(name: str) -> Any:
-    """Return what the package offers under a name, or a subpackage of it; it is imported the first time."""
+    """Return a public object or a subpackage by name, imported at its first use."""
     if name == "__all__":
         return [*_offered(), "__version__"]
     subpackage = None if name.startswith("_") else _offered().get(name)
@@ -46,7 +46,7 @@ def __getattr__(name: str) -> Any:
         return functools.reduce(getattr, moved.split("."), sys.modules[__name__])
     if subpackage is None and (name.startswith("_") or importlib.util.find_spec(f"{__name__}.{name}") is None):
         message = f"module {__name__!r} has no attribute {name!r}"
-        raise AttributeError(message, name=name, obj=sys.modules[__name__])  # by which Python finds what is meant
+        raise AttributeError(message, name=name, obj=sys.modules[__name__])  # for Python's suggestions
     with _importing.lock, _importing.without_garbage_collection():
         if subpackage in (None, __name__):
             value = importlib.import_module(f"{__name__}.{name}")
@@ -66,7 +66,7 @@ def __dir__() -> list[str]:
 
 @functools.lru_cache(maxsize=1)
 def _offered() -> dict[str, str]:
-    """Return the names in the stub, each with the subpackage that it is imported from."""
+    """Return the names in the stub, each with its subpackage."""
     stub = Path(__file__).with_suffix(".pyi").read_text(encoding="utf-8")
     imports = re.findall(r"^from (\S+) import (\([^)]*\)|.*)", stub, re.MULTILINE)
     return {name: subpackage for subpackage, names in imports for name in re.findall(r"(\w+) as \w+", names)}

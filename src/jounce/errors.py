@@ -1,7 +1,7 @@
-"""The one family of exceptions of the package, and the small helpers that word their messages.
+"""The exceptions and warnings of the package, and helpers that word their messages.
 
-Every error carries what a reader needs to mend the input: the file and line (when it came from a file), the dotted name
-of the entry, what is wrong, and the value received. ``str(error)`` puts these into one friendly sentence.
+Every error carries what a reader needs to correct the input: the file and line (if it came from a file), the dotted
+name of the entry, the problem with a remedy, and the value received. ``str(error)`` joins these to one sentence.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from typing import Any
 
 
 class _Unset:
-    """Marks a value that was not given, so that ``None`` can be reported as a value."""
+    """Marker of a value that was not given, so that ``None`` can be reported as a value."""
 
     def __repr__(self) -> str:
         return "<not given>"
@@ -28,13 +28,13 @@ class _Unset:
 
 UNSET = _Unset()
 LONGEST = 4000
-"""Characters of a message; of what a file's own names and texts make longer, the middle is left out."""
+"""Characters of a message; the middle of a message that is longer by names and texts of a file is left out."""
 MOST_LIKENED = 2000
-"""Names among which one that is nearly the given one is looked for."""
+"""Largest number of names that are searched for one similar to the given name."""
 
 
 def shortened(text: str, limit: int = LONGEST) -> str:
-    """Return a text of at most a few more characters than a limit, without its middle if it is longer.
+    """Return a text with its middle left out if it is longer than a limit.
 
     Examples
     --------
@@ -46,7 +46,7 @@ def shortened(text: str, limit: int = LONGEST) -> str:
 
 
 def show_value(value: object, limit: int = 80) -> str:
-    """Word a received value in one line of at most ``limit`` characters.
+    """Return a received value as one line of at most ``limit`` characters.
 
     Examples
     --------
@@ -69,7 +69,7 @@ def show_value(value: object, limit: int = 80) -> str:
 
 
 def _represent(value: object, limit: int, depth: int = 3) -> str:
-    """``repr`` that never walks deeper or longer than what will be shown."""
+    """Return the `repr` of a value, without visiting more than will be shown."""
     if isinstance(value, str):
         return repr(value[: limit + 1])
     if isinstance(value, dict):
@@ -93,12 +93,12 @@ def _represent(value: object, limit: int, depth: int = 3) -> str:
 
 
 def _printable(text: str) -> str:
-    """Return a text with escapes for what no terminal should be given: it may come from anyone's file."""
+    """Return a text with unprintable characters escaped, since it may come from an untrusted file."""
     return text if text.isprintable() else "".join(c if c.isprintable() else ascii(c)[1:-1] for c in text)
 
 
 def no_such(kind: str, name: object, known: Iterable[str], what: str = "name") -> str:
-    """Word that nothing of a kind has a name, or another word such as a type, and which ones there are.
+    """Return a message that nothing of a kind has a name, or another word such as a type, with the valid ones.
 
     Examples
     --------
@@ -109,7 +109,7 @@ def no_such(kind: str, name: object, known: Iterable[str], what: str = "name") -
 
 
 def unknown(what: str, given: object, valid: Iterable[str]) -> str:
-    """Word that a word is none of those that may stand in its place.
+    """Return a message that a word is not valid, with the valid ones.
 
     Examples
     --------
@@ -122,7 +122,7 @@ def unknown(what: str, given: object, valid: Iterable[str]) -> str:
 def check_name(
     kind: str, given: object, known: Collection[str], error: type[JounceError], what: str = "name", **location: Any
 ) -> None:
-    """Raise an error unless something of a kind has the name given; `location` says where it was given."""
+    """Raise an error unless something of a kind has the given name; `location` is the place of the name."""
     if not isinstance(given, Hashable) or given not in known:
         raise error(no_such(kind, given, known, what), value=given, **location)
 
@@ -143,14 +143,14 @@ def whole_number(name: str, value: object, least: int = 0, most: int | None = No
 
 
 def flag(name: str, value: object, *, error: type[JounceError]) -> bool:
-    """Return True or False, or raise an error: any other value, such as "no", would count as one of them."""
-    if type(value).__name__ != "bool":  # so is NumPy's called, which need not be imported for it
+    """Return True or False, or raise an error for any other value, such as "no", which is truthy."""
+    if type(value).__name__ != "bool":  # also the name of NumPy's type, without its import
         raise error("must be True or False", name=name, value=value)
     return bool(value)
 
 
 def did_you_mean(name: object, valid: Iterable[str], limit: int = 20) -> str:
-    """Word a suggestion: the nearest valid name, and the valid names when they are few.
+    """Return a suggestion: the most similar valid name, and all valid names if they are few.
 
     Examples
     --------
@@ -183,7 +183,7 @@ class JounceError(Exception):
     Parameters
     ----------
     message
-        What is wrong, and how to mend it, without the place and the value.
+        The problem and a remedy, without the place and the value.
     path
         The file, as the user named it.
     line
@@ -191,7 +191,7 @@ class JounceError(Exception):
     name
         The dotted name of the entry, such as ``joints.BC.length``.
     value
-        The value received; left out of the message when not given.
+        The value received; left out of the message if not given.
 
     Examples
     --------
@@ -223,7 +223,7 @@ class JounceError(Exception):
         if self.name:
             location.append(_printable(shortened(self.name, 400)))
         message = "\n".join(map(_printable, self.message.split("\n")))
-        if self.value is not UNSET:  # what is wrong, got this; what to do about it
+        if self.value is not UNSET:  # the problem, got the value; the remedy
             problem, semicolon, advice = message.partition("; ")
             message = f"{problem}, got {show_value(self.value)}{semicolon}{advice}"
         return f"{', '.join(location)}: {message}" if location else message
@@ -231,7 +231,7 @@ class JounceError(Exception):
     def located(
         self, *, path: object = None, line: int | None = None, name: str | None = None, value: Any = UNSET
     ) -> JounceError:
-        """Return the same error with the places filled in that it does not have yet."""
+        """Return the same error with missing parts of its location and value filled in."""
         error = copy.copy(self)
         error.__traceback__ = None
         error.path = self.path if self.path is not None else path
@@ -242,9 +242,9 @@ class JounceError(Exception):
 
 
 class ExpressionError(JounceError):
-    """An expression holds something that is not allowed, or cannot be evaluated.
+    """An expression contains something that is not allowed, or cannot be evaluated.
 
-    ``column`` counts from 1 within the expression; it is None where no single place is at fault.
+    ``column`` counts from 1 within the expression; it is None if no single position is at fault.
     """
 
     def __init__(self, message: str, *, column: int | None = None, **location: Any) -> None:
@@ -253,19 +253,19 @@ class ExpressionError(JounceError):
 
 
 class UnitError(JounceError):
-    """A value has a unit that does not exist, or one of the wrong dimension."""
+    """A value has an unknown unit, or a unit of the wrong dimension."""
 
 
 class UnsupportedError(JounceError):
-    """What is right in itself cannot be done here: with values that JAX traces, or in a process that was forked."""
+    """A valid request is not supported, such as with values that JAX traces, or in a forked process."""
 
 
 class ContractError(JounceError):
-    """A class of one's own does not do what those of the library do, see `jounce.testing`."""
+    """A user-defined class violates a contract of the library's classes; see `jounce.testing`."""
 
 
 class MechanismError(JounceError):
-    """The structure of a mechanism is wrong: a missing body, an axis of zero length, a bad grid of time."""
+    """A mechanism is not valid: a missing body, an axis of zero length, a bad time grid."""
 
 
 class MechanismFileError(MechanismError):
@@ -275,8 +275,8 @@ class MechanismFileError(MechanismError):
 class MobilityError(MechanismError):
     """The drivers and joints do not leave exactly zero degrees of freedom.
 
-    ``status`` is that of a singular position, where the start is one. ``idle`` are the axes of bodies that may spin
-    about themselves, on the bodies, by body, where all degrees of freedom left are of that kind.
+    ``status`` is that of a singular position, if the start is one. ``idle`` has, by body, the axes in the body frame
+    about which bodies can spin freely, if these are the only remaining degrees of freedom.
     """
 
     def __init__(self, message: str, *, status: Any = None, idle: Any = None, **location: Any) -> None:
@@ -285,11 +285,11 @@ class MobilityError(MechanismError):
 
 
 class RobotError(JounceError):
-    """A robot cannot be what was described, or values do not fit it: a loop, a link without mass, an unknown joint."""
+    """A robot is not valid, or values do not fit it: a loop, a link without mass, an unknown joint."""
 
 
 class RobotFileError(RobotError):
-    """A URDF, MJCF or SDF file cannot be read, or describes no possible robot."""
+    """A URDF, MJCF or SDF file cannot be read, or does not describe a valid robot."""
 
 
 class TrajectoryError(JounceError):
@@ -297,7 +297,7 @@ class TrajectoryError(JounceError):
 
 
 class SingularityError(JounceError):
-    """An orientation or a configuration is singular: what was requested does not exist or is not unique there."""
+    """An orientation or configuration is singular: the requested quantity does not exist or is not unique."""
 
 
 class _BoundedWarning(UserWarning):
@@ -308,7 +308,7 @@ class _BoundedWarning(UserWarning):
 
 
 def warn_caller(warning: Warning) -> None:
-    """Give a warning at the line of the user's program that called this package, through however many functions."""
+    """Issue a warning at the line of the user's program that called this package, at any call depth."""
     frame, level, caller = sys._getframe(1), 1, 1
     while frame is not None:
         level += 1
@@ -319,7 +319,7 @@ def warn_caller(warning: Warning) -> None:
 
 
 class RobotWarning(_BoundedWarning):
-    """A robot file holds what no real robot has, or forces that are left out; it is read all the same."""
+    """A robot file has physically implausible values, or forces that are left out; it is read all the same."""
 
 
 class SampleWarning(_BoundedWarning):
@@ -327,39 +327,39 @@ class SampleWarning(_BoundedWarning):
 
 
 class RecordingWarning(_BoundedWarning):
-    """Of a recording something was not taken as it is: rows were sorted, merged or left out, or stamps shifted."""
+    """A recording was changed when read: rows were sorted, merged or left out, or time stamps shifted."""
 
 
 class UnitWarning(_BoundedWarning):
-    """A number without a unit is likely meant in another unit than that of SI."""
+    """A number without a unit is likely not in SI units."""
 
 
 class AssemblyWarning(_BoundedWarning):
-    """Bodies were assembled with a part turned over in its joint, or on the other side than its joint means."""
+    """Bodies were assembled with a part reversed in its joint, or on the wrong side of it."""
 
 
 class IdleMotionWarning(_BoundedWarning):
-    """Bodies that may spin about an axis of themselves, which moves nothing else, are held by the least motion."""
+    """Bodies can spin about an axis of their own without moving anything else, and are held by the least motion."""
 
 
 class PrecisionWarning(_BoundedWarning):
-    """A function given to this library computes in less than double precision, and derivatives are no better."""
+    """A user's function computes in less than double precision, and so do its derivatives."""
 
 
 class MachineCodeWarning(_BoundedWarning):
-    """XLA computes what there is no machine code for: the same results in two to fifty times the time."""
+    """XLA computes an operation without machine code: the same results in two to fifty times the time."""
 
 
 class ProgramFolderWarning(_BoundedWarning):
-    """The folder chosen for compiled programs cannot be used: they are compiled again in each process."""
+    """The chosen folder of compiled programs cannot be used: programs are compiled again in each process."""
 
 
 class DamageWarning(_BoundedWarning):
-    """Files of a result were lost or changed after they were written; what they held is computed again."""
+    """Files of a result were lost or changed after they were written; their contents are computed again."""
 
 
 class OutputError(JounceError):
-    """A file of results cannot be written or read; ``while_writing``: what was computed, as where a disk is full."""
+    """A file of results cannot be written or read; ``while_writing`` tells that results were being written."""
 
     def __init__(self, message: str, *, while_writing: bool = False, **location: Any) -> None:
         super().__init__(message, **location)
@@ -367,9 +367,9 @@ class OutputError(JounceError):
 
 
 class SolveError(JounceError):
-    """A solve did not reach its end.
+    """A solution did not reach its end.
 
-    ``motion`` holds what was computed (None when nothing was), ``status`` the reason, by the names of
+    ``motion`` has the results so far (None if there are none), ``status`` the reason, by the names of
     ``Motion.status``.
     """
 
@@ -382,7 +382,7 @@ class SolveError(JounceError):
 class AssemblyError(SolveError):
     """The bodies cannot be assembled from the starting guess.
 
-    ``details`` is all that is known of it, where the message is a short one; the command tells it with ``--verbose``.
+    ``details`` is the full explanation of a short message, which the command shows with ``--verbose``.
     """
 
     def __init__(self, message: str, *, details: str = "", **location: Any) -> None:
@@ -391,7 +391,7 @@ class AssemblyError(SolveError):
 
 
 class DesignError(SolveError):
-    """No design was found that moves and meets the conditions; `design` is the one nearest to that, if there is one."""
+    """No design was found that moves and meets the conditions; `design` is the best one found, if any."""
 
     def __init__(self, message: str, *, design: Any = None, **location: Any) -> None:
         super().__init__(message, **location)

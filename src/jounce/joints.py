@@ -1,4 +1,4 @@
-"""The catalogue of joints and drivers, and the base class for your own."""
+"""The catalogue of joints and drivers, and the base class of user-defined ones."""
 
 import jounce.robot as _robot
 from jounce.constraints import (
@@ -18,4 +18,4 @@ from jounce.trajectory import (
     SampledCurve as SampledCurve,
 )
 
-del _robot  # imported so that no joint of your own takes the type of one of robots
+del _robot  # imported to reserve the type names of robot joints

@@ -1,4 +1,4 @@
-"""Quantities that are computed along a motion, by the names that files give them in `outputs`."""
+"""Quantities that are computed along a motion, as under `outputs` in files."""
 
 from jounce.dynamics import (
     AccelerationEnergyOutput as AccelerationEnergyOutput,

@@ -10,10 +10,10 @@ _display: Display | None = None
 
 
 def show() -> None:
-    """Show from here on what is being computed, wherever that takes longer than two seconds.
+    """Show the progress of all further computations that take longer than two seconds.
 
-    A line says what is solved, simulated or optimized, how much of it is done, and which program is compiled. In a
-    notebook it is shown below the cell that runs, elsewhere it goes to standard error; it disappears with the work.
+    A line tells what is solved, simulated or optimized, how much is done, and which program is being compiled. It
+    appears below the running cell of a notebook, or on standard error, and disappears at the end.
 
     Examples
     --------
@@ -29,7 +29,7 @@ def show() -> None:
 
 
 def hide() -> None:
-    """Show it no longer."""
+    """Stop showing progress."""
     global _display
     if _display is not None:
         _display.__exit__()

@@ -1,10 +1,9 @@
-"""The settings of JAX and NumPy under which this package computes, however they are set up around it.
+"""The settings of JAX and NumPy under which this package computes, independent of those of the process.
 
-JAX computes in single precision by default, stops at numbers that are not finite where its settings ask it to
-look for them, and takes hours where it is not to compile. Its settings hold for a thread or for the whole process,
-which belongs to the program that imports this package. So the settings of the process are left alone: what a subpackage
-offers, and all that its objects can do, computes in a context of its own, entered at the first of nested calls.
-Threads, which inherit no context, enter it for themselves.
+JAX by default computes in single precision; with other settings it stops at nonfinite numbers, or takes hours without
+compilation. Its settings hold for a thread or for the whole process, which belongs to the program that imports this
+package, and are not changed. Instead, public functions and all methods of the package's objects compute in a context
+that the outermost of nested calls enters. Threads inherit no context, and enter it themselves.
 """
 
 import functools
@@ -26,8 +25,8 @@ from jounce.base.jax_internals import config, core
 from jounce.base.jax_options import OPTIONS
 from jounce.errors import UnsupportedError
 
-_packages: list[str] = []  # of which all that they offer computes in double precision
-_modules: set[str] = set()  # of them, whose classes do
+_packages: list[str] = []  # subpackages whose public functions compute in double precision
+_modules: set[str] = set()  # their modules whose classes do
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -39,18 +38,18 @@ OPERATORS = frozenset(
         *("matmul", "rmatmul", "mod", "lt", "le", "gt", "ge", "str", "format", "enter", "exit", "next", "getattr"),
     )
 )
-"""Special methods that may compute. JAX and Python call the others for their own ends: `__eq__` and `__hash__`, say."""
+"""Special methods that may compute. JAX and Python call others, such as `__eq__` and `__hash__`, internally."""
 
 LEFT_ALONE = frozenset({"tree_flatten", "tree_unflatten", "mro"})
 """Methods that JAX calls within transformations of any precision; they compute nothing."""
 
 
 FLOATING_POINT = {"divide": "warn", "over": "warn", "invalid": "warn", "under": "ignore"}
-"""What NumPy does by default where numbers are not finite; operations where that is no error ignore it."""
+"""NumPy's default handling of floating-point errors; operations in which these are harmless ignore them."""
 
 
 class _Thread(threading.local):
-    """What a thread is at."""
+    """The state of a thread."""
 
     computing = False  # within a context of this package
 
@@ -60,7 +59,7 @@ _thread, _double = _Thread(), config.enable_x64
 
 
 class _OwnSettings:
-    """The context in which this package computes: what is set up as usual is left as it is."""
+    """The context in which this package computes; settings that have the right value already are not changed."""
 
     def __enter__(self) -> None:
         if not config.enable_x64.value and not core.trace_state_clean():
@@ -89,9 +88,9 @@ class _OwnSettings:
 
 
 def check_process() -> None:
-    """Raise UnsupportedError in a process that was forked after JAX had started: it would wait for ever.
+    """Raise UnsupportedError in a process that was forked after JAX had started, since it would hang.
 
-    XLA computes in threads, and a fork has none of them, only the locks that they held.
+    XLA computes in threads, which a fork does not have, although it has the locks that they held.
     """
     if is_forked_after_jax():
         raise UnsupportedError(
@@ -104,7 +103,7 @@ def check_process() -> None:
 def _check_device(error: BaseException) -> None:
     """Raise UnsupportedError if JAX failed because its settings name a device that this machine does not have.
 
-    Looking beforehand would start the device, and JAX's threads with it, where nothing computes, as on import.
+    The check follows a failure, since it starts the device and JAX's threads.
     """
     chosen, platforms = config.default_device.value, config.jax_platforms.value
     chosen = chosen if isinstance(chosen, str) else None
@@ -121,13 +120,13 @@ def _check_device(error: BaseException) -> None:
 
 
 def own_settings() -> AbstractContextManager[Any]:
-    """Return the context in which this package computes, in this thread; nothing to do where it is in force.
+    """Return the context in which this package computes in this thread; an empty one if it is already active.
 
     Raises
     ------
     UnsupportedError
-        Within a transformation of JAX in single precision: its values are rounded already, and so would results be.
-        Where JAX is set to compute on a device that this machine does not have.
+        Within a transformation of JAX in single precision, whose values are already rounded; or if JAX is set to
+        compute on a device that this machine does not have.
 
     Examples
     --------
@@ -141,7 +140,7 @@ def own_settings() -> AbstractContextManager[Any]:
 
 
 def under_own_settings(function: Callable[P, R]) -> Callable[P, R]:
-    """Have a function compute in double precision, a generator at each of its steps."""
+    """Return a function that computes under own settings; a generator does so at each of its steps."""
     if inspect.isgeneratorfunction(function):
 
         @functools.wraps(function)
@@ -170,7 +169,7 @@ def under_own_settings(function: Callable[P, R]) -> Callable[P, R]:
 
 
 def in_full(value: Any) -> jax.Array:
-    """Return an array of double precision where one of lower precision is given; others as they are.
+    """Return a float or complex array of lower precision in double precision, and other arrays unchanged.
 
     Examples
     --------
@@ -186,20 +185,19 @@ def in_full(value: Any) -> jax.Array:
 
 
 def called_back(function: Callable[[Any], Any], shapes: Any, values: Any, *, vmap_method: str) -> Any:
-    """Have a compiled program call a function on the host, as `jax.pure_callback` does, in double precision.
+    """Return the result of a callback on the host in double precision, as `jax.pure_callback` does.
 
-    Where a program waits for its operands, JAX calls it in a thread of its own, where only the setting of the process
-    holds: it rounds what it hands over to single precision there, and refuses what it gets back. So numbers go both
-    ways as words of 32 bits.
+    JAX may call the function in another thread, where only the settings of the process hold: it would round the
+    arguments to single precision and refuse the results. Numbers are therefore passed as pairs of 32-bit words.
 
     Parameters
     ----------
     function : callable
-        Maps a pytree of NumPy arrays to one of arrays.
+        Function from a pytree of NumPy arrays to a pytree of arrays.
     shapes : pytree of jax.ShapeDtypeStruct
-        Of what it returns.
+        Shapes and types of the result.
     values : pytree of array
-        Of floats in double precision.
+        Arrays of floats in double precision.
     vmap_method : str
         See `jax.pure_callback`.
     """
@@ -224,16 +222,16 @@ def _is_wide(array: Any) -> bool:
 
 
 def _as_words_of_32_bits(array: np.ndarray) -> np.ndarray:
-    """Return an array whose numbers of 64 bits are two words each, along a new last axis; others as they are."""
+    """Return a 64-bit array as pairs of 32-bit words along a new last axis, and other arrays unchanged."""
     return np.array(array[..., None], order="C").view(np.uint32) if _is_wide(array) else array
 
 
 def compute_under_own_settings(subpackage: str) -> None:
     """Have all public functions of a subpackage, and all classes of its modules, compute in double precision.
 
-    Classes that are not public count too, since results are objects of them, and so do those of modules of lower
-    subpackages that this one is the first to import. Each ``__init__.py`` ends with a call, so that whatever is added
-    to the subpackage is included.
+    This includes private classes, since results are instances of them, and classes of lower subpackages whose modules
+    this one imports first. Each ``__init__.py`` ends with this call, so that everything added to the subpackage is
+    included.
     """
     _packages.append(subpackage)
     offered = vars(sys.modules[subpackage])
@@ -242,12 +240,12 @@ def compute_under_own_settings(subpackage: str) -> None:
             home = vars(sys.modules[value.__module__])
             offered[name] = wrapper = under_own_settings(value)
             if home.get(value.__name__) is value:
-                home[value.__name__] = wrapper  # by which pickle finds it
+                home[value.__name__] = wrapper  # where pickle finds it
     cover_new_modules()
 
 
 def cover_new_modules() -> None:
-    """Have the classes of modules that were imported since compute in double precision, in the subpackages so far.
+    """Have the classes of newly imported modules of the registered subpackages compute in double precision.
 
     A higher subpackage may be the first to import a module of a lower one.
     """
@@ -261,13 +259,13 @@ def cover_new_modules() -> None:
 
 
 def _is_open(value: Any, subpackage: str) -> bool:
-    """Tell whether a value is a function of a subpackage that has no wrapper yet."""
+    """Return whether a value is a function of a subpackage without a wrapper."""
     inside = inspect.isfunction(value) and f"{value.__module__}.".startswith(f"{subpackage}.")
     return inside and not hasattr(value, "own_settings")
 
 
 def _compute_under_own_settings(kind: type[Any]) -> None:
-    """Have the methods and properties that a class defines compute in double precision."""
+    """Have the methods and properties of a class compute in double precision."""
     for name, member in list(vars(kind).items()):
         if name in LEFT_ALONE or (name.startswith("_") and name not in OPERATORS and not name.startswith("_repr_")):
             continue
@@ -276,9 +274,9 @@ def _compute_under_own_settings(kind: type[Any]) -> None:
 
 
 def _decorated_member(member: Any) -> Any:
-    """Return a method or property that computes in double precision; None for what is none, or has a wrapper."""
+    """Return a wrapped method or property; None for other members, and for those that have a wrapper."""
     if isinstance(member, types.FunctionType):
-        generated = member.__code__.co_filename == "<string>"  # by dataclasses: it stores values, or shows them
+        generated = member.__code__.co_filename == "<string>"  # by dataclasses, without computation
         return None if generated or hasattr(member, "own_settings") else under_own_settings(member)
     if isinstance(member, staticmethod | classmethod):
         inner = _decorated_member(member.__func__)

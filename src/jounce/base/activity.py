@@ -1,6 +1,6 @@
-"""What is being done at the moment: which programs are compiled, and how much of a count is done.
+"""The current activity of the package: programs that are being compiled, and the progress of counts.
 
-Nothing is shown here. Whoever shows it, on a terminal or in a notebook, asks `now` from time to time.
+Nothing is displayed by this module. A display, on a terminal or in a notebook, polls `now`.
 """
 
 from __future__ import annotations
@@ -12,13 +12,13 @@ from dataclasses import dataclass
 from typing import Any
 
 _lock = threading.Lock()
-_compiled: dict[object, str] = {}  # programs that are compiled, the latest last
+_compiled: dict[object, str] = {}  # programs that are being compiled, the latest last
 _count: Count | None = None
 
 
 @dataclass(frozen=True)
 class Activity:
-    """What is being done: in words, with how much of it is done, of how much in all, and in which unit."""
+    """The current activity: its description, the amount done, the total, and the unit of both."""
 
     words: str
     done: int = 0
@@ -27,16 +27,16 @@ class Activity:
 
 
 class Count:
-    """A count that goes on while something is computed; of nested ones, the outermost is reported.
+    """The progress of a computation; of nested counts, the outermost is reported.
 
     Parameters
     ----------
     words : str
-        What is done, such as ``solving``.
+        Description of the computation, such as ``solving``.
     unit : str, optional
-        What is counted, where counts and a rate are of interest.
+        Counted items, if counts and a rate are of interest.
     report : callable, optional
-        Is called with each count too, as `progress` of `jounce.solve`.
+        Function that is called with each count, too, as `progress` of `jounce.solve`.
 
     Examples
     --------
@@ -64,7 +64,7 @@ class Count:
             _count = None if _count is self else _count
 
     def __call__(self, done: int, total: int, *more: Any) -> None:
-        """Say how much is done."""
+        """Report the amount done and the total."""
         self.activity = Activity(self.activity.words, done, total, self.activity.unit)
         if self._report is not None:
             self._report(done, total, *more)
@@ -72,7 +72,7 @@ class Count:
 
 @contextmanager
 def compiling(function: Any) -> Iterator[None]:
-    """Say that a program is compiled meanwhile, by the name of its function."""
+    """Report a function by name as being compiled within the context."""
     token, name = object(), getattr(function, "__name__", "a function")
     with _lock:
         _compiled[token] = name.strip("_<>").replace("_", " ")
@@ -84,7 +84,7 @@ def compiling(function: Any) -> Iterator[None]:
 
 
 def now() -> Activity | None:
-    """Return what is being done; None if that is nothing known."""
+    """Return the current activity; None if there is none."""
     with _lock:
         counted = _count.activity if _count is not None else None
         compiled = list(_compiled.values())[-1:]

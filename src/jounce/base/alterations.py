@@ -1,9 +1,9 @@
-"""Whether this package is in memory what its files say.
+"""Detection of differences between this package in memory and its files.
 
-The names of kept programs are made of the text of the files, so that nothing has to be traced to find them. A function,
-a method or a constant that somebody has replaced in this process is not in that text: then programs have no names, and
-none is kept or taken. What modules and classes hold is noted when they are imported, and compared whenever a name is
-made, in a millisecond or two.
+Cache keys of stored programs depend on the text of the files, so that nothing has to be traced to find them. That text
+does not show a function, method or constant that was replaced in this process; programs then have no keys, and none is
+stored or loaded. The contents of modules and classes are recorded at import, and compared for each key, in a
+millisecond or two.
 """
 
 import sys
@@ -14,18 +14,18 @@ from typing import Any
 
 BEGUN = time.time()  # before other modules of this package are imported
 PACKAGE = __name__.partition(".")[0]
-TABLES = dict, list, set  # which may be changed in their places
-REGISTERED = ("_REGISTRY",)  # users' own classes, which have no names in any case
-_held: dict[str, tuple[Any, dict[str, Any], dict[str, Any]]] = {}  # modules and classes: what is in them, and in tables
+TABLES = dict, list, set  # types of constants that can be changed in place
+REGISTERED = ("_REGISTRY",)  # tables of user classes, which have no cache keys anyway
+_held: dict[str, tuple[Any, dict[str, Any], dict[str, Any]]] = {}  # modules and classes, their contents and tables
 
 
 def note(ready: Collection[str] = ()) -> None:
-    """Note what the modules of this package hold that are imported, and the classes that they define.
+    """Record the contents of the imported modules of this package, and of their classes.
 
     Parameters
     ----------
     ready : collection of str, optional
-        Rooms that are imported but for the end of their ``__init__.py``; what is in others changes until that.
+        Subpackages that are at the end of their ``__init__.py``; the contents of others still change during import.
     """
     modules = sys.modules
     for name in [name for name in list(modules) if name.startswith(f"{PACKAGE}.") and name not in _held]:
@@ -41,7 +41,7 @@ def note(ready: Collection[str] = ()) -> None:
 
 
 def altered() -> str | None:
-    """Return the name of something that is not what it was when its module was imported; None where nothing is.
+    """Return the name of an object that was replaced since its module was imported; None if there is none.
 
     Examples
     --------
@@ -66,12 +66,12 @@ def altered() -> str | None:
 
 
 def _is_begun(module: Any) -> bool:
-    """Tell whether the import of a module has not come to its end."""
+    """Return whether the import of a module has begun but not ended."""
     return getattr(getattr(module, "__spec__", None), "_initializing", False)
 
 
 def _counts(thing: Any, name: str, value: Any) -> bool:
-    """Tell whether what a module or a class holds under a name says what it does, and is not what it remembers."""
+    """Return whether an entry of a module or class determines its behavior, and is no mere state."""
     return _acts(value) or name.isupper() or (isinstance(thing, type) and not name.startswith("_"))
 
 
@@ -80,7 +80,7 @@ def _acts(value: Any) -> bool:
 
 
 def _tables(space: dict[str, Any]) -> dict[str, Any]:
-    """Return what is in the tables among constants."""
+    """Return the entries of the tables among the constants."""
     names = [name for name, value in space.items() if isinstance(value, TABLES) and name.isupper()]
     return {name: _entries(space[name]) for name in names if name not in REGISTERED}
 

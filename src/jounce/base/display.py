@@ -1,4 +1,4 @@
-"""How objects of this package show themselves in a notebook."""
+"""Display of objects of this package in a notebook."""
 
 from collections.abc import Callable
 
@@ -6,9 +6,9 @@ _shown: "Callable[[Displayed], str | None]" = lambda _: None  # noqa: E731 - unt
 
 
 class Displayed:
-    """What a notebook shows as tables.
+    """Base class of objects that a notebook shows as tables.
 
-    What makes the tables knows all kinds of objects, so it is in a higher subpackage, which registers it by `show_by`.
+    The function that makes the tables knows all kinds of objects, so a higher subpackage registers it by `show_by`.
     """
 
     __slots__ = ()
@@ -18,6 +18,6 @@ class Displayed:
 
 
 def show_by(function: Callable[[Displayed], str]) -> None:
-    """Have a notebook show objects of this package by the HTML that a function returns of each."""
+    """Register the function that returns the HTML of an object for notebooks."""
     global _shown
     _shown = function

@@ -1,4 +1,4 @@
-"""Rooms are imported when something of them is first used, by one thread at a time."""
+"""Lazy imports of subpackages, by one thread at a time."""
 
 import contextlib
 import gc
@@ -6,18 +6,18 @@ import threading
 from collections.abc import Iterator
 
 lock = threading.RLock()
-"""Held while functions import subpackages: two threads that import at once may see modules half initialized."""
+"""Held while functions import subpackages: two threads that import at once may see half-initialized modules."""
 
 frozen = threading.Event()
-"""Set once objects of others were found frozen, which takes as long as there are many of them to count."""
+"""Set once frozen objects of other packages were found, since counting them takes long if there are many."""
 
 
 @contextlib.contextmanager
 def without_garbage_collection() -> Iterator[None]:
-    """Leave the search for garbage until later.
+    """Return a context without garbage collection.
 
-    Imports, and programs that are traced and written, leave little, and each search looks through all of JAX again: a
-    quarter of the time of Python in which a program is made.
+    Imports, tracing and translation leave little garbage, while each collection traverses all of JAX: a quarter of the
+    Python time in which a program is made.
     """
     if not gc.isenabled():
         yield
@@ -28,7 +28,7 @@ def without_garbage_collection() -> Iterator[None]:
     finally:
         if not frozen.is_set() and gc.get_freeze_count():
             frozen.set()
-        if not frozen.is_set():  # what is imported stays: it counts as old without being looked through
+        if not frozen.is_set():  # imported objects stay: move them to the old generation without a traversal
             gc.freeze()
             gc.unfreeze()
         gc.enable()

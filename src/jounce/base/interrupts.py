@@ -1,11 +1,11 @@
 """Signals that stop the process, and forks of it.
 
-A signal to stop ends the command at once, with a status that says so, and nothing half written.
+A signal ends the command at once, with the conventional exit status and without unfinished files.
 
-`KeyboardInterrupt` is no way to end a program that computes in JAX: raised in a callback of the tracer or the collector
-it is lost, and the command goes on; raised while XLA's threads compile, the interpreter is taken down under them. So
-the command handles signals itself, from before the libraries are imported: it undoes what it has begun and leaves the
-process without unwinding anything. Nothing of it is active in a program that imports this package.
+`KeyboardInterrupt` does not reliably end a program that computes in JAX. Raised in a callback of the tracer or the
+garbage collector it is lost, and the command continues; raised while XLA's threads compile, it shuts the interpreter
+down under them. The command therefore handles signals itself, from before the import of the libraries: it removes
+unfinished work and exits without unwinding. None of this is active in a program that imports this package.
 """
 
 from __future__ import annotations
@@ -20,22 +20,22 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 
 SIGNALS = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name))
-PATIENCE = 0.2  # s that the main thread has to come out of native code before another one ends the process
-STATUS = 128  # of a process ended by a signal, plus its number
+PATIENCE = 0.2  # s for the main thread to leave native code before another thread ends the process
+STATUS = 128  # exit status of a process ended by a signal, less the number of the signal
 
 _undo: dict[object, Callable[[], object]] = {}
 _ending = threading.Lock()
 _ender = 0  # the thread that ends the process
-_left_behind = False  # whether the threads of XLA stayed in the process that this one was forked from
+_left_behind = False  # whether this process was forked from one with XLA threads
 
 
 def is_command() -> bool:
-    """Tell whether this process was started as the command ``jounce`` or as ``python -m jounce``."""
-    if sys.argv[:1] == ["-m"]:  # while the module is being looked for
+    """Return whether this process was started as the command ``jounce`` or as ``python -m jounce``."""
+    if sys.argv[:1] == ["-m"]:  # during the search for the module
         given = sys.orig_argv
         after = given[given.index("-m") + 1 :] if "-m" in given else []
         return "-mjounce" in given or after[:1] == ["jounce"]
-    folder, name = os.path.split(sys.argv[0] if sys.argv else "")  # pathlib takes a while to import
+    folder, name = os.path.split(sys.argv[0] if sys.argv else "")  # without the slow import of pathlib
     if name == "__main__.py":
         return os.path.basename(folder) == "jounce"  # noqa: PTH119
     return name.removesuffix(".exe").removesuffix("-script.py") == "jounce"
@@ -44,8 +44,8 @@ def is_command() -> bool:
 def end_on_signals() -> None:
     """End this process on Ctrl-C, SIGTERM and SIGHUP, each unless ignored, with status 128 plus the signal's number.
 
-    Python calls handlers between two of its own instructions in the main thread, which may be in native code for long,
-    or for ever: a second thread is woken by the signal itself, and ends the process if the handler has not.
+    Python calls handlers between bytecode instructions of the main thread, which may be in native code for long. The
+    signal therefore also wakes a second thread, which ends the process if the handler has not.
     """
     if threading.current_thread() is not threading.main_thread() or signal.getsignal(signal.SIGINT) is _end:
         return
@@ -54,19 +54,19 @@ def end_on_signals() -> None:
     os.set_blocking(writing, False)
     for number in handled:
         signal.signal(number, _end)
-    atexit.register(_done, handled)  # the first to be registered is the last to be called
+    atexit.register(_done, handled)  # the first registered function is called last
     signal.set_wakeup_fd(writing, warn_on_full_buffer=False)
     threading.Thread(target=_watch, args=(reading,), name="jounce-signals", daemon=True).start()
 
 
 def _done(handled: list[signal.Signals]) -> None:
-    """Ignore signals from here on: Python gives handlers up as it ends, and the status shall say that all was done."""
+    """Ignore signals from now on: the work is complete, and Python drops its handlers as it ends."""
     for number in handled:
         signal.signal(number, signal.SIG_IGN)
 
 
 def _pipe() -> tuple[int, int]:
-    """Return a pipe; standard files that are closed go nowhere first, or it, or a result, would take their places."""
+    """Return a pipe, after closed standard files are opened to the null device, so that no file takes their numbers."""
     while (nowhere := os.open(os.devnull, os.O_RDWR)) <= 2:
         pass
     os.close(nowhere)
@@ -81,10 +81,10 @@ def _watch(reading: int) -> None:
 
 
 def _end(number: int, _frame: object = None) -> None:
-    """Undo what was begun and leave; no lock is needed for it that the interrupted thread might hold."""
+    """Remove unfinished work and exit, without any lock that the interrupted thread might hold."""
     global _ender
     if not _ending.acquire(blocking=False):
-        while _ender != threading.get_ident():  # another thread is at it; nothing new may be begun meanwhile
+        while _ender != threading.get_ident():  # another thread ends the process; this one must not continue
             time.sleep(1.0)
         return
     _ender = threading.get_ident()
@@ -96,9 +96,9 @@ def _end(number: int, _frame: object = None) -> None:
 
 @contextmanager
 def cleanup_on_signal(undo: Callable[[], object]) -> Iterator[None]:
-    """Call a function if a signal ends the process meanwhile, such as one that removes an unfinished file.
+    """Return a context in which a signal that ends the process calls `undo`, such as to remove an unfinished file.
 
-    It may run in any thread while another stands still anywhere, so it must need no lock.
+    The function may run in any thread while another is stopped anywhere, so it must not need a lock.
     """
     key = object()
     _undo[key] = undo
@@ -110,7 +110,7 @@ def cleanup_on_signal(undo: Callable[[], object]) -> Iterator[None]:
 
 @contextmanager
 def raising() -> Iterator[None]:
-    """Let Ctrl-C raise KeyboardInterrupt meanwhile, where the main thread only waits."""
+    """Return a context in which Ctrl-C raises KeyboardInterrupt, for a main thread that only waits."""
     if signal.getsignal(signal.SIGINT) is not _end:
         yield
         return
@@ -123,10 +123,10 @@ def raising() -> Iterator[None]:
 
 @contextmanager
 def interrupts_shielded() -> Iterator[None]:
-    """Keep Ctrl-C from the processes that threads started meanwhile will start: they end with the command, silently.
+    """Return a context whose threads start processes that ignore Ctrl-C, and so end silently with the command.
 
-    It goes to all processes of a terminal, and each would print where it was. The mask of a thread goes over to the
-    threads and processes that it starts; this process hears of the signal by the thread that watches for it.
+    Ctrl-C goes to all processes of a terminal, and each would print a traceback. Threads and processes inherit the
+    signal mask of the thread that starts them; the watching thread still receives the signal for this process.
     """
     if signal.getsignal(signal.SIGINT) is not _end or not hasattr(signal, "pthread_sigmask"):
         yield
@@ -139,13 +139,13 @@ def interrupts_shielded() -> Iterator[None]:
 
 
 def mark_forks() -> None:
-    """Have the processes that are forked from this one know it."""
+    """Have processes that are forked from this one detect the fork."""
     if hasattr(os, "register_at_fork"):
         os.register_at_fork(after_in_child=_after_fork)
 
 
 def is_forked_after_jax() -> bool:
-    """Tell whether this process was forked from one in which JAX had started: XLA's threads are not in it."""
+    """Return whether this process was forked from one in which JAX had started, so that XLA's threads are missing."""
     return _left_behind
 
 

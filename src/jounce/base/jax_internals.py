@@ -1,9 +1,8 @@
-"""What this package uses of JAX and jaxlib that is private to them: all of it is here, and nowhere else.
+"""All uses of private parts of JAX and jaxlib in this package.
 
-Another release may have none of it, or something else by the same name. It was tried with JAX and jaxlib 0.10 and 0.11.
-Where a release is without something, that does not happen which it was for: a program is not
-kept, or is compiled within another one; what cannot be done without is imported here, so that a release without it is
-known at once.
+Other releases may lack these parts, or use their names otherwise; JAX and jaxlib 0.10 and 0.11 were tested. Without an
+optional part, its purpose is not served: a program is not stored, or is compiled within another one. Required parts are
+imported at the top, so that a release without them fails at once.
 """
 
 from collections.abc import Callable, Sequence
@@ -14,18 +13,18 @@ import jax
 from jax._src import config as config, core as core
 from jax.core import Tracer
 
-TRIED = (0, 10), (0, 11)  # releases of JAX
-CERTAIN = "by_certain_entries"  # a name of operations
-OWN = "subroutine_"  # how the names of functions begin that are not written in the place of their calls
+TRIED = (0, 10), (0, 11)  # tested releases of JAX
+CERTAIN = "by_certain_entries"  # name scope of marked operations
+OWN = "subroutine_"  # prefix of the names of functions that are not inlined
 
 
 def is_tested_release() -> bool:
-    """Tell whether this release of JAX was tried: another one may say otherwise what an operation is to do."""
+    """Return whether this release of JAX was tested; others may describe operations differently."""
     return jax.__version_info__[:2] in TRIED
 
 
 def in_plain_operations(program: Any) -> Any:
-    """Return a traced program without operations that stand for several, as some do from JAX 0.12 on."""
+    """Return a traced program with composite operations, which exist from JAX 0.12 on, lowered to plain ones."""
     if not getattr(program, "is_high", False):
         return program
     from jax._src.interpreters import partial_eval
@@ -35,21 +34,22 @@ def in_plain_operations(program: Any) -> Any:
 
 
 def trace_settings() -> tuple[Any, ...]:
-    """Return how JAX is set up in this thread, as `jax.jit` distinguishes its own programs."""
+    """Return the settings of JAX in this thread by which `jax.jit` distinguishes programs."""
     return config.trace_context()
 
 
 def processes_started() -> bool:
-    """Tell whether JAX has started XLA's threads; where that is unknown, that it has."""
+    """Return whether JAX has started XLA's threads; True if that is not known."""
     from jax._src import xla_bridge
 
     return getattr(xla_bridge, "backends_are_initialized", lambda: True)()
 
 
 def runs_at_once(value: Tracer) -> bool:
-    """Tell whether what JAX does with a value that it traces runs at once, as under `jax.jvp` outside of `jax.jit`.
+    """Return whether operations on a tracer run at once, as under `jax.jvp` outside of `jax.jit`.
 
-    Then a program is a whole one, which takes options. What is not known, and what is run later, is part of another.
+    A program called with such a tracer is a whole program, which takes compiler options. Operations on other tracers
+    become part of another program.
     """
     trace: Any = getattr(value, "_trace", None)
     kinds = []
@@ -60,7 +60,7 @@ def runs_at_once(value: Tracer) -> bool:
 
 
 def use_file_cache(make: Callable[[str], tuple[Any, str]]) -> bool:
-    """Have JAX keep its own programs in what a function makes for a path; tell whether this release supports that."""
+    """Have JAX store its own programs in the cache that a function returns for a path; return whether that works."""
     from jax._src import compilation_cache
 
     if known := hasattr(compilation_cache, "get_file_cache"):
@@ -69,21 +69,20 @@ def use_file_cache(make: Callable[[str], tuple[Any, str]]) -> bool:
 
 
 def by_certain_entries() -> Any:
-    """Mark operations in which a constant zero is an entry that a matrix does not have, whatever it is multiplied by.
+    """Return a context or decorator that marks operations in which constant zeros are structural zeros of a matrix.
 
-    Machine code leaves such products out; elsewhere zero times what is not finite is NaN. The mark is a context, or
-    decorates a function.
+    Machine code omits products with structural zeros; with other zeros, the product with a nonfinite number is NaN.
     """
     return jax.named_scope(CERTAIN)
 
 
 def is_by_certain_entries(equation: Any) -> bool:
-    """Tell whether an operation is so marked."""
+    """Return whether an operation is marked by `by_certain_entries`."""
     return CERTAIN in str(equation.source_info.name_stack)
 
 
 def subroutine(function: Callable[..., Any]) -> Any:
-    """Decorate a function of arrays that machine code has once for all its calls: what follows is jitted, too."""
+    """Return a function of arrays, jitted, that machine code contains once for all its calls."""
 
     @wraps(function)
     def named(*arguments: Any) -> Any:
@@ -94,15 +93,15 @@ def subroutine(function: Callable[..., Any]) -> Any:
 
 
 def is_subroutine(equation: Any) -> bool:
-    """Tell whether an operation is a call of such a function."""
+    """Return whether an operation is a call of a `subroutine`."""
     return str(equation.params.get("name", "")).startswith(OWN)
 
 
 def sizes_of_scan(equation: Any) -> tuple[int, int]:
-    """Return how many operands of a loop of known length are constants, and how many are carried from turn to turn.
+    """Return the numbers of constant and of carried operands of a `scan`.
 
-    Releases of JAX write this down in different ways. What is carried has one shape outside and inside the loop; what
-    is read or collected turn by turn has one axis more outside.
+    Releases of JAX store these in different ways. Carried operands have the same shape outside and inside the loop;
+    operands that are read or collected by iteration have one more axis outside.
     """
     inner = equation.params["jaxpr"].jaxpr
 

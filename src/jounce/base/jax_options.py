@@ -1,18 +1,18 @@
-"""The options of JAX under which this package computes, by the names that JAX gives them."""
+"""The options of JAX under which this package computes."""
 
 from typing import Any
 
 OPTIONS: dict[str, Any] = {
     "jax_enable_x64": True,
-    # Numbers that are not finite are used where a case does not apply, and results say where there are none.
+    # Nonfinite numbers occur in cases that do not apply, and mark missing results.
     "jax_debug_nans": False,
     "jax_debug_infs": False,
-    # One operation after another, a solution takes minutes.
+    # Without compilation a solution takes minutes.
     "jax_disable_jit": False,
     "jax_default_matmul_precision": None,
-    # Numbers go to the device with each call, and come back.
+    # Each call transfers numbers to the device and back.
     "jax_transfer_guard_host_to_device": "allow",
     "jax_transfer_guard_device_to_device": "allow",
     "jax_transfer_guard_device_to_host": "allow",
 }
-"""Those that would change results, or stop a computation, each with the value that it has meanwhile."""
+"""Options that would change results or stop a computation, with their values during computations."""

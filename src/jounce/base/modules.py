@@ -1,7 +1,7 @@
-"""Objects whose values JAX sees, and copies of them with other values, made without the checks of a construction.
+"""Dataclasses that are pytrees of JAX, and fast copies of them with other values, without checks.
 
-A model is built of modules that were checked already, and of each several copies are made for every solution:
-`dataclasses.replace` takes longer for one than Newton's method for a step.
+A model is built from modules that were checked already, and every solution makes several copies of each: one call of
+`dataclasses.replace` takes longer than a step of Newton's method.
 """
 
 import dataclasses
@@ -15,20 +15,20 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar, dataclass_transform
 import jax
 import numpy as np
 
-_being_made: set[int] = set()  # the identities of modules whose `__init__` runs
+_being_made: set[int] = set()  # identities of modules in `__init__`
 
 
 def field(*, static: bool = False, converter: Callable[[Any], Any] | None = None, **options: Any) -> Any:
-    """Return a field of a module, as `dataclasses.field` does, whose metadata Equinox reads and writes, too.
+    """Return a field of a module, as `dataclasses.field` does, with metadata compatible with Equinox.
 
     Parameters
     ----------
     static : bool, default False
-        Whether JAX sees no value but a constant: programs are compiled for each that is not equal to others.
+        Whether the value is a constant for JAX: programs are compiled for each different value.
     converter : callable, optional
-        What makes the value of the one that is given.
+        Function from the given value to the stored one.
     **options
-        Those of `dataclasses.field`.
+        Options of `dataclasses.field`.
     """
     metadata = dict(options.pop("metadata", {}))
     if static:
@@ -39,9 +39,9 @@ def field(*, static: bool = False, converter: Callable[[Any], Any] | None = None
 
 
 class _Layout(NamedTuple):
-    """What a class of modules has: fields by kind, and what is called once an object is made."""
+    """The layout of a class of modules: fields by kind, converters and checks."""
 
-    own_init: bool  # whether `__init__` is not that of a dataclass
+    own_init: bool  # whether `__init__` is not generated
     traced: tuple[str, ...]
     static: tuple[str, ...]
     converters: tuple[tuple[str, Callable[[Any], Any]], ...]
@@ -50,9 +50,9 @@ class _Layout(NamedTuple):
 
 @dataclass_transform(field_specifiers=(dataclasses.field, field))
 class _ModuleType(ABCMeta):
-    """The class of classes whose objects are dataclasses and trees of JAX.
+    """Metaclass of dataclasses that are pytrees of JAX.
 
-    None is registered as the virtual base class of another: `isinstance` need not look for such.
+    There are no virtual subclasses, so `isinstance` need not search for them.
     """
 
     __layout__: _Layout
@@ -69,7 +69,7 @@ class _ModuleType(ABCMeta):
             converters=tuple((f.name, f.metadata["converter"]) for f in fields if f.metadata.get("converter")),
             checks=tuple(vars(base)["__check_init__"] for base in kind.__mro__ if "__check_init__" in vars(base)),
         )
-        for converted, _ in layout.converters:  # of any type: those who check types see the value that is given
+        for converted, _ in layout.converters:  # type checkers see the given value, which may have any type
             if converted in kind.__init__.__annotations__:
                 kind.__init__.__annotations__[converted] = Any
         _register(kind, layout)
@@ -77,11 +77,11 @@ class _ModuleType(ABCMeta):
 
     @property
     def __signature__(cls) -> inspect.Signature:
-        """The signature for `help`, which would be that of `__call__` otherwise."""
+        """The signature of `__init__`, for `help`, instead of that of `__call__`."""
         signature = inspect.signature(cls.__init__)
         return signature.replace(parameters=list(signature.parameters.values())[1:])
 
-    if not TYPE_CHECKING:  # those who check types see the dataclasses
+    if not TYPE_CHECKING:  # type checkers see plain dataclasses
         __instancecheck__ = type.__instancecheck__
 
         def __call__(cls, *arguments, **keywords):
@@ -110,7 +110,7 @@ def _has_own_init(base: type) -> bool:
 
 
 def _register(kind: type, layout: _Layout) -> None:
-    """Register a class of modules as a tree of JAX whose leaves are in the fields that are not static."""
+    """Register a class of modules as a pytree of JAX whose children are the fields that are not static."""
     traced, static = _getter(layout.traced), _getter(layout.static)
     keys, names = tuple(map(jax.tree_util.GetAttrKey, layout.traced)), (*layout.traced, *layout.static)
 
@@ -129,7 +129,7 @@ def _register(kind: type, layout: _Layout) -> None:
 
 
 def _getter(names: tuple[str, ...]) -> Callable[[Any], tuple[Any, ...]]:
-    """Return a function that takes the values of several attributes."""
+    """Return a function that returns the values of attributes as a tuple."""
     if len(names) > 1:
         return operator.attrgetter(*names)
     one = operator.attrgetter(*names) if names else None
@@ -137,13 +137,13 @@ def _getter(names: tuple[str, ...]) -> Callable[[Any], tuple[Any, ...]]:
 
 
 class Module(metaclass=_ModuleType):
-    """A dataclass that JAX sees as a tree, whose fields keep their values once it has been made.
+    """An immutable dataclass that is a pytree of JAX.
 
-    Subclasses declare fields, as dataclasses do, with `field(static=True)` for those that JAX is not to see. Once an
-    object is made, converters run, and then `__check_init__` of its class and of each of its bases.
+    Subclasses declare fields, as dataclasses do, with `field(static=True)` for constants of JAX. After `__init__`,
+    converters run, and then `__check_init__` of its class and of each of its bases.
     """
 
-    if TYPE_CHECKING:  # classes of joints, laws and outputs are distinguished by facts, too
+    if TYPE_CHECKING:  # classes of joints, laws and outputs have facts as attributes, too
 
         def __getattr__(self, name: str) -> Any: ...
 
@@ -183,14 +183,14 @@ def _is_default(module: Module, field: dataclasses.Field) -> bool:
 
 
 def _shown(value: Any) -> str:
-    """Return the text of a value, an array of more than a few numbers by its type and shape."""
+    """Return the text of a value; a large array is shown by its type and shape."""
     if isinstance(value, np.ndarray | jax.Array) and value.size > 12:
         return f"{value.dtype}{list(value.shape)}"
     return repr(value)
 
 
 def _is_same(a: Any, b: Any) -> bool:
-    """Tell whether leaves are of one type and equal, arrays in all numbers."""
+    """Return whether leaves have the same type and are equal, arrays in all entries."""
     if a is b:
         return True
     if isinstance(a, np.ndarray | np.generic | jax.Array):
@@ -201,7 +201,7 @@ def _is_same(a: Any, b: Any) -> bool:
 
 @dataclasses.dataclass(unsafe_hash=True)
 class Untraced:
-    """Data of a module that JAX is not to see: all are equal, so that what is compiled does not depend on them."""
+    """Data of a module that JAX ignores: all instances are equal, so that compiled programs do not depend on them."""
 
     value: Any = dataclasses.field(compare=False)
     derived: Any = dataclasses.field(default=None, compare=False)
@@ -211,7 +211,7 @@ M = TypeVar("M")
 
 
 def with_fields(module: M, **values: Any) -> M:
-    """Return a module, or a dataclass, with other values in some fields; neither converters nor checks are called.
+    """Return a module or dataclass with new values of some fields, without converters and checks.
 
     Examples
     --------
@@ -230,7 +230,7 @@ def with_fields(module: M, **values: Any) -> M:
 
 
 def unchecked(kind: type[M], values: Mapping[str, Any]) -> M:
-    """Return a module with these values of all its fields; neither converters nor checks are called."""
+    """Return a module with given values of all fields, without converters and checks."""
     module = object.__new__(kind)
     vars(module).update(values)
     return module
@@ -244,7 +244,7 @@ def field_names(kind: type[Any]) -> Set[str]:
 
 @jax.tree_util.register_pytree_node_class
 class ReadOnlyDict(dict):
-    """A dictionary that does not change, and says what to do instead; for JAX a pytree, as dictionaries are.
+    """An immutable dictionary whose errors name the alternative; for JAX a pytree, like a dictionary.
 
     Examples
     --------
@@ -278,12 +278,12 @@ class ReadOnlyDict(dict):
 
 
 def read_only(entries: Mapping[str, Any], instead: str) -> ReadOnlyDict:
-    """Return a dictionary that does not change, the same one if it is one."""
+    """Return entries as a `ReadOnlyDict`, the same object if they are one."""
     return entries if isinstance(entries, ReadOnlyDict) else ReadOnlyDict(entries, instead)
 
 
 def belongs_to_package(thing: Any) -> bool:
-    """Tell whether a class or a function is one of this package, by the name of its module.
+    """Return whether a class or function belongs to this package, by the name of its module.
 
     Examples
     --------
@@ -296,16 +296,16 @@ def belongs_to_package(thing: Any) -> bool:
 
 
 def changes_parts(kind: type, general: tuple[type, ...], known: Iterable[str] = ()) -> bool:
-    """Tell whether a user's class has anything else in the place of what methods of this package may use.
+    """Return whether a user's class overrides an attribute that methods of this package may use.
 
     Parameters
     ----------
     kind : type
         A class derived from one of this package.
     general : tuple of type
-        Classes of this package that say only what there may be.
+        Abstract classes of this package, whose attributes are meant to be overridden.
     known : iterable of str, optional
-        Names that do not count.
+        Names that may be overridden.
     """
     if belongs_to_package(kind):
         return False

@@ -1,4 +1,4 @@
-"""Public names of release 0.4 and where they are from 0.5 on; the old ones work for one release, with a warning."""
+"""Public names of release 0.4 and their replacements from 0.5 on; old names work for one release, with a warning."""
 
 import functools
 import sys
@@ -78,7 +78,7 @@ MOVED = {
 
 
 def new_name(old: str) -> str | None:
-    """Return where a public name of release 0.4 is now, such as "outputs.PointOutput"; None for other names."""
+    """Return the new name of a public name of release 0.4, such as "outputs.PointOutput"; None for other names."""
     for module, names in MOVED.items():
         if old in names.split():
             return f"{module}.{old}"
@@ -86,7 +86,7 @@ def new_name(old: str) -> str | None:
 
 
 def old_keyword(old: str, new: str) -> Callable[[Callable[P, R]], Callable[P, R]]:
-    """Return a decorator that has a function accept a keyword of release 0.4 too, with a warning."""
+    """Return a decorator that lets a function accept a keyword of release 0.4, too, with a warning."""
 
     def accepting(function: Callable[P, R]) -> Callable[P, R]:
         @functools.wraps(function)
@@ -102,7 +102,7 @@ def old_keyword(old: str, new: str) -> Callable[[Callable[P, R]], Callable[P, R]
 
 
 def renamed(module: str, names: Mapping[str, str]) -> Callable[[str], Any]:
-    """Return the `__getattr__` of a module that gives renamed objects under their old names too, with a warning."""
+    """Return the `__getattr__` of a module that returns renamed objects for their old names, with a warning."""
 
     def get(old: str) -> Any:
         if old not in names:

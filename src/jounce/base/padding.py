@@ -1,17 +1,17 @@
-"""Arrays that are made longer, so that programs are compiled for few lengths."""
+"""Padding of arrays, so that programs are compiled for few lengths."""
 
 import numpy as np
 
 
 def padded(array: np.ndarray, length: int, axis: int = -1) -> np.ndarray:
-    """Repeat the last entry along the first or the last axis up to a length; zeros where there is none.
+    """Return an array padded along the first or last axis with its last entry, or with zeros if it is empty.
 
     Parameters
     ----------
     array : array
-        No longer than that.
+        Array no longer than `length` along the axis.
     length : int
-        Of the axis of the result.
+        Length of the axis of the result.
     axis : int, default -1
         0 or -1.
 
@@ -32,7 +32,7 @@ def padded(array: np.ndarray, length: int, axis: int = -1) -> np.ndarray:
 
 
 def power_of_two(count: int, least: int = 1) -> int:
-    """Return the smallest power of two that is neither below a count nor below the least one.
+    """Return the smallest power of two that is not below a count, but at least `least`.
 
     Examples
     --------

@@ -1,8 +1,8 @@
-"""A folder in which nobody but this user may write: what is read from it, this user put there.
+"""A folder that only this user can write to, so that its contents can be trusted.
 
-Code that is kept in files runs with the rights of who reads it. So the folder, and each file in it, must belong to this
-user and be closed to the writing of others; names are looked up in the folder that was checked, whatever takes its
-place meanwhile, and links are not followed.
+Stored code runs with the rights of the user who reads it. The folder and each file in it must therefore belong to this
+user and not be writable by others. Names are looked up relative to the checked folder, even if another one takes its
+place, and links are not followed.
 """
 
 from __future__ import annotations
@@ -27,9 +27,9 @@ _POSIX = sys.platform != "win32"
 
 
 class PrivateFolder:
-    """A folder of this user, made if it is not there.
+    """A private folder of this user, created if it does not exist.
 
-    On Windows, where a folder of the user's profile is closed to others by its access list, only links are refused.
+    On Windows, where access lists protect the folders of a user's profile, only links are refused.
 
     Parameters
     ----------
@@ -39,10 +39,10 @@ class PrivateFolder:
     Raises
     ------
     OutputError
-        It belongs to another user, others may write in it or in a folder that it is in, or it cannot be opened.
+        If it belongs to another user, others can write to it or to a folder above it, or it cannot be opened.
     """
 
-    SCRATCH = ".part"  # the ending of what is being written
+    SCRATCH = ".part"  # suffix of unfinished files
 
     def __init__(self, path: str | Path):
         self.path = Path(os.path.realpath(path))
@@ -60,7 +60,7 @@ class PrivateFolder:
             raise OutputError(f"cannot be used: {error.strerror}", path=self.path) from None
 
     def read(self, name: str) -> bytes | None:
-        """Return the content of a file, None if there is none that only this user may have written."""
+        """Return the content of a file; None if there is none, or others may have written it."""
         try:
             with open(self._opened(name, _READ), "rb") as stream:  # noqa: PTH123 - of a descriptor
                 status = os.fstat(stream.fileno())
@@ -73,7 +73,7 @@ class PrivateFolder:
             return None
 
     def write(self, name: str, content: bytes) -> None:
-        """Put a file in the place of one of this name, or of a link, in one step; leave it if that fails."""
+        """Write a file atomically, in place of a file or link of the same name; do nothing if that fails."""
         scratch = f".{secrets.token_hex(8)}{self.SCRATCH}"
         try:
             with open(self._opened(scratch, _WRITE), "wb") as stream:  # noqa: PTH123 - of a descriptor
@@ -83,15 +83,15 @@ class PrivateFolder:
             self.remove(scratch)
 
     def remove(self, name: str) -> None:
-        """Remove a file, or a link, where that is possible."""
+        """Remove a file or link, if possible."""
         with contextlib.suppress(OSError):
             os.unlink(*self._at(name), **self._here())
 
     def files(self, ending: str) -> Iterator[tuple[float, int, str]]:
-        """Give when each file of an ending was used last, its bytes and its name."""
+        """Yield the time of last use, the size in bytes and the name of each file with a suffix."""
         with contextlib.suppress(OSError):
             for name in os.listdir(self.path if self._descriptor is None else self._descriptor):  # noqa: PTH208
-                with contextlib.suppress(OSError):  # another process removes some, too
+                with contextlib.suppress(OSError):  # another process may remove files
                     if name.endswith(ending):
                         status = os.stat(*self._at(name), follow_symlinks=False, **self._here())
                         yield status.st_mtime, status.st_size, name
@@ -117,7 +117,7 @@ class PrivateFolder:
             raise OutputError(message, path=self.path)
 
     def _check_above(self) -> None:
-        """Refuse folders above in which others may put another one in the place of this."""
+        """Raise OutputError if others could replace this folder in one of the folders above it."""
         for folder in self.path.parents if _POSIX else ():
             status = folder.stat()
             writable = stat.S_IWOTH if status.st_gid == os.getegid() else _OTHERS
@@ -128,7 +128,7 @@ class PrivateFolder:
 
 
 def _unsafe_reason(status: os.stat_result) -> str:
-    """Say why a folder or a file may hold what another has put there; nothing where it does not."""
+    """Return the reason why others may have written a folder or file; empty if they cannot have."""
     if not _POSIX:
         return ""
     if status.st_uid != os.geteuid():

@@ -1,12 +1,13 @@
 """Arrays in annotations: `Float[Numbers, "order 3 *batch"]` is an array of floats with that shape.
 
-An annotation states a shape as jaxtyping writes it, and beartype checks it while tests run. Axes are named alike
-everywhere: within the library `order` first, components next, `*batch` last; at its doors `*batch` or `time` first,
-then `derivative`, then `joint`, `row`, `column` or a component. An axis `order` or `derivative` counts from zero.
+An annotation states a shape in the notation of jaxtyping, which beartype checks during tests. Axis names and orders are
+the same everywhere: within the library `order` first, components next, `*batch` last; in public functions `*batch` or
+`time` first, then `derivative`, then `joint`, `row`, `column` or a component. An axis `order` or `derivative` counts
+from zero.
 
-Public functions write `Array` for `Float`, and name the unions that they take by `TypeAliasType`: in a signature that
-``help`` shows such an alias is its name. The checks see what it stands for. Within `dict[...]` and `tuple[...]`, which
-beartype distinguishes by their text, only one shape of `Array` may be written: write `Float` there.
+Public functions use `Array` for `Float`, and unions named by `TypeAliasType`, whose names ``help`` shows in signatures;
+the checks see the types behind them. Within `dict[...]` and `tuple[...]`, which beartype distinguishes by their text,
+only one shape of `Array` is possible: use `Float` there.
 """
 
 import datetime
@@ -22,14 +23,14 @@ from jax.core import Tracer
 from typing_extensions import TypeAliasType
 
 Numbers = jax.Array | np.ndarray
-"""An array of JAX or NumPy."""
+"""A JAX or NumPy array."""
 
 if TYPE_CHECKING:
     from jaxtyping import Float as Array
 else:
 
     class Array:
-        """An array of floats of some shape, as `jaxtyping.Float` writes it; ``help`` shows it by this short name."""
+        """An array of floats with a shape, as `jaxtyping.Float`, which ``help`` shows by this short name."""
 
         def __class_getitem__(cls, kind_and_shape: tuple[Any, str]) -> TypeAliasType:
             return TypeAliasType("Array", jaxtyping.Float[kind_and_shape])
@@ -37,67 +38,67 @@ else:
 
 @runtime_checkable
 class Labeled(Protocol):
-    """What NumPy makes an array of: a column of a table, an array with labels, a quantity with a unit."""
+    """An object that NumPy converts to an array: a column of a table, a labeled array, a quantity with a unit."""
 
     def __array__(self, *args: Any, **options: Any) -> np.ndarray: ...
 
 
 ArrayLike = TypeAliasType("ArrayLike", Numbers | Sequence | np.floating | np.integer | float | int | Labeled)
-"""What becomes an array of numbers: an array, lists or tuples of numbers in any nesting, a number."""
+"""An object that can be converted to an array of numbers: an array, nested lists or tuples of numbers, a number."""
 
 Real = TypeAliasType("Real", Numbers | np.floating | np.integer | float | int)
 """Real numbers: an array or one number."""
 
 Refused = object
-"""Anything else, which a function takes only to refuse it in words: ``int | Refused`` is a whole number."""
+"""Any other object, which a function accepts only to raise a clear error: ``int | Refused`` means a whole number."""
 
 
 def is_traced(values: Any) -> bool:
-    """Tell whether JAX traces an array in a pytree: then there are no numbers to check or to choose by."""
+    """Return whether a pytree contains JAX tracers, whose values cannot be checked."""
     leaves = jax.tree.leaves(values)
     return not only_arrays(leaves) and any(isinstance(x, Tracer) for x in leaves)
 
 
 def only_arrays(leaves: Sequence[Any]) -> bool:
-    """Tell whether all are arrays of NumPy, of which JAX would be slow to tell one by one that it traces none."""
+    """Return whether all leaves are NumPy arrays, a fast check that none is a tracer."""
     return set(map(type, leaves)) <= {np.ndarray}
 
 
 def real_numbers(
     name: str | None, values: Any, error: Callable[..., Exception], expected: str = "real numbers"
 ) -> np.ndarray:
-    """Return values as an array of double precision, the same one if they are one.
+    """Return values as an array of double precision; the same object if they are one.
 
     Raises
     ------
     Exception
-        That given, if they are no real numbers in one rectangular array: text, truth values, dates, durations, records,
-        complex numbers, masked values, or quantities with a unit that is not of SI. NumPy would take most for numbers.
+        The class `error`, unless the values are real numbers in a rectangular array. Text, truth values, dates,
+        durations, records, complex numbers, masked values, and quantities with units other than SI are refused,
+        although NumPy would convert most of them.
     """
     return _checked(name, values, error, expected, timed=False)
 
 
 def real_or_traced(name: str | None, values: Any, error: Callable[..., Exception], *, timed: bool = False) -> Any:
-    """Return values as they are where JAX traces them, or takes them for the real numbers that they are.
+    """Return tracers and real numbers unchanged, and other values as `real_numbers`, or for times as `seconds`.
 
-    Lists of what JAX traces become arrays. Others are read as `real_numbers` does, or, where they are times, as
-    `seconds` does.
+    Lists with tracers become JAX arrays.
     """
     if is_real(values) or type(values) in _PLAIN or (type(values) is np.ndarray and values.dtype.kind in "fiu"):
         return values
     if isinstance(values, Tracer) and values.dtype.kind == "b":
         return values
     if not isinstance(values, Tracer) and is_traced(values):
-        return jnp.asarray(values, float)  # a list of them
+        return jnp.asarray(values, float)  # a list of tracers
     return (seconds if timed else real_numbers)(name, values, error)
 
 
 def seconds(
     name: str | None, values: Any, error: Callable[..., Exception], expected: str = "real numbers"
 ) -> np.ndarray:
-    """Return instants as `real_numbers` does, durations and quantities of time converted to seconds.
+    """Return instants as `real_numbers` does, with durations and quantities of time converted to seconds.
 
-    Dates are refused: which of them is time zero is for the user to say.
+    Dates are refused, since only the user knows which date is time zero.
 
     Examples
     --------
@@ -119,14 +120,14 @@ def _checked(
 
 
 class _NoNumbersError(Exception):
-    """Says what values are in place of real numbers, and what to do."""
+    """The values are not real numbers; the message names their kind and a remedy."""
 
     def __str__(self) -> str:
         return f"; {self.args[0]}"
 
 
 def _numbers(values: Any, timed: bool) -> np.ndarray:
-    """Return values as an array of double precision; entries of lists and of arrays of objects one by one."""
+    """Return values as an array of double precision, with entries of lists and object arrays converted one by one."""
     if type(values) is np.ndarray and values.dtype.kind in "fiu":
         return np.asarray(values, float)
     if isinstance(values, list | tuple):
@@ -159,8 +160,8 @@ def _seconds_of(durations: np.ndarray) -> np.ndarray:
 
 
 def _unit_free(values: Any, timed: bool) -> Any:
-    """Return the magnitudes of a quantity with a unit; raise an error unless they are in SI units, or are times."""
-    unit = getattr(values, "attrs", {}).get("units")  # of arrays with labels
+    """Return the magnitudes of a quantity; raise an error unless its unit is SI or, if `timed`, a unit of time."""
+    unit = getattr(values, "attrs", {}).get("units")  # of labeled arrays
     if isinstance(unit, str) and not _SI.fullmatch(unit.strip()):
         raise _NoNumbersError(f"these are in {unit}: convert them to SI units")
     bare = getattr(values, "data", values) if unit is not None or hasattr(values, "coords") else values
@@ -190,34 +191,34 @@ _SI = re.compile(rf"|dimensionless|{_UNIT}(?: ?[*/ ] ?{_UNIT})*")
 
 
 def real_derivatives(derivatives: Iterable[Any]) -> list[Any]:
-    """Return derivatives as a list of arrays; a ValueError if one is not of real numbers, as `real_numbers` says."""
+    """Return derivatives as a list of arrays; raise ValueError unless all are real numbers as for `real_numbers`."""
     return [x if is_real(x) else real_numbers("derivatives", x, no_numbers) for x in derivatives]
 
 
 def no_numbers(message: str, name: str, value: object) -> ValueError:
-    """Return the error of a jet for what is no array of real numbers."""
+    """Return the error of a jet for values that are not an array of real numbers."""
     return ValueError(f"{name} {message}, got {type(value).__name__}")
 
 
 def is_real(x: Any) -> TypeGuard[jax.Array]:
-    """Tell whether a value is an array of JAX, traced or not, of real numbers."""
+    """Return whether a value is a JAX array of real numbers, traced or not."""
     return isinstance(x, jax.Array) and x.dtype.kind in "fiu"
 
 
 def has_labels(values: Any) -> bool:
-    """Tell whether values are an array of xarray or pandas."""
+    """Return whether values are labeled, as xarray or pandas objects are."""
     return hasattr(values, "isel") or hasattr(values, "iloc")
 
 
 def by_component(name: str | None, values: Any, error: Callable[..., Exception]) -> Any:
-    """Return values with their components in the order x, y, z where they have such labels, in any order.
+    """Return values with labeled components sorted to x, y, z, or to w, x, y, z for a quaternion.
 
-    Arrays of xarray and pandas have; quaternions are ``w, x, y, z``. Of a tensor both axes may have labels.
+    Labels are those of xarray and pandas; both axes of a tensor may have labels.
 
     Raises
     ------
     Exception
-        That given, if some of the labels are others, or the components lie along another axis than the last.
+        The class `error`, if there are other labels, or the components are not along the last axis.
 
     Examples
     --------
