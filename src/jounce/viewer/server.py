@@ -1,4 +1,4 @@
-"""Viewing: a page on this machine for a mechanism or a robot, from a file or from Python."""
+"""The viewer: a local page for a mechanism or a robot, from a file or from Python."""
 
 from __future__ import annotations
 
@@ -18,27 +18,27 @@ MECHANISM_FILES = (".yaml", ".yml", ".toml", ".json")
 
 
 class View:
-    """A page that is being served.
+    """A served page.
 
     Parameters
     ----------
     subject : Subject
-        What is looked at.
+        The viewed object.
     port : int, default 0
-        Of this machine; 0 takes one that is free.
+        Port of this machine; 0 chooses a free one.
     order : int, default 4
         Highest derivative.
     playing : bool, default True
-        Whether it moves at once.
+        Whether the motion plays at once.
 
     Attributes
     ----------
     url : str
-        Its address, with the token that it takes to see and move it.
+        Address of the page, with the token required to view and control it.
     page : Page
-        What is shown.
+        The page.
     panel, arrows, forces, plots
-        Its controls.
+        Controls of the page.
     """
 
     def __init__(self, subject: Any, *, port: int = 0, order: int = 4, playing: bool = True):
@@ -46,7 +46,7 @@ class View:
         access = AccessControl()
         server = quiet_server(port, label=subject.name, access=access)
         try:
-            from jounce.viewer.page.page import Page  # which needs the extra
+            from jounce.viewer.page.page import Page  # needs the extra ``viewer``
 
             self.page = Page(server, subject, order)
             self._lay_out(subject, playing)
@@ -83,7 +83,7 @@ class View:
         self.panel.set_playing(playing)
 
     def wait(self) -> None:
-        """Serve until interrupted (Ctrl-C), then end."""
+        """Serve until interrupted (Ctrl-C), then close."""
         try:
             while True:
                 time.sleep(3600)
@@ -93,7 +93,7 @@ class View:
             self.close()
 
     def close(self) -> None:
-        """End the page."""
+        """Stop serving the page."""
         self.page.close()
 
     def __enter__(self) -> View:
@@ -116,39 +116,38 @@ def view(
     without: Sequence[str] = (),
     hold: str | Sequence[str] = (),
 ) -> View:
-    """Show a mechanism or a robot in the browser: moving, with arrows, plots, forces and live parameters.
+    """Show a moving mechanism or robot in the browser, with arrows, plots, forces and live parameters.
 
-    The page is served on this machine only, asks nothing of the network, and goes with `View.close`, or with the
-    process.
+    The page is served on this machine only and uses no network. It ends with `View.close`, or with the process.
 
     Parameters
     ----------
     subject : Mechanism, Robot, PlateCam, or path of a file of a mechanism or a robot
-        A mechanism (.yaml, .yml, .toml or .json) with a time grid: it is solved, or simulated if it has initial
-        conditions. A robot (.urdf, .sdf, or .xml for MJCF): its shapes are shown where the file has some.
+        A mechanism (.yaml, .yml, .toml or .json) with a time grid, which is solved, or simulated if it has initial
+        conditions. A robot (.urdf, .sdf, or .xml for MJCF), shown with the shapes of its file if it has any.
     trajectory : JointTrajectory, or path of a file, optional
-        Of a robot; each joint swings within its limits unless given.
+        Motion of a robot; by default each joint swings within its limits.
     port : int, default 0
-        Of this machine; 0 takes one that is free.
+        Port of this machine; 0 chooses a free one.
     order : int, default 4
         Highest derivative of arrows and plots.
     open_page : bool, default True
         Open the page in the browser of the user.
     playing : bool, default True
-        Whether it moves at once.
+        Whether the motion plays at once.
     allow
-        Folders besides that of the file that samples and meshes named in it may be below.
+        Further folders allowed for samples and meshes named in the file.
     modes : bool, default False
-        Show the natural modes about the equilibrium instead of a motion; a slider chooses one.
+        Show the modes about the equilibrium instead of a motion; a slider chooses one.
     without : sequence of str, optional
-        Drivers of a mechanism that are left out of the equilibrium.
+        Drivers of a mechanism to omit for the equilibrium.
     hold : sequence of str, or "all", optional
-        Joints of a robot that are held in the equilibrium.
+        Joints of a robot to lock for the equilibrium.
 
     Returns
     -------
     View
-        With its address, `View.url`; `View.wait` serves until Ctrl-C.
+        The view, with its address `View.url`; `View.wait` serves until Ctrl-C.
 
     Raises
     ------
@@ -174,7 +173,7 @@ def view(
 
 
 class ModesChoice(NamedTuple):
-    """Whether modes are shown instead of a motion, and what is left out or held then."""
+    """Whether to show modes instead of a motion, with the omitted drivers or locked joints."""
 
     requested: bool = False
     without: tuple[str, ...] = ()
@@ -187,12 +186,12 @@ def subject_of(
     allow: Iterable[str | PathLike[str]] = (),
     modes: ModesChoice = ModesChoice(),  # noqa: B008 - a constant
 ) -> Any:
-    """Return what is to be looked at, from a mechanism, a robot or a file.
+    """Return the subject of a view, from a mechanism, a robot or a file.
 
     Raises
     ------
     JounceError
-        If it is none of them, or a trajectory is given with a mechanism.
+        If the argument is none of them, or a trajectory is given with a mechanism.
     """
     from jounce.io import load, load_robot
     from jounce.viewer.subjects.mechanisms import MechanismSubject
@@ -231,12 +230,12 @@ def subject_of(
 def modes_subject(
     given: Mechanism | Robot, modes: ModesChoice, path: Path | None, allow: Iterable[str | PathLike[str]] = ()
 ) -> Any:
-    """Return the modes of a mechanism or a robot as what is looked at.
+    """Return the modes of a mechanism or a robot as the subject of a view.
 
     Raises
     ------
     JounceError
-        If there is no equilibrium, nothing moves about it, or an option is for the other kind.
+        If there is no equilibrium, nothing can move about it, or an option is for the other kind.
     """
     from jounce.viewer.shapes.robot_appearance import robot_appearance
     from jounce.viewer.subjects.modes import ModesSubject
@@ -256,16 +255,16 @@ def modes_subject(
 def robot_subject(
     robot: Robot, trajectory: Any = None, path: Path | None = None, allow: Iterable[str | PathLike[str]] = ()
 ) -> Any:
-    """Return a robot as what is looked at; one with closures moves as the mechanism that it is.
+    """Return a robot as the subject of a view; a robot with closures moves as a mechanism.
 
     Parameters
     ----------
     robot : Robot
     trajectory : JointTrajectory, path or None
     path : Path, optional
-        The file of the robot, whose shapes are shown.
+        The file of the robot, with its shapes.
     allow
-        Folders besides that of the file that meshes may be below.
+        Further folders allowed for meshes.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""What a page can be kept as: a table, a picture, an animation in one file that plays without this package."""
+"""Exports of a page: a table, a picture, or an animation in one file that plays without this package."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ SMOOTH = 1 / 30  # s between two pictures of an animation
 
 
 def file_name(title: str, ending: str) -> str:
-    """Return a name for a file of a motion.
+    """Return a file name for a motion.
 
     Examples
     --------
@@ -48,14 +48,14 @@ def table(recording: Recording) -> bytes:
 
 
 def picture(client: Any, height: int | None = None, width: int | None = None) -> bytes:
-    """Return what a browser shows of the scene as a PNG file, on white.
+    """Return the scene in a browser as a PNG file, on white.
 
     Parameters
     ----------
     client : viser.ClientHandle
-        The browser, which draws it.
+        The browser that draws the scene.
     height, width : int, optional
-        Pixels; those of the browser unless given.
+        Size in pixels, by default that of the browser.
 
     Raises
     ------
@@ -79,7 +79,7 @@ def picture(client: Any, height: int | None = None, width: int | None = None) ->
 
 
 def animation(overlay: Overlay) -> str:
-    """Return what a page shows as one HTML file that plays in any browser, without a network and this package.
+    """Return an animation of a page as one HTML file, which plays in any browser without a network or this package.
 
     Parameters
     ----------
@@ -110,9 +110,9 @@ def animation(overlay: Overlay) -> str:
 
 
 def frames_shown(recording: Recording) -> list[int]:
-    """Return the frames of an animation: all, or as many as are needed to look smooth."""
+    """Return the frames of an animation: all, or as many as look smooth."""
     time = recording.time
     targets = np.arange(time[0], time[-1] + 0.5 * SMOOTH, SMOOTH)
-    if len(targets) < 60:  # short motions are shown instant by instant
+    if len(targets) < 60:  # short motions are shown at all instants
         return list(range(len(time)))
     return sorted({*nearest_instants(time, targets).tolist(), len(time) - 1})

@@ -1,4 +1,4 @@
-"""The legend of the page: what the arrows and colors mean, and how large everything is now."""
+"""The legend of the page: meanings of arrows and colors, and current values."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def _chip(color: Color) -> str:
 
 
 def _table(rows: list[tuple[str, ...]]) -> str:
-    """Return a table as HTML, its last column to the right."""
+    """Return a table as HTML, with its last column aligned to the right."""
     lines = []
     for *cells, last in rows:
         left = "".join(f'<td style="{CELL}">{cell}</td>' for cell in cells)
@@ -33,7 +33,7 @@ def _table(rows: list[tuple[str, ...]]) -> str:
 
 
 def legend(shown: Overlay, frame: int) -> str:
-    """Return the legend as HTML: a row for each arrow with its size now, then the scales, the paths and the forces."""
+    """Return the legend as HTML: a row for each arrow with its current size, then scales, paths and forces."""
     recording, rows = shown.recording, []
     for each in shown.options.traced:
         motion = recording.motion(each.point)[frame]
@@ -55,7 +55,7 @@ def legend(shown: Overlay, frame: int) -> str:
 
 
 def _loads(shown: Overlay, frame: int) -> list[str]:
-    """Return the rows of forces and torques that are shown."""
+    """Return the rows of the shown forces and torques."""
     rows = []
     for load in shown.loads:
         words = []
@@ -91,7 +91,7 @@ def _color_bar(shown: Overlay) -> str:
 
 
 def _number(value: float) -> str:
-    """Return a number with three digits, at one width while it changes slowly."""
+    """Return a number with three digits, of constant width while it changes slowly."""
     if value == 0 or 0.01 <= abs(value) < 1e4:
         digits = 2 if value == 0 else max(0, 2 - int(np.floor(np.log10(abs(value)))))
         return f"{value:.{digits}f}"
@@ -99,7 +99,7 @@ def _number(value: float) -> str:
 
 
 def _powers(text: str) -> str:
-    """Return a unit with raised exponents."""
+    """Return a unit as HTML with superscript exponents."""
     return re.sub(r"\^(-?\d+)", r"<sup>\1</sup>", escape(text))
 
 
@@ -113,7 +113,7 @@ def error_box(text: str) -> str:
 
 
 def status_line(recording: Recording, elapsed: float, busy: bool) -> str:
-    """Return what is shown, in gray."""
+    """Return the status of the page as a gray line of HTML."""
     words = f"{len(recording.time)} instants, order {recording.order}"
     if busy:
         words += ", solving ..."

@@ -1,10 +1,9 @@
-"""The server of a page: on this machine only, for those who have its address with the token, and for no other origin.
+"""The server of a page: on this machine only, for requests with the token in the address, and for no other origin.
 
-A server that listens on this machine only can still be reached from it by every program, and by every page that is open
-in a browser here: scripts may open a WebSocket to any port (only its Origin says whose script it is), and a name of an
-attacker may be made to mean this machine after its page was loaded (DNS rebinding: only the Host says so). So every
-request, for a page or a WebSocket, must name this machine as its host, come from this page or from no page, and hold
-the token.
+A server that listens on this machine only can still be reached by every local program, and by every page open in a
+local browser: scripts may open a WebSocket to any port (only its Origin identifies the page), and an attacker may point
+a name to this machine after its page was loaded (DNS rebinding: only the Host reveals it). Every request, for a page or
+a WebSocket, must therefore name this machine as its host, come from this page or from no page, and contain the token.
 """
 
 from __future__ import annotations
@@ -22,11 +21,11 @@ from urllib.parse import parse_qs, urlsplit
 
 from jounce.errors import JounceError
 
-HOSTS = ("127.0.0.1", "localhost", "[::1]")  # of any port, as a tunnel may have another one at its other end
-LONGEST_PATH = 1000  # characters; those of the page are far shorter
+HOSTS = ("127.0.0.1", "localhost", "[::1]")  # with any port, as the other end of a tunnel may have another one
+LONGEST_PATH = 1000  # characters; paths of the page are far shorter
 REFUSED = "Open this page with the complete address that jounce view prints, including its token.\n"
 HEADERS = {"Cache-Control": "no-store", "Referrer-Policy": "no-referrer", "X-Content-Type-Options": "nosniff"}
-# The page of viser connects to its own address without the query string, unless it is given another one.
+# By default the page of viser connects to its own address without the query string.
 CONNECT = b"""<script>{
 const given = new URLSearchParams(location.search);
 if (!given.has("websocket")) {
@@ -35,24 +34,24 @@ if (!given.has("websocket")) {
 }
 }</script>"""
 _starting = threading.Lock()
-_quiet = logging.getLogger(__name__)  # what strangers send is no trouble of the user's
+_quiet = logging.getLogger(__name__)  # invalid requests of others do not concern the user
 _quiet.setLevel(logging.CRITICAL + 1)
 
 
 class AccessControl:
-    """Lets requests pass that hold a token of its own.
+    """Control that allows only requests with a random token.
 
     Attributes
     ----------
     token : str
-        128 random bits, for the address.
+        Token of 128 random bits, for the address.
     """
 
     def __init__(self) -> None:
         self.token = secrets.token_urlsafe(16)
 
     def allows(self, request: Any) -> bool:
-        """Tell whether a request may pass.
+        """Return whether a request is allowed.
 
         Parameters
         ----------
@@ -66,19 +65,19 @@ class AccessControl:
 
     @contextmanager
     def starting(self) -> Iterator[None]:
-        """Guard the server that viser starts meanwhile, which has no hook for it.
+        """Guard the server that viser starts in this context, as viser has no hook for it.
 
         Raises
         ------
         JounceError
-            If viser did not start one as is known here: what cannot be guarded is not served.
+            If viser does not start its server in the known way, so that it cannot be guarded.
         """
         from websockets.asyncio import server as library
 
         serve, guarded = library.serve, []
 
         def serving(*arguments: Any, process_request: Any = None, **options: Any) -> Any:
-            if getattr(process_request, "__module__", "").startswith("viser."):  # any other server is left alone
+            if getattr(process_request, "__module__", "").startswith("viser."):  # other servers are not changed
                 guarded.append(True)
                 process_request = self._before(process_request)
                 options["logger"] = _quiet
@@ -94,7 +93,7 @@ class AccessControl:
             raise JounceError("this version of viser cannot be guarded; install that of the extra jounce[viewer]")
 
     def _before(self, process_request: Callable[..., Any]) -> Callable[..., Any]:
-        """Return what answers a request only where it is allowed."""
+        """Return a function that answers only allowed requests."""
 
         def guarded(connection: Any, request: Any) -> Any:
             if not self.allows(request):
@@ -102,7 +101,7 @@ class AccessControl:
             if len(request.path) > LONGEST_PATH:
                 return connection.respond(414, "This address is too long.\n")
             if "Accept-Encoding" in request.headers:
-                del request.headers["Accept-Encoding"]  # so that the page comes as it is
+                del request.headers["Accept-Encoding"]  # so that the page is not compressed
             response = process_request(connection, request)
             if response is not None:
                 _complete(response)
@@ -112,7 +111,7 @@ class AccessControl:
 
 
 def _refuse_uploads(server: Any) -> None:
-    """Take no files: no control of the page asks for any, but viser would keep what is sent for a slider.
+    """Refuse uploads: no control of the page asks for files, but viser would store files sent for a slider.
 
     Parameters
     ----------
@@ -125,7 +124,7 @@ def _refuse_uploads(server: Any) -> None:
 
 
 def _ignore_what_does_not_fit(server: Any) -> None:
-    """Say nothing of messages that no page sends, such as letters for the number of a slider.
+    """Ignore messages that no page sends, such as letters for the number of a slider.
 
     Parameters
     ----------
@@ -135,7 +134,7 @@ def _ignore_what_does_not_fit(server: Any) -> None:
     handle = interface._handle_incoming_message
 
     async def handled(client: int, message: Any) -> None:
-        with suppress(Exception):  # viser would print it; errors of callbacks come another way
+        with suppress(Exception):  # viser would print it; errors of callbacks are handled elsewhere
             await handle(client, message)
 
     interface._handle_incoming_message = handled
@@ -146,7 +145,7 @@ def _is_local_host(host: str) -> bool:
 
 
 def _complete(response: Any) -> None:
-    """Tell the page where to connect, and the browser to keep the address to itself."""
+    """Add the address of the connection to the page, and headers with which the browser keeps the address private."""
     response.headers.update(HEADERS)
     head = b"<head>"
     if response.headers.get("Content-Type", "").startswith("text/html") and head in response.body:
@@ -156,7 +155,7 @@ def _complete(response: Any) -> None:
 
 
 def check_installed() -> None:
-    """Raise JounceError unless the packages of the extra ``viewer`` are there."""
+    """Raise JounceError unless the packages of the extra ``viewer`` are installed."""
     from importlib.util import find_spec
 
     if any(find_spec(name) is None for name in ("viser", "trimesh", "shapely")):
@@ -165,7 +164,7 @@ def check_installed() -> None:
 
 
 def quiet_server(port: int = 0, label: str | None = None, access: AccessControl | None = None) -> Any:
-    """Return a viser server that listens on this machine only, answers the given hosts only, and prints nothing.
+    """Return a viser server that listens on this machine only, answers allowed requests only, and prints nothing.
 
     Raises
     ------
@@ -189,20 +188,20 @@ def quiet_server(port: int = 0, label: str | None = None, access: AccessControl 
 
 
 def stop_silently(server: Any) -> None:
-    """End a viser server without a word."""
+    """Stop a viser server without output."""
     with redirect_stdout(io.StringIO()):
         server.stop()
 
 
 def _free_port() -> int:
-    """Return a port of this machine that nobody listens on."""
+    """Return a free port of this machine."""
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         return int(probe.getsockname()[1])
 
 
 def check_port(port: Any) -> None:
-    """Raise JounceError unless a port can be listened on."""
+    """Raise JounceError unless a port is valid and free."""
     if isinstance(port, bool) or not isinstance(port, int) or not 0 <= port <= 65535:
         raise JounceError("must be a whole number from 0 to 65535; 0 takes a free one", name="port", value=port)
     if port:

@@ -1,4 +1,4 @@
-"""Arrows, paths and loads over a recording, computed at all instants beforehand, so that playing is showing only."""
+"""Arrows, paths and loads of a recording, computed for all instants in advance, so that playing only displays them."""
 
 from __future__ import annotations
 
@@ -14,20 +14,20 @@ from jounce.viewer.shapes.recording import Load, Recording
 
 @dataclasses.dataclass(frozen=True)
 class DisplayOptions:
-    """What is shown over a recording.
+    """Display options of a recording.
 
     Parameters
     ----------
     traced : tuple of TracedPoint
         Points with arrows and paths.
     lengths : dict of int to float
-        By what arrows of a derivative are longer than the automatic length.
+        Factor of the automatic length of arrows, by derivative.
     path_order : int, default 1
-        Derivative whose size colors the paths.
+        Derivative whose magnitude colors the paths.
     kinds : frozenset of str
-        Of loads that are shown: reaction, driver, applied.
+        Kinds of shown loads: reaction, driver, applied.
     force_length : float, default 1
-        By what arrows of forces are longer than the automatic length.
+        Factor of the automatic length of arrows of forces.
     """
 
     traced: tuple[TracedPoint, ...] = ()
@@ -37,7 +37,7 @@ class DisplayOptions:
     force_length: float = 1.0
 
     def fitted(self, recording: Recording) -> DisplayOptions:
-        """Return the same for another recording: points by their names, and derivatives that it has."""
+        """Return the options for another recording: points matched by name, and derivatives limited to its order."""
         known = {point.name: point for point in recording.appearance.points}
         traced = tuple(
             dataclasses.replace(
@@ -53,27 +53,27 @@ class DisplayOptions:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Overlay:
-    """Arrows, paths and loads over a recording at all instants.
+    """Arrows, paths and loads of a recording at all instants.
 
     Parameters
     ----------
     recording : Recording
     options : DisplayOptions
     arrows : dict of int to numpy.ndarray of shape (time, arrows, 2, 3)
-        By derivative, m.
+        Arrows by derivative, m.
     scales : dict of int to float
-        Length of an arrow by unit of the derivative, m.
+        Length of an arrow per unit of the derivative, m.
     lines, colors : numpy.ndarray
-        Of paths.
+        Lines and colors of paths.
     extremes : tuple of float
-        Sizes that the ends of the colors stand for.
+        Magnitudes at the ends of the color scale.
     loads : sequence of Load
     forces : dict of str to numpy.ndarray of shape (time, arrows, 2, 3)
-        By kind, m.
+        Arrows of forces by kind, m.
     force_scale : float
-        Length of an arrow by N, m.
+        Length of an arrow per N, m.
     largest_torque : float
-        N m.
+        Largest torque, N m.
     """
 
     recording: Recording
@@ -90,7 +90,7 @@ class Overlay:
 
     @classmethod
     def of(cls, recording: Recording, options: DisplayOptions) -> Overlay:
-        """Compute what is to be shown.
+        """Return the overlay of a recording.
 
         Raises
         ------

@@ -1,4 +1,4 @@
-"""The page of one subject: its motion, what is to be shown of it, and what is shown at the instant of now."""
+"""The page of a subject: its motion, the display options, and the current instant."""
 
 from __future__ import annotations
 
@@ -16,30 +16,30 @@ from jounce.viewer.page.session import Session, Subject
 from jounce.viewer.shapes.arrows import TracedPoint
 from jounce.viewer.shapes.recording import Recording
 
-SLOWLY = 6  # legend and plots follow every so many pictures
+SLOWLY = 6  # pictures between two updates of legend and plots
 
 
 class Observer:
-    """A panel, which is notified of events; by default it does nothing."""
+    """A panel that is notified of events; by default it does nothing."""
 
     def on_recording(self, recording: Recording) -> None:
-        """There is a new motion."""
+        """Respond to a new motion."""
 
     def on_failure(self, error: JounceError) -> None:
-        """There is none for the newest values."""
+        """Respond to a failure for the newest values."""
 
     def on_busy(self, busy: bool) -> None:
-        """The solver begins to work, or has nothing left to do."""
+        """Respond to the start or the end of the work of the solver."""
 
     def on_time(self, instant: float) -> None:
-        """The player is at a time, s."""
+        """Respond to a time of the player, s."""
 
     def on_frame(self, frame: int) -> None:
-        """Another instant is shown; not called for every picture of the player."""
+        """Respond to another shown instant; not called for every picture of the player."""
 
 
 class Page:
-    """A motion on a viser server, with what is shown of it; the panels change it, the player moves it.
+    """A displayed motion on a viser server; panels change it, and the player moves it.
 
     Parameters
     ----------
@@ -51,15 +51,15 @@ class Page:
     Attributes
     ----------
     session : Session
-        Solves.
+        Session that solves the motion.
     player : Player
-        Its clock.
+        Clock of the page.
     overlay : Overlay
-        What is shown.
+        Shown arrows, paths and loads.
     frame : int
-        Index of the instant that is shown.
+        Index of the shown instant.
     observers : list of Observer
-        Panels.
+        Panels of the page.
     """
 
     def __init__(self, server: Any, subject: Subject, order: int):
@@ -79,16 +79,16 @@ class Page:
 
     @property
     def recording(self) -> Recording:
-        """The motion that is shown."""
+        """The shown motion."""
         return self.overlay.recording
 
     @property
     def options(self) -> DisplayOptions:
-        """What is shown of it."""
+        """The display options."""
         return self.overlay.options
 
     def _take_over_motion(self, recording: Recording) -> None:
-        """Take over a new motion, in the worker; what takes time is done before the page is touched."""
+        """Display a new motion, in the worker; the overlay is computed before the page changes."""
         overlay = Overlay.of(recording, self.options)
         with self.lock:
             player = self.player
@@ -112,7 +112,7 @@ class Page:
                 observer.on_busy(busy)
 
     def set_options(self, options: DisplayOptions) -> None:
-        """Show something else of the motion; done by the worker, as forces take a moment."""
+        """Change the display options; the worker applies them, as forces take time."""
 
         def job() -> None:
             overlay = Overlay.of(self.recording, options)
@@ -130,7 +130,7 @@ class Page:
         self._refresh()
 
     def _refresh(self) -> None:
-        """Show the instant of now; nothing is computed but which one it is."""
+        """Show the current instant; nothing else is computed."""
         self.frame = self.recording.frame_at(self.player.now)
         self.scene.show(self.overlay, self.frame)
 
@@ -157,7 +157,7 @@ class Page:
                     observer.on_frame(self.frame)
 
     def close(self) -> None:
-        """End the threads and the server."""
+        """Stop the threads and the server."""
         self.player.end()
         self.session.close()
         stop_silently(self.server)

@@ -22,7 +22,7 @@ class Panel(Observer):
     Parameters
     ----------
     page : Page
-        What they control.
+        The page.
     """
 
     def __init__(self, page: Page):
@@ -47,7 +47,7 @@ class Panel(Observer):
         self._say_status()
 
     def _interval(self) -> tuple[float, float, float]:
-        """Return the ends and the step of the slider of the time, s."""
+        """Return the ends and the step of the time slider, s."""
         player = self.page.player
         return player.start, max(player.stop, player.start + 1e-9), _step(player.stop - player.start)
 
@@ -65,7 +65,7 @@ class Panel(Observer):
         self.play.icon = "player-pause" if playing else "player-play"
 
     def add_parameters(self) -> None:
-        """Add a slider for each parameter, number fields for exact values, and what follows from them."""
+        """Add a slider for each parameter, number fields for exact values, and dependent parameters."""
         gui, parameters = self.gui, self.page.session.subject.parameters
         if not parameters:
             gui.add_markdown(self.page.session.subject.no_sliders)
@@ -94,13 +94,13 @@ class Panel(Observer):
             number.on_update(lambda event: self._changed(its.name, event))
 
     def _changed(self, name: str, event: Any) -> None:
-        """Take over a value that the user has set with a slider, or typed."""
+        """Apply a value that the user has set with a slider or typed."""
         if event.client is not None:
             self._put(name, float(event.target.value), but=event.target)
             self.page.session.request({name: float(event.target.value)})
 
     def _put(self, name: str, value: float, but: Any = None) -> None:
-        """Show a value of a parameter but where it comes from; the slider is widened where it is outside."""
+        """Show a value of a parameter in all controls but its source, widening the slider if necessary."""
         slider, number = self._sliders[name], self._numbers[name]
         if number is not but:
             number.value = value
@@ -115,7 +115,7 @@ class Panel(Observer):
         self.page.session.request(values)
 
     def add_exports(self) -> None:
-        """Add the buttons of what can be kept."""
+        """Add the export buttons."""
         gui = self.gui
         csv = gui.add_button("Table (CSV)", icon="table-export", hint="All outputs with their derivatives")
         csv.on_click(lambda event: self._send(event, ".csv", lambda _: table(self.page.recording)))
@@ -125,7 +125,7 @@ class Panel(Observer):
         html.on_click(lambda event: self._send(event, ".html", lambda _: animation(self.page.overlay).encode()))
 
     def _send(self, event: Any, ending: str, make: Any) -> None:
-        """Make a file and send it to the browser that asked."""
+        """Create a file and send it to the browser that requested it."""
         try:
             content = make(event.client)
         except JounceError as error:
@@ -134,7 +134,7 @@ class Panel(Observer):
         event.client.send_file_download(file_name(self.page.recording.title, ending), content, save_immediately=True)
 
     def on_recording(self, recording: Recording) -> None:
-        """Follow a new motion."""
+        """Adapt the controls to a new motion."""
         self.message.visible = False
         self.time.min, self.time.max, self.time.step = self._interval()
         self.time.value = self.page.player.now
@@ -144,13 +144,13 @@ class Panel(Observer):
         self._say_status()
 
     def on_failure(self, error: JounceError) -> None:
-        """Show why there is no motion."""
+        """Show the error of a motion that failed."""
         self.message.content = error_box(str(error))
         self.message.visible = True
         self._say_status()
 
     def on_busy(self, busy: bool) -> None:
-        """Say that the solver works, where it takes a while."""
+        """Show that the solver works if it takes a while."""
         self._busy = busy
         if not busy or self.page.session.elapsed > 0.3:
             self._say_status()
@@ -158,7 +158,7 @@ class Panel(Observer):
     def on_time(self, instant: float) -> None:
         """Follow the player."""
         self.time.value = float(np.clip(instant, self.time.min, self.time.max))
-        if self.play.label == "Pause" and not self.page.player.playing:  # it came to the end
+        if self.play.label == "Pause" and not self.page.player.playing:  # at the end
             self.set_playing(False)
 
     def _say_status(self) -> None:

@@ -1,4 +1,4 @@
-"""The clock of the page: plays, stops, loops, at any speed, and calls back with the time."""
+"""The clock of the page, which plays, stops and loops at any speed, and reports the time."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from collections.abc import Callable
 
 from jounce.settings import under_own_settings
 
-RATE = 30.0  # pictures a second
+RATE = 30.0  # pictures per second
 
 
 class Player:
@@ -17,7 +17,7 @@ class Player:
     Parameters
     ----------
     start, stop : float
-        s.
+        Ends of the time, s.
     on_time : callable
         Called with the time, s, from the thread of the player.
     """
@@ -34,13 +34,13 @@ class Player:
         self._thread.start()
 
     def end(self) -> None:
-        """End the thread."""
+        """Stop the thread."""
         self._ended.set()
         if self._thread.is_alive():
             self._thread.join(timeout=5.0)
 
     def advanced(self, elapsed: float) -> float:
-        """Return the time after some seconds of the clock on the wall, and stop at the end unless it loops.
+        """Return the time after an elapsed time in seconds, and stop at the end unless the player loops.
 
         Examples
         --------

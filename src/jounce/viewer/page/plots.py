@@ -24,7 +24,7 @@ SETTLING = 1.5  # s
 def cursor_data(
     time: Times, values: Float[np.ndarray, "time component"], frame: int
 ) -> tuple[Float[np.ndarray, " longer"], ...]:
-    """Return what a plot draws: time, components, and an upright line at an instant, which counts for two.
+    """Return the data of a plot: time, components, and a vertical line at an instant, which occurs twice.
 
     Parameters
     ----------
@@ -39,7 +39,7 @@ def cursor_data(
     >>> t.round(6).tolist(), y.tolist(), line.tolist()
     ([0.0, 1.0, 1.0], [3.0, 5.0, 5.0], [nan, 3.0, 5.0])
     """
-    after = time[frame] + 1e-9 * (time[-1] - time[0])  # not the same, or the page finds no ticks
+    after = time[frame] + 1e-9 * (time[-1] - time[0])  # distinct, as the page otherwise finds no ticks
     times = np.insert(time, min(frame + 1, len(time)), after)
     lines = [np.insert(column, frame, column[frame]) for column in values.T]
     low, high = axis_range(values)
@@ -51,7 +51,7 @@ def cursor_data(
 def cleaned(
     time: Times, values: Float[np.ndarray, "time derivative component"], order: int
 ) -> Float[np.ndarray, "time component"]:
-    """Return a derivative, (time, components), or zeros where it is but the rounding of lower ones.
+    """Return a derivative, (time, components), or zeros if it is only rounding of lower ones.
 
     Parameters
     ----------
@@ -72,7 +72,7 @@ def cleaned(
 
 
 def default_charts(recording: Recording) -> list[tuple[str, int]]:
-    """Return the output and the derivative of the plots that a page starts with."""
+    """Return the output and the derivative of the initial plots of a page."""
     names = list(recording.outputs)
     if not names:
         return []
@@ -87,10 +87,10 @@ class Chart:
     Parameters
     ----------
     gui : viser.GuiApi
-        In the context of the container that the plot is to stand in.
+        GUI in the context of the container of the plot.
     recording : Recording
     name : str
-        Of the quantity.
+        Name of the quantity.
     order : int
         Derivative.
     """
@@ -116,7 +116,7 @@ class Chart:
         )
 
     def _read(self, recording: Recording) -> tuple[str, dict[str, Any]]:
-        """Take what is drawn of a motion, short numbers with zeros for rounding errors; return title and scales."""
+        """Read the plotted data of a motion, without rounding errors, and return the title and the scales."""
         quantity = recording.outputs[self.name]
         values = cleaned(recording.time, quantity.values, self.order)
         exponent = scale_of(values)
@@ -132,15 +132,15 @@ class Chart:
         self.handle.title, self.handle.scales = self._read(recording)
 
     def show(self, frame: int) -> None:
-        """Put the cursor at an instant."""
+        """Move the cursor to an instant."""
         self.handle.data = cursor_data(self.time, self.values, frame)
 
     def fits(self, recording: Recording) -> bool:
-        """Whether a recording has the quantity and the derivative."""
+        """Return whether a recording has the quantity and the derivative."""
         return self.name in recording.outputs and self.order < recording.outputs[self.name].values.shape[1]
 
     def remove(self) -> None:
-        """Take the plot away."""
+        """Remove the plot."""
         self.handle.remove()
 
 
@@ -150,7 +150,7 @@ class Plots(Observer):
     Parameters
     ----------
     page : Page
-        What is shown.
+        The page.
     """
 
     def __init__(self, page: Page):
@@ -187,7 +187,7 @@ class Plots(Observer):
         page.server.on_client_connect(lambda _: self._settle())
 
     def _settle(self) -> None:
-        """Let a browser that has just come lay out the plots: data that arrive before leave them without ticks."""
+        """Wait for a new browser to lay out the plots, as earlier data would leave them without ticks."""
         self._fixed_until = time.monotonic() + SETTLING
         time.sleep(SETTLING)
         with self.page.lock:
@@ -221,13 +221,13 @@ class Plots(Observer):
                 self.charts[-1].show(page.frame)
 
     def remove(self) -> None:
-        """Take the last plot away."""
+        """Remove the last plot."""
         with self.page.lock:
             if self.charts:
                 self.charts.pop().remove()
 
     def on_recording(self, recording: Recording) -> None:
-        """Plot a new motion; plots that it has no derivative for go."""
+        """Plot a new motion, and remove plots of derivatives that it does not have."""
         for chart in [chart for chart in self.charts if not chart.fits(recording)]:
             self.charts.remove(chart)
             chart.remove()
@@ -240,7 +240,7 @@ class Plots(Observer):
             self._offer()
 
     def on_frame(self, frame: int) -> None:
-        """Move the cursors, and renew the legend."""
+        """Move the cursors, and update the legend."""
         if time.monotonic() >= self._fixed_until:
             for chart in self.charts:
                 chart.show(frame)

@@ -1,4 +1,4 @@
-"""The three-dimensional part of the page: bodies, rods and springs, arrows, paths, the ground and the camera."""
+"""The three-dimensional scene of the page: bodies, rods and springs, arrows, paths, the ground and the camera."""
 
 from __future__ import annotations
 
@@ -16,15 +16,15 @@ from jounce.viewer.shapes.arrows import LOAD_COLORS, derivative_color, in_front,
 from jounce.viewer.shapes.meshes import arc_arrow, coil, cylinder
 from jounce.viewer.shapes.recording import Recording, Vectors
 
-FIELD_OF_VIEW, FLAT_FIELD_OF_VIEW = 0.6, 0.12  # rad; the second is nearly without perspective
-MARGIN, NARROW = 1.2, 0.85  # width by height of the space between the panels
+FIELD_OF_VIEW, FLAT_FIELD_OF_VIEW = 0.6, 0.12  # rad; the second has almost no perspective
+MARGIN, NARROW = 1.2, 0.85  # NARROW is the aspect ratio of the space between the panels
 ARROW = {"shaft_radius": 0.0045, "head_radius": 0.0125, "head_length": 0.034}  # in sizes
 ARC_RADIUS = 0.062
 Vector = Float[np.ndarray, "3"]
 
 
 class ViserScene:
-    """What a viser server shows of recordings, one instant at a time.
+    """The scene of a recording on a viser server, one instant at a time.
 
     Parameters
     ----------
@@ -41,7 +41,7 @@ class ViserScene:
         self._size = 1.0
 
     def set_shapes(self, recording: Recording) -> None:
-        """Show the shapes of a recording, in the place of those of the one before; only what changed is sent."""
+        """Show the shapes of a recording instead of those of the previous one; only changes are sent."""
         self._size = recording.size
         for body, meshes in recording.appearance.meshes.items():
             if body not in self._frames:
@@ -117,7 +117,7 @@ class ViserScene:
             self._arrows[name] = self.scene.add_arrows(f"/arrows/{name}", arrows, _linear(np.array(color)), **sizes)
 
     def _show_torques(self, overlay: Overlay, frame: int) -> None:
-        """Show torques as arrows around their axes, larger where they are larger."""
+        """Show torques as arrows around their axes, scaled with their magnitude."""
         torques = {f"{load.kind} {load.name}": load for load in overlay.loads if load.torque is not None}
         for name in self._arcs.keys() - torques.keys():
             self._arcs.pop(name).remove()
@@ -133,7 +133,7 @@ class ViserScene:
                 handle.scale = ARC_RADIUS * self._size * (0.3 + 0.7 * np.sqrt(share))
 
     def begin(self, overlay: Overlay) -> None:
-        """Show the paths; arrows shown next have the thickness of the size of now."""
+        """Show the paths, and set the thickness of arrows by the size of the recording."""
         for handle in self._arrows.values():
             handle.remove()
         self._arrows.clear()
@@ -143,8 +143,8 @@ class ViserScene:
             )
 
     def set_stage(self, recording: Recording) -> None:
-        """Set light, ground and camera; done once, so that the view does not jump while one works."""
-        self.scene.configure_environment_map(hdri=None)  # lights of our own, and nothing to be fetched
+        """Set light, ground and camera; called once, so that the view does not jump later."""
+        self.scene.configure_environment_map(hdri=None)  # own lights, so that nothing is fetched
         self.scene.configure_default_lights(enabled=True, cast_shadow=False)
         self.scene.add_light_ambient("/lights/ambient", intensity=1.7)
         (low, high), size, up = recording.box, recording.size, np.array(recording.appearance.up)
@@ -162,13 +162,13 @@ class ViserScene:
         self._set_grid(k, center, size)
 
     def _set_camera(self, target: Vector, up: Vector, toward: Vector, half: float, field: float) -> None:
-        """Look at a target from a direction, so that what is as high as twice a half fills the field of view, rad."""
+        """Point the camera at a target from a direction, with a field of view, rad, that covers twice `half`."""
         camera, distance = self.server.initial_camera, half / np.tan(0.5 * field)
         camera.position, camera.look_at, camera.up = tuple(target + distance * toward), tuple(target), tuple(up)
         camera.fov, camera.near, camera.far = field, 0.01 * distance, 20.0 * distance
 
     def _set_grid(self, normal: int, position: Vector, size: float) -> None:
-        """Draw a grid of round cells through a position, across one of the axes."""
+        """Draw a grid with cells of a round length through a position, perpendicular to one of the axes."""
         cell = rounded_down(0.12 * size)
         section = 5 * cell
         width = float(np.ceil(2.2 * size / section)) * section
@@ -190,7 +190,7 @@ class ViserScene:
 
 
 def quaternion_to(direction: Vector) -> Float[np.ndarray, "4"]:
-    """Return the quaternion, scalar part first, that turns z to a direction.
+    """Return the quaternion, scalar part first, that rotates z to a direction.
 
     Examples
     --------
@@ -206,7 +206,7 @@ def quaternion_to(direction: Vector) -> Float[np.ndarray, "4"]:
 
 
 def _linear(colors: Integer[np.ndarray, "*batch 3"]) -> UInt8[np.ndarray, "*batch 3"]:
-    """Return colors as the page wants those of arrows and lines: by intensity of light, not as the eye sees them."""
+    """Return sRGB colors as linear intensities, which the page expects for arrows and lines."""
     share = colors / 255
     light = np.where(share <= 0.04045, share / 12.92, ((share + 0.055) / 1.055) ** 2.4)
     return (255 * light).round().astype(np.uint8)

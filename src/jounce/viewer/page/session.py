@@ -1,4 +1,4 @@
-"""Live solving: one worker, which takes the newest values and drops those that came before."""
+"""Live solving: a worker that solves for the newest values and drops outdated requests."""
 
 from __future__ import annotations
 
@@ -14,18 +14,18 @@ from jounce.viewer.shapes.recording import Parameter, Recording
 
 @runtime_checkable
 class Subject(Protocol):
-    """What is looked at: something with parameters that has a motion.
+    """A viewed object with parameters and a motion.
 
     Attributes
     ----------
     name : str
-        What it is called.
+        Name of the subject.
     loaded : bool
-        Whether there are forces to be shown.
+        Whether it has forces to show.
     parameters : tuple of Parameter
-        What sliders may set.
+        Parameters with sliders.
     no_sliders : str
-        What is said where there are none.
+        Text if there are no parameters.
     """
 
     name: str
@@ -39,35 +39,34 @@ class Subject(Protocol):
 
 
 class Session:
-    """The motion that is shown, solved again when parameters change.
+    """The shown motion, solved again when parameters change.
 
-    One thread solves. A request that arrives while it works waits; one that arrives after it takes its place, so that
-    the newest values win and no time is spent on values that are out of date. What fails leaves the last motion
-    as it was.
+    One thread solves. A request that arrives while it works waits, and a later request replaces it, so that outdated
+    values are never solved for. After a failure, the last motion stays.
 
     Parameters
     ----------
     subject : Subject
-        What is looked at.
+        The viewed object.
     order : int
         Highest derivative.
     on_recording : callable, optional
         Called in the worker with each new `Recording`, before it is shown.
     on_failure : callable, optional
-        Called in the worker with the error of a solve that failed.
+        Called in the worker with the error of a failed solve.
     on_busy : callable, optional
-        Called in the worker with True when it begins to work and False when nothing is left to do.
+        Called in the worker with True when it starts to work and with False when no work is left.
 
     Attributes
     ----------
     recording : Recording
-        The last good motion.
+        The last successful motion.
     error : JounceError or None
-        Why the newest values have no motion.
+        Error of the newest values, if they have no motion.
     solved : int
-        How many solves were made, the first included.
+        Number of solves, including the first.
     elapsed : float
-        How long the last solve took, s, with what `on_recording` prepared.
+        Duration of the last solve, including `on_recording`, s.
     """
 
     def __init__(
@@ -92,7 +91,7 @@ class Session:
         self._worker.start()
 
     def request(self, values: Mapping[str, float] | None = None, order: int | None = None) -> None:
-        """Ask for a motion with other values of some parameters, or of another order; returns at once."""
+        """Request a motion with other values of some parameters, or of another order, without waiting for it."""
         with self._news:
             self.values.update(values or {})
             self.order = self.order if order is None else order
@@ -100,18 +99,18 @@ class Session:
             self._news.notify_all()
 
     def run_between_solves(self, job: Callable[[], object]) -> None:
-        """Let the worker do something between two solves, such as reactions, which take a moment."""
+        """Have the worker run a job between two solves, such as the computation of reactions."""
         with self._news:
             self._jobs.append(job)
             self._news.notify_all()
 
     def wait(self, timeout: float = 60.0) -> bool:
-        """Wait until nothing is left to do; return whether that is so."""
+        """Wait until no work is left, and return whether that was reached within the timeout."""
         with self._news:
             return self._news.wait_for(lambda: self._closed or not self._pending, timeout)
 
     def close(self) -> None:
-        """End the worker after the solve that it is at."""
+        """Stop the worker after its current solve."""
         with self._news:
             self._closed = True
             self._news.notify_all()
@@ -143,12 +142,12 @@ class Session:
                 self._guarded(lambda requested=requested: self._solve(*requested))
 
     def _guarded(self, job: Callable[[], object]) -> None:
-        """Do something; an error is shown, and the worker lives on."""
+        """Run a job; its errors are shown, and the worker continues."""
         try:
             job()
         except JounceError as error:
             self._failed(error)
-        except Exception as error:  # noqa: BLE001 - a worker that dies would leave a page that does nothing
+        except Exception as error:  # noqa: BLE001 - without its worker, the page would not respond
             from jounce.reporting.terminal import unexpected
 
             self._failed(JounceError(unexpected(error)))
@@ -161,7 +160,7 @@ class Session:
         started = time.perf_counter()
         self.solved += 1
         recording = self.subject.solve(values, order)
-        if recording.notice and not self.recording.notice:  # a part of a motion does not take the place of a whole one
+        if recording.notice and not self.recording.notice:  # a partial motion does not replace a complete one
             raise JounceError(recording.notice)
         self.on_recording(recording)
         self.recording, self.error = recording, None

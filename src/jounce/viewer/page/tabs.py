@@ -1,4 +1,4 @@
-"""The tabs of arrows, which says which points have arrows and paths and how long they are, and of forces."""
+"""The tab of arrows, with the points that have arrows and paths, and the tab of forces."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from jounce.viewer.shapes.arrows import LOAD_WORDS, TracedPoint
 from jounce.viewer.shapes.recording import Recording
 
 OWN = "a point of my own"
-SHOWN = 4  # derivatives with a check box; higher ones are plotted
+SHOWN = 4  # derivatives with a check box; higher ones have plots only
 SCALE_HINT = "Factor by which arrows are longer than the automatic length"
 
 
@@ -23,7 +23,7 @@ class ArrowsTab(Observer):
     Parameters
     ----------
     page : Page
-        In whose GUI they are made, in the container of now.
+        The page, in whose current GUI container the controls are created.
     """
 
     def __init__(self, page: Page):
@@ -75,7 +75,7 @@ class ArrowsTab(Observer):
             self.trace(next(point for point in points if point.name == self.point.value))
 
     def trace(self, point: BodyPoint, orders: tuple[int, ...] = (1, 2), path: bool = True) -> None:
-        """Show arrows and the path of one more point."""
+        """Show the arrows and the path of another point."""
         orders = tuple(order for order in orders if order <= self.page.recording.order)
         self._exchange((*self._others(point), TracedPoint(point, orders, path)))
 
@@ -87,7 +87,7 @@ class ArrowsTab(Observer):
         self._rebuild(traced)
 
     def _rebuild(self, traced: tuple[TracedPoint, ...]) -> None:
-        """List the points that are traced, each with its check boxes."""
+        """Rebuild the list of traced points, each with its check boxes."""
         for folder in self._folders:
             folder.remove()
         with self.list:
@@ -116,7 +116,7 @@ class ArrowsTab(Observer):
         self._set(traced=tuple(replace(each, **parts) if each.point.name == point.name else each for each in traced))
 
     def on_recording(self, recording: Recording) -> None:
-        """Offer the points of a new motion."""
+        """Update the list of points for a new motion."""
         names = self._offered(recording)
         if tuple(self.point.options) != names:
             self.point.options = names
@@ -129,7 +129,7 @@ class ForcesTab:
     ----------
     page : Page
     loaded : bool
-        Whether anything has a mass, or forces are applied.
+        Whether a body has a mass, or forces are applied.
     """
 
     def __init__(self, page: Page, loaded: bool):

@@ -1,1 +1,1 @@
-"""Shapes of bodies, joints and links, how they look, and where they are recorded."""
+"""Shapes of bodies, joints and links, their appearance, and recorded motions."""

@@ -1,4 +1,4 @@
-"""What bodies look like on the page, as data: colored meshes, connectors between two points, points to choose from."""
+"""Appearance of bodies on the page, as data: colored meshes, connectors between two points, and selectable points."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ Color = tuple[int, int, int]
 Position = Sequence[float | int] | Float[np.ndarray, " components"]
 """Two or three components, m."""
 
-DARK, GRAY = (70, 74, 82), (150, 155, 163)  # of what belongs to no body
-# the light colors of Tol, which the color-blind distinguish; arrows have the strong ones
+DARK, GRAY = (70, 74, 82), (150, 155, 163)  # of parts that belong to no body
+# the light colors of Tol, suitable for the color-blind; arrows have strong colors
 BODY_COLORS = (
     (119, 170, 221),
     (238, 136, 102),
@@ -31,7 +31,7 @@ BODY_COLORS = (
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class ColoredMesh:
-    """A surface of triangles in the frame of a body, m, with a color and an opacity from 0 to 1."""
+    """A triangle mesh in the frame of a body, m, with a color and an opacity from 0 to 1."""
 
     mesh: Trimesh
     color: Color
@@ -46,9 +46,9 @@ class BodyPoint:
     ----------
     body : str
     point : tuple of float
-        In the frame of the body, m; two or three components.
+        Position in the frame of the body, m; two or three components.
     name : str
-        What it is called on the page.
+        Name on the page.
     """
 
     body: str
@@ -58,7 +58,7 @@ class BodyPoint:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Connector:
-    """What joins a point of one body to a point of another: a rod, a spring, an actuator, a span of a belt or a rope.
+    """A connection of points of two bodies: a rod, a spring, an actuator, or a span of a belt or a rope.
 
     Parameters
     ----------
@@ -66,12 +66,12 @@ class Connector:
     kind : {"rod", "spring", "actuator", "line"}
     bodies : tuple of str
     points : tuple of numpy.ndarray
-        One on each body, in its frame, m.
+        A point on each body, in its frame, m.
     radius : float
-        m.
+        Radius, m.
     color : tuple of int
     ends : tuple of numpy.ndarray of shape (time, 3)
-        Where it begins and ends in the ground, m, where that is no point of a body.
+        Start and end in the ground frame, m, if they are not fixed to bodies.
     """
 
     name: str
@@ -85,21 +85,21 @@ class Connector:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Appearance:
-    """What a mechanism or a robot looks like.
+    """Appearance of a mechanism or a robot.
 
     Parameters
     ----------
     meshes : mapping of str to sequence of ColoredMesh
-        By body, in its frame.
+        Meshes by body, in its frame.
     connectors : sequence of Connector
     points : sequence of BodyPoint
         Points that the page offers for arrows and paths; outputs first.
     size : float
-        A length of the whole, m.
+        Characteristic length, m.
     up : tuple of float
-        What is up.
+        Upward direction.
     front : float, default 0
-        z in front of all planar bodies, m; zero in space.
+        z in front of all planar bodies, m; zero for spatial ones.
     """
 
     meshes: Mapping[str, Sequence[ColoredMesh]]
@@ -110,7 +110,7 @@ class Appearance:
     front: float = 0.0
 
     def corners(self) -> dict[str, Float[np.ndarray, "8 3"]]:
-        """Return the corners of the box around the meshes of each body that has some, in its frame."""
+        """Return the corners of the bounding box of the meshes of each body with meshes, in its frame."""
         corners = {}
         for body, meshes in self.meshes.items():
             if meshes:
@@ -121,7 +121,7 @@ class Appearance:
 
 
 def upward(gravity: Float[np.ndarray, " components"]) -> tuple[float, float, float]:
-    """Return the axis nearest to what is up: against gravity, or z where there is none.
+    """Return the coordinate axis nearest to the upward direction, against gravity, or z without gravity.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""What mechanisms look like on the page: meshes from their joints, connectors, and points to choose from."""
+"""Appearance of mechanisms on the page: meshes from their joints, connectors, and selectable points."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ CONNECTORS = {  # by symbol: kind, radius in sizes of the mechanism, and color
 
 
 def mechanism_appearance(motion: Motion) -> Appearance:
-    """Return what the bodies of a mechanism look like; sliders get rails as long as they travel in a motion.
+    """Return the appearance of a mechanism, with rails as long as the travel of sliders in a motion.
 
     Examples
     --------
@@ -69,7 +69,7 @@ def _gravity(mechanism: Mechanism) -> np.ndarray:
 
 
 def _connectors(seen: Skeleton) -> Iterator[Connector]:
-    """Give the rods, springs and actuators between two points."""
+    """Yield the rods, springs and actuators between two points."""
     for symbol in (*seen.symbols, *seen.drivers, *seen.forces):
         if symbol.kind in CONNECTORS and len(symbol.bodies) == 2:
             kind, share, color = CONNECTORS[symbol.kind]
@@ -77,7 +77,7 @@ def _connectors(seen: Skeleton) -> Iterator[Connector]:
 
 
 def _lines(motion: Motion, seen: Skeleton) -> Iterator[Connector]:
-    """Give the spans of ropes, and the strands of belts."""
+    """Yield the spans of ropes, and the strands of belts."""
     for symbol in seen.symbols:
         if symbol.kind == "rope":
             for k, slots in enumerate(pairwise(range(len(symbol.bodies)))):
@@ -96,7 +96,7 @@ def _lines(motion: Motion, seen: Skeleton) -> Iterator[Connector]:
 
 
 def _points(mechanism: Mechanism, seen: Skeleton) -> list[BodyPoint]:
-    """Return the points of outputs, then those where joints are, but for those of the ground."""
+    """Return the points of outputs, then those of joints, except on the ground."""
     points = []
     for name, output in mechanism.outputs.items():
         if isinstance(output, PointOutput):

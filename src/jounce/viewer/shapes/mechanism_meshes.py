@@ -1,4 +1,4 @@
-"""Meshes of mechanisms: planar bodies as plates in layers, seen from the front, spatial ones as round bars."""
+"""Meshes of mechanisms: planar bodies as plates in layers, viewed from the front, spatial bodies as round bars."""
 
 from __future__ import annotations
 
@@ -30,16 +30,16 @@ from jounce.viewer.shapes.meshes import (
     wheel,
 )
 
-Pieces = Iterator[tuple[str, Trimesh, Color]]  # of which body, in its frame
+Pieces = Iterator[tuple[str, Trimesh, Color]]  # body, mesh in its frame, color
 
 STAND = (104, 110, 120)
 THICKNESS, WIDTH, PIN = 0.02, 0.017, 0.011  # of plates, and radius of pins, in sizes of the mechanism
 BAR = 0.013  # radius of spatial bars
-THREADS = 15  # turns of a screw that are drawn
+THREADS = 15  # drawn turns of a screw
 
 
 def planar_meshes(motion: Motion, skeleton: Skeleton, colors: Mapping[str, Color]) -> Pieces:
-    """Give the meshes of planar bodies, each body in a layer of its own."""
+    """Yield the meshes of planar bodies, each body in its own layer."""
     size = skeleton.size
     layer = {body: (k - 1) * THICKNESS * size for k, body in enumerate(skeleton.links)}
     yield from _plates_and_wheels(skeleton, layer, colors)
@@ -79,7 +79,7 @@ def _plates_and_wheels(skeleton: Skeleton, layer: Mapping[str, float], colors: M
 
 
 def _wheel(its: Wheel, low: float, high: float, color: Color) -> Pieces:
-    """Give a wheel with its teeth, and a mark that shows how it turns."""
+    """Yield a wheel with its teeth, and a mark that shows its rotation."""
     radius, (x, y) = its.radius, its.center.tolist()
     module = 0.0 if its.partner is None else min(radius, its.partner) / 9
     if its.internal:
@@ -94,7 +94,7 @@ def _wheel(its: Wheel, low: float, high: float, color: Color) -> Pieces:
 
 
 def _pedestal(point: Point, size: float, low: float) -> Trimesh:
-    """Return the triangle with a base that stands for the ground, its tip in a point."""
+    """Return the support that represents the ground: a triangle on a base, with its tip at a point."""
     high, width, radius = 0.06 * size, 0.034 * size, 1.3 * PIN * size
     bottom, top = low - 0.5 * THICKNESS * size, low + 0.7 * THICKNESS * size
     angle = np.linspace(0.12 * np.pi, 0.88 * np.pi, 12)
@@ -105,7 +105,7 @@ def _pedestal(point: Point, size: float, low: float) -> Trimesh:
 
 
 def _pins(symbol: Symbol, layer: Mapping[str, float], size: float) -> Pieces:
-    """Give the pin of a joint through the layers of its bodies, or those at both ends of a rod."""
+    """Yield the pin of a joint through the layers of its bodies, or the pins at both ends of a rod."""
     rod = symbol.kind == "rod"
     for k in (0, 1) if rod else (1,):
         levels = [layer[body] for body in ((symbol.bodies[k],) if rod else symbol.bodies)]
@@ -115,7 +115,7 @@ def _pins(symbol: Symbol, layer: Mapping[str, float], size: float) -> Pieces:
 
 
 def _planar_slide(motion: Motion, symbol: Symbol, layer: Mapping[str, float], size: float) -> Pieces:
-    """Give a rail on the first body, as long as what slides travels, and the block of a prismatic joint."""
+    """Yield a rail on the first body, as long as the travel, and the block of a prismatic joint."""
     first, second = symbol.bodies[:2]
     middle, length = _rail(motion, symbol, 0.06 * size)
     thick = THICKNESS * size
@@ -127,7 +127,7 @@ def _planar_slide(motion: Motion, symbol: Symbol, layer: Mapping[str, float], si
 
 
 def _groove(motion: Motion, symbol: Symbol, size: float, level: float = 0.0) -> Pieces:
-    """Give the curve or the lines of a surface on the first body, those of a planar body at the level of its layer."""
+    """Yield the curve or the lines of a surface on the first body, at the level of its layer if it is planar."""
     whole, body = frames(motion), symbol.bodies[0]
     visited = within(whole[body], points_at(whole[symbol.bodies[1]], symbol.points[1]))
     radius = (0.5 if symbol.kind == "curve" else 0.15) * BAR * size
@@ -137,7 +137,7 @@ def _groove(motion: Motion, symbol: Symbol, size: float, level: float = 0.0) -> 
 
 
 def _disc_cam(motion: Motion, symbol: Symbol, layer: Mapping[str, float], size: float, color: Color) -> Pieces:
-    """Give a roller at the point of a follower, and the plate cam that it rolls on in a motion of a whole turn."""
+    """Yield a roller at the point of a follower, and, for a motion of a whole turn, the plate cam."""
     (disc, moved), radius = symbol.bodies, 2.0 * PIN * size
     low, high = layer[disc], layer[disc] + 0.8 * THICKNESS * size
     center = [*symbol.points[1], 0.5 * (low + high)]
@@ -151,13 +151,13 @@ def _disc_cam(motion: Motion, symbol: Symbol, layer: Mapping[str, float], size: 
 
 
 def _turned_to(axis: Point) -> Float[np.ndarray, "3 3"]:
-    """Return the rotation about z that turns x to an axis in the plane."""
+    """Return the rotation about z from x to an axis in the plane."""
     x, y = axis / np.linalg.norm(axis)
     return np.array([[x, -y, 0], [y, x, 0], [0, 0, 1.0]])
 
 
 def _rail(motion: Motion, symbol: Symbol, margin: float) -> tuple[Point, float]:
-    """Return middle and length of the line on the first body along which the point on the second travels, m."""
+    """Return the middle and the length of the line on the first body along which the second travels, m."""
     whole, axis = frames(motion), symbol.axis_on(0) / np.linalg.norm(symbol.axis_on(0))
     point = points_at(whole[symbol.bodies[1]], symbol.points[1])
     along = (within(whole[symbol.bodies[0]], point) - symbol.points[0]) @ axis
@@ -166,7 +166,7 @@ def _rail(motion: Motion, symbol: Symbol, margin: float) -> tuple[Point, float]:
 
 
 def spatial_meshes(motion: Motion, skeleton: Skeleton, colors: Mapping[str, Color]) -> Pieces:
-    """Give the meshes of spatial bodies, with hinges, balls, crosses, slides and screws."""
+    """Yield the meshes of spatial bodies, with hinges, balls, crosses, slides and screws."""
     radius = BAR * skeleton.size
     for body, link in skeleton.links.items():
         if body == GROUND:
@@ -213,7 +213,7 @@ def _spatial_joint(symbol: Symbol, size: float) -> Pieces:
 
 
 def _shaft_wheels(symbol: Symbol, size: float, colors: Mapping[str, Color]) -> Pieces:
-    """Give the wheels of two shafts, or one that rolls, with marks that show how they turn."""
+    """Yield the wheels of two shafts, or a rolling wheel, with marks that show their rotation."""
     for slot, (body, radius) in enumerate(zip(symbol.bodies[:2], symbol.radii, strict=False)):
         if radius is None or body == GROUND:
             continue
@@ -224,7 +224,7 @@ def _shaft_wheels(symbol: Symbol, size: float, colors: Mapping[str, Color]) -> P
 
 
 def _rack(motion: Motion, symbol: Symbol, size: float, colors: Mapping[str, Color]) -> Pieces:
-    """Give the rack on the first body along which a pinion rolls, as long as it travels; nothing of wheels."""
+    """Yield the rack on the first body along which a pinion rolls, as long as its travel; nothing for wheels."""
     if symbol.kind != "rolling":
         return
     body, thin = symbol.bodies[0], 0.7 * BAR * size
@@ -234,7 +234,7 @@ def _rack(motion: Motion, symbol: Symbol, size: float, colors: Mapping[str, Colo
 
 
 def _spatial_slide(motion: Motion, symbol: Symbol, size: float) -> Pieces:
-    """Give a rail on the first body, as long as the second travels, and what slides on it."""
+    """Yield a rail on the first body, as long as the travel of the second, and the sliding part."""
     first, second = symbol.bodies[:2]
     middle, length = _rail(motion, symbol, 0.08 * size)
     axis, other, thin = symbol.axis_on(0), symbol.axis_on(1), 0.7 * BAR * size

@@ -1,4 +1,4 @@
-"""Meshes that a URDF names: found beside it or in the folder of its package, and read."""
+"""Mesh files named in a URDF, in its folder or in the folder of its package."""
 
 from __future__ import annotations
 
@@ -19,25 +19,25 @@ from jounce.io.files.reading import MAX_SAMPLES, named_file, read_file
 
 Rgba = tuple[float, ...]
 """Red, green, blue and opacity, from 0 to 1."""
-LARGEST = 400_000  # triangles of one mesh that a page can move smoothly
+LARGEST = 400_000  # triangles of a mesh that a page can move smoothly
 
 
 class MeshFiles:
-    """The files of meshes that a robot file names.
+    """The mesh files named in a robot file.
 
     Parameters
     ----------
     path : Path
-        The file.
+        The robot file.
     allow
-        Folders besides that of the file that they may be below.
+        Further folders allowed for meshes.
     """
 
     def __init__(self, path: Path, allow: Iterable[str | PathLike[str]] = ()) -> None:
         self.path, self.allow = path, tuple(allow)
 
     def read(self, name: str) -> list[tuple[trimesh.Trimesh, Rgba | None]]:
-        """Return the parts of a mesh, by its name in the file, with their colors; none where it cannot be read."""
+        """Return the parts of a mesh, by its name in the file, with their colors; none if it cannot be read."""
         try:
             file = self._file(name)
             if file is None:
@@ -51,18 +51,18 @@ class MeshFiles:
                 warnings.simplefilter("ignore")
                 kind = Path(file).suffix.lower().removeprefix(".")
                 parts = trimesh.load_scene(io.BytesIO(content), file_type=kind, resolver=_resolver(file)).dump()
-        except Exception:  # noqa: BLE001 - readers of meshes fail in ways of their own; bars are shown instead
+        except Exception:  # noqa: BLE001 - mesh readers raise errors of many kinds; bars are shown instead
             return []
         whole = (part for part in parts if isinstance(part, trimesh.Trimesh) and 0 < len(part.faces) <= LARGEST)
         return [(part, _color(part)) for part in whole]
 
     def _file(self, name: str) -> str | None:
-        """Return the file of a mesh: beside the robot, or in the folder of its package somewhere above."""
+        """Return the file of a mesh: relative to the robot file, or in the folder of its package above it."""
         scheme, _, rest = name.rpartition("://")
         if not rest:
             return None
         if scheme in ("package", "model"):
-            folders = self.path.resolve().parents[:-1]  # not in that of the whole system
+            folders = self.path.resolve().parents[:-1]  # without the root of the file system
             candidates = [(folder, inner) for folder in folders for inner in (rest, rest.partition("/")[2]) if inner]
             files = [named_file(inner, folder / "package.xml", error=RobotFileError) for folder, inner in candidates]
         else:
@@ -80,7 +80,7 @@ def _color(part: trimesh.Trimesh) -> Rgba | None:
 
 
 def _resolver(file: str) -> Resolver:
-    """Return what trimesh asks for the files that a mesh names: materials, pictures."""
+    """Return the resolver that gives trimesh the files named in a mesh: materials, pictures."""
 
     class AdjacentFiles(Resolver):
         def __init__(self) -> None:

@@ -1,6 +1,6 @@
-"""Meshes of simple solids: the primitives of trimesh, placed, with edges that look sharp where they are.
+"""Meshes of simple solids: primitives of trimesh in given poses, with sharp edges.
 
-Faces that share a vertex look round where they meet, so that sharp edges have vertices of their own.
+Faces that share a vertex look smooth, so that faces at a sharp edge have separate vertices.
 """
 
 from __future__ import annotations
@@ -37,19 +37,19 @@ def rotation_to(axis: Position) -> Rotation:
 
 
 def transformed(mesh: Trimesh, center: Position = ORIGIN, rotation: Rotation | None = None) -> Trimesh:
-    """Return a mesh that is turned, then moved."""
+    """Return a mesh after a rotation and a translation."""
     turned = mesh.vertices if rotation is None else mesh.vertices @ rotation.T
     return Trimesh(turned + np.asarray(center), mesh.faces, process=False)
 
 
 def merged(meshes: Sequence[Trimesh]) -> Trimesh:
-    """Return several meshes as one."""
+    """Return the union of several meshes as one."""
     vertices, faces = trimesh.util.append_faces([mesh.vertices for mesh in meshes], [mesh.faces for mesh in meshes])
     return Trimesh(vertices, faces, process=False)
 
 
 def cylinder(radius: float, length: float, axis: Position = Z, center: Position = ORIGIN) -> Trimesh:
-    """Return a cylinder about an axis, its middle in a center."""
+    """Return a cylinder with an axis and a center."""
     return transformed(_unit_cylinder(), center, rotation_to(axis) * (radius, radius, length))
 
 
@@ -59,20 +59,20 @@ def _unit_cylinder() -> Trimesh:
 
 
 def sleeve(inside: float, outside: float, length: float, axis: Position = Z, center: Position = ORIGIN) -> Trimesh:
-    """Return a hollow cylinder about an axis, its middle in a center."""
+    """Return a hollow cylinder with an axis and a center."""
     ring = creation.annulus(inside, outside, length, sections=AROUND)
     return transformed(_round_walls(ring), center, rotation_to(axis))
 
 
 def _round_walls(mesh: Trimesh) -> Trimesh:
-    """Return a mesh whose caps, across z, share no vertices with its walls."""
+    """Return a mesh whose caps, perpendicular to z, share no vertices with its walls."""
     caps, count = np.abs(mesh.face_normals[:, 2]) > 0.5, len(mesh.vertices)
     faces = np.concatenate([mesh.faces[caps], mesh.faces[~caps] + count])
     return Trimesh(np.tile(mesh.vertices, (2, 1)), faces, process=False)
 
 
 def _flat_walls(mesh: Trimesh) -> Trimesh:
-    """Return a mesh none of whose faces share vertices."""
+    """Return a mesh whose faces share no vertices."""
     mesh.unmerge_vertices()
     return mesh
 
@@ -88,7 +88,7 @@ def _unit_sphere() -> Trimesh:
 
 
 def capsule(start: Position, end: Position, radius: float) -> Trimesh:
-    """Return a round bar between two points, with round ends."""
+    """Return a round bar with round ends between two points."""
     start, end = np.asarray(start, float), np.asarray(end, float)
     length = float(np.linalg.norm(end - start))
     if length == 0:
@@ -98,18 +98,18 @@ def capsule(start: Position, end: Position, radius: float) -> Trimesh:
 
 
 def box(size: Position, center: Position = ORIGIN, rotation: Rotation | None = None) -> Trimesh:
-    """Return a box of three edges about a center."""
+    """Return a box with three edge lengths about a center."""
     return _flat_walls(transformed(creation.box(np.asarray(size, float)), center, rotation))
 
 
 def extruded(outline: Polygon, low: float, high: float, *, sharp: bool = True) -> Trimesh:
-    """Return a flat shape drawn out along z; its walls meet in sharp edges, or look round."""
+    """Return a plane shape extruded along z, with walls that meet in sharp edges or look smooth."""
     mesh = transformed(creation.extrude_polygon(outline, high - low), (0.0, 0.0, low))
     return _flat_walls(mesh) if sharp else _round_walls(mesh)
 
 
 def plate(points: FlatPoints, radius: float, low: float, high: float) -> Trimesh:
-    """Return the flat plate of the convex outline of some points in the plane, rounded with a radius."""
+    """Return a plate with the convex hull of points in the plane as outline, rounded with a radius."""
     outline = MultiPoint(points).convex_hull.buffer(radius, quad_segs=AROUND // 4)
     return extruded(outline, low, high, sharp=False)
 
@@ -117,7 +117,7 @@ def plate(points: FlatPoints, radius: float, low: float, high: float) -> Trimesh
 def wheel(
     radius: float, low: float, high: float, center: Position, *, module: float = 0.0, outside: float = 0.0
 ) -> Trimesh:
-    """Return a wheel of a pitch radius with teeth of a module, smooth where that is zero; a ring with an outside."""
+    """Return a wheel with a pitch radius and teeth of a module (zero: smooth), a ring if `outside` is given."""
     middle = np.asarray(center, float)
     outline = _toothed(radius, -module if outside else module) + middle
     polygon = Polygon(_toothed(outside, 0.0) + middle, [outline]) if outside else Polygon(outline)
@@ -125,7 +125,7 @@ def wheel(
 
 
 def _toothed(radius: float, module: float) -> FlatPoints:
-    """Return the outline of a wheel with teeth outward, inward where the module is negative."""
+    """Return the outline of a wheel with external teeth, or internal teeth for a negative module."""
     if module == 0:
         teeth, corners = 4 * AROUND, np.zeros(1)
     else:
@@ -142,7 +142,7 @@ def tube(line: Float[np.ndarray, "points 3"], radius: float) -> Trimesh:
 
 
 def coil(turns: int, radius: float, wire: float) -> Trimesh:
-    """Return a spring of length one along z, to be stretched; its wire is drawn as thick as it can be afterwards."""
+    """Return a coil spring of length one along z, to be stretched, with a thickness of its wire."""
     height = np.linspace(0.0, 1.0, 16 * turns + 1)
     around = np.clip((height - 0.1) / 0.8, 0, 1) * 2 * np.pi * turns
     reach = radius * np.clip(np.minimum(height, 1 - height) / 0.1, 0, 1)
@@ -150,7 +150,7 @@ def coil(turns: int, radius: float, wire: float) -> Trimesh:
 
 
 def arc_arrow() -> Trimesh:
-    """Return an arrow around z, counterclockwise, on a circle of radius one: the sign of a torque."""
+    """Return a counterclockwise arrow around z on a circle of radius one: the symbol of a torque."""
     angle = np.linspace(0.0, 1.45 * np.pi, 40)
     line = np.stack([np.cos(angle), np.sin(angle), np.zeros_like(angle)], axis=1)
     ahead = np.array([-line[-1, 1], line[-1, 0], 0.0])

@@ -23,21 +23,21 @@ Quaternions = Float[np.ndarray, "time body 4"]
 
 @dataclasses.dataclass(frozen=True)
 class Parameter:
-    """A number that a slider of the page sets.
+    """A parameter with a slider on the page.
 
     Parameters
     ----------
     name : str
     value : float
-        SI, as the file gives it.
+        Value in the file, SI.
     low, high : float
         Ends of the slider.
     group : str, default ""
-        Heading under which it is listed.
+        Heading of its group.
     derived : bool, default False
-        It follows from others, by an expression, and is shown only.
+        Whether it follows from others by an expression, and is only shown.
     unit : str, default ""
-        Its SI unit, where one is known.
+        SI unit, if known.
     whole : bool, default False
         Whether it is a whole number.
     """
@@ -53,7 +53,7 @@ class Parameter:
 
     @property
     def label(self) -> str:
-        """The name with the unit, as a slider shows it."""
+        """Name with the unit, as shown at the slider."""
         return f"{self.name} ({raised(self.unit)})" if self.unit else self.name
 
 
@@ -64,12 +64,12 @@ class Quantity:
     Parameters
     ----------
     unit : str
-        Of derivative 0.
+        Unit of derivative 0.
     values : numpy.ndarray of shape (time, order, component)
     words : tuple of str
-        What each derivative is called.
+        Name of each derivative.
     labels : tuple of str
-        What each component is called, where there are several.
+        Name of each component, if there are several.
     """
 
     unit: str
@@ -80,18 +80,18 @@ class Quantity:
 
 @dataclasses.dataclass(frozen=True)
 class Load:
-    """What a joint, a driver or an applied force does to a body, over time.
+    """The force and torque of a joint, a driver or an applied force on a body, over time.
 
     Parameters
     ----------
     name : str
     kind : {"reaction", "driver", "applied"}
     point : numpy.ndarray of shape (time, 3)
-        Where it acts, m.
+        Point of application, m.
     force : numpy.ndarray of shape (time, 3) or None
-        N, global.
+        Force, N, in the global frame.
     torque : numpy.ndarray of shape (time, 3) or None
-        N m, global.
+        Torque, N m, in the global frame.
     """
 
     name: str
@@ -103,28 +103,28 @@ class Load:
 
 @dataclasses.dataclass(frozen=True, eq=False, kw_only=True)
 class Recording(abc.ABC):
-    """One solved motion as the page shows it; everything in three components, planar ones with zero z.
+    """A solved motion for the page, in three components, with zero z for planar mechanisms.
 
     Parameters
     ----------
     title : str
     planar : bool
     time : numpy.ndarray of shape (time,)
-        s; only instants that were solved.
+        Solved instants, s.
     order : int
         Highest derivative.
     bodies : tuple of str
-        Names, ``ground`` or the base of a robot first.
+        Names of the bodies, ``ground`` or the base of a robot first.
     position : numpy.ndarray of shape (time, body, 3)
         Origins of the bodies, m.
     quaternion : numpy.ndarray of shape (time, body, 4)
-        Their attitudes, scalar part first.
+        Attitudes of the bodies, scalar part first.
     values : mapping
-        Values of the parameters that it was solved with.
+        Values of the parameters of the solution.
     appearance : Appearance
         Shapes of the bodies.
     notice : str, default ""
-        What is to be said of it: instants that could not be solved.
+        Remark on unsolved instants.
     """
 
     title: str
@@ -140,28 +140,28 @@ class Recording(abc.ABC):
 
     @abc.abstractmethod
     def quantities(self) -> Mapping[str, Quantity]:
-        """Return what is plotted, by name."""
+        """Return the plotted quantities by name."""
 
     @abc.abstractmethod
     def derivatives(self, body: str, point: Position) -> Float[np.ndarray, "time derivative 3"]:
-        """Return position and derivatives of a point of a body."""
+        """Return the position and derivatives of a point of a body."""
 
     @abc.abstractmethod
     def all_loads(self) -> list[Load]:
-        """Return what joints, drivers and applied forces do to the bodies; empty where nothing has a mass."""
+        """Return the loads of joints, drivers and applied forces on the bodies; empty without masses."""
 
     @abc.abstractmethod
     def dataset(self) -> Dataset:
-        """Return what an export writes."""
+        """Return the dataset of an export."""
 
     @cached_property
     def outputs(self) -> Mapping[str, Quantity]:
-        """What is plotted, by name; computed once."""
+        """Plotted quantities by name, computed once."""
         return self.quantities()
 
     @cached_property
     def loads(self) -> list[Load]:
-        """What joints, drivers and applied forces do to the bodies; computed once."""
+        """Loads of joints, drivers and applied forces on the bodies, computed once."""
         return self.all_loads()
 
     @cached_property
@@ -169,7 +169,7 @@ class Recording(abc.ABC):
         return {}
 
     def motion(self, point: BodyPoint) -> Float[np.ndarray, "time derivative 3"]:
-        """Return the position of a point and its derivatives, m by s; computed once."""
+        """Return the position of a point and its derivatives, m by s, computed once."""
         if point not in self._motions:
             self._motions[point] = self.derivatives(point.body, point.point)
         return self._motions[point]
@@ -179,31 +179,31 @@ class Recording(abc.ABC):
         return int(nearest_instants(self.time, np.array([instant]))[0])
 
     def global_point(self, body: str, point: Position) -> Vectors:
-        """Return where a point of a body is at all instants, m."""
+        """Return the global position of a point of a body at all instants, m."""
         index = self.bodies.index(body)
         return self.position[:, index] + rotated(self.quaternion[:, index], spatial_vectors(np.asarray(point, float)))
 
     @cached_property
     def box(self) -> tuple[Float[np.ndarray, "3"], Float[np.ndarray, "3"]]:
-        """Corners of the box that holds all that moves, at all instants, m."""
+        """Corners of the bounding box of all moving parts over all instants, m."""
         corners = [self.global_point(body, corner) for body, box in self.appearance.corners().items() for corner in box]
         every = np.concatenate([self.position.reshape(-1, 3), *corners])
         return every.min(axis=0), every.max(axis=0)
 
     @cached_property
     def size(self) -> float:
-        """Diagonal of the box, m; 1 where it is a point."""
+        """Diagonal of the bounding box, m; 1 if it is a point."""
         low, high = self.box
         return float(np.linalg.norm(high - low)) or 1.0
 
     def first_moving_point(self) -> BodyPoint:
-        """Return the first of the points that moves by more than rounding, or the first where none does."""
+        """Return the first point that moves by more than rounding, or the first of all if none does."""
         points, least = self.appearance.points, 1e-9 * self.size
         return next((point for point in points if np.ptp(self.motion(point)[:, 0], axis=0).max() > least), points[0])
 
 
 def poses(motion: Motion) -> tuple[Positions, Quaternions]:
-    """Return origins and quaternions of all bodies, the ground first."""
+    """Return the origins and quaternions of all bodies, the ground first."""
     _, coordinates = motion.poses
     values = {name: np.asarray(derivatives[0]).T for name, derivatives in coordinates.items()}  # time, body, component
     position = spatial_vectors(values["position"])
@@ -220,7 +220,7 @@ def poses(motion: Motion) -> tuple[Positions, Quaternions]:
 def rotated(
     quaternion: Float[np.ndarray, "*batch 4"], vector: Float[np.ndarray, "*local 3"]
 ) -> Float[np.ndarray, "*batch 3"]:
-    """Turn vectors by quaternions, scalar part first.
+    """Return vectors rotated by quaternions, scalar part first.
 
     Examples
     --------
@@ -235,6 +235,6 @@ def rotated(
 
 
 def spatial_vectors(values: Float[np.ndarray, "*batch components"]) -> Float[np.ndarray, "*batch 3"]:
-    """Return vectors, components last, with a third component, zero where there are only two."""
+    """Return vectors, components last, with a zero third component added to those with two."""
     missing = 3 - values.shape[-1]
     return np.concatenate([values, np.zeros((*values.shape[:-1], missing))], axis=-1) if missing else values

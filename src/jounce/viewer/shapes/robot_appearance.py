@@ -1,4 +1,4 @@
-"""What robots look like: the shapes of their files, or bars from joint to joint where there are none."""
+"""Appearance of robots: the shapes of their files, or bars from joint to joint without shapes."""
 
 from __future__ import annotations
 
@@ -22,15 +22,15 @@ Rotation = Float[np.ndarray, "3 3"]
 
 
 def robot_appearance(robot: Robot, path: Path | None = None, allow: Iterable[str | PathLike[str]] = ()) -> Appearance:
-    """Return what a robot looks like.
+    """Return the appearance of a robot.
 
     Parameters
     ----------
     robot : Robot
     path : Path, optional
-        Its file; shapes in it are shown, and bars in the place of those that cannot be read.
+        Its file; bars replace shapes that cannot be read.
     allow
-        Folders besides that of the file that meshes may be below.
+        Further folders allowed for meshes.
 
     Examples
     --------
@@ -52,14 +52,14 @@ def robot_appearance(robot: Robot, path: Path | None = None, allow: Iterable[str
             ]
     bars = _bars(robot, size)
     bare = not any(shapes_of_links.values())
-    for link in links:  # a base without shapes has no stand, as in its file, unless all is bars
+    for link in links:  # a base without shapes gets a support only if all links are bars
         if not shapes_of_links[link] and (bare or link != robot.base):
             shapes_of_links[link] = bars[link]
     return Appearance(shapes_of_links, (), list(_points(robot)), size, upward(robot.gravity))
 
 
 def _body_of(robot: Robot, link: str) -> tuple[str, Vector, Rotation]:
-    """Return the moving link that a link is part of, or the base, and its pose there."""
+    """Return the moving link, or the base, to which a link is fixed, and its pose in that frame."""
     if robot.frames[link].body < 0:
         base, frame = robot.frames[robot.base], robot.frames[link]
         return robot.base, base.rotation.T @ (frame.position - base.position), base.rotation.T @ frame.rotation
@@ -75,7 +75,7 @@ def _size(robot: Robot) -> float:
 
 
 def _ends(robot: Robot) -> dict[str, list[Vector]]:
-    """Return for each body the points where other things are: the next joints, closures, frames fixed to it."""
+    """Return the end points of each body: its next joints, closures, and frames fixed to it."""
     ends: dict[str, list[Vector]] = {link: [] for link in (robot.base, *robot.moving_links)}
     touched = [(joint.parent, joint.position) for joint in robot.joints.values()]
     for closure in robot.closures.values():
@@ -83,7 +83,7 @@ def _ends(robot: Robot) -> dict[str, list[Vector]]:
     for link, point in touched:
         body, position, rotation = _body_of(robot, link)
         ends[body].append(position + rotation @ point)
-    for link in robot.moving_links:  # the last of a branch ends in its center of mass
+    for link in robot.moving_links:  # the last link of a branch ends at its center of mass
         inertia = robot.links[link].inertia
         if not any(np.linalg.norm(end) > 1e-6 for end in ends[link]) and inertia is not None:
             ends[link].append(2.0 * np.asarray(inertia.center_of_mass))
@@ -91,7 +91,7 @@ def _ends(robot: Robot) -> dict[str, list[Vector]]:
 
 
 def _bars(robot: Robot, size: float) -> Shapes:
-    """Return bars from each joint to the next, and the joints as cylinders and boxes."""
+    """Return bars from each joint to the next, and cylinders and boxes for the joints."""
     thin = 0.016 * size
     colors = {link: BODY_COLORS[k % len(BODY_COLORS)] for k, link in enumerate(robot.moving_links)}
     colors[robot.base] = DARK
@@ -114,7 +114,7 @@ def _bars(robot: Robot, size: float) -> Shapes:
 
 
 def _points(robot: Robot) -> Iterator[BodyPoint]:
-    """Give the tips of the branches, then all other links, as points."""
+    """Yield the tips of the branches, then all other links, as points."""
     parents = {joint.parent for joint in robot.joints.values()}
     moving = [link for link in robot.links if robot.frames[link].body >= 0]
     tips = [link for link in moving if link not in parents]

@@ -1,4 +1,4 @@
-"""Shapes of robots from their files: URDF and MJCF here, SDF by its own module."""
+"""Shapes of robots from URDF and MJCF files; SDF has its own module."""
 
 from __future__ import annotations
 
@@ -28,14 +28,14 @@ Rotation = Float[np.ndarray, "3 3"]
 
 
 def file_shapes(path: Path, allow: Iterable[str | PathLike[str]] = ()) -> Shapes:
-    """Return the shapes of a robot file by link, in its frame; none where they cannot be read.
+    """Return the shapes of a robot file by link, in its frame; none if they cannot be read.
 
     Parameters
     ----------
     path : Path
-        URDF, MJCF or SDF.
+        URDF, MJCF or SDF file.
     allow
-        Folders besides that of the file that meshes may be below; a warning tells of those that lie elsewhere.
+        Further folders allowed for meshes; a warning reports meshes in other folders.
     """
     root = read_markup(str(path))
     if root.tag == "sdf":
@@ -44,7 +44,7 @@ def file_shapes(path: Path, allow: Iterable[str | PathLike[str]] = ()) -> Shapes
 
 
 def _of_urdf(root: Element, files: MeshFiles) -> Shapes:
-    """Return what the elements ``<visual>`` show."""
+    """Return the shapes of the elements ``<visual>``."""
     materials = {}
     for material in root.every("material"):
         with suppress(ValueError):
@@ -53,7 +53,7 @@ def _of_urdf(root: Element, files: MeshFiles) -> Shapes:
     for link in root.every("link"):
         meshes = shapes_of_links.setdefault(link.attributes["name"], [])
         for visual in link.every("visual"):
-            with suppress(KeyError, ValueError):  # words where numbers should be: a bar is shown instead
+            with suppress(KeyError, ValueError):  # a bar replaces a shape with invalid numbers
                 meshes += _visual(visual, materials, files)
     return shapes_of_links
 
@@ -83,7 +83,7 @@ def _origin(element: Element | None) -> tuple[list[float], Rotation]:
 
 
 def _urdf_shape(shape: Element, files: MeshFiles) -> list[tuple[Trimesh, Rgba | None]]:
-    """Return the meshes of a shape of a URDF, with a color where a mesh brings its own."""
+    """Return the meshes of a shape of a URDF, with the colors of mesh files."""
     given, kind = shape.attributes, shape.tag
     if kind == "mesh":
         scale = words_as_numbers(given.get("scale", "1 1 1"))
@@ -99,7 +99,7 @@ def _urdf_shape(shape: Element, files: MeshFiles) -> list[tuple[Trimesh, Rgba | 
 
 
 def _of_mjcf(root: Element, path: Path, allow: Iterable[str | PathLike[str]]) -> Shapes:
-    """Return the geoms that MuJoCo shows: groups 0 to 2."""
+    """Return the geoms that MuJoCo shows, those of groups 0 to 2."""
     mujoco: Any = importlib.import_module("mujoco")
     if not any(element.tag == "geom" for element in root.walk()):
         return {}
@@ -113,7 +113,7 @@ def _of_mjcf(root: Element, path: Path, allow: Iterable[str | PathLike[str]]) ->
     except RobotFileError as error:
         warnings.warn(f"the shapes are not shown: {error}", stacklevel=2)
         return {}
-    except (ValueError, RuntimeError, OSError):  # a mesh is missing: the robot itself could be read without
+    except (ValueError, RuntimeError, OSError):  # a mesh is missing, which the robot itself does not need
         return {}
     names, shapes_of_links = names_of_bodies(model), {}
     for k in range(model.ngeom):
@@ -129,7 +129,7 @@ def _of_mjcf(root: Element, path: Path, allow: Iterable[str | PathLike[str]]) ->
 
 
 def _geom(model: Any, k: int, mujoco: Any) -> Trimesh | None:
-    """Return the mesh of a geom; none for planes and height fields."""
+    """Return the mesh of a geom; None for planes and height fields."""
     kinds, kind, size = mujoco.mjtGeom, int(model.geom_type[k]), model.geom_size[k]
     if kind == int(kinds.mjGEOM_SPHERE):
         return sphere(float(size[0]))

@@ -1,4 +1,4 @@
-"""Shapes of robots from SDF files: what the elements ``<visual>`` show."""
+"""Shapes of robots from the elements ``<visual>`` of SDF files."""
 
 from __future__ import annotations
 
@@ -20,25 +20,25 @@ from jounce.viewer.shapes.shapes import Shapes, colored, upright_capsule, words_
 
 
 def sdf_shapes(root: Element, files: MeshFiles) -> Shapes:
-    """Return the shapes of an SDF file by link, in its frame; planes, height maps and what cannot be read are left out.
+    """Return the shapes of an SDF file by link, in its frame, without planes, height maps and unreadable shapes.
 
     Parameters
     ----------
     root : Element
         The element ``<sdf>`` of a file that describes a robot.
     files : MeshFiles
-        Where it lies.
+        Mesh files of the SDF file.
     """
     try:
         chosen = chosen_model(root, Faults(root.path), None, files.allow).model
-    except RobotFileError:  # several models move, and nobody says here which one is meant
+    except RobotFileError:  # several models move, and none is selected
         return {}
     frames = Frames(chosen, named(chosen))
     shapes_of_links: Shapes = {}
     for name, link in frames.elements.items():
         shown = shapes_of_links.setdefault(name, []) if link.tag == "link" else []
         for visual in link.every("visual") if link.tag == "link" else ():
-            with suppress(RobotFileError, ValueError):  # words where numbers should be: a bar is shown instead
+            with suppress(RobotFileError, ValueError):  # a bar replaces a shape with invalid numbers
                 shown += _visual(visual, name, frames, files)
     return shapes_of_links
 
@@ -52,7 +52,7 @@ def _visual(visual: Element, link: str, frames: Frames, files: MeshFiles) -> lis
 
 
 def _pose(visual: Element, link: str, frames: Frames) -> FramePose:
-    """Return where a visual is in the frame of its link; its pose may be relative to another frame."""
+    """Return the pose of a visual in the frame of its link; the file may give it in another frame."""
     pose = visual.first("pose")
     reference = "" if pose is None else pose.attributes.get("relative_to", "")
     if reference and reference not in frames.elements:
@@ -61,7 +61,7 @@ def _pose(visual: Element, link: str, frames: Frames) -> FramePose:
 
 
 def _rgba(visual: Element) -> Rgba | None:
-    """Return the color in diffuse light, or the ambient one, with the transparency."""
+    """Return the diffuse color, or the ambient one, with the transparency."""
     material = visual.first("material")
     given = None if material is None else material.first("diffuse") or material.first("ambient")
     if given is None:
@@ -72,7 +72,7 @@ def _rgba(visual: Element) -> Rgba | None:
 
 
 def _meshes(shape: Element, files: MeshFiles) -> list[tuple[Trimesh, Rgba | None]]:
-    """Return the meshes of a shape, with a color where a mesh brings its own."""
+    """Return the meshes of a shape, with the colors of mesh files."""
     if shape.tag == "mesh":
         scale = _vector(shape, "scale")
         return [(mesh.apply_scale(scale), color) for mesh, color in files.read(text_of(shape, "uri", "mesh"))]
@@ -90,7 +90,7 @@ def _vector(shape: Element, tag: str) -> list[float]:
 
 
 def _polyline(shape: Element) -> Trimesh:
-    """Return a flat shape drawn out along z."""
+    """Return a plane shape extruded along z."""
     corners = [point.content_numbers(2, shape.tag, "point") for point in shape.every("point")]
     return extruded(Polygon(corners), 0.0, _length(shape, "height"))
 

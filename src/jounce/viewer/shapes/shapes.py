@@ -1,4 +1,4 @@
-"""Solids as the files of robots describe them: with colors of three or four numbers, along z, by link."""
+"""Solids of robot files: colored meshes by link, and capsules along z."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from jounce.viewer.shapes.meshes import capsule
 
 PLAIN = (190, 195, 202)
 Shapes = dict[str, list[ColoredMesh]]
-"""By link, in its frame."""
+"""Meshes by link, in its frame."""
 
 
 def colored(mesh: Trimesh, rgba: Rgba | None) -> ColoredMesh:
-    """Return a mesh with a color of red, green, blue and perhaps opacity, from 0 to 1; gray without one."""
+    """Return a mesh with a color: red, green, blue and an optional opacity, from 0 to 1; gray by default."""
     if rgba is None or len(rgba) < 3:
         return ColoredMesh(mesh, PLAIN)
     red, green, blue = (round(255 * float(np.clip(c, 0, 1))) for c in rgba[:3])
@@ -23,7 +23,7 @@ def colored(mesh: Trimesh, rgba: Rgba | None) -> ColoredMesh:
 
 
 def upright_capsule(radius: float, length: float) -> Trimesh:
-    """Return a capsule along z about the origin; the length is that of its cylinder."""
+    """Return a capsule along z about the origin, with the length of its cylinder."""
     return capsule([0, 0, -0.5 * length], [0, 0, 0.5 * length], radius)
 
 

@@ -1,1 +1,1 @@
-"""What the view can show, each with its controls."""
+"""Subjects of the viewer, each with its controls."""

@@ -1,4 +1,4 @@
-"""Plate cams as the view sees them: a mechanism of the cam and its follower, moved by the law, with their outlines."""
+"""Plate cams in the viewer: a mechanism of the cam and its follower, moved by the law, with their outlines."""
 
 from __future__ import annotations
 
@@ -23,11 +23,11 @@ from jounce.viewer.shapes.recording import Recording
 from jounce.viewer.subjects.mechanisms import MechanismSubject, instants_shown, recorded
 
 INSTANTS = 361
-STEM = 0.05  # half the width of what holds an edge or a roller, in base radii
+STEM = 0.05  # half the width of the stem of an edge or a roller, in base radii
 
 
 def cam_mechanism(cam: PlateCam) -> Mechanism:
-    """Return a cam and its follower as a mechanism, both driven; the cam turns by one radian in a second.
+    """Return a cam and its follower as a mechanism, both driven; the cam turns by one radian per second.
 
     Examples
     --------
@@ -75,7 +75,7 @@ class CamSubject(MechanismSubject):
         self.cam = cam
 
     def solve(self, values: Mapping[str, float], order: int) -> Recording:
-        """Return a turn of the cam; there are no parameters to change."""
+        """Return a turn of the cam, which has no parameters."""
         del values
         motion = solve(self.mechanism, instants_shown(self.mechanism), order=order, strict=False)
         seen = mechanism_appearance(motion)
@@ -87,7 +87,7 @@ class CamSubject(MechanismSubject):
 
 
 def _outlines(cam: PlateCam, thick: float) -> Iterator[tuple[str, Trimesh]]:
-    """Give the plate of the cam, then what touches it and what holds that, each in the frame of its body."""
+    """Yield the plate of the cam, then the contact part and the stem of the follower, each in its body frame."""
     follower, width = cam.follower, STEM * cam.base_radius
     yield "cam", extruded(Polygon(cam.table.profile.T).buffer(0), 0.0, 0.8 * thick, sharp=False)
     low, high = 0.1 * thick, 0.7 * thick
@@ -109,7 +109,7 @@ def _outlines(cam: PlateCam, thick: float) -> Iterator[tuple[str, Trimesh]]:
         yield "follower", plate(np.stack([tip, end]), width, high, high + 0.5 * thick)
         return
     side, neck = np.array([-away[1], away[0]]) * width, tip + 4 * width * away
-    if follower.turning:  # the edge points to the cam, across the arm
+    if follower.turning:  # the edge points to the cam, perpendicular to the arm
         away, neck = np.array([0.0, 1.0]), tip + np.array([0.0, 4 * width])
         side = np.array([width, 0.0])
     yield "follower", extruded(Polygon([tip, neck + side, neck - side]), low, high)

@@ -1,4 +1,4 @@
-"""Robots with closed loops, which move as the mechanisms that they are."""
+"""Robots with closed loops, which move as mechanisms."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ from jounce.viewer.shapes.recording import Recording
 from jounce.viewer.subjects.mechanisms import recorded
 from jounce.viewer.subjects.robots import RobotSubject
 
-MOST_TRIED = 60  # choices of driven joints, which take a few seconds
+MOST_TRIED = 60  # trial choices of driven joints, which take a few seconds
 
 
 class ClosedRobotSubject(RobotSubject):
-    """A robot with closures: as many joints are driven as it has degrees of freedom.
+    """A robot with closures, with as many driven joints as degrees of freedom.
 
-    Its trajectory is that of the driven joints; without, the first joints that determine the others swing.
+    Its trajectory is that of the driven joints; by default, the first joints that determine the others swing.
 
     Raises
     ------
@@ -29,7 +29,7 @@ class ClosedRobotSubject(RobotSubject):
     """
 
     def joints_driven(self) -> tuple[tuple[str, ...], float]:
-        """Return the joints that drive all others; loops leave less room than the limits of joints."""
+        """Return the joints that drive all others, and the fraction of their swings that loops permit."""
         return (independent(self.robot) if self.trajectory is None else self.trajectory.names), 0.5
 
     def solve(self, values: Mapping[str, float], order: int) -> Recording:
@@ -46,7 +46,7 @@ class ClosedRobotSubject(RobotSubject):
 
 
 def independent(robot: Robot) -> tuple[str, ...]:
-    """Return joints whose coordinates determine all others: first those with drives, and those near the base.
+    """Return joints whose coordinates determine all others, preferring those with drives and those near the base.
 
     Raises
     ------
@@ -68,7 +68,7 @@ def independent(robot: Robot) -> tuple[str, ...]:
 
 
 def _depth(robot: Robot, name: str) -> int:
-    """Return how many moving joints are between a joint and the base."""
+    """Return the number of moving joints between a joint and the base."""
     parents = {joint.child: joint for joint in robot.joints.values()}
     count, link = 0, robot.joints[name].parent
     while link in parents:

@@ -1,4 +1,4 @@
-"""What joints, drivers and applied forces do to the bodies of a mechanism, as forces and torques at points."""
+"""Loads of joints, drivers and applied forces on the bodies of a mechanism, as forces and torques at points."""
 
 from __future__ import annotations
 
@@ -17,17 +17,17 @@ from jounce.viewer.shapes.recording import Load, Vectors, spatial_vectors
 
 
 def has_loads(mechanism: Mechanism) -> bool:
-    """Tell whether there are masses or applied forces, so that joints carry something."""
+    """Return whether a mechanism has masses or applied forces, and thus reactions."""
     return bool(mechanism.forces) or any(body.mass is not None for body in mechanism.bodies.values())
 
 
 def mechanism_loads(motion: Motion, solved: Bool[np.ndarray, " all"]) -> list[Load]:
-    """Return what joints, drivers and applied forces do to the last of their bodies, at the instants that were solved.
+    """Return the loads of joints, drivers and applied forces on the last of their bodies, at the solved instants.
 
     Raises
     ------
     JounceError
-        The order of the motion is too low for forces.
+        If the order of the motion is too low for forces.
     """
     if not has_loads(motion.mechanism):
         return []
@@ -50,7 +50,7 @@ def mechanism_loads(motion: Motion, solved: Bool[np.ndarray, " all"]) -> list[Lo
 def _reaction(
     motion: Motion, solved: Bool[np.ndarray, " all"], whole: dict[str, Frame], symbol: Symbol, kind: str
 ) -> Load:
-    """Return what a joint or a driver does to its last body of two."""
+    """Return the load of a joint or a driver on its second body."""
     slot = min(1, len(symbol.bodies) - 1)
     reaction = joint_reaction(motion, symbol.name, point=symbol.points[slot])
     force, torque = reaction.force.values[solved][:, 0], reaction.torque.values[solved]
@@ -73,7 +73,7 @@ def _applied(
     whole: dict[str, Frame],
     points: list[Float[np.ndarray, "time component"]],
 ) -> Vectors | None:
-    """Return a force or a torque as a global vector; None for a law of no direction that is known here."""
+    """Return a force or a torque as a global vector; None if its direction is unknown."""
     if size.ndim == 2:  # by components
         if getattr(force, "frame", "global") == "body":
             size = np.einsum("tck,tk->tc", whole[symbol.bodies[-1]][:, :, 1:], size)

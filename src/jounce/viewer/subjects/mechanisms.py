@@ -1,4 +1,4 @@
-"""Mechanisms as the view sees them: parameters to set, and the motion for their values."""
+"""Mechanisms in the viewer: their parameters, and the motion for given values."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from jounce.viewer.shapes.mechanism_appearance import mechanism_appearance
 from jounce.viewer.shapes.recording import Load, Parameter, Quantity, Recording, poses, spatial_vectors
 from jounce.viewer.subjects.loads import has_loads, mechanism_loads
 
-FEWEST, MOST = 100, 2001  # instants that are shown
+FEWEST, MOST = 100, 2001  # shown instants
 
 
 class MechanismSubject:
@@ -32,12 +32,12 @@ class MechanismSubject:
     Parameters
     ----------
     mechanism : Mechanism
-        With a time grid.
+        A mechanism with a time grid.
 
     Raises
     ------
     MechanismError
-        If there is no time grid.
+        If the mechanism has no time grid.
     """
 
     no_sliders = "There are no parameters. Name values under `parameters:` in the file to get sliders here."
@@ -73,7 +73,7 @@ def mechanism_parameters(mechanism: Mechanism) -> tuple[Parameter, ...]:
 
 
 def parameter_range(value: float) -> tuple[float, float]:
-    """Return the ends of a slider: half and one and a half of a value, and from -1 to 1 for zero.
+    """Return the ends of a slider: half and one and a half times a value, or -1 and 1 for zero.
 
     Examples
     --------
@@ -87,7 +87,7 @@ def parameter_range(value: float) -> tuple[float, float]:
 
 
 def instants_shown(mechanism: Mechanism) -> Float[np.ndarray, " time"]:
-    """Return the instants of a mechanism, more where they are too few to look smooth, fewer where they are too many."""
+    """Return the instants to show of a mechanism, more if too few to look smooth, fewer if too many."""
     given = time_grid(mechanism.time, mechanism.parameter_values)
     if len(given) > MOST:
         return np.linspace(given[0], given[-1], MOST)
@@ -99,15 +99,15 @@ def instants_shown(mechanism: Mechanism) -> Float[np.ndarray, " time"]:
 
 @dataclasses.dataclass(frozen=True, eq=False, kw_only=True)
 class MechanismRecording(Recording):
-    """The motion of a mechanism as the page shows it.
+    """The motion of a mechanism for the page.
 
     Parameters
     ----------
     solution : Motion
     solved : numpy.ndarray of bool, shape (all,)
-        Which of its instants were solved.
+        Mask of solved instants.
     ground : str
-        What the ground is called.
+        Name of the ground.
     """
 
     solution: Motion
@@ -115,7 +115,7 @@ class MechanismRecording(Recording):
     ground: str
 
     def quantities(self) -> dict[str, Quantity]:
-        """Return all outputs, or how each body turns where there are none."""
+        """Return all outputs, or without outputs the rotation of each body."""
         outputs, quantities = self.solution.mechanism.outputs, {}
         units = self.solution.mechanism.shown_units
         for name, values in self.solution.outputs.items():
@@ -139,34 +139,34 @@ class MechanismRecording(Recording):
         return Quantity(unit, values.reshape(*values.shape[:2], -1), words, *labels)
 
     def derivatives(self, body: str, point: Position) -> Float[np.ndarray, "time derivative 3"]:
-        """Return position and derivatives of a point."""
+        """Return the position and derivatives of a point."""
         body = GROUND if body == self.ground else body
         return spatial_vectors(self.solution.point(body, np.asarray(point).tolist()).values[self.solved])
 
     def all_loads(self) -> list[Load]:
-        """Return what joints, drivers and applied forces do."""
+        """Return the loads of joints, drivers and applied forces."""
         return mechanism_loads(self.solution, self.solved)
 
     def dataset(self) -> Dataset:
-        """Return the results of all instants, in the units in which they are shown."""
+        """Return the results at all instants, in the shown units."""
         return in_units(self.solution.dataset, self.solution.mechanism.shown_units)
 
 
 def recorded(
     motion: Motion, appearance: Appearance | None = None, title: str = "", ground: str = GROUND
 ) -> MechanismRecording:
-    """Return a motion as the view shows it.
+    """Return the recording of a motion.
 
     Parameters
     ----------
     motion : Motion
-        Instants that were not solved are left out.
+        The motion; unsolved instants are omitted.
     appearance : Appearance, optional
-        Shapes of the bodies; from joints unless given.
+        Shapes of the bodies, by default from the joints.
     title : str, optional
-        That of the mechanism unless given.
+        Title, by default that of the mechanism.
     ground : str, optional
-        What the ground is called.
+        Name of the ground.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Modes as the view sees them: a slider chooses one, others change the parameters of the mechanism."""
+"""Modes in the viewer: a slider chooses one, and others change the parameters of the mechanism."""
 
 from __future__ import annotations
 
@@ -14,32 +14,32 @@ from jounce.viewer.shapes.appearance import Appearance
 from jounce.viewer.shapes.recording import Parameter, Recording
 from jounce.viewer.subjects.mechanisms import mechanism_parameters, recorded
 
-SWING = 2.0  # s, that one takes on the page, however fast it is
+SWING = 2.0  # period on the page, s, whatever the frequency
 MODE, AMPLITUDE = "mode", "amplitude"
 GROUP = "Mode"
 LARGEST = 0.5  # rad or sizes of the mechanism
 
 
 class ModesSubject:
-    """The modes of a mechanism or a robot about its equilibrium, one at a time, in swings of two seconds.
+    """The modes of a mechanism or a robot about its equilibrium, one at a time, with a period of two seconds.
 
     Parameters
     ----------
     subject : Mechanism or Robot
-        With masses.
+        A mechanism or robot with masses.
     settings
-        For `jounce.equilibrium`: drivers that are left out, or joints of a robot that are held.
+        Settings of `jounce.equilibrium`: omitted drivers, or locked joints of a robot.
     appearance : Appearance, optional
-        Shapes of the bodies; from joints unless given.
+        Shapes of the bodies, by default from the joints.
 
     Raises
     ------
     JounceError
-        If it has no equilibrium, or nothing can move about it.
+        If the subject has no equilibrium, or nothing can move about it.
     """
 
     no_sliders = ""
-    loaded = False  # a mode is a shape: its size is free, and so are its forces
+    loaded = False  # a mode has an arbitrary amplitude, and thus arbitrary forces
 
     def __init__(self, subject: Mechanism | Robot, settings: Mapping[str, Any], appearance: Appearance | None = None):
         self.subject, self.settings, self.appearance = subject, settings, appearance
@@ -60,7 +60,7 @@ class ModesSubject:
         Raises
         ------
         JounceError
-            If there is no equilibrium for these values, or joints cannot be closed so far from it.
+            If there is no equilibrium for these values, or joints cannot be closed at this amplitude.
         """
         own = {name: value for name, value in values.items() if name not in self._keys}
         mode, amplitude = (values[key] for key in self._keys)

@@ -1,4 +1,4 @@
-"""Robots as the view sees them: a trajectory, or joints that swing within their limits."""
+"""Robots in the viewer: a trajectory, or joints that swing within their limits."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ from jounce.viewer.shapes.appearance import Appearance, Position
 from jounce.viewer.shapes.recording import Load, Parameter, Quantity, Recording, rotated
 
 FRAMES = 181
-SWING = 4.0  # s, of one swing, unless a limit of velocity is slower
-REACH = {True: np.pi / 4, False: 0.1}  # of joints without limits, rad and m: half a swing
+SWING = 4.0  # period of a swing, s, unless a limit of velocity needs a longer one
+REACH = {True: np.pi / 4, False: 0.1}  # amplitude of joints without limits, rad and m
 TORQUES = ("torque", "yank", "second rate", "third rate", "fourth rate")
 
 Times = Float[np.ndarray, " time"]
@@ -34,7 +34,7 @@ Coordinates = Float[np.ndarray, "time derivative joint"]
 
 @dataclasses.dataclass(frozen=True, eq=False, kw_only=True)
 class RobotRecording(Recording):
-    """The motion of a tree of links as the page shows it.
+    """The motion of a tree of links for the page.
 
     Parameters
     ----------
@@ -48,13 +48,13 @@ class RobotRecording(Recording):
 
     @cached_property
     def torques(self) -> Float[np.ndarray, "time derivative joint"] | None:
-        """Torques and forces of the joints with their rates; None where nothing tells them."""
+        """Torques and forces of the joints with their rates; None if they are unknown."""
         if self.order < 2 or not has_masses(self.robot):
             return None
         return np.asarray(inverse_dynamics(self.robot, self.q))
 
     def quantities(self) -> dict[str, Quantity]:
-        """Return coordinates and torques of the joints."""
+        """Return the coordinates and torques of the joints."""
         words = tuple(derivative_name(k) for k in range(self.order + 1))
         rates = (*TORQUES, *(f"{derivative_name(k)} rate" for k in range(5, 40)))
         coordinates, torques = {}, {}
@@ -69,11 +69,11 @@ class RobotRecording(Recording):
         return coordinates | torques
 
     def derivatives(self, body: str, point: Position) -> Float[np.ndarray, "time derivative 3"]:
-        """Return position and derivatives of a point."""
+        """Return the position and derivatives of a point."""
         return np.asarray(forward_kinematics(self.robot, self.q, body, np.asarray(point, float)).position)
 
     def all_loads(self) -> list[Load]:
-        """Return what the joints carry, and what their drives exert."""
+        """Return the reactions of the joints, and the forces of their drives."""
         if self.torques is None:
             return []
         wrenches = np.asarray(joint_wrenches(self.robot, self.q, frame="base"))[:, 0]
@@ -88,7 +88,7 @@ class RobotRecording(Recording):
         return loads
 
     def dataset(self) -> Dataset:
-        """Return coordinates and torques, for a table."""
+        """Return the dataset of coordinates and torques."""
         variables = {}
         for name, quantity in self.outputs.items():
             padded = np.full(self.q.shape[:2], np.nan)
@@ -105,16 +105,16 @@ class RobotSubject:
     Parameters
     ----------
     robot : Robot
-        A tree.
+        A robot without closures.
     appearance : Appearance
         Shapes of its moving links and its base.
     trajectory : JointTrajectory, optional
-        Without, each joint swings about a middle, by an amount; both are sliders.
+        By default each joint swings; its middle and amplitude are sliders.
 
     Raises
     ------
     RobotError
-        If the robot has no moving joint, or the trajectory names others.
+        If the robot has no moving joint, or the trajectory names other joints.
     """
 
     no_sliders = "The robot follows a trajectory. Without one, each joint swings, and has sliders here."
@@ -132,11 +132,11 @@ class RobotSubject:
         self.parameters = () if trajectory is not None else swing_parameters(robot, self.driven, share)
 
     def joints_driven(self) -> tuple[tuple[str, ...], float]:
-        """Return the joints that move by themselves, and the share of their swings that there is room for."""
+        """Return the driven joints, and the fraction of their swings that is possible."""
         return self.robot.joint_names, 1.0
 
     def laws(self, values: Mapping[str, float]) -> tuple[JointTrajectory, Times]:
-        """Return the trajectory, or that on which joints swing, and the instants that are shown."""
+        """Return the trajectory, by default that of swinging joints, and the shown instants."""
         if self.trajectory is not None:
             return self.trajectory, np.asarray(self.trajectory.times)
         laws = swinging(values, self.driven)
@@ -148,7 +148,7 @@ class RobotSubject:
         Raises
         ------
         JounceError
-            If the trajectory does not fit, or the period is not above zero.
+            If the trajectory does not fit, or the period is not positive.
         """
         robot, (laws, time) = self.robot, self.laws(values)
         q = coordinates(robot, laws, time, max(order, 1))
@@ -171,12 +171,12 @@ class RobotSubject:
 
 
 def has_masses(robot: Robot) -> bool:
-    """Tell whether links have a mass."""
+    """Return whether links have a mass."""
     return any(link.inertia is not None for link in robot.links.values())
 
 
 def swing_of(joint: Joint) -> tuple[float, float, float, float]:
-    """Return limits of a joint, the middle of its swing and its size, rad or m; without limits, some near zero."""
+    """Return the limits of a joint, and the middle and amplitude of its swing, rad or m; about zero without limits."""
     low, high, reach = joint.limits.lower, joint.limits.upper, REACH[joint.turning]
     if low is None or high is None or not high > low:
         middle = low if low is not None and low == high else 0.0
@@ -185,7 +185,7 @@ def swing_of(joint: Joint) -> tuple[float, float, float, float]:
 
 
 def swing_parameters(robot: Robot, names: tuple[str, ...], share: float) -> tuple[Parameter, ...]:
-    """Return the period, and the swing, or a share of it, and the middle of each joint."""
+    """Return the parameters of swings: the period, and the amplitude, times a share, and middle of each joint."""
     swings, middles = [], []
     for joint in (robot.joints[name] for name in names):
         low, high, middle, swing = swing_of(joint)
@@ -195,7 +195,7 @@ def swing_parameters(robot: Robot, names: tuple[str, ...], share: float) -> tupl
 
 
 def _period(robot: Robot) -> float:
-    """Return a period at which no joint has to be faster than it can."""
+    """Return a period at which all joints keep their limits of velocity."""
     slowest = SWING
     for joint in (robot.joints[name] for name in robot.joint_names):
         if joint.limits.velocity:
@@ -204,12 +204,12 @@ def _period(robot: Robot) -> float:
 
 
 def swinging(values: Mapping[str, float], names: tuple[str, ...]) -> JointTrajectory:
-    """Return the trajectory on which each joint swings, one after the other by a part of the period.
+    """Return the trajectory of swinging joints, with phases shifted from joint to joint.
 
     Raises
     ------
     RobotError
-        If the period is not above zero.
+        If the period is not positive.
     """
     period = float(values["period"])
     if not period > 0:
@@ -223,10 +223,10 @@ def swinging(values: Mapping[str, float], names: tuple[str, ...]) -> JointTrajec
 
 
 def coordinates(robot: Robot, trajectory: JointTrajectory, time: Times, order: int) -> Coordinates:
-    """Return the coordinates of all joints with their derivatives; those without a law stay at zero."""
+    """Return the coordinates of all joints with their derivatives; joints without a law stay at zero."""
     q = np.zeros((len(time), order + 1, len(robot.joint_names)))
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore", SampleWarning)  # the page shows how rough they are
+        warnings.simplefilter("ignore", SampleWarning)  # the page shows their roughness
         derivatives = trajectory.derivatives(time, order)
     for k, name in enumerate(trajectory.names):
         q[..., robot.joint_names.index(name)] = derivatives[..., k]

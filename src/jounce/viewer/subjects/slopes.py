@@ -1,4 +1,4 @@
-"""How a peak changes with each parameter: exact, for the sliders of the page."""
+"""Exact sensitivities of a peak to each parameter, for the sliders of the page."""
 
 from __future__ import annotations
 
@@ -31,12 +31,12 @@ class PeakSlopes:
     Parameters
     ----------
     peak : float
-        In the unit; without sign.
+        Magnitude, in the unit.
     unit : str
     instant : float
-        Where it is reached, s.
+        Instant of the peak, s.
     slopes : dict of str to float
-        Units of the peak per SI unit of the parameter.
+        Slopes, in units of the peak per SI unit of the parameter.
     """
 
     peak: float
@@ -47,24 +47,24 @@ class PeakSlopes:
 
 @under_own_settings
 def peak_slopes(motion: Motion, name: str, order: int) -> PeakSlopes:
-    """Return the peak of a derivative of an output, between the instants too, and its slopes.
+    """Return the peak of a derivative of an output, also between the instants, and its slopes.
 
-    The slope of a peak is that of the value at its instant, as the value does not change with the instant there; where
-    it is reached at an end of the motion, the end stays where it is.
+    The slope of a peak is that of the value at its instant, as the value is stationary in time at a peak; a peak at an
+    end of the motion stays at that end.
 
     Parameters
     ----------
     motion : Motion
-        Of a driven mechanism with parameters.
+        Motion of a driven mechanism with parameters.
     name : str
-        Output, with its component where it has some: ``C_x``.
+        Output, with its component if it has any: ``C_x``.
     order : int
-        Of the derivative, up to that of the motion.
+        Order of the derivative, up to that of the motion.
 
     Raises
     ------
     JounceError
-        If there is no such output, or the motion cannot be differentiated.
+        If the output does not exist, or the motion cannot be differentiated.
 
     Examples
     --------
@@ -96,19 +96,19 @@ def peak_slopes(motion: Motion, name: str, order: int) -> PeakSlopes:
 
 
 def can_be_differentiated(subject: Any) -> bool:
-    """Tell whether a subject is a driven mechanism with parameters and outputs."""
+    """Return whether a subject is a driven mechanism with parameters and outputs."""
     if not isinstance(subject, MechanismSubject) or not subject.parameters:
         return False
     return bool(subject.mechanism.outputs) and not subject.mechanism.initial
 
 
 class SlopesFolder(Observer):
-    """Says for a chosen peak what a step of each slider makes of it, and follows the sliders.
+    """A folder with the changes of a chosen peak for a step of each slider.
 
     Parameters
     ----------
     page : Page
-        In whose GUI it is made, in the container of now.
+        The page, in whose current GUI container the folder is created.
     """
 
     def __init__(self, page: Page):
@@ -124,14 +124,14 @@ class SlopesFolder(Observer):
             control.on_update(lambda _: self._ask())
 
     def on_recording(self, recording: Recording) -> None:
-        """Follow a new motion, which may have other orders."""
+        """Update the folder for a new motion, which may have other orders."""
         orders = tuple(derivative_name(k) for k in range(recording.order + 1))
         if self.order.options != orders:
             self.order.options = orders
         self._ask()
 
     def _ask(self) -> None:
-        """Have the worker find the slopes; a motion that came since has its own."""
+        """Have the worker compute the slopes, unless a new motion has arrived since."""
         if self.output.value == NONE:
             self.text.content = ""
             return
@@ -146,7 +146,7 @@ class SlopesFolder(Observer):
 
 
 def slopes_html(recording: Any, name: str, order: int) -> str:
-    """Return the peak and what a step of each parameter makes of it, as lines of HTML."""
+    """Return the peak and its change for a step of each parameter, as lines of HTML."""
     motion = recording.solution
     try:
         slopes = peak_slopes(motion, name, order)
