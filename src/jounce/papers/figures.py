@@ -1,4 +1,4 @@
-"""What figures of papers share: panels with a title and a note, and a legend below them. Imports matplotlib."""
+"""Common elements of the figures of papers: panels with a title, a note and a legend below. Imports matplotlib."""
 
 from typing import Any
 

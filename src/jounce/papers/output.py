@@ -1,4 +1,4 @@
-"""How the figures and tables of papers are written: whole files or none, into a directory that is tried first."""
+"""Files of the figures and tables of papers: whole files or none, in a directory that is tested first."""
 
 import io
 import tempfile
@@ -12,7 +12,7 @@ from jounce.io.files.writing import replacing
 
 FORMATS = ("png", "svg")
 Progress = Callable[[int, int], None]
-"""Called with the number of steps done and their total."""
+"""Function called with the number of finished steps and their total."""
 
 
 def write(path: Path, content: bytes) -> Path:
@@ -21,7 +21,7 @@ def write(path: Path, content: bytes) -> Path:
     Raises
     ------
     OutputError
-        If it cannot be written.
+        If the file cannot be written.
     """
     with replacing(path) as temporary:
         temporary.write_bytes(content)
@@ -29,12 +29,12 @@ def write(path: Path, content: bytes) -> Path:
 
 
 def write_texts(directory: Path, texts: Mapping[str, str]) -> list[Path]:
-    """Write texts by the names of their files."""
+    """Write texts to files of the given names."""
     return [write(directory / name, text.encode("ascii")) for name, text in texts.items()]
 
 
 def write_figures(directory: Path, figures: Mapping[str, Callable[[Any], Any]], results: Any) -> Iterable[list[Path]]:
-    """Draw the figures of some results, and give the files of each as it is done."""
+    """Draw the figures of some results, and yield the paths of each figure when it is written."""
     from jounce.plot.style import style
 
     for name, draw in figures.items():
@@ -44,12 +44,12 @@ def write_figures(directory: Path, figures: Mapping[str, Callable[[Any], Any]], 
 
 
 def writable(directory: Path) -> Path:
-    """Make the directory, and try a file in it.
+    """Make a directory and test it with a file.
 
     Raises
     ------
     OutputError
-        If files cannot be written there.
+        If files cannot be written to the directory.
     """
     try:
         directory.mkdir(parents=True, exist_ok=True)
@@ -62,7 +62,7 @@ def writable(directory: Path) -> Path:
 
 
 def counter(total: int, progress: Progress | None) -> Callable[[], None]:
-    """Return what is called after each of some steps to tell the progress."""
+    """Return the function that reports the progress, to be called after each step."""
     done = 0
 
     def advanced() -> None:
@@ -94,7 +94,7 @@ def csv_table(columns: Iterable[str], rows: Iterable[Iterable[Any]]) -> str:
 
 
 def markdown_table(columns: str, rows: Iterable[Iterable[str]]) -> str:
-    """Return a table in Markdown; its columns are divided by upright lines.
+    """Return a table in Markdown; ``|`` separates the names of its columns.
 
     Examples
     --------
@@ -108,5 +108,5 @@ def markdown_table(columns: str, rows: Iterable[Iterable[str]]) -> str:
 
 
 def page(package: str | None, name: str, **values: Any) -> str:
-    """Return a text of a package with values in the place of names in braces."""
+    """Return a text file of a package, with values for the names in braces."""
     return (files(str(package)) / name).read_text(encoding="ascii").format(**values)

@@ -1,8 +1,8 @@
-"""The measured motions and the arm of section 4, with stand-ins for what the text of the paper does not hold.
+"""The measured motions and the arm of section 4, with stand-ins for data that the text of the paper lacks.
 
-The third link of a Fanuc LR Mate 100 iB turns from 0 to pi in 1.7 s. An accelerometer on it gives the tangential
-acceleration every 0.033 s, once in a motion at high speed, once with a sudden stop. The samples stand in figures 4 and
-5 only, and the masses in figure 6 only, so both are chosen here.
+The third link of a Fanuc LR Mate 100 iB turns from 0 to pi in 1.7 s. An accelerometer on it measures the tangential
+acceleration every 0.033 s, once in a motion at high speed, once with a sudden stop. Only figures 4 and 5 show the
+samples, and only figure 6 shows the masses, so this module chooses both.
 """
 
 import dataclasses
@@ -24,29 +24,29 @@ SEGMENTS = 51  # section 4; the spacing of the samples is then 0.0333 s
 CONTINUITY = 4  # m of equations 61 and 62: segments of degree 5
 KNOTS = np.linspace(0.0, DURATION, SEGMENTS + 1)
 
-RIPPLE = ((0.08, 29.0, 0.7), (0.05, 41.0, 2.1))  # rad/s^2, rad/s, rad: what the accelerometer adds
+RIPPLE = ((0.08, 29.0, 0.7), (0.05, 41.0, 2.1))  # rad/s^2, rad/s, rad: disturbances of the accelerometer
 STOP = 0.9  # s, when braking begins
-BRAKING = 0.2  # s, how long it lasts
-TURNS, SETTLED = 500, 1e-13  # by which gravity is taken off readings
-RINGING = (6.0, 32.0, 8.0)  # rad/s^2, rad/s, 1/s: how the arm rings after it
+BRAKING = 0.2  # s, duration of braking
+TURNS, SETTLED = 500, 1e-13  # iterations and tolerance for removing gravity from readings
+RINGING = (6.0, 32.0, 8.0)  # rad/s^2, rad/s, 1/s: oscillation of the arm after braking
 
 
 @dataclasses.dataclass(frozen=True)
 class Link:
-    """The link that turns: what figure 6 of the paper holds of it, and where the accelerometer is.
+    """The link that turns: its masses in figure 6 of the paper, and the place of the accelerometer.
 
     Parameters
     ----------
     mass : float
-        kg.
+        Mass, kg.
     center_x, center_z : float
-        Of the center of mass from the axis, m; x and z are those of the link.
+        Coordinates of the center of mass in the frame of the link, from the axis, m.
     inertia_x, inertia_y, inertia_z : float
-        About the center of mass, kg m^2; y is along the axis.
+        Moments of inertia about the center of mass, kg m^2; y is along the axis.
     radius : float
-        From the axis to the accelerometer, m.
+        Distance from the axis to the accelerometer, m.
     sensor_angle : float, default 0
-        From x of the link to the accelerometer, in the sense in which the link turns, rad.
+        Angle from x of the link to the accelerometer, in the sense in which the link turns, rad.
     """
 
     mass: float
@@ -66,7 +66,7 @@ class Link:
 
     @property
     def inertia_about_axis(self) -> float:
-        """``M (x_C^2 + z_C^2) + I_y`` of equations 141-146, kg m^2."""
+        """Moment of inertia about the axis, ``M (x_C^2 + z_C^2) + I_y`` of equations 141-146, kg m^2."""
         return self.mass * (self.center_x**2 + self.center_z**2) + self.inertia_y
 
 
@@ -81,7 +81,7 @@ def arm() -> Robot:
 
 
 def rest_to_rest(time: Samples) -> tuple[Samples, Samples]:
-    """Return speed and acceleration of the polynomial of degree 7 from 0 to pi, with rest to the third derivative."""
+    """Return speed and acceleration of the polynomial of degree 7 from 0 to pi, at rest to the third derivative."""
     s = time / DURATION
     speed = 140 * s**3 * (1 - s) ** 3
     acceleration = 420 * s**2 * (1 - s) ** 2 * (1 - 2 * s)
@@ -89,12 +89,12 @@ def rest_to_rest(time: Samples) -> tuple[Samples, Samples]:
 
 
 def high_speed() -> Samples:
-    """Return samples of the angular acceleration in the motion at high speed, rad/s^2, one for each knot."""
+    """Return the angular acceleration in the motion at high speed, rad/s^2, one sample for each knot."""
     return rest_to_rest(KNOTS)[1] + ripple(KNOTS)
 
 
 def sudden_stop() -> Samples:
-    """Return samples of the angular acceleration where the motion is stopped at 0.9 s, rad/s^2, one for each knot."""
+    """Return the angular acceleration in a motion that stops from 0.9 s on, rad/s^2, one sample for each knot."""
     turned = KNOTS - STOP
     phase = np.clip(turned / BRAKING, 0.0, 1.0)
     braking = -rest_to_rest(np.array([STOP]))[0] / BRAKING * (1 - np.cos(2 * np.pi * phase))
@@ -105,7 +105,7 @@ def sudden_stop() -> Samples:
 
 
 def ripple(time: Samples) -> Samples:
-    """Return what the accelerometer adds to the motion, rad/s^2."""
+    """Return the disturbances of the accelerometer, rad/s^2."""
     parts = (size * np.sin(frequency * time + phase) for size, frequency, phase in RIPPLE)
     return np.sum(list(parts), axis=0)
 
@@ -119,14 +119,14 @@ def law(accelerations: Samples, knots: Samples = KNOTS) -> PolynomialMotion:
 def without_gravity(readings: Samples, link: Link, knots: Samples) -> Samples:
     """Return the angular accelerations of an arm, from tangential readings that contain gravity, rad/s^2.
 
-    An accelerometer reads ``r q'' - g cos(q + b)`` along the tangent, with its angle b on the link, which at angle zero
-    is level and turns down. The angle follows from the accelerations, so both are found in turns; as each angle
-    depends on earlier accelerations, this ends.
+    An accelerometer reads ``r q'' - g cos(q + b)`` along the tangent; b is its angle on the link, which at angle zero
+    is level and turns down. The angle follows from the accelerations, so an iteration finds both in turn; it converges,
+    because each angle depends on earlier accelerations only.
 
     Raises
     ------
     TrajectoryError
-        If the accelerations do not settle.
+        If the iteration does not converge.
     """
     weight = -float(link.robot().gravity[2])
     accelerations = readings / link.radius
@@ -150,14 +150,14 @@ def end_of(motion: PolynomialMotion) -> Float[np.ndarray, "2"]:
 
 
 def at_rest(accelerations: Samples, angle: float | None) -> Samples:
-    """Return samples less the bias, and with an angle less the drift, that keep the motion from its end.
+    """Return samples without their bias, and if an angle is given, their drift, so that the motion ends at rest.
 
     Parameters
     ----------
     accelerations : array of shape (knots,)
         Samples, rad/s^2.
     angle : float or None
-        Where the motion ends at rest, rad; None if only the rest is known.
+        Angle at which the motion ends at rest, rad; None if it is not known.
     """
     shapes = [np.ones(len(KNOTS)), KNOTS] if angle is not None else [np.ones(len(KNOTS))]
     known = slice(None) if angle is not None else slice(1, 2)
@@ -174,19 +174,19 @@ class Case:
     Parameters
     ----------
     name : str
-        As in the files.
+        Name in the files.
     title : str
-        As in figures.
+        Title in figures.
     samples : callable
-        Returns the samples of the angular acceleration, rad/s^2, one for each of `KNOTS`.
+        Function that returns the samples of the angular acceleration, rad/s^2, one for each knot.
     angle : float or None
-        Where the motion ends, rad, if that is known.
+        Angle at the end of the motion, rad, if it is known.
     link : Link, default the stand-in
-        What moves so.
+        The moving link.
     knots : array of shape (knots,), default those of the paper
         Instants of the samples, s.
     measured : bool, default False
-        Whether the samples are someone's own, and taken as they are.
+        Whether the samples are measured data of the user, kept unchanged.
     """
 
     name: str
@@ -199,7 +199,7 @@ class Case:
 
     @property
     def accelerations(self) -> Samples:
-        """Samples less bias and drift, rad/s^2: what the law goes through."""
+        """Samples without bias and drift, rad/s^2, through which the law goes."""
         return self.samples() if self.measured else at_rest(self.samples(), self.angle)
 
     @property

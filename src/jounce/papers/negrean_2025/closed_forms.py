@@ -10,19 +10,19 @@ from jounce.jet import Jet, sine_cosine
 def energies(inertia: float, motion: ArrayLike) -> Float[np.ndarray, "*batch 3"]:
     """Return the acceleration energies of orders 1 to 3: Negrean 2025, equations 141-143.
 
-    Two terms of equation 143 stand twice in the text that we read; they count once.
+    Two terms of equation 143 are printed twice in the text at hand; they count once.
 
     Parameters
     ----------
     inertia : float
-        About the axis, kg m^2.
+        Moment of inertia about the axis, kg m^2.
     motion : array_like of shape (..., 5 or more)
         Angle, speed, acceleration, jerk and jounce, rad by s.
 
     Returns
     -------
     array of shape (..., 3)
-        kg m^2 / s^4, / s^6 and / s^8.
+        Acceleration energies, kg m^2 / s^4, / s^6 and / s^8.
 
     Examples
     --------
@@ -42,26 +42,26 @@ def gravity_torques(
 ) -> Float[np.ndarray, "*batch rates"]:
     """Return the torque that holds the link against its weight, and its rates: Q_g of Negrean 2025, 144-146.
 
-    The paper does not write it out. The axis y is horizontal, the link turns from x toward -z and z is up at angle
-    zero, so that the center of mass stands at the height ``z_C cos q - x_C sin q``.
+    The paper does not write this torque out. The axis y is horizontal, the link turns from x toward -z, and z is up at
+    angle zero, so that the center of mass has the height ``z_C cos q - x_C sin q``.
 
     Parameters
     ----------
     mass : float
-        kg.
+        Mass, kg.
     center : tuple of float
-        x_C and z_C, m.
+        Coordinates x_C and z_C of the center of mass, m.
     gravity : float
-        Downwards, m/s^2.
+        Gravitational acceleration, downwards, m/s^2.
     motion : array_like of shape (..., rates + 1 or more)
         Angle and its derivatives, rad by s.
     rates : int, default 2
-        How many rates are requested.
+        Number of rates.
 
     Returns
     -------
     array of shape (..., rates + 1)
-        N m by s.
+        Torque and its rates, N m by s.
 
     Examples
     --------
@@ -80,7 +80,7 @@ def torques(inertia: float, motion: ArrayLike, gravity: ArrayLike) -> Float[np.n
     Parameters
     ----------
     inertia : float
-        About the axis, kg m^2.
+        Moment of inertia about the axis, kg m^2.
     motion : array_like of shape (..., rates + 3 or more)
         Angle and its derivatives, rad by s.
     gravity : array_like of shape (..., rates + 1)
@@ -89,7 +89,7 @@ def torques(inertia: float, motion: ArrayLike, gravity: ArrayLike) -> Float[np.n
     Returns
     -------
     array of shape (..., rates + 1)
-        N m by s.
+        Torque and its rates, N m by s.
 
     Examples
     --------

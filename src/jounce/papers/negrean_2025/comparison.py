@@ -1,4 +1,4 @@
-"""The page `comparison.md`: what was chosen, closed forms beside the library, and the printed segment."""
+"""The page `comparison.md`: the chosen data, closed forms beside the library, and the printed segment."""
 
 from collections.abc import Iterator, Mapping
 
@@ -15,7 +15,7 @@ UNITS = {"angle": "rad", "speed": "rad/s", "acceleration": "rad/s^2", "jerk": "r
 
 
 def comparison(histories: Mapping[str, History], data: str | None = None) -> str:
-    """Return the page in Markdown; `data` says what was given in the place of the stand-ins."""
+    """Return the page in Markdown; `data` describes measured data that replace the stand-ins."""
     first, checks = next(iter(histories.values())), segment.check()
     ends = segment.evaluated(np.array(segment.INTERVAL)).T
     names = tuple(UNITS)
@@ -54,7 +54,7 @@ def comparison(histories: Mapping[str, History], data: str | None = None) -> str
 
 
 def stand_ins() -> str:
-    """Return what the page says of what was chosen."""
+    """Return the part of the page about the chosen data."""
     size, rate, decay = chosen.RINGING
     return page(
         __package__,

@@ -1,7 +1,7 @@
 """Figures 4, 5 and 7-9 of the paper, and one of the acceleration energies, drawn from computed histories.
 
-This module imports matplotlib, and is imported only when figures are drawn. Figures are objects of their own with the
-Agg canvas; the state of `matplotlib.pyplot` is not touched.
+This module imports matplotlib; import it only for drawing figures. Figures are objects of their own with the Agg
+canvas; the state of `matplotlib.pyplot` stays as it is.
 """
 
 from collections.abc import Mapping
@@ -25,7 +25,7 @@ ENERGY_COLORS = (BLUE, VERMILION, GREEN)
 
 
 def note_on_substitutes(case: Case) -> str:
-    """Word which data are stand-ins for those of the paper: samples, masses and lengths, unless files gave them."""
+    """Return a note on the stand-ins for data of the paper: samples, masses and lengths, unless files give them."""
     chosen = [] if case.measured else ["samples"]
     chosen += ["masses", "lengths"] if case.link is STAND_IN else []
     if not chosen:
@@ -71,7 +71,7 @@ def accelerations(histories: Mapping[str, History], *, tangential: bool, number:
 
 
 def torque(histories: Mapping[str, History], *, rate: int, number: int) -> Figure:
-    """Draw the driving torque or one of its rates, and the part of inertia in it (figures 7 to 9)."""
+    """Draw the driving torque or one of its rates, and the share of inertia (figures 7 to 9)."""
     name, title, unit = TORQUES[rate]
     figure, grid = _panels(len(histories), 1, (6.0, 4.8), f"{title} (figure {number} of Negrean 2025)")
     for panel, history in zip(grid[:, 0], histories.values(), strict=True):

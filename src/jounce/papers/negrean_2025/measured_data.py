@@ -1,4 +1,4 @@
-"""Measured samples and masses in the place of the stand-ins: files, and what the page says of them."""
+"""Measured samples and masses that replace the stand-ins: their files, and their description on the page."""
 
 import dataclasses
 from pathlib import Path
@@ -19,23 +19,23 @@ NEEDED = ("mass", "center_x", "center_z", "inertia_y")
 
 
 def given_cases(samples: Path | None, masses: Path | None, *, remove_gravity: bool = False) -> dict[str, Case]:
-    """Return the motions of a file of samples on an arm of a file of masses, stand-ins for what is not given.
+    """Return the motions of a file of samples, on the arm of a file of masses; stand-ins replace a missing file.
 
     Parameters
     ----------
     samples : path, optional
-        CSV: ``time`` in s, and for each motion a column of its name with angular accelerations, rad/s^2, or with
-        tangential ones, whose name says so: ``fast [m/s^2]``.
+        CSV file: ``time`` in s, and for each motion a column of its name with angular accelerations, rad/s^2, or with
+        tangential accelerations, marked by their unit in the name: ``fast [m/s^2]``.
     masses : path, optional
-        YAML, TOML or JSON: mass, center_x, center_z and inertia_y, with units; inertia_x and inertia_z have no part in
-        the torques, the radius of the accelerometer only where accelerations are tangential.
+        YAML, TOML or JSON file: mass, center_x, center_z and inertia_y, with units; inertia_x and inertia_z do not
+        affect the torques, and only tangential accelerations need the radius of the accelerometer.
     remove_gravity : bool, default False
         Whether tangential accelerations are readings of an accelerometer, which contain gravity.
 
     Raises
     ------
     JounceError
-        If a file cannot be read, or what it says makes no motion or no link.
+        If a file cannot be read, or does not describe a motion or a link.
     """
     link, known = (STAND_IN, frozenset()) if masses is None else read_link(masses)
     if samples is None:
@@ -64,12 +64,12 @@ def given_cases(samples: Path | None, masses: Path | None, *, remove_gravity: bo
 
 
 def read_link(path: Path) -> tuple[Link, frozenset[str]]:
-    """Return the link of a file of masses, and the names of the values that it gives.
+    """Return the link of a file of masses, and the names of the values in it.
 
     Raises
     ------
     JounceError
-        If the file cannot be read, a value is missing, is none or has another unit, or no body has these moments.
+        If the file cannot be read, a value is missing, is no number or has a wrong unit, or no body has these moments.
     """
     source = read_source(path, kind="masses")
     data = source.mapping((), UNITS)
@@ -77,7 +77,7 @@ def read_link(path: Path) -> tuple[Link, frozenset[str]]:
         if key not in data:
             raise source.error("is missing", (key,))
     values = {key: source.number((key,), raw, UNITS[key]) for key, raw in data.items()}
-    for name in ("inertia_x", "inertia_z"):  # they have no part in it, and any body may have those of a thin rod
+    for name in ("inertia_x", "inertia_z"):  # without effect on the torques; those of a thin rod are always possible
         values.setdefault(name, values["inertia_y"])
     link = Link(**{"radius": STAND_IN.radius} | values)
     if not link.radius > 0:
@@ -90,7 +90,7 @@ def read_link(path: Path) -> tuple[Link, frozenset[str]]:
 
 
 def summary(cases: dict[str, Case], samples: Path | None, masses: Path | None, *, remove_gravity: bool = False) -> str:
-    """Return what the page says of data that are not the stand-ins of all of it."""
+    """Return the part of the page about measured data."""
     case = next(iter(cases.values()))
     gravity = "gravity is taken off the readings" if remove_gravity else GRAVITY_STAYS
     through = "The law is made of quintic segments through them, as they are"

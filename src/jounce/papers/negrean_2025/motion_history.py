@@ -1,4 +1,4 @@
-"""What the library computes for a motion of the arm, beside the closed forms of the paper."""
+"""Results of the library for a motion of the arm, beside the closed forms of the paper."""
 
 import dataclasses
 
@@ -12,7 +12,7 @@ from jounce.papers.negrean_2025 import closed_forms
 from jounce.papers.negrean_2025.case import Case
 from jounce.robot import inverse_dynamics
 
-ORDER = 6  # of the derivatives of the angle: equation 131 with m = 4 needs as many
+ORDER = 6  # highest derivative of the angle, as equation 131 with m = 4 needs
 STEPS = 20  # instants in each segment
 Table = Float[np.ndarray, "time 3"]
 
@@ -26,16 +26,16 @@ class History:
     case : Case
         The motion.
     time : array of shape (time,)
-        s.
+        Instants, s.
     motion : array of shape (time, 7)
         Angle and its derivatives, rad by s.
     energies, closed_energies : array of shape (time, 3)
-        Acceleration energies of orders 1 to 3, of the library and by equations 141-143, kg m^2 / s^(2 p + 2).
+        Acceleration energies of orders 1 to 3, by the library and by equations 141-143, kg m^2 / s^(2 p + 2).
     torques, closed_torques, equation_torques : array of shape (time, 3)
-        Torque and its two rates: of the library by Newton-Euler, by equations 144-146, and by the higher-order
-        equations 129-131 with the part of gravity, N m by s.
+        Torque and its two rates: by the library (Newton-Euler), by equations 144-146, and by the higher-order
+        equations 129-131 with the share of gravity, N m by s.
     gravity : array of shape (time, 3)
-        The part of gravity in them, N m by s.
+        Share of gravity in the torques, N m by s.
     """
 
     case: Case
@@ -50,7 +50,7 @@ class History:
 
 
 def history(case: Case) -> History:
-    """Return all that is computed of a motion, at 20 instants in each segment and at the end.
+    """Return the history of a motion, at 20 instants in each segment and at the end.
 
     Parameters
     ----------
@@ -60,7 +60,7 @@ def history(case: Case) -> History:
     Returns
     -------
     History
-        Where a knot stands, derivatives above the fourth are those of the segment that begins there.
+        The history. At a knot, derivatives above the fourth are those of the segment that begins at the knot.
     """
     link, knots = case.link, case.knots
     robot, inertia = link.robot(), link.inertia_about_axis

@@ -27,29 +27,29 @@ def reproduce(
     Parameters
     ----------
     out_directory : path
-        Where to write; made if it does not exist. Files of the same names are replaced.
+        Directory of the files, made if it does not exist. Existing files of the same names are replaced.
     progress : callable, optional
-        Called with the number of motions and figures done and their total.
+        Function called with the number of finished motions and figures, and their total.
     samples : path, optional
-        One's own measurements in the place of the stand-ins: a CSV file with ``time``, s, and for each motion a column
-        of angular accelerations, rad/s^2, or of tangential ones with their unit, ``fast [m/s^2]``, and a radius among
-        the masses.
+        Measurements that replace the stand-ins: a CSV file with ``time``, s, and for each motion a column of angular
+        accelerations, rad/s^2, or of tangential accelerations with their unit, ``fast [m/s^2]``; these need a radius
+        among the masses.
     masses : path, optional
-        The link: a YAML, TOML or JSON file with mass, center_x, center_z and inertia_y, with units, and what else
-        `Link` has.
+        The link: a YAML, TOML or JSON file with mass, center_x, center_z and inertia_y, with units, and optionally the
+        other fields of `Link`.
     remove_gravity : bool, default False
-        Take gravity off tangential samples: readings of an accelerometer on an arm whose axis is level, and which is
-        level at angle zero, contain it.
+        Whether to remove gravity from tangential samples. Readings of an accelerometer contain it; the axis of the arm
+        is level, and so is the arm at angle zero.
 
     Returns
     -------
     list of pathlib.Path
-        The files written: `comparison.md`, `energies.csv` and `torques.csv` first, then the figures as PNG and SVG.
+        Paths of the files: `comparison.md`, `energies.csv` and `torques.csv` first, then the figures as PNG and SVG.
 
     Raises
     ------
     OutputError
-        If the directory cannot be made or written to; raised before any computing.
+        If the directory cannot be made or written to; raised before any computation.
     JounceError
         If samples or masses cannot be read.
 
@@ -90,7 +90,7 @@ def energies_csv(histories: Mapping[str, History]) -> str:
 
 
 def torques_csv(histories: Mapping[str, History]) -> str:
-    """Return the driving torque and its two rates, and the part of gravity in them, as CSV, 17 significant digits."""
+    """Return the driving torque and its two rates, and the share of gravity, as CSV, 17 significant digits."""
     columns = ("torque", "torque_d1", "torque_d2", "gravity", "gravity_d1", "gravity_d2")
     return _csv(columns, {name: np.hstack([h.torques, h.gravity]) for name, h in histories.items()}, histories)
 

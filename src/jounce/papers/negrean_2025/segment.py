@@ -1,7 +1,7 @@
-"""The one segment that section 4 prints, on [0.565, 0.605] s: do its five polynomials belong together?
+"""The one segment that section 4 prints, on [0.565, 0.605] s, and a check that its polynomials are derivatives.
 
-The text that we read has lost minus signs. Those of the angle are + - + - + - from the highest power down, and those of
-each derivative follow.
+The text at hand has lost minus signs. The signs of the angle are + - + - + - from the highest power down; the signs of
+each derivative follow from them.
 """
 
 import dataclasses
@@ -23,18 +23,18 @@ HALF_UNIT = Decimal("0.0005")  # three decimals are printed; a final zero is not
 
 @dataclasses.dataclass(frozen=True)
 class Check:
-    """One coefficient beside what the derivative of the polynomial before makes it.
+    """One printed coefficient beside the coefficient that the preceding polynomial gives.
 
     Parameters
     ----------
     order : int
-        Of the derivative that the coefficient belongs to.
+        Order of the derivative with the coefficient.
     power : int
-        Of the time.
+        Power of the time.
     printed, derived : Decimal
-        The coefficient, and the power times the coefficient of the polynomial before.
+        The coefficient as printed, and as derived from the preceding polynomial.
     rounding : Decimal
-        How far the two may differ if both are rounded to three decimals.
+        Largest difference of the two if both are rounded to three decimals.
     """
 
     order: int
@@ -50,12 +50,12 @@ class Check:
 
     @property
     def rounded(self) -> bool:
-        """Whether rounding to three decimals explains the difference; if not, digits were cut off."""
+        """Whether rounding to three decimals explains the difference; if not, the paper truncates digits."""
         return abs(self.residual) <= self.rounding
 
 
 def check() -> list[Check]:
-    """Return all fourteen coefficients of the four derivatives beside those that follow from the one before.
+    """Return all fourteen coefficients of the four derivatives, each beside that from the preceding polynomial.
 
     Examples
     --------
@@ -79,5 +79,5 @@ def evaluated(time: Float[np.ndarray, " time"]) -> Float[np.ndarray, "5 time"]:
 
 
 def uncertainty(order: int) -> float:
-    """Return how far a value of the segment may be off through the rounding of its coefficients, rad by s."""
+    """Return the largest error of a value of the segment from the rounding of its coefficients, rad by s."""
     return sum(float(HALF_UNIT) * INTERVAL[1] ** k for k in range(len(POLYNOMIALS[order])))

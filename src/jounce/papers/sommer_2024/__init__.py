@@ -1,4 +1,4 @@
-"""The seven simulations of Sommer 2024 (sections 4 and 6), each against an explicit geometric solution.
+"""The seven simulations of Sommer 2024 (sections 4 and 6), each beside an explicit geometric solution.
 
 H. J. Sommer III, Kinematic jerk and jounce for multibody dynamics with joint constraints, Mechanism and Machine Theory
 196 (2024) 105613.

@@ -23,7 +23,7 @@ Times = Float[np.ndarray, " time"]
 Derivatives = Float[np.ndarray, "time 5"]
 Table = Float[np.ndarray, "time column"]
 Columns = Float[np.ndarray, " column"]
-STEPS = (1e-4, 2e-4, 5e-4, 1e-3, 2e-3, 5e-3, 1e-2, 2e-2, 5e-2, 1e-1)  # s, each a whole part of the cycle
+STEPS = (1e-4, 2e-4, 5e-4, 1e-3, 2e-3, 5e-3, 1e-2, 2e-2, 5e-2, 1e-1)  # s; each divides the cycle
 
 
 @dataclasses.dataclass(frozen=True)
@@ -33,13 +33,13 @@ class ValidationCase:
     Parameters
     ----------
     name : str
-        As in `errors.csv`; also the name of the mechanism file.
+        Name in `errors.csv`, and of the mechanism file.
     title : str
-        As in figures.
+        Title in figures.
     output : str
-        The output angle, as named in the mechanism file.
+        Name of the output angle in the mechanism file.
     form : callable
-        Its explicit solution, from `geometry`.
+        Explicit solution of the output angle, from `geometry`.
     """
 
     name: str
@@ -48,7 +48,7 @@ class ValidationCase:
     form: geometry.Form
 
     def load(self) -> Mechanism:
-        """Return the mechanism, from the file that is part of the package."""
+        """Return the mechanism, loaded from its file in the package."""
         with as_file(MECHANISMS / f"{self.name}.yaml") as path:
             return load(path)
 
@@ -57,7 +57,7 @@ class ValidationCase:
         return solve(mechanism, time, order=len(QUANTITIES), **settings).outputs[self.output]
 
     def explicit(self, mechanism: Mechanism, time: Times) -> Derivatives:
-        """Return the same from the explicit solution, which does not use the solver."""
+        """Return the output angle and its derivatives from the explicit solution, without the solver."""
         return geometry.evaluate(self.form, time, mechanism.parameter_values, order=len(QUANTITIES))
 
 
@@ -78,8 +78,8 @@ VALIDATION_CASES = {
 }
 
 
-HISTORIES = {2: "jerk", 3: "jounce"}  # figures and what of the four-bar they show
-TOLERANCE_SWEEPS = {  # figures and the cases in them; those of time steps come next
+HISTORIES = {2: "jerk", 3: "jounce"}  # figures of the four-bar and their quantity
+TOLERANCE_SWEEPS = {  # figures and their cases; the sweep of time steps is the next figure
     4: ("four_bar",),
     6: ("inverted_slider_crank_slide", "inverted_slider_crank_distance"),
     10: ("rsur", "rssr"),
@@ -116,7 +116,7 @@ class Cycle:
 
     @property
     def normalized_rmse(self) -> Float[np.ndarray, "4"]:
-        """The errors divided by the largest absolute values, shape (4,)."""
+        """Root-mean-square errors divided by the largest absolute values, shape (4,)."""
         return normalized_rmse(self.simulated, self.explicit)[1:]
 
 
@@ -136,14 +136,14 @@ def nominal_time() -> Times:
 
 
 def nominal_cycle(case: ValidationCase, mechanism: Mechanism) -> Cycle:
-    """Return one cycle at an assembly tolerance of 1e-12, simulated and explicit."""
+    """Return one cycle, simulated at an assembly tolerance of 1e-12, and explicit."""
     time = nominal_time()
     simulated = case.simulated(mechanism, time, tolerance=TOLERANCE)
     return Cycle(time, simulated, case.explicit(mechanism, time))
 
 
 def tolerance_error(case: ValidationCase, mechanism: Mechanism, tolerance: float) -> Float[np.ndarray, "4"]:
-    """Return the normalized RMSE of velocity to jounce, with positions no better than an assembly tolerance."""
+    """Return the normalized RMSE of velocity to jounce, with positions only as accurate as an assembly tolerance."""
     time = nominal_time()
     computed = case.simulated(mechanism, time, tolerance=tolerance, refine=False)
     return normalized_rmse(computed, case.explicit(mechanism, time))[1:]
@@ -152,7 +152,7 @@ def tolerance_error(case: ValidationCase, mechanism: Mechanism, tolerance: float
 def step_errors(case: ValidationCase, mechanism: Mechanism, step: float) -> dict[str, Float[np.ndarray, "2"]]:
     """Return the normalized RMSE of jerk and jounce at one time step: simulated, and by differences of order 2 and 4.
 
-    All three stand at the same instants, one whole cycle of them.
+    All three use the same instants over one whole cycle.
     """
     time, centers = stencil_instants(step)
     computed = case.simulated(mechanism, time)
@@ -168,10 +168,10 @@ def step_errors(case: ValidationCase, mechanism: Mechanism, step: float) -> dict
 
 
 def stencil_instants(step: float) -> tuple[Times, Int[np.ndarray, " centers"]]:
-    """Return increasing instants, and the indices of those around which two more stand on either side, `step` apart.
+    """Return increasing instants, and the indices of those with two neighbors on either side, `step` apart.
 
-    A grid of that step over one cycle. Where it would have more than some thousand instants, only the surroundings of
-    the nominal 201 instants are kept: the mean square of an error over the cycle is the same.
+    The instants are a grid of that step over one cycle. If the grid is too long, only the neighborhoods of the nominal
+    201 instants remain: the mean square of an error over the cycle is the same.
     """
     if 2 * REACH * step < STEP:
         centers = REACH * step + nominal_time()

@@ -1,4 +1,4 @@
-"""The page `comparison.md`: what is the paper's and what is chosen, a verdict on each figure, and all errors."""
+"""The page `comparison.md`: data of the paper and chosen data, a verdict on each figure, and all errors."""
 
 from collections.abc import Iterator, Mapping, Sequence
 
@@ -14,13 +14,13 @@ PRINTED = {  # root-mean-square errors in the text of the paper, sections 4 and 
     ("rsur", "jerk"): 2.17e-14,
     ("rsur", "jounce"): 3.81e-13,
 }
-PRINTED_FLOORS = {4: 1e-11, 10: 1e-12}  # tolerances below which the text has the floor, by figure
+PRINTED_FLOORS = {4: 1e-11, 10: 1e-12}  # tolerances below which errors stay constant in the text, by figure
 ALMOST = 1e-9
 UNITS = ("rad/s", "rad/s^2", "rad/s^3", "rad/s^4")
-FLOOR = 1e-14  # normalized RMSE of what is computed to rounding
-ALIKE = 10.0  # errors of velocity to jounce differ by less than this factor
-CONVERGING = (1.5e-3, 3e-2)  # s, steps at which neither rounding nor the next order shows
-STANDS_IN = {  # what of each simulation the text of the paper does not give
+FLOOR = 1e-14  # normalized RMSE of rounding
+ALIKE = 10.0  # largest ratio of the errors of velocity to jounce
+CONVERGING = (1.5e-3, 3e-2)  # s, steps at which neither rounding nor the next order matters
+STANDS_IN = {  # data of each simulation that the text of the paper lacks
     "four_bar": "",
     "inverted_slider_crank_slide": "drive",
     "inverted_slider_crank_distance": "drive",
@@ -32,7 +32,7 @@ STANDS_IN = {  # what of each simulation the text of the paper does not give
 
 
 def comparison(results: Mapping[str, Results]) -> str:
-    """Return what was chosen, a verdict on each figure, and the errors beside the printed ones, in Markdown."""
+    """Return the chosen data, a verdict on each figure, and computed beside printed errors, in Markdown."""
     return page(
         __package__,
         "comparison.md",
@@ -52,7 +52,7 @@ def comparison(results: Mapping[str, Results]) -> str:
 
 
 def _verdicts(results: Mapping[str, Results]) -> Iterator[tuple[str, ...]]:
-    """Yield a row for each figure whose simulations were run."""
+    """Yield a row for each figure that has results."""
     figures = (
         dict.fromkeys(cases.HISTORIES, ("four_bar",))
         | cases.TOLERANCE_SWEEPS
@@ -85,8 +85,8 @@ def _history(results: Sequence[Results], figure: int) -> tuple[str, bool, str]:
 def _tolerances(results: Sequence[Results], figure: int) -> tuple[str, bool, str]:
     """Judge a sweep of tolerances: errors of all quantities fall together, to rounding.
 
-    Of residuals in cm, the floor begins where the text of the paper has it. A correction squares the residual, so that
-    the largest one is often far below the tolerance, and errors do not fall evenly.
+    With residuals in cm, errors stop falling at the tolerance in the text of the paper. A correction squares the
+    residual, so the largest residual is often far below the tolerance, and errors do not fall evenly.
     """
     errors = np.stack([result.by_tolerance for result in results])
     spread = float((errors.max(axis=2) / errors.min(axis=2)).max())

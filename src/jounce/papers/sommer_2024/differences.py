@@ -1,9 +1,9 @@
-"""Finite differences, what jerk and jounce were taken from before: central (Sommer 2024, 57-58) and backward."""
+"""Finite differences, the older way to jerk and jounce: central (Sommer 2024, 57-58) and backward."""
 
 import numpy as np
 from jaxtyping import Float, Int
 
-WEIGHTS = {  # by order of accuracy and order of derivative, from the sample two steps before to that two steps after
+WEIGHTS = {  # by order of accuracy and order of derivative, from two steps before the instant to two steps after
     (2, 1): (0, -1 / 2, 0, 1 / 2, 0),
     (2, 2): (0, 1, -2, 1, 0),
     (4, 1): (1 / 12, -8 / 12, 0, 8 / 12, -1 / 12),  # printed with -8/12 twice, see the errata
@@ -25,20 +25,20 @@ def central_difference(
     Parameters
     ----------
     samples : array of shape (time,)
-        Values `step` apart (near each of the instants asked for).
+        Values `step` apart (near each of the requested instants).
     step : float
         Time step, s.
     derivative : int
-        1 or 2.
+        Order of the derivative, 1 or 2.
     accuracy : int
-        2 or 4: the error falls with this power of the step.
+        Order of accuracy, 2 or 4: the error falls with this power of the step.
     at : array of int, optional
-        Indices of the instants asked for; all that have two samples on either side unless given.
+        Indices of the requested instants; all that have two samples on either side unless given.
 
     Returns
     -------
     numpy.ndarray
-        Derivatives at those instants.
+        Derivatives at the requested instants.
 
     Examples
     --------
@@ -55,7 +55,7 @@ def central_difference(
 def backward_difference(
     samples: Float[np.ndarray, " time"], step: float, *, derivative: int
 ) -> Float[np.ndarray, " time-{derivative}"]:
-    """Return the first or second derivative of evenly spaced samples from those of the past alone.
+    """Return the first or second derivative of evenly spaced samples from past samples alone.
 
     Parameters
     ----------
@@ -64,12 +64,12 @@ def backward_difference(
     step : float
         Time step, s.
     derivative : int
-        1 or 2.
+        Order of the derivative, 1 or 2.
 
     Returns
     -------
     numpy.ndarray of shape (time - derivative,)
-        At each instant that has as many samples before it.
+        Derivatives at each instant that has enough samples before it.
 
     Examples
     --------

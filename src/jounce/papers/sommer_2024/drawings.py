@@ -1,7 +1,7 @@
-"""Figures 1, 8 and 9 of Sommer 2024: the mechanisms, drawn from the files that are solved, with the paper's letters.
+"""Figures 1, 8 and 9 of Sommer 2024: the mechanisms, drawn from their files, with the letters of the paper.
 
-The drawings of the paper are not in the text that this was made from. Lengths are the printed ones; where the files
-choose directions of axes and a motion, the pictures say so. This module is imported only when figures are drawn.
+The text at hand does not contain the drawings of the paper. Lengths are as printed; the pictures name directions of
+axes and motions that the files choose. Import this module only for drawing figures.
 """
 
 import dataclasses
@@ -20,7 +20,7 @@ from jounce.plot.machine_sketch import SketchFigure, draw_scale
 from jounce.plot.style import GRAY, PALE_GRAY
 
 ARC = 7.0  # radius of the arc of an angle, in halves of a pin
-VIEW = (-130.0, 25.0)  # degrees, of the spatial ones
+VIEW = (-130.0, 25.0)  # degrees, view of spatial mechanisms
 X, Y, Z = np.eye(3)
 LENGTHS_ONLY = "lengths as printed; the paper does not print the drive of the slider-crank"
 CHOSEN = "lengths as printed; directions of the axes, reference of the angle{} and drive chosen (stand-in)"
@@ -28,19 +28,19 @@ CHOSEN = "lengths as printed; directions of the axes, reference of the angle{} a
 
 @dataclasses.dataclass(frozen=True)
 class Drawn:
-    """What a drawing of the paper shows of a mechanism besides its links and joints.
+    """The letters, lengths and angles in a drawing of the paper.
 
     Parameters
     ----------
     simulation : str
-        Name of the simulation whose mechanism is drawn.
+        Name of the simulation with the mechanism.
     points : dict of str to tuple
-        Letter: body, and place in its frame, numbers or names of parameters, m.
+        Body, and place in its frame (numbers or names of parameters, m), by the letter.
     lengths : sequence of str
-        Pairs of letters; a pair that names a parameter is written with its length, another one is driven.
+        Pairs of letters; the drawing gives the length of a pair that names a parameter, other pairs are driven.
     angles : dict of str to tuple
-        Symbol: the letter of its vertex, the direction from which it counts, that a quarter turn on, and the letter
-        to which it reaches.
+        Letter of the vertex, reference direction, direction a quarter turn ahead, and letter at the end of the angle,
+        by the symbol.
     fixed : sequence of str
         Pairs of letters on the ground, drawn as dashed lines.
     """
@@ -84,19 +84,19 @@ RSPU = Drawn(
 
 
 def draw(drawn: Mapping[str, Drawn], _: Any, *, title: str, note: str, size: tuple[float, float]) -> Figure:
-    """Draw one figure of the paper, a panel with a title for each mechanism; it takes no results."""
+    """Draw one figure of the paper, a panel with a title for each mechanism, without results."""
     figure, axes = panels(1, len(drawn), size, title, note)
     drawings = []
     for panel, (name, its) in zip(axes[0], drawn.items(), strict=True):
         panel.set_title(name)
         drawings.append(_panel(panel, its, VIEW))
-    for drawing in drawings:  # once all panels have their places
+    for drawing in drawings:  # after all panels have their places
         drawing.write_names("all")
     return figure
 
 
 def _panel(axes: Any, drawn: Drawn, view: View) -> SketchFigure:
-    """Return a mechanism, assembled at the start of its cycle, in a panel; its names are not yet written."""
+    """Return a mechanism, assembled at the start of its cycle, in a panel, still without names."""
     mechanism = VALIDATION_CASES[drawn.simulation].load()
     values, drawing = mechanism.parameter_values, drawing_of(mechanism, view=view)
     drawing.labels.clear()

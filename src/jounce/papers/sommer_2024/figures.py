@@ -1,7 +1,7 @@
-"""Figures 2-7 and 10-13 of Sommer 2024 and one of its section 7, drawn from measured results.
+"""Figures 2-7 and 10-13 of Sommer 2024, and a figure for its section 7, drawn from measured results.
 
-This module imports matplotlib, and is imported only when figures are drawn. Figures are objects of their own with the
-Agg canvas; the state of `matplotlib.pyplot` is not touched.
+This module imports matplotlib; import it only for drawing figures. Figures are objects of their own with the Agg
+canvas; the state of `matplotlib.pyplot` stays as it is.
 """
 
 from collections.abc import Mapping, Sequence
@@ -38,7 +38,7 @@ RATE_UNITS = {"jerk": r"rad/s$^3$", "jounce": r"rad/s$^4$"}
 
 
 def _note(names: Sequence[str]) -> str:
-    """Return what is written in the picture of a stand-in."""
+    """Return the note on stand-in data in a figure."""
     chosen = sorted({STANDS_IN[name] for name in names} - {""})
     return f"stand-in data: {', '.join(chosen)} chosen, lengths as printed" if chosen else ""
 
@@ -138,7 +138,7 @@ def phase_lag(results: Mapping[str, Results], *, name: str, step: float) -> Figu
 
 
 def _decades(axis: Any, every: int) -> None:
-    """Mark every few decades, without marks between them."""
+    """Mark every few decades, without minor ticks."""
     axis.set_major_locator(LogLocator(base=10.0**every, numticks=20))
     axis.set_minor_locator(LogLocator(base=10.0, numticks=40))
     axis.set_minor_formatter(NullFormatter())

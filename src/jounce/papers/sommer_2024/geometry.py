@@ -1,8 +1,8 @@
 """Explicit geometric solutions of the output angles, as closed expressions of time on jets.
 
-They share no step with the solver: no constraint, no Jacobian, no iteration. Each comes from one triangle or one
-closed vector loop and is written in a form that keeps its digits: angles come from `atan2` of two lengths, never from
-`acos` near its ends. Lengths are in m, angles in rad, time in s.
+The solutions share no step with the solver: no constraint, no Jacobian, no iteration. Each solution comes from one
+triangle or one closed vector loop, in a form without loss of digits: angles come from `atan2` of two lengths, never
+from `acos` near its ends. Lengths are in m, angles in rad, time in s.
 """
 
 import math
@@ -19,7 +19,7 @@ from jounce.jet import Jet
 from jounce.settings import under_own_settings
 
 THETA_START, THETA_DELTA = math.radians(30), math.radians(60)
-LANES = 1024  # instants evaluated together; one width, so that each form compiles once
+LANES = 1024  # instants evaluated together; with one width, each form compiles once
 
 Number = Jet | jax.Array | float
 Form = Callable[[Jet, Mapping[str, Any]], Jet]
@@ -33,7 +33,7 @@ def swing(time: Jet, period: Number) -> Jet:
 def balanced_angle(x: Number, y: Number, z: Number, side: int) -> Jet:
     """Return the angle phi for which ``x cos(phi) + y sin(phi) = z``.
 
-    Of the two solutions, `side` +1 is the one ahead of the direction (x, y), -1 the one behind it.
+    Of the two solutions, `side` +1 selects the one ahead of the direction (x, y), -1 the one behind it.
     """
     root = side * jet.sqrt(x * x + y * y - z * z)
     return jet.atan2(y * z + x * root, x * z - y * root)
@@ -42,9 +42,9 @@ def balanced_angle(x: Number, y: Number, z: Number, side: int) -> Jet:
 def opening_angle(distance: Jet, nearest: Number, farthest: Number) -> Jet:
     """Return the angle between 0 and pi at which two points are `distance` apart.
 
-    One point turns about a fixed axis; the other is fixed. The angle is counted from the place where they are
-    `nearest`; half a turn later they are `farthest`. These three distances give the sine and the cosine of half the
-    angle, up to a common factor: neither suffers at the ends.
+    One point turns about a fixed axis; the other is fixed. The angle starts where the points are `nearest`; half a turn
+    later they are `farthest` apart. These three distances give the sine and the cosine of half the angle, up to a
+    common factor, both without loss of digits at the ends.
     """
     sine = (distance - nearest) * (distance + nearest)
     cosine = (farthest - distance) * (farthest + distance)
@@ -65,7 +65,7 @@ def four_bar(time: Jet, p: Mapping[str, Any]) -> Jet:
 def inverted_slider_crank(time: Jet, p: Mapping[str, Any]) -> Jet:
     """Return the angle of the link FG of the inverted slider-crank, from the triangle E, F, G.
 
-    Its sides EF and FG are given, its side EG is driven; G is nearest to E at psi = pi.
+    The sides EF and FG have given lengths, the side EG is driven; G is nearest to E at psi = pi.
     """
     distance = p["d_start"] + p["d_delta"] * swing(time, p["tau"])
     return math.pi - opening_angle(distance, p["EF"] - p["FG"], p["EF"] + p["FG"])
@@ -84,7 +84,7 @@ def rsur(time: Jet, p: Mapping[str, Any]) -> Jet:
 
 
 def rspu(time: Jet, p: Mapping[str, Any]) -> Jet:
-    """Return the angle of the crank AB of the RSPU mechanism, from the distance BD that is driven.
+    """Return the angle of the crank AB of the RSPU mechanism, from the driven distance BD.
 
     B = (OA, AB cos theta, AB sin theta) is nearest to D = (0, OD, 0) at theta = 0.
     """
@@ -103,11 +103,11 @@ def evaluate(
     Parameters
     ----------
     form : callable
-        One of the closed forms of this module.
+        A closed form of this module.
     time : array_like of shape (time,)
         Instants, s.
     parameters : mapping of str to float
-        Lengths, m, and the period of the driver, s, by the names of the mechanism file.
+        Lengths, m, and the period of the driver, s, by their names in the mechanism file.
     order : int, default 4
         Highest derivative.
 

@@ -1,4 +1,4 @@
-"""All that is measured of one simulation: its errors at nominal settings and in sweeps, and the lag of differences."""
+"""Measurements of one simulation: its errors at nominal settings and in sweeps, and the lag of differences."""
 
 import dataclasses
 from collections.abc import Callable, Iterable
@@ -26,21 +26,21 @@ RUNS = 1 + len(TOLERANCES) + len(STEPS) + len(LAG_STEPS)  # of each simulation
 
 @dataclasses.dataclass(frozen=True)
 class Results:
-    """All that is measured of one simulation.
+    """The measurements of one simulation.
 
     Attributes
     ----------
     cycle : Cycle
-        At nominal settings.
+        Cycle at nominal settings.
     by_tolerance : array of shape (tolerances, 4)
         Normalized RMSE of velocity to jounce for each of `TOLERANCES`.
     by_step : dict of str to array of shape (steps, 2)
         Normalized RMSE of jerk and jounce for each of `STEPS`: of the simulation, and of the differences of second
         and fourth order of its acceleration.
     lags : list of Lag
-        Jerk and jounce by backward differences, for each of the steps of `lag`.
+        Jerk and jounce by backward differences, for each of their time steps.
     stop : {"correction", "residual"}
-        What the tolerances of `by_tolerance` bound.
+        Quantity that the tolerances of `by_tolerance` bound.
     """
 
     cycle: Cycle
@@ -56,17 +56,17 @@ def measure(case: ValidationCase, advanced: Callable[[], None] = lambda: None, *
     Parameters
     ----------
     case : ValidationCase
-        What to run.
+        The simulation.
     advanced : callable, optional
-        Called after each of the `RUNS` runs.
+        Function called after each of the `RUNS` runs.
     stop : {"correction", "residual"}, default "correction"
-        What the assembly tolerance bounds in the sweep of it: the next Newton-Raphson correction, as in `jounce.solve`
-        with ``refine=False``, or the largest residual with lengths in cm.
+        Quantity that the tolerances of the sweep bound: the next Newton-Raphson correction, as in `jounce.solve` with
+        ``refine=False``, or the largest residual with lengths in cm.
 
     Raises
     ------
     JounceError
-        If there is no such rule.
+        If `stop` is another word.
     """
     check_choice("rule", stop, STOPS, JounceError, name="stop")
     mechanism = case.load()
@@ -83,7 +83,7 @@ def measure(case: ValidationCase, advanced: Callable[[], None] = lambda: None, *
     stopped = tolerance_error
     if stop == "residual":
         sweep = ResidualStop(case)
-        stopped = lambda *run: sweep.error(run[-1])  # noqa: E731 - the case and its mechanism are known to it
+        stopped = lambda *run: sweep.error(run[-1])  # noqa: E731 - the sweep has the case and its mechanism
     by_tolerance, by_step = each(stopped, TOLERANCES), each(step_errors, STEPS)
     methods = {name: np.stack([errors[name] for errors in by_step]) for name in by_step[0]}
     late = each(lags, LAG_STEPS)

@@ -1,9 +1,9 @@
-"""The phase lag of backward differences, which the paper's section 7 holds against them, and what it must be.
+"""The phase lag of backward differences, their drawback in section 7 of the paper: measured, and by theory.
 
 In real time only samples of the past are known. A backward difference of the acceleration over a step h is the mean of
-the jerk over that step, and a second one the mean of the jounce over two steps, weighted by a triangle. So of a part of
-the motion with angular frequency w they give back ``sinc(w h / 2) exp(-i w h / 2)`` and the square of that: all parts
-of the motion come late by h / 2 and by h, and smaller.
+the jerk over that step, and a second difference is the mean of the jounce over two steps, weighted by a triangle. So
+the differences multiply a harmonic with angular frequency w by ``sinc(w h / 2) exp(-i w h / 2)`` and by its square:
+all harmonics are late by h / 2 and by h, and smaller.
 """
 
 import dataclasses
@@ -15,9 +15,9 @@ from jounce.mechanism import Mechanism
 from jounce.papers.sommer_2024.cases import CYCLE, QUANTITIES, STEP, ValidationCase, normalized_rmse
 from jounce.papers.sommer_2024.differences import backward_difference
 
-STEPS = (STEP, 0.02, 0.05, 0.1)  # s, each a whole part of the cycle
+STEPS = (STEP, 0.02, 0.05, 0.1)  # s; each divides the cycle
 Series = Float[np.ndarray, " time"]
-FINE = 2000  # instants of the cycle from which the spectrum of the explicit solution is taken
+FINE = 2000  # instants of the cycle for the spectrum of the explicit solution
 
 
 @dataclasses.dataclass(frozen=True)
@@ -31,11 +31,11 @@ class Lag:
     step : float
         Time step, s.
     time : array of shape (time,)
-        One cycle, s.
+        Instants of one cycle, s.
     explicit, simulated, difference : array of shape (time,)
         The quantity by the explicit solution, by the simulation and by backward differences of its acceleration.
     error : float
-        Normalized RMSE that backward differences of these steps must have, from the spectrum of the explicit solution.
+        Theoretical normalized RMSE of backward differences with this step, from the spectrum of the explicit solution.
     """
 
     quantity: str
@@ -48,11 +48,11 @@ class Lag:
 
     @property
     def expected(self) -> float:
-        """How late the differences must be, s: h / 2 for the jerk, h for the jounce."""
+        """Theoretical delay of the differences, s: h / 2 for the jerk, h for the jounce."""
         return self.step * (0.5 if self.quantity == "jerk" else 1.0)
 
     def late(self, computed: Series) -> float:
-        """Return how late a quantity is, s, in the harmonic of the cycle in which the explicit one is largest."""
+        """Return the delay of a quantity, s, in the largest harmonic of the explicit solution."""
         right = np.fft.rfft(self.explicit)
         n = 1 + int(np.argmax(np.abs(right[1:])))
         return -float(np.angle(np.fft.rfft(computed)[n] / right[n])) * CYCLE / (2 * np.pi * n)
@@ -68,11 +68,11 @@ def lags(case: ValidationCase, mechanism: Mechanism, step: float) -> list[Lag]:
     Parameters
     ----------
     case : ValidationCase
-        What is driven.
+        The simulation.
     mechanism : Mechanism
-        Its mechanism.
+        The mechanism of the simulation.
     step : float
-        Time step, s, a whole part of the cycle.
+        Time step that divides the cycle, s.
     """
     count = round(CYCLE / step)
     time = step * np.arange(count + 2)  # two samples before the first difference

@@ -14,31 +14,31 @@ from jounce.papers.sommer_2024.measurement import RUNS, STOPS, Results, measure
 def reproduce(
     out_directory: str | os.PathLike[str], progress: Progress | None = None, *, stop: str = "correction"
 ) -> list[Path]:
-    """Run the seven simulations of Sommer 2024 and write figures 1-13, one of the phase lag of section 7,
+    """Run the seven simulations of Sommer 2024 and write figures 1-13, a figure of the phase lag of section 7,
     the errors as CSV, and `comparison.md`.
 
     Parameters
     ----------
     out_directory : path
-        Where to write; made if it does not exist. Files of the same names are replaced.
+        Directory of the files, made if it does not exist. Existing files of the same names are replaced.
     progress : callable, optional
-        Called with the number of runs and figures done and their total.
+        Function called with the number of finished runs and figures, and their total.
     stop : {"correction", "residual"}, default "correction"
-        What the tolerances of figures 4, 6, 10 and 12 bound: the next Newton-Raphson correction, or the largest
-        residual with lengths in cm, which puts the floor where the paper has it.
+        Quantity that the tolerances of figures 4, 6, 10 and 12 bound: the next Newton-Raphson correction, or the
+        largest residual with lengths in cm, with which errors stop falling at the tolerances of the paper.
 
     Returns
     -------
     list of pathlib.Path
-        The files written: `comparison.md`, `errors.csv`, `errors_by_tolerance.csv` and `errors_by_step.csv` first, then
-        the figures as PNG and SVG.
+        Paths of the files: `comparison.md`, `errors.csv`, `errors_by_tolerance.csv` and `errors_by_step.csv` first,
+        then the figures as PNG and SVG.
 
     Raises
     ------
     OutputError
-        If the directory cannot be made or written to; raised before any computing.
+        If the directory cannot be made or written to; raised before any computation.
     JounceError
-        If there is no such rule.
+        If `stop` is another word.
 
     Examples
     --------
@@ -75,7 +75,7 @@ def errors_csv(cycles: Mapping[str, Cycle]) -> str:
 
 
 def tolerances_csv(results: Mapping[str, Results]) -> str:
-    """Return the normalized errors at each assembly tolerance as CSV: what figures 4, 6, 10 and 12 draw."""
+    """Return the normalized errors at each assembly tolerance as CSV, the data of figures 4, 6, 10 and 12."""
     rows = (
         (name, f"{tolerance:g}", *errors)
         for name, result in results.items()
@@ -85,7 +85,7 @@ def tolerances_csv(results: Mapping[str, Results]) -> str:
 
 
 def steps_csv(results: Mapping[str, Results]) -> str:
-    """Return the normalized errors of jerk and jounce at each time step as CSV: what figures 5, 7, 11 and 13 draw."""
+    """Return the normalized errors of jerk and jounce at each time step as CSV, the data of figures 5, 7, 11 and 13."""
     rows = (
         (name, f"{step:g}", method, *errors)
         for name, result in results.items()

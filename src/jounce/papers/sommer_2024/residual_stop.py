@@ -1,8 +1,8 @@
-"""The stopping rule that the paper's figures 4, 6, 10 and 12 point at: the largest residual, lengths in centimeters.
+"""The probable stopping rule of figures 4, 6, 10 and 12 of the paper: the largest residual, lengths in centimeters.
 
-The paper does not say what its assembly tolerance bounds. A plain Newton-Raphson iteration that stops as soon as the
-largest residual of all constraints is within the tolerance has its floor where the paper has it, if lengths are in cm,
-in which the paper gives them. Each instant starts from the position at the instant before.
+The paper does not say what its assembly tolerance bounds. With a plain Newton-Raphson iteration that stops as soon as
+the largest residual of all constraints is within the tolerance, errors stop falling at the tolerances of the paper, if
+lengths are in cm, the unit of the paper. Each instant starts from the position at the preceding instant.
 """
 
 import dataclasses
@@ -29,13 +29,13 @@ from jounce.mechanism.system import System
 from jounce.papers.sommer_2024.cases import MECHANISMS, QUANTITIES, ValidationCase, nominal_time, normalized_rmse
 from jounce.rigid.pose import Pose
 
-MOST = 10  # corrections; rounding keeps residuals above the least tolerances
+MOST = 10  # limit on corrections; rounding keeps residuals above the smallest tolerances
 
 Lanes = Float[Numbers, " time"]
 
 
 class ResidualStop:
-    """A simulation of the paper whose positions are no better than a largest residual.
+    """A simulation of the paper with positions only as accurate as a largest residual.
 
     Parameters
     ----------
@@ -62,7 +62,7 @@ class ResidualStop:
         Parameters
         ----------
         tolerance : float
-            Of residuals in the paper's units: cm, cm^2, rad and products of unit vectors.
+            Largest residual in the units of the paper: cm, cm^2, rad and products of unit vectors.
         """
         computed = self.angle(tolerance)
         return normalized_rmse(computed, self.right)[1:]
@@ -82,7 +82,7 @@ class ResidualStop:
 
 
 def in_centimeters(case: ValidationCase) -> Mechanism:
-    """Return the mechanism of a simulation with its lengths in cm as numbers."""
+    """Return the mechanism of a simulation with the numbers of its lengths in cm."""
     with as_file(MECHANISMS / f"{case.name}.yaml") as path:
         text = path.read_text(encoding="utf-8")
     with tempfile.TemporaryDirectory() as folder:
@@ -92,7 +92,7 @@ def in_centimeters(case: ValidationCase) -> Mechanism:
 
 
 def _plain(motion: Motion) -> System:
-    """Return the system of a motion with residuals and coordinates as they are."""
+    """Return the system of a motion with residuals and coordinates without scaling."""
     system, count = motion.model.system, motion.poses[0].shifts + motion.poses[0].turns
     ones = np.ones((system.shape[0], 1)), np.ones(count)
     return dataclasses.replace(system, forces=(), fronts=None, row_scale=ones[0], column_scale=ones[1])
@@ -110,7 +110,7 @@ def _corrected(system: System, bodies: Coordinates, instants: Lanes, pose_type: 
 
 @compiled("pose_type", "group")
 def _outputs(system: System, bodies: Coordinates, instants: Lanes, pose_type: type[Pose], group: int) -> Any:
-    """Return the outputs of a group from the derivatives at the positions as they are."""
+    """Return the outputs of a group from the derivatives at the given positions."""
     pose: Any = pose_of(bodies, pose_type, 0)
     time = Jet.variable(instants[None], len(QUANTITIES))
     factor = factored(system, pose, time.truncate(0))
