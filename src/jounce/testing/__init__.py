@@ -1,4 +1,4 @@
-"""Contracts of the library for classes of one's own: `check_joint` holds a joint or driver to them."""
+"""Contracts of joints and drivers: `check_joint` checks a user-defined class against them."""
 
 from jounce.errors import ContractError as ContractError
 from jounce.settings import compute_under_own_settings as _compute_under_own_settings

@@ -1,4 +1,4 @@
-"""The check of a class of joints or drivers against the contracts of the library."""
+"""The check of a class of joints or drivers against the contracts of joints."""
 
 import dataclasses
 import inspect
@@ -33,21 +33,21 @@ CONTRACTS: Mapping[str, Callable[[Subject], None]] = MappingProxyType(
         "back ends": back_ends,
     }
 )
-"""The contracts that every joint of the library keeps, by name."""
+"""Checks of the contracts that every joint of the library keeps, by name."""
 
 
 @dataclasses.dataclass(frozen=True)
 class JointReport:
-    """The contracts that a class of joints or drivers was checked against.
+    """The result of a check of a class of joints or drivers.
 
     Parameters
     ----------
     kind : type
         The class.
     held : tuple of str
-        Names of the contracts that it keeps.
+        Names of the contracts that the class keeps.
     left_out : mapping of str to str
-        Why a contract does not apply to it, or not wholly, by name.
+        Reason why a contract does not apply, or not completely, by the name of the contract.
 
     Examples
     --------
@@ -81,45 +81,45 @@ def check_joint(
     contracts: Sequence[str] | None = None,
     seed: int = 0,
 ) -> JointReport:
-    """Check a class of joints or drivers against the contracts that those of the library keep.
+    """Check a class of joints or drivers against the contracts that joints and drivers of the library keep.
 
-    Joints of the class with random values are put between bodies in random motions:
+    The checks use joints of the class with random values between bodies in random motions:
 
-    - ``jacobian``: at each order, the residual is affine in the coordinates of that order, with the Jacobian as slope,
+    - ``jacobian``: at each order, the residual is affine in the coordinates of that order; the slope is the Jacobian,
       which agrees with differences;
     - ``derivatives``: derivatives along a motion are those of a polynomial through values of the residual;
-    - ``frames``: a common motion of all bodies changes nothing;
-    - ``instances``: joints that are evaluated together have the same residuals as each joint by itself;
+    - ``frames``: a common motion of all bodies does not change the residual;
+    - ``instances``: joints evaluated together have the same residuals as each joint by itself;
     - ``expressions``: values may be expressions of parameters;
     - ``one program``: other values need no further compilation;
-    - ``rank``: where the joint holds, it has as many independent equations as it has rows;
-    - ``facts``: `held_parallel`, `squared_distance`, `point_distance`, `pair` and `dimensions`, as stated, are true;
-    - ``equilibrium``: its reactions have no resultant, and their power is that of its multipliers on its residual;
+    - ``rank``: at a position where the joint holds, it has as many independent equations as rows;
+    - ``facts``: `held_parallel`, `squared_distance`, `point_distance`, `pair` and `dimensions` of the class are true;
+    - ``equilibrium``: the reactions have no resultant, and their power is that of the multipliers on the residual;
     - ``copies``: copies and pickles are equal, with the same hash;
-    - ``files``: it is the same after it was written to a file and read;
-    - ``back ends``: machine code, XLA, and one operation after another agree.
+    - ``files``: writing the joint to a file and reading it again gives the same joint;
+    - ``back ends``: machine code, XLA, and evaluation one operation after another agree.
 
     Parameters
     ----------
     kind : type
-        Derived from `AbstractConstraint`.
+        The class, derived from `AbstractConstraint`.
     values : mapping, optional
-        Values of fields that are not to be random: words, or lengths with which the joint can hold.
+        Values of fields that must not be random: words, or lengths with which the joint can hold.
     space : str, optional
-        planar or spatial, where the class does not say it.
+        ``planar`` or ``spatial``, if the class does not define it.
     order : int
-        Highest derivative of the residual that is checked.
+        Highest derivative of the residual to check.
     relative : bool
         Whether the joint depends only on the relative poses of its bodies.
     equations : int, optional
-        Number of its independent equations, if not as many as it has rows.
+        Number of independent equations of the joint, if it differs from the number of rows.
     period : str or float, optional
-        Period of the last row, if it is known up to whole periods: a number, or the name of its field; 2 pi if the
+        Period of the last row, if the row is known up to whole periods: a number, or the name of its field; 2 pi if the
         class is `periodic`.
     optional : bool
-        Whether fields that may be left out have values, too.
+        Whether optional fields have values, too.
     bodies : int, optional
-        Number of bodies that the joint connects, if its class allows several numbers; the first of them unless given.
+        Number of connected bodies, if the class allows several numbers; the first of these numbers unless given.
     contracts : sequence of str, optional
         Names of the contracts to check; all unless given.
     seed : int
@@ -128,14 +128,14 @@ def check_joint(
     Returns
     -------
     JointReport
-        The contracts that the class keeps, and those that do not apply to it.
+        Contracts that the class keeps, and those that do not apply.
 
     Raises
     ------
     ContractError
-        If the class breaks a contract; the message names it and says what is wrong.
+        If the class breaks a contract; the message names the contract and the failure.
     MechanismError
-        If the class states a fact that cannot be, or values do not fit.
+        If the class states an impossible fact, or values do not fit.
 
     Examples
     --------

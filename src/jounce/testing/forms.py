@@ -24,11 +24,11 @@ from jounce.rigid import PlanarPose, SpatialPose
 from jounce.testing.samples import BODIES, INSTANT, group_of, pose_of, random_motion
 from jounce.testing.subject import Broken, SkippedContract, Subject, residual
 
-LANES = 9  # instants: more than one vector of the processor, and a remainder
+LANES = 9  # instants: more than one vector of the processor, with a remainder
 
 
 def copies(subject: Subject) -> None:
-    """Check that copies and pickles of a joint are equal to it and have the same hash."""
+    """Check that copies and pickles of a joint equal the joint and have the same hash."""
     element = subject.samples.element(subject.random())
     vectors = (name for name, kind in field_kinds(type(element)).items() if kind == "vector")
     given = {name: tuple(value) for name in vectors if (value := getattr(element, name)) is not None}
@@ -56,7 +56,7 @@ def _by_name(kind: type[Any]) -> Any:
 
 
 def files(subject: Subject) -> None:
-    """Check that a mechanism with the joint is the same after it was written to a file and read."""
+    """Check that writing a mechanism with the joint to a file and reading it gives the same mechanism."""
     kind, space = subject.samples.kind, subject.space
     role = kind.role or "joint"
     if catalogue(space, role).get(kind.type_name) is not kind:
@@ -80,7 +80,7 @@ def files(subject: Subject) -> None:
 
 
 def back_ends(subject: Subject) -> None:
-    """Check that machine code, XLA, and one operation after another give the same residual and its derivatives."""
+    """Check that machine code, XLA, and evaluation one operation after another give the same residual derivatives."""
     random, pose_type = subject.random(), PlanarPose if subject.space == "planar" else SpatialPose
     group = group_of([subject.samples.element(random)], subject.space)
     pose = pose_of(random_motion(random, subject.space, 2, batch=LANES))

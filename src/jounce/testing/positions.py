@@ -1,4 +1,4 @@
-"""Contracts at positions where a joint holds: the number of its independent equations, and the truth of its facts."""
+"""Contracts at positions where a joint holds: the number of independent equations, and the facts of the class."""
 
 import dataclasses
 from typing import Any
@@ -24,14 +24,14 @@ from jounce.testing.subject import Broken, SkippedContract, Subject, evaluated, 
 
 STARTS, STEPS = 8, 40
 NEEDED = 2  # positions
-CLOSED, NEARLY = 1e-13, 1e-10  # last corrections, m or rad: while they decrease, and where rounding limits them
-DEPENDENT = 1e-9  # smallest singular value over the largest
-FACTOR = 3.0  # of lengths and directions
+CLOSED, NEARLY = 1e-13, 1e-10  # last corrections, m or rad: while they decrease, and if rounding limits them
+DEPENDENT = 1e-9  # ratio of the smallest singular value to the largest
+FACTOR = 3.0  # factor on lengths and directions
 PAIRS = {"revolute": planar.Revolute, "rod": planar.DoubleRevolute, "prismatic": planar.Prismatic}
 
 
 def rank(subject: Subject) -> None:
-    """Check that a joint that holds has as many independent equations as it has rows, or as are claimed."""
+    """Check that a joint that holds has as many independent equations as rows, or as the subject claims."""
     group = group_of([_sample(subject)], subject.space)
     for _, slopes in _positions(subject, group):
         sizes = np.linalg.svd(slopes, compute_uv=False)
@@ -45,7 +45,7 @@ def rank(subject: Subject) -> None:
 
 
 def facts(subject: Subject) -> None:
-    """Check that what the class states is true: directions held parallel, a squared distance, a pair, dimensions."""
+    """Check the facts that the class states: directions held parallel, a squared distance, a pair, dimensions."""
     element = _sample(subject)
     stated, group = facts_of(type(element)), group_of([element], subject.space)
     positions = _positions(subject, group)
@@ -61,7 +61,7 @@ def facts(subject: Subject) -> None:
 
 
 def _sample(subject: Subject) -> Any:
-    """Return a random joint, with directions that must not be parallel perpendicular to each other."""
+    """Return a random joint; directions that must not be parallel are perpendicular to each other."""
     element = subject.samples.element(subject.random())
     changed = {}
     for name, other in facts_of(type(element)).never_parallel:
@@ -73,7 +73,7 @@ def _sample(subject: Subject) -> Any:
 
 
 def _positions(subject: Subject, group: Group) -> list[tuple[Motion, np.ndarray]]:
-    """Return some positions where a joint holds, with the Jacobian there, shape (rows, coordinates)."""
+    """Return positions where a joint holds, with their Jacobians, shape (rows, coordinates)."""
     random, positions = subject.random(), subject.positions
     for _ in range(STARTS):
         if len(positions) == NEEDED:
@@ -128,7 +128,7 @@ def _held_parallel(group: Group, motion: Motion) -> None:
 
 
 def _point_distance(group: Group, motion: Motion, stated: str) -> None:
-    """Check how far apart the points of a joint that holds are."""
+    """Check the distance between the points of a joint that holds."""
     pose = pose_of(motion)
     first, second = (
         np.array(pose.take(bodies).point(getattr(group.element, name)).coefficients[0])[:, 0, 0]
@@ -141,7 +141,7 @@ def _point_distance(group: Group, motion: Motion, stated: str) -> None:
 
 
 def _is_pair(subject: Subject, element: Any, motion: Motion) -> None:
-    """Check that a joint holds where its pair does, and the pair where the joint does."""
+    """Check that a joint and its pair hold at the same positions."""
     pair = facts_of(type(element)).pair
     kind = PAIRS[pair]
     values = {name: getattr(element, name, None) for name in field_kinds(kind)}
@@ -156,7 +156,7 @@ def _is_pair(subject: Subject, element: Any, motion: Motion) -> None:
 
 
 def _squared_distance(subject: Subject, element: Any) -> None:
-    """Check that the residual, with the square of the value added, is that of a distance, whatever the value."""
+    """Check that the residual plus the square of the value is that of a distance, for any value."""
     field = facts_of(type(element)).squared_distance
     motion = random_motion(subject.random(), subject.space, 0, batch=20)
     is_law = field_kinds(type(element))[field] == "motion"
@@ -171,7 +171,7 @@ def _squared_distance(subject: Subject, element: Any) -> None:
 
 
 def _dimensions(subject: Subject, element: Any, motion: Motion) -> None:
-    """Check that a joint which holds still does where all lengths are multiplied, and directions are lengthened."""
+    """Check that a joint still holds after all lengths and directions are multiplied by a factor."""
     changed: dict[str, Any] = {}
     for name, kind in field_kinds(type(element)).items():
         value = getattr(element, name)
@@ -183,7 +183,7 @@ def _dimensions(subject: Subject, element: Any, motion: Motion) -> None:
         if kind not in ("scalar", "vector", "points", "motion") or (value is None and not stretched):
             continue
         if value is None or not (stretched or dimension in ("angle", "ratio")):
-            return  # the class states no dimension of a field, or the default of a length is unknown
+            return  # without a dimension of a field or the default of a length
         if stretched:
             changed[name] = f"{FACTOR}*({value})" if kind == "motion" else (FACTOR * np.asarray(value)).tolist()
     wide = {**motion, "position": FACTOR * motion["position"]}

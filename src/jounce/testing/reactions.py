@@ -1,6 +1,6 @@
 """Equilibrium of the reactions of joints and drivers, and of forces, along random motions with random multipliers.
 
-The motions do not fulfill the constraints, so that nothing depends on the solution of a mechanism.
+The motions do not fulfill the constraints, so the checks do not depend on the solution of a mechanism.
 """
 
 from collections.abc import Callable, Mapping
@@ -16,11 +16,11 @@ from jounce.mechanism import Body, Mechanism, build
 from jounce.testing.samples import BODIES, INDEX, INSTANT, pose_of, random_motion
 from jounce.testing.subject import Subject
 
-RATES = 1  # derivatives of reactions that are checked
+RATES = 1  # checked derivatives of reactions
 
 
 def equilibrium(subject: Subject) -> None:
-    """Check that the reactions of a joint have no resultant, and the power of its multipliers on its residual."""
+    """Check that the reactions of a joint have no resultant, and that their power is that of the multipliers."""
     random = subject.random()
     element = subject.samples.element(random)
     pose, forces = acting({"joint": element}, subject.space, RATES, random)
@@ -40,9 +40,9 @@ class Resultant(NamedTuple):
     Attributes
     ----------
     force, moment : array
-        Resultant, and moment about the origin.
+        Resultant force, and moment about the origin.
     power : array
-        Power that goes into the bodies.
+        Power supplied to the bodies.
     size : float
         Magnitude of the largest contribution.
     """
@@ -78,7 +78,7 @@ def acting(
 
 
 def _with_carriages(series: np.ndarray, count: int) -> np.ndarray:
-    """Return the motion of bodies with that of carriages, which rest where the last body begins."""
+    """Return the motion of bodies and carriages; carriages rest at the start of the last body."""
     still = np.zeros_like(series[..., -1:, :])
     still[0] = series[0, ..., -1:, :]
     return np.concatenate([series, *[still] * count], axis=-2)
@@ -114,7 +114,7 @@ def resultant(
 
 
 def power_of_element(forces: MotionForces, name: str, element: Any, pose: Any) -> np.ndarray:
-    """Return Taylor coefficients of the power that a joint, driver or force puts into all bodies, (levels, time)."""
+    """Return Taylor coefficients of the power that a joint, driver or force supplies to all bodies, (levels, time)."""
     clock = Jet.variable(np.full((1, 1), INSTANT), pose.order)
     if element.role == "force":
         index, instance = forces._force_index(name)
@@ -136,7 +136,7 @@ def convolved(product: Callable[..., Any], a: Any, b: Any) -> np.ndarray:
 
 
 def cross(a: Any, b: Any) -> Any:
-    """Return the vector product along the first axis; in the plane its third component."""
+    """Return the vector product along the first axis, in the plane its third component."""
     return np.cross(a, b, axis=0) if len(a) == 3 else (a[0] * b[1] - a[1] * b[0])[None]
 
 

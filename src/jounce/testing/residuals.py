@@ -1,4 +1,4 @@
-"""Contracts of residuals: derivatives by bodies and by time, frames, instances, expressions, compilation."""
+"""Contracts of residuals: derivatives by coordinates and time, frames, instances, expressions, compilation."""
 
 from typing import Any
 
@@ -28,16 +28,16 @@ from jounce.testing.samples import (
 from jounce.testing.subject import Broken, SkippedContract, Subject, evaluated, residual
 from jounce.trajectory import Expression
 
-NODES = 40  # of an interpolating polynomial
-REACHES = (0.5, 0.25, 0.125)  # s, on either side
+NODES = 40  # nodes of an interpolating polynomial
+REACHES = (0.5, 0.25, 0.125)  # s, half widths of the interval around an instant
 
 
 def jacobian(subject: Subject) -> None:
     """Check that coefficients are affine in the unknown, with the Jacobian as slope.
 
-    For each order k, the k-th coefficient with the unknown x[k], less that with zero, is the Jacobian times x[k]. The
-    Jacobian, read off at order one, agrees with central differences and with the Jacobian of the solver, in blocks.
-    Everything is evaluated side by side: two lanes for each order, then one for each column of the Jacobian.
+    For each order k, the k-th coefficient with the unknown x[k] minus that with zero is the Jacobian times x[k]. The
+    Jacobian from order one agrees with central differences and with the Jacobian of the solver, in blocks. One
+    evaluation covers all cases: two lanes for each order, then one lane for each column of the Jacobian.
     """
     random, order = subject.random(), subject.order
     group = group_of([subject.samples.element(random)], subject.space)
@@ -74,7 +74,7 @@ def jacobian(subject: Subject) -> None:
 
 
 def jacobian_of_blocks(group: Group, motion: Motion) -> np.ndarray:
-    """Return the Jacobian that the solver takes: block by block for the bodies in each slot."""
+    """Return the Jacobian of the solver: block by block for the bodies in each slot."""
     pose = pose_of({name: series[:1] for name, series in motion.items()})
     frozen = Jet.constant(jnp.full((1, 1), INSTANT), 1)
     count = coordinates_of("planar" if "angle" in motion else "spatial")
@@ -119,7 +119,7 @@ def derivatives(subject: Subject) -> None:
 
 
 def _around(subject: Subject, group: Group, motion: Motion, jets: Any, reach: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return instants around, less the instant, and the residual there, shape (rows, instances, instants)."""
+    """Return neighboring instants relative to the instant, and their residuals, shape (rows, instances, instants)."""
     steps = reach * np.cos(np.pi * (np.arange(NODES) + 0.5) / NODES)
     powers = steps ** np.arange(len(motion["position"]))[:, None]
     around = {
@@ -135,7 +135,7 @@ def _around(subject: Subject, group: Group, motion: Motion, jets: Any, reach: fl
 
 
 def frames(subject: Subject) -> None:
-    """Check that a common motion of all bodies changes nothing.
+    """Check that a common motion of all bodies does not change the residual.
 
     A joint between moving bodies depends on their relative motion only; vectors of residuals turn with the bodies.
     """
@@ -184,7 +184,7 @@ def instances(subject: Subject) -> None:
 
 
 def expressions(subject: Subject) -> None:
-    """Check that values that are expressions of parameters are the numbers."""
+    """Check that values from expressions of parameters equal the numbers."""
     random = subject.random()
     plain = subject.samples.element(random)
     parameters, replaced = {"unit": 1.0, "law": 0.9}, {}

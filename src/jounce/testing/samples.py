@@ -1,4 +1,4 @@
-"""Random joints of a class, from only its fields and facts, and random motions of the bodies they connect."""
+"""Random joints of a class, from its fields and facts only, and random motions of the connected bodies."""
 
 import dataclasses
 from collections.abc import Mapping, Sequence
@@ -18,7 +18,7 @@ from jounce.rigid import PlanarPose, SpatialPose
 
 BODIES = ("ground", "one", "two", "three", "four")
 INDEX = {name: k for k, name in enumerate(BODIES)}
-CURVES = {  # by the space and the number of parameters: text is no number, so that it is always the same
+CURVES = {  # by the space and the number of parameters; always the same, since random values are numbers
     ("planar", 1): ("0.8*cos(s) + 0.1*s", "0.6*sin(s) - 0.2"),
     ("spatial", 1): ("0.8*cos(s) + 0.1*s", "0.6*sin(s) - 0.2", "0.3*s + 0.1*sin(2*s)"),
     ("spatial", 2): ("0.8*cos(u) + 0.1*v", "0.6*sin(u) - 0.1*v**2", "0.7*v + 0.1*u"),
@@ -39,13 +39,13 @@ class Samples:
     kind : type
         The class.
     space : str
-        planar or spatial.
+        ``planar`` or ``spatial``.
     given : mapping, optional
         Values of fields that are not random.
     optional : bool, default False
-        Whether fields that may be left out have values, too; an offset always has.
+        Whether optional fields have values, too; an offset always has a value.
     joined : int, optional
-        Number of bodies that a joint connects, if its class allows several numbers; the first of them unless given.
+        Number of connected bodies, if the class allows several numbers; the first of these numbers unless given.
     """
 
     kind: type[Any]
@@ -56,19 +56,19 @@ class Samples:
 
     @property
     def bodies(self) -> tuple[str, ...]:
-        """Names of the bodies that the joint connects, all of them moving."""
+        """Names of the connected bodies, all of which move."""
         return BODIES[1 : 1 + self.count]
 
     @property
     def count(self) -> int:
-        """Number of bodies that the joint connects."""
+        """Number of connected bodies."""
         counts: tuple[int, ...] = self.kind.body_counts or (self.kind.body_count,)
         return self.joined or counts[0]
 
     def element(
         self, random: np.random.Generator, bodies: Sequence[str] = (), values: Mapping[str, Any] | None = None
     ) -> Any:
-        """Return a random joint between bodies; `values` replaces some of its values."""
+        """Return a random joint between bodies, with the given `values` of some fields."""
         known = {**self.given, **(values or {})}
         chosen = {}
         for name, field in value_fields(self.kind).items():
@@ -169,39 +169,39 @@ def unit_quaternion_and_rate(series: Sequence[Sequence[Any]]) -> tuple[Jet, Jet 
 
 
 def coordinates_of(space: str) -> int:
-    """Return how many coordinates a body has: shifts and turns."""
+    """Return the number of coordinates of a body: translations and rotations."""
     return 3 if space == "planar" else 6
 
 
 def directions(space: str) -> np.ndarray:
-    """Return every coordinate of every moving body in turn, along a batch: shape (coordinates, bodies, batch)."""
+    """Return a batch of unit steps, one for each coordinate of each moving body: shape (coordinates, bodies, batch)."""
     c, moving = coordinates_of(space), len(BODIES) - 1
     each = np.eye(c * moving).reshape(moving, c, moving * c)
     return np.concatenate([np.zeros((c, 1, moving * c)), np.swapaxes(each, 0, 1)], axis=1)
 
 
 def lanes_of(space: str) -> int:
-    """Return the number of lanes in which residuals are evaluated: differences of all coordinates take so many.
+    """Return the number of lanes for residuals, as differences with respect to all coordinates need.
 
-    Other evaluations are filled up to it, so that they share its compiled operations.
+    Other evaluations are padded to this number, so that they share the compiled operations.
     """
     return 4 * (len(BODIES) - 1) * coordinates_of(space)
 
 
 def widened(values: np.ndarray, lanes: int) -> np.ndarray:
-    """Return arrays of which the last lane is repeated until there are a number of lanes."""
+    """Return an array padded to a number of lanes by repeating the last lane."""
     return np.pad(values, [*[(0, 0)] * (values.ndim - 1), (0, max(lanes - values.shape[-1], 0))], mode="edge")
 
 
 def repeated(motion: Motion, batch: int) -> dict[str, np.ndarray]:
-    """Return the motion at order zero, the same in every lane of a batch."""
+    """Return the position of a motion, the same in every lane of a batch."""
     return {name: np.repeat(series[:1], batch, axis=-1) for name, series in motion.items()}
 
 
 def with_unknowns(motion: Motion, unknowns: np.ndarray) -> Any:
-    """Return the pose that starts as the motion does, with x[k] = (r[k], phi[k]) or (r[k], w'[k-1] / k) given.
+    """Return the pose at the position of a motion, with given x[k] = (r[k], phi[k]) or (r[k], w'[k-1] / k).
 
-    The unknowns have the shape (order + 1, c, bodies, batch); those of order zero are not used.
+    The unknowns have the shape (order + 1, c, bodies, batch); those of order zero have no effect.
     """
     start, shifts = repeated(motion, unknowns.shape[-1]), motion["position"].shape[1]
     position = Jet(map(jnp.asarray, [start["position"][0], *unknowns[1:, :shifts]]))
@@ -213,7 +213,7 @@ def with_unknowns(motion: Motion, unknowns: np.ndarray) -> Any:
 
 
 def displaced(motion: Motion, steps: np.ndarray) -> dict[str, np.ndarray]:
-    """Return coefficients of order zero with coordinates changed: shifts, turns about body axes, (c, bodies, batch)."""
+    """Return a position after steps (c, bodies, batch): translations, and rotations about body axes."""
     moved = repeated(motion, steps.shape[-1])
     shifts = moved["position"].shape[1]
     moved["position"][0] += steps[:shifts]
@@ -233,7 +233,7 @@ def quaternion_product(p: np.ndarray, q: np.ndarray) -> np.ndarray:
 
 
 def seen_from_moving_frame(motion: Motion, random: np.random.Generator, order: int) -> dict[str, np.ndarray]:
-    """Return the motion as seen after a common rigid motion of all bodies, itself a random function of time."""
+    """Return the motion after a common rigid motion of all bodies, a random function of time."""
     turned = {name: series.copy() for name, series in motion.items()}
     common = random_motion(random, "planar" if "angle" in motion else "spatial", order)
     common = {name: series[..., 1:2, :] for name, series in common.items()}

@@ -1,4 +1,4 @@
-"""The subject of contracts of joints: samples of a class, claims about it, and the ways in which a contract fails."""
+"""The subject of contracts of joints: samples of a class, claims about the class, and exceptions of contracts."""
 
 import dataclasses
 from functools import cached_property
@@ -12,34 +12,35 @@ from jounce.mechanism.system import Group
 from jounce.testing.samples import Motion, Samples, group_of, lanes_of, pose_of, random_motion, time_jet, widened
 
 
-class SkippedContract(Exception):  # noqa: N818 - it is no error
-    """A contract that does not apply to a joint, and why."""
+class SkippedContract(Exception):  # noqa: N818 - not an error
+    """The reason why a contract does not apply to a joint."""
 
 
 class Broken(Exception):  # noqa: N818 - `ContractError` names the contract, too
-    """A joint does not keep a contract, and why."""
+    """The reason why a joint does not keep a contract."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Subject:
-    """A class of joints or drivers, and the claims about it.
+    """A class of joints or drivers, and claims about the class.
 
     Parameters
     ----------
     samples : Samples
         Random joints of the class.
     order : int
-        Highest derivative that is checked.
+        Highest derivative to check.
     relative : bool
-        Whether it depends only on the relative poses of its bodies.
+        Whether a joint depends only on the relative poses of its bodies.
     period : str or float or None
-        Period of the last row of the residual, if it is known up to whole periods: a number, or the name of its field.
+        Period of the last row of the residual, if the row is known up to whole periods: a number, or the name of its
+        field.
     equations : int or None
-        Number of its independent equations; None for as many as its residual has rows.
+        Number of independent equations of a joint; None for the number of rows of the residual.
     seed : int
         Seed of all random numbers.
     positions : list
-        Positions in which the joint holds, once they are computed.
+        Positions where the joint holds, empty before their computation.
     """
 
     samples: Samples
@@ -56,7 +57,7 @@ class Subject:
         return self.samples.space
 
     def random(self) -> np.random.Generator:
-        """Return a new source of random numbers, the same each time."""
+        """Return a new generator of random numbers, always with the same seed."""
         return np.random.default_rng(self.seed)
 
     def period_of(self, group: Group) -> float | None:
@@ -67,14 +68,14 @@ class Subject:
 
     @cached_property
     def scale(self) -> float:
-        """Size of residuals, the unit of all tolerances."""
+        """Magnitude of residuals, the unit of all tolerances."""
         random = self.random()
         group = group_of([self.samples.element(random)], self.space)
         largest = float(np.abs(residual(group, random_start(self, random))).max())
         return largest if largest > 10 else 1.0
 
     def same(self, actual: Any, expected: Any, tolerance: float, words: str) -> None:
-        """Raise Broken unless numbers agree within a tolerance, in sizes of the residual."""
+        """Raise Broken unless numbers agree within a tolerance, in units of `scale`."""
         actual, expected = np.asarray(actual, float), np.asarray(expected, float)
         if actual.shape != expected.shape:
             raise Broken(f"{words}: shapes {actual.shape} and {expected.shape}")
@@ -93,7 +94,7 @@ def random_start(subject: Subject, random: np.random.Generator) -> Motion:
 def residual(group: Group, motion: Motion, instants: np.ndarray | None = None) -> np.ndarray:
     """Return coefficients of the residual on a motion, shape (order + 1, rows, instances, batch).
 
-    Time runs at the instant of all samples, or is held at one instant for each lane.
+    Time runs from the instant of all samples, or is constant at one instant for each lane.
     """
     batch = motion["position"].shape[-1]
     lanes = max(batch, lanes_of("planar" if "angle" in motion else "spatial"))
