@@ -26,6 +26,9 @@ def expression(text):
         (expression("0.1*(t - 0.4)**2*sign(t - 0.4)"), [0.4]),
         (expression("abs(sin(7*t))"), [np.pi / 7, 2 * np.pi / 7]),
         (expression("abs(t - 0.3)**3*t"), [0.3]),
+        (expression("((t - 0.3)**2)**0.5"), [0.3]),
+        (expression("t + atan(tan(7*t))"), [np.pi / 14, 3 * np.pi / 14]),
+        (expression("t/(2 - t)**2.5"), []),
         (jn.laws.FunctionMotion(lambda t: abs(t - 0.7)), [0.7]),
         (jn.laws.PiecewiseMotion(["t**4", "0.2**4 + abs(t - 0.6)"], until=[0.2]), [0.2, 0.6]),
         (RAMP, [0.25, 0.75]),
@@ -45,8 +48,8 @@ def test_those_of_several_laws_are_reported_once():
 
 
 def test_a_leader_of_several_laws_is_looked_at_once(monkeypatch):
-    looked, seen = [], breaks._observed_breaks
-    monkeypatch.setattr(breaks, "_observed_breaks", lambda law, *x: looked.append(law) or seen(law, *x))
+    looked, seen = [], breaks.observed_jumps
+    monkeypatch.setattr(breaks, "observed_jumps", lambda laws, *x: looked.extend(laws) or seen(laws, *x))
     leader = jn.laws.FunctionMotion(lambda t: abs(t - 0.7))
     laws = [jn.laws.FollowingMotion(own, leader) for own in (expression("sin(t)"), jn.laws.CycloidalMotion(0.0, 1.0))]
     assert law_breaks(laws, 0.0, 0.9, 2).tolist() == pytest.approx([0.7], abs=1e-11)

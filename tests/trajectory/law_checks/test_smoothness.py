@@ -2,6 +2,7 @@
 
 import math
 
+import jax.numpy as jnp
 import numpy as np
 import pytest
 
@@ -96,10 +97,68 @@ def test_pieces_splines_and_expressions():
     assert held.smoothness == 0
     assert held.derivatives[1].size == pytest.approx(7.0, rel=1e-3)
     assert jn.laws.continuity(jn.laws.ExpressionMotion("sin(t)"), 0.0, 1.0).unknown == ""
-    assert "abs" in jn.laws.continuity(jn.laws.ExpressionMotion("abs(t)"), 0.0, 1.0).unknown
-    assert jn.laws.continuity(jn.laws.FunctionMotion(lambda t: t), 0.0, 1.0).unknown
+    assert "seen" in jn.laws.continuity(jn.laws.ExpressionMotion("abs(t)"), 0.0, 1.0).unknown
+    assert "seen" in jn.laws.continuity(jn.laws.FunctionMotion(lambda t: t), 0.0, 1.0).unknown
+    assert "too fast" in jn.laws.continuity(jn.laws.FunctionMotion(lambda t: jnp.sin(1e6 * t)), 0.0, 1.0).unknown
     with pytest.raises(jn.errors.TrajectoryError, match="from 0 to 10"):
         jn.laws.continuity(pieces, 0.0, 1.0, order=11)
+
+
+KINKS = {  # smoothness, and the first jumps: when, by how much
+    "abs(t - 0.3)": (0, [0.3], 2.0),
+    "sqrt((t - 0.3)**2)": (0, [0.3], 2.0),
+    "((t - 0.3)**2)**0.5": (0, [0.3], 2.0),
+    "sin(3*t) + 1e-3*((t - 0.3)**2)**1.5": (2, [0.3], 1.2e-2),
+    "acos(cos(10*t))": (0, [np.pi / 10, np.pi / 5, 0.3 * np.pi], -20.0),
+    "asin(sin(10*t))": (0, [np.pi / 20, 3 * np.pi / 20, np.pi / 4], -20.0),
+    "atan2(sin(10*t), cos(10*t))": (-1, [np.pi / 10, 0.3 * np.pi], -2 * np.pi),
+    "atan(1/(t - 0.4))": (-1, [0.4], np.pi),
+    "(t + 0.3 - abs(t - 0.3))/2": (0, [0.3], -1.0),
+    "t*abs(t - 0.7)*(t - 0.7)": (1, [0.7], 2.8),
+    "exp(sin(abs(abs(t - 0.5) - 0.2)))": (0, [0.3, 0.5, 0.7], 2 * math.exp(math.sin(0.2)) * math.cos(0.2)),
+    "0.05*cos(6*t) + sqrt(0.05**2 - (0.05*sin(6*t))**2)": (0, [np.pi / 12, np.pi / 4], 0.6),
+    "(t - 0.3)*abs(t - 0.3)**0.5": (1, [0.3], np.inf),
+}
+
+
+@pytest.mark.parametrize("text", KINKS)
+def test_kinks_of_formulas_are_found_whatever_function_they_come_from(text):
+    smoothness, instants, size = KINKS[text]
+    found = jn.laws.continuity(jn.laws.ExpressionMotion(text), 0.0, 1.0)
+    jumps = found.derivatives[smoothness + 1]
+    assert (found.smoothness, jumps.count) == (smoothness, len(instants))
+    assert min(abs(jumps.instant - t) for t in instants) < 1e-9
+    assert abs(jumps.size) == pytest.approx(abs(size), rel=1e-5)
+
+
+@pytest.mark.parametrize(
+    "function, smoothness, count",
+    [
+        (lambda t: jnp.minimum(t, 0.3), 0, 1),
+        (lambda t: jnp.where(t < 0.3, 0.0, (t - 0.3) ** 3), 2, 1),
+        (lambda t: jnp.floor(10 * t + 0.05) / 10, -1, 10),
+        (lambda t: jnp.mod(t, 0.3), -1, 3),
+        (lambda t: jnp.interp(t, jnp.array([0.0, 0.3, 0.31, 1.0]), jnp.array([0.0, 1.0, 0.0, 1.0])), 0, 2),
+        (lambda t: jnp.sign(jnp.sin(7 * t)) * jnp.sin(7 * t) ** 2, 1, 2),
+        (lambda t: jnp.sqrt((t - 0.3) ** 2 + 1e-8), None, 0),
+        (lambda t: jnp.tanh(1e5 * (t - 0.3)), None, 0),
+        (lambda t: jnp.exp(-(((t - 0.3) / 1e-3) ** 2)), None, 0),
+        (lambda t: jnp.arccos(0.9999 * jnp.cos(10 * t)), None, 0),
+    ],
+)
+def test_kinks_of_functions_are_found_and_smooth_ones_have_none(function, smoothness, count):
+    found = jn.laws.continuity(jn.laws.FunctionMotion(function), 0.0, 1.0)
+    assert found.smoothness == smoothness
+    assert not count or found.derivatives[smoothness + 1].count == count
+
+
+def test_kinks_of_a_leader_show_in_what_follows_it():
+    """Beside the knots of the law that follows, which the leader passes."""
+    bent = jn.laws.PiecewiseMotion(["t", "2*t - 0.25"], until=[0.25])
+    found = jn.laws.continuity(jn.laws.FollowingMotion(bent, "abs(t - 0.5)"), 0.0, 1.0)
+    assert (found.smoothness, found.derivatives[1].count) == (0, 3)  # the leader is 0.25 at 0.25 s and at 0.75 s
+    assert found.derivatives[1].size == pytest.approx(2.0)
+    assert found.derivatives[1].instant == pytest.approx(0.5)
 
 
 @pytest.mark.parametrize("law", ["0.01*(1 - cos(t))", "0.2*sin(3*t) - 0.1*sin(t)**2"])

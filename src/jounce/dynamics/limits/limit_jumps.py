@@ -6,7 +6,8 @@ import numpy as np
 from jaxtyping import Float
 
 from jounce.dynamics.limits.trajectories import FollowedTrajectory
-from jounce.trajectory.law_checks.seen_jumps import level_sizes, seen_jumps
+from jounce.trajectory.law_checks.observed import observed_jumps
+from jounce.trajectory.law_checks.seen_jumps import level_sizes
 from jounce.trajectory.law_checks.smoothness import LeaderValues, known_jumps
 from jounce.trajectory.laws.stacking import law_derivatives
 
@@ -80,7 +81,8 @@ def jumps_of(
     if not duration > 0:
         nothing = np.zeros((0, order + 1, joints))
         return Jumps(np.zeros(0), nothing, nothing)
-    instants, sizes, unknown = [np.zeros(0)], [np.zeros((0, order, joints))], []
+    instants, sizes = [np.zeros(0)], [np.zeros((0, order, joints))]
+    unknown, bending = [], []
     leaders = LeaderValues()
     for column, law in zip(followed.columns, trajectory.laws.values(), strict=True):
         own, jumps, everything = known_jumps(law, first, last, order - 1, leaders)
@@ -90,6 +92,7 @@ def jumps_of(
         sizes.append(spread)
         if not everything:
             unknown.append(column)
+            bending.append(law)
 
     def evaluate(times: np.ndarray) -> np.ndarray:
         """Return coordinates as `followed` does, without a check that they are finite."""
@@ -99,10 +102,10 @@ def jumps_of(
         return q
 
     if unknown:
-        seen, jumps = seen_jumps(lambda times: evaluate(times)[:, :, unknown], grid, values[:, :, unknown])
-        spread = np.zeros((len(seen), order, joints))
-        spread[:, :, unknown] = jumps
-        instants.append(seen)
+        seen = observed_jumps(bending, first, last, order - 1)
+        spread = np.zeros((len(seen.instants), order, joints))
+        spread[:, :, unknown] = np.where(np.isinf(seen.sizes), np.finfo(float).max, seen.sizes)
+        instants.append(seen.instants)
         sizes.append(spread)
     where, heights = _joined(np.concatenate(instants), np.concatenate(sizes), SAME * duration)
     heights = np.where(np.abs(heights) > SMALL * level_sizes(values, duration)[:-1], heights, 0.0)

@@ -1,23 +1,18 @@
 """Breaks of laws, at which derivatives jump or bend, and the instants beside them for one-sided limits."""
 
 from collections.abc import Iterable, Iterator
-from typing import Any
 
 import numpy as np
 from jaxtyping import Float, Int
 
 from jounce.settings import under_own_settings
-from jounce.trajectory.law_checks.seen_jumps import seen_jumps
+from jounce.trajectory.law_checks.observed import may_bend, observed_jumps
 from jounce.trajectory.law_checks.smoothness import HIGHEST, LeaderValues, known_jumps
 from jounce.trajectory.laws.composed import FollowingMotion
-from jounce.trajectory.laws.profiles import AbstractProfile
-from jounce.trajectory.laws.stacking import law_derivatives
-from jounce.trajectory.motion import AbstractMotion, ExpressionMotion, SplineMotion
+from jounce.trajectory.motion import AbstractMotion, ExpressionMotion
 
-BENDING = frozenset({"abs", "sign", "sqrt", "asin", "acos", "atan2"})  # functions that may have kinks or jumps
-LOOKS = 2001  # samples of a law that may bend anywhere
-SIDE_OFFSET = 2e-11  # of a time span: distance of the sides of a break; kinks are found to half of it
-MOST = 1000  # most breaks of the derivative above the requested ones; more, as of a spline through samples, are ignored
+SIDE_OFFSET = 2e-11  # of a span of time: how far beside a break its sides are; kinks are found to half of that
+MOST = 1000  # breaks of the derivative above the requested ones; of more, as of a spline through samples, none is used
 
 Times = Float[np.ndarray, " time"]
 Breaks = Float[np.ndarray, " break"]
@@ -27,8 +22,8 @@ Breaks = Float[np.ndarray, " break"]
 def law_breaks(laws: Iterable[AbstractMotion], first: float, last: float, order: int) -> Breaks:
     """Return the sorted instants at which a derivative up to an order jumps or bends, s.
 
-    Knots between pieces of a law are known, also those that the leader of a law passes. Kinks of expressions with
-    ``abs`` and the like, and of Python functions, are searched.
+    Where pieces of a law meet is known, also where they are passed by what leads the law. Kinks of expressions and
+    of Python functions are looked for, up to the fifth derivative.
 
     Parameters
     ----------
@@ -55,8 +50,8 @@ def law_breaks(laws: Iterable[AbstractMotion], first: float, last: float, order:
         instants, jumps, _ = known_jumps(law, first, last, level, seen)
         jump, bend = np.any(jumps[:-1] != 0, axis=0), jumps[-1] != 0
         breaks.append(instants[jump | bend if np.sum(jump | bend) <= MOST else jump])
-        if _may_bend(law):
-            breaks.append(_observed_breaks(law, first, last, order))
+        if may_bend(law):
+            breaks.append(observed_jumps([law], first, last, order + 1).instants)
     return distinct_instants(np.concatenate(breaks), first, last)
 
 
@@ -120,31 +115,5 @@ def _with_leaders(laws: Iterable[AbstractMotion]) -> Iterator[AbstractMotion]:
 
 
 def may_break(law: AbstractMotion) -> bool:
-    """Return whether a law may jump or bend: True except for expressions of smooth functions."""
-    return not isinstance(law, ExpressionMotion) or _may_bend(law)
-
-
-def _may_bend(law: Any) -> bool:
-    """Return whether a law may have unknown kinks: True unless it is a spline, a profile or a smooth expression.
-
-    Kinks of its leader are those of another law.
-    """
-    if parts := getattr(law, "parts", ()):
-        return any(map(_may_bend, parts[:1] if isinstance(law, FollowingMotion) else parts))
-    if isinstance(law, ExpressionMotion):
-        used: set[str] = set()
-        law.expression.folded(lambda _: None, lambda _: None, lambda word, _: used.add(word))
-        return bool(used & BENDING)
-    return not isinstance(law, SplineMotion | AbstractProfile)
-
-
-def _observed_breaks(law: AbstractMotion, first: float, last: float, order: int) -> Times:
-    """Return the instants at which derivatives of a law jump by their sampled values."""
-    level = min(order + 2, HIGHEST + 1)
-
-    def evaluate(times: Times) -> Any:
-        return np.nan_to_num(np.moveaxis(law_derivatives([law], times, level), -1, 0))
-
-    looks = np.linspace(first, last, LOOKS)
-    with np.errstate(over="ignore", invalid="ignore"):  # near values that grow without bound
-        return seen_jumps(evaluate, looks, evaluate(looks))[0]
+    """Tell whether a law may jump or bend somewhere: all but expressions of smooth functions."""
+    return not isinstance(law, ExpressionMotion) or may_bend(law)

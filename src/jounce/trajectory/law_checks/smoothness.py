@@ -8,15 +8,14 @@ from jaxtyping import Float, Int
 
 from jounce.base.padding import padded, power_of_two
 from jounce.jet import Jet
-from jounce.jet.programs.composition import Composed
 from jounce.trajectory.checks import whole_number
 from jounce.trajectory.knots import SMOOTH, Jumps, derivative_sizes, knot_jumps
+from jounce.trajectory.law_checks.observed import may_bend, observed_jumps
 from jounce.trajectory.laws.composed import FollowingMotion, OutputMotion
 from jounce.trajectory.laws.integrated import IntegratedMotion
 from jounce.trajectory.laws.piecewise import PiecewiseMotion
 from jounce.trajectory.laws.profiles import AbstractProfile
-from jounce.trajectory.laws.user_laws import ReadMotion
-from jounce.trajectory.motion import AbstractMotion, ExpressionMotion, FunctionMotion, SplineMotion
+from jounce.trajectory.motion import AbstractMotion, SplineMotion
 
 HIGHEST = 10  # highest derivative that is examined
 MOST_CROSSINGS = 10_000
@@ -24,7 +23,9 @@ INTERVALS = 4000  # samples of a leader, for its passages of knots of the law th
 STEPS = 24  # most refinements of a passage between two samples, down to rounding
 AMONG, CLOSE = np.arange(1, 8) / 8, 10.0 ** -np.arange(2, 16, 2)  # shares of the interval that are evaluated together
 SLACK = 1e-6  # of the sampling interval, by which a passage may be beyond an end
-BROKEN = {"abs": "kinks", "sign": "jumps"}  # breaks of functions where the argument is zero
+LOOKED = "its kinks and jumps are those seen between 2000 instants"
+TOO_FAST = "it varies too fast for all of its kinks and jumps to be seen"
+SAME = 1e-7  # of the time: seen jumps this near to a known one are the known one
 ROUNDING = 1e-9  # of the rise of a profile over its duration to the power of the order; smaller jumps are ignored
 
 
@@ -105,6 +106,8 @@ def continuity(law: AbstractMotion, first: float, last: float, order: int = 4, *
     """
     whole_number("order", order, 0, HIGHEST)
     instants, jumps, unknown = _jumps(law, first, last)
+    if unknown and last > first:
+        instants, jumps, unknown = _with_seen(law, instants, jumps, first, last, order)
     repeats = getattr(law, "beyond", "") in ("repeat", "advance")
     if periodic:  # the end is the beginning, and counts once, at which the law begins again
         near = SLACK * (last - first)
@@ -113,7 +116,8 @@ def continuity(law: AbstractMotion, first: float, last: float, order: int = 4, *
     if periodic and not repeats:
         ends = [np.asarray(law(Jet.variable(np.asarray(at, float), HIGHEST)).derivatives()) for at in (last, first)]
         rounding = SMOOTH * derivative_sizes(law, first, last, HIGHEST)
-        closing = np.where(np.abs(ends[1] - ends[0]) <= rounding, 0.0, ends[1] - ends[0])
+        # where a law has no derivatives at its ends, how they close is not known
+        closing = np.where(np.abs(ends[1] - ends[0]) > rounding, ends[1] - ends[0], 0.0)
         instants, jumps = np.append(instants, first), np.column_stack([jumps, closing])
     broken = np.flatnonzero(np.any(jumps != 0, axis=1))
     highest_order = max(order, int(broken[0])) if len(broken) else order
@@ -124,6 +128,20 @@ def continuity(law: AbstractMotion, first: float, last: float, order: int = 4, *
         at = (float(jumps[level, where]), float(instants[where])) if where >= 0 else (np.nan, np.nan)
         summaries.append(DerivativeJumps(level, int(np.count_nonzero(sizes)), *at))
     return Continuity(tuple(summaries), unknown)
+
+
+def _with_seen(
+    law: AbstractMotion, instants: np.ndarray, jumps: np.ndarray, first: float, last: float, order: int
+) -> tuple[np.ndarray, np.ndarray, str]:
+    """Return known jumps with those that are seen, and what is not known."""
+    seen = observed_jumps([law], first, last, order + 1)
+    away = np.abs(seen.instants[:, None] - instants).min(axis=1, initial=np.inf)
+    new = away > SAME * (last - first)
+    sizes = np.zeros((len(jumps), np.count_nonzero(new)))
+    sizes[: seen.sizes.shape[1]] = seen.sizes[new, :, 0].T[: len(jumps)]
+    every, sizes = np.append(instants, seen.instants[new]), np.concatenate([jumps, sizes], axis=1)
+    sequence = np.argsort(every, kind="stable")
+    return every[sequence], sizes[:, sequence], LOOKED if seen.everywhere else TOO_FAST
 
 
 def knots(law: AbstractMotion, first: float, last: float) -> Float[np.ndarray, " knots"]:
@@ -219,15 +237,7 @@ def _jumps(
             return *_repeated(knot_jumps(law, order), start, float(law.stop), first, last, repeats=repeats), ""
         case AbstractProfile():
             return *_within(*_profile_jumps(law, order), first, last), ""
-        case ExpressionMotion():
-            words = str(law.expression.folded(lambda _: "", lambda _: "", lambda word, parts: f"{word} {parts}"))
-            kinks = [f"{kind} where {word} is of zero" for word, kind in BROKEN.items() if word in words]
-            return *none, f"it may have {' and '.join(kinks)}" if kinks else ""
-        case FunctionMotion() | ReadMotion(computes=Composed()):
-            return *none, "it is a Python function"
-        case ReadMotion():
-            return *none, f"nothing is known of a {type(law.computes.source.value).__name__}"
-    return *none, f"nothing is known of a {type(law).__name__}"
+    return *none, LOOKED if may_bend(law) else ""
 
 
 def _repeated(
@@ -290,7 +300,7 @@ def _followed(
     none = np.zeros(0), np.zeros((order + 1, 0))
     own, _, unknown = _jumps(leader, first, last, order, seen)
     if len(own):
-        unknown = "its leader has jumps of its own"
+        unknown = LOOKED
     if isinstance(law, SplineMotion) and not knot_jumps(law, order)[1].any():
         return *none, unknown
     looks = np.linspace(first, last, INTERVALS + 1)

@@ -1,0 +1,83 @@
+"""Which laws may jump or bend where nothing says so, and where they are seen to."""
+
+from typing import Any
+
+import jax
+import numpy as np
+from jaxtyping import Float
+
+from jounce.jet.programs.composition import Composed, has_rules
+from jounce.trajectory.law_checks.seen_jumps import SeenJumps, seen_jumps
+from jounce.trajectory.laws.composed import FollowingMotion
+from jounce.trajectory.laws.profiles import AbstractProfile
+from jounce.trajectory.laws.stacking import law_derivatives
+from jounce.trajectory.laws.user_laws import read_laws
+from jounce.trajectory.motion import AbstractMotion, ExpressionMotion, SplineMotion
+from jounce.units.expression import Expression
+
+SMOOTH = frozenset("+ - * pos neg sin cos exp sinh cosh tanh atan".split())  # operations without kinks, jumps and poles
+HIGHEST_SEEN = 5  # derivative whose jumps are looked for: that above jounce; rounding hides those of higher ones
+TERMS = 3  # of series, above that derivative
+
+
+def may_bend(law: Any) -> bool:
+    """Tell whether a law may have a kink that is not known: one that is no spline, profile or smooth expression.
+
+    Kinks of its leader are looked for there.
+
+    Examples
+    --------
+    >>> import jounce as jn
+    >>> def law(text):
+    ...     return jn.laws.ExpressionMotion(jn.laws.Expression(text), {})
+    >>> may_bend(law("t**3/2 + sin(t)")), may_bend(law("atan(1/t)")), may_bend(law("(t**2)**0.5"))
+    (False, True, True)
+    """
+    if parts := getattr(law, "parts", ()):
+        return any(map(may_bend, parts[:1] if isinstance(law, FollowingMotion) else parts))
+    if isinstance(law, ExpressionMotion):
+        return _has_singularities(law.expression)
+    return not isinstance(law, SplineMotion | AbstractProfile)
+
+
+def _has_singularities(expression: Expression) -> bool:
+    """Tell whether an operation on something that moves with time has places where it is not analytic.
+
+    Of each part: its value where that is a number, whether it moves, and whether there are such places.
+    """
+
+    def operation(word: str, parts: list[Any]) -> Any:
+        moves = [part[1] for part in parts]
+        smooth = word in SMOOTH or not any(moves)
+        if word == "/":
+            smooth = not moves[1]
+        if word == "**" and not moves[1]:
+            exponent = parts[1][0]
+            smooth = not moves[0] or (exponent is not None and exponent >= 0 and float(exponent).is_integer())
+        value = parts[0][0] if word == "pos" else None
+        return value, any(moves), not smooth or any(part[2] for part in parts)
+
+    return expression.folded(lambda x: (x, False, False), lambda name: (None, name == "t", False), operation)[2]
+
+
+def observed_jumps(laws: list[AbstractMotion], first: float, last: float, order: int) -> SeenJumps:
+    """Return where derivatives of laws up to an order, or up to the fifth, are seen to jump.
+
+    Examples
+    --------
+    >>> import jounce as jn
+    >>> law = jn.laws.FunctionMotion(lambda t: abs(t - 0.3))
+    >>> found = observed_jumps([law], 0.0, 1.0, 1)
+    >>> found.instants.round(9).tolist(), found.sizes[..., 0].round(9).tolist()
+    ([0.3], [[0.0, 2.0]])
+    """
+    order = min(order, HIGHEST_SEEN)
+    read = read_laws(laws)
+    leaves = jax.tree.leaves(read, is_leaf=lambda x: isinstance(x, Composed))
+    plain = all(has_rules(x.program) for x in leaves if isinstance(x, Composed))  # others take twice as long an order
+    levels = order + (TERMS if plain else 1)
+
+    def evaluate(times: Float[np.ndarray, " time"]) -> Float[np.ndarray, "time level joint"]:
+        return np.moveaxis(law_derivatives(read, times, levels), -1, 0).copy()
+
+    return seen_jumps(evaluate, first, last, order)
