@@ -1,5 +1,6 @@
 """Functions of one instant run for many: the same by machine code and by XLA, side by side and in rounds."""
 
+import pickle
 import threading
 
 import jax
@@ -9,6 +10,7 @@ import pytest
 from scipy.special import digamma
 
 import jounce as jn
+from jounce.dynamics.inverse import force_programs
 from jounce.execution import backends, mapped, translated
 from jounce.execution.llvm import self_test
 from jounce.execution.llvm.modules import object_file
@@ -177,3 +179,8 @@ def test_xla_computes_blocks_of_few_sizes(monkeypatch, count, rows):
     np.testing.assert_allclose(found, x**2 + 2.0, rtol=1e-15)
     assert found.flags.writeable
     assert function.on_xla.jitted._cache_size() == 1
+
+
+def test_a_mapped_function_is_pickled_by_its_name():
+    """Results of mechanisms hold those that compute forces when they are asked for."""
+    assert pickle.loads(pickle.dumps(force_programs.joint_wrench)) is force_programs.joint_wrench

@@ -240,6 +240,11 @@ class Mapped:
         self.on_xla = ByXla(self._block_of_rows if rows else self._block, ("how",), narrow=narrow)
         self.in_rounds = ByXla(self._in_rounds, ("how",))
         self.__wrapped__, self.__doc__ = function, function.__doc__  # so that `structure` finds it by name
+        self.__module__, self.__qualname__ = function.__module__, function.__qualname__
+
+    def __reduce__(self) -> str:
+        """Pickle it as its name: results hold those that compute further ones, when they are asked for."""
+        return self.__qualname__
 
     @under_own_settings
     def program(

@@ -2,6 +2,7 @@
 
 import dataclasses
 import math
+import pickle
 
 import jax
 import numpy as np
@@ -272,3 +273,11 @@ def test_gradient_of_what_a_bearing_does_to_the_ground():
     along = np.stack([np.cos(angle), np.sin(angle)], axis=1)
     np.testing.assert_allclose(felt(0.4), 2.0 * 25 * 0.2 * along + [0, -2.0 * 9.81], rtol=1e-12)
     np.testing.assert_allclose(jax.jacfwd(felt)(0.4), 2.0 * 25 / 2 * along, rtol=1e-11, atol=1e-12)
+
+
+def test_a_motion_whose_forces_were_asked_for_goes_to_other_processes():
+    motion = jn.solve(jn.load("examples/press.yaml"), [0.0, 0.1], order=2)
+    asked = dict(motion.outputs)
+    copied = pickle.loads(pickle.dumps(motion))
+    for name, values in asked.items():
+        np.testing.assert_array_equal(copied.outputs[name], values)
