@@ -103,7 +103,7 @@ class Samples:
 
 
 def group_of(elements: Sequence[Any], space: str, parameters: Mapping[str, Any] | None = None) -> Group:
-    """Return the group in which joints of one kind are stacked; the last body has their hidden coordinates."""
+    """Return the group of stacked joints of one kind; the last body has their hidden coordinates."""
     named = {f"joints.{k}": e for k, e in enumerate(elements)}
     carriage = {carriage_of(str(k)): len(BODIES) - 1 for k in range(len(elements))}
     (group,), _ = group_elements(named, parameters or {}, {**INDEX, **carriage}, POSITION_COMPONENTS[space])

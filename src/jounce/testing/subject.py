@@ -94,7 +94,7 @@ def random_start(subject: Subject, random: np.random.Generator) -> Motion:
 def residual(group: Group, motion: Motion, instants: np.ndarray | None = None) -> np.ndarray:
     """Return coefficients of the residual on a motion, shape (order + 1, rows, instances, batch).
 
-    Time runs from the instant of all samples, or is constant at one instant for each lane.
+    Time runs, at the instant of all samples, or is constant, at one instant for each lane.
     """
     batch = motion["position"].shape[-1]
     lanes = max(batch, lanes_of("planar" if "angle" in motion else "spatial"))

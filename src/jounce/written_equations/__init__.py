@@ -1,4 +1,4 @@
-"""Equations as text and code, from the residuals of joints on jets: for programs of others, and to be read."""
+"""Equations as code for other programs and as text for readers, from the residuals of joints on jets."""
 
 from jounce.settings import compute_under_own_settings as _compute_under_own_settings
 from jounce.written_equations.write import equations as equations

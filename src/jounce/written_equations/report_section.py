@@ -1,4 +1,4 @@
-"""The equations of a mechanism at an instant of its motion, as a section of a page: for a thesis or a report."""
+"""The equations of a mechanism at an instant of its motion, as a section of a page for a thesis or a report."""
 
 import html
 from collections.abc import Iterable, Sequence
@@ -24,14 +24,14 @@ def equations_section(motion: Motion, at: Real | None = None) -> str:
     Parameters
     ----------
     motion : Motion
-        That was solved or simulated.
+        Solved or simulated motion.
     at : float, optional
-        When, s: the instant of the motion that is nearest; its first one unless given.
+        Time, s; the section shows the nearest instant of the motion. The first instant unless given.
 
     Raises
     ------
     MechanismError
-        If `at` is no instant within the motion, or that was not solved.
+        If `at` is outside the motion, or the instant was not solved.
     """
     time = motion.time
     if at is not None and not time.min() <= float(real_numbers("at", at, MechanismError)) <= time.max():
@@ -64,7 +64,7 @@ def _joints(motion: Motion, equations: "xarray.Dataset") -> Iterable[Sequence[An
 
 
 def _pattern(equations: "xarray.Dataset", pattern: np.ndarray) -> str:
-    """Return the places that are not zero: a line for each row, a group of places for each body."""
+    """Return the pattern of nonzero entries: a line for each row, a group of places for each body."""
     columns, rows = equations.column.values.tolist(), equations.row.values.tolist()
     bodies = [column.rpartition(".")[0] for column in columns]
     known = list(dict.fromkeys(bodies))
@@ -92,7 +92,7 @@ def _sides(now: "xarray.Dataset") -> str:
 
 
 def _table(heads: Sequence[str], rows: Iterable[Sequence[Any]]) -> str:
-    """Return a table; heads are HTML, what is in rows is text."""
+    """Return a table in HTML; heads are HTML, rows are plain text."""
     lines = [f"<tr>{''.join(f'<th>{head}</th>' for head in heads)}</tr>"]
     lines += [f"<tr>{''.join(f'<td>{html.escape(str(x))}</td>' for x in row)}</tr>" for row in rows]
     return f"<table>{''.join(lines)}</table>"

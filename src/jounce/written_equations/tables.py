@@ -13,9 +13,9 @@ if TYPE_CHECKING:
 def columns(equations: "xarray.Dataset") -> "xarray.Dataset":
     """Return the equations of `constraint_equations` with one variable for each column of a table.
 
-    Names are that of the quantity, with the order of the derivative where it has some, and the labels:
-    ``residual.A.1``, ``jacobian.A.1.crank.x``, ``right_side_2.A.1``, ``multipliers_0.A.1``. What is NaN at all instants
-    has no column.
+    A name consists of the quantity, the order of the derivative if there are several, and the labels:
+    ``residual.A.1``, ``jacobian.A.1.crank.x``, ``right_side_2.A.1``, ``multipliers_0.A.1``. Values that are NaN at all
+    instants have no column.
     """
     import xarray
 

@@ -1,4 +1,4 @@
-"""The equations of a mechanism as text: code of Python, of SymPy and of C, and LaTeX."""
+"""The equations of a mechanism or a robot as text: NumPy, SymPy and C code, and LaTeX."""
 
 import re
 from collections.abc import Callable, Sequence
@@ -23,16 +23,16 @@ DEFAULT_NAME = "mechanism"
 
 
 class Language(NamedTuple):
-    """A language that equations are written in.
+    """A language of written equations.
 
     Attributes
     ----------
     write : callable
-        Of code and a name: the text.
+        Function that returns the text from code and a name.
     ending : str
-        Of its files.
+        Ending of files.
     most : int
-        Operations that a file of it may hold.
+        Largest number of operations in a file.
     """
 
     write: Callable[[Code, str], str]
@@ -67,48 +67,48 @@ def equations(
 ) -> str:
     """Return the equations of a mechanism or a robot as code. Sommer 2024, 1-8; Negrean 2025, 65-122 and 144-146.
 
-    Those of a mechanism are residual, Jacobian and right sides as `constraint_equations` has them, with its labels, own
-    joints included; those of a robot its torques and their rates as `inverse_dynamics` gives them. They are read off
-    the same residuals on jets, in SI units, and what is computed twice is shared. The code needs nothing of this
-    package.
+    The equations of a mechanism are residual, Jacobian and right sides as in `constraint_equations`, with the same
+    labels, including user-defined joints; the equations of a robot are its torques and their rates as in
+    `inverse_dynamics`. They come from the same residuals on jets, in SI units, and the code shares common
+    subexpressions. The code does not need this package.
 
     Parameters
     ----------
     model : Mechanism, Motion or Robot
-        A mechanism: angles about axes in space are counted from where its bodies are assembled, at the start of its
-        grid of time. Or a motion: they are counted as along it. Or a robot.
+        A mechanism, with angles about axes in space relative to its assembled position at the start of its time grid; a
+        motion, with its angles; or a robot.
     joint : str, optional
-        Name of the joint or driver whose equations alone are written.
+        Name of a joint or driver, to write its equations only.
     format : {"python", "sympy", "c", "latex"}, default "python"
-        ``python`` is a module that needs NumPy alone, with ``COORDINATES``, ``COLUMNS``, ``ROWS`` and ``ORDER``, and
-        ``residual(t, q)``, ``jacobian(t, q)`` and ``right_side(t, q, velocities)``. ``sympy`` is one whose functions
-        return expressions of SymPy. ``c`` is a file of C99 with the same functions, their names begun by `name`. All
-        state in their headings what the arguments are. ``latex`` is a document with the equations of each type of joint
-        in the vectors of the paper; a joint that is not made of them has its equations by coordinates.
+        ``python`` is a module that needs only NumPy, with ``COORDINATES``, ``COLUMNS``, ``ROWS`` and ``ORDER``, and
+        ``residual(t, q)``, ``jacobian(t, q)`` and ``right_side(t, q, velocities)``. ``sympy`` is a module whose
+        functions return SymPy expressions. ``c`` is a C99 file with the same functions and the prefix `name`. Each
+        heading describes the arguments. ``latex`` is a document with the equations of each type of joint in the vectors
+        of the paper, or by coordinates for a joint without a vector form.
     order : int, default 4
-        The highest derivative that has a right side, from 1 to 12, of LaTeX to 8.
+        Highest derivative with a right side, from 1 to 12; to 8 for LaTeX.
     name : str, default "mechanism"
-        With which the names of the functions of C begin.
+        Prefix of the names of C functions.
     quantities : sequence of str, optional
-        What is written. Of a mechanism ``constraints``, unless given; ``forces``, that is ``mass_matrix(t, q)`` and
-        ``forces(t, q, velocities, multipliers)``, which with the constraints give accelerations and multipliers, and
-        their rates; ``outputs``, that is ``outputs(t, q, velocities)``, what places and motions of bodies determine of
-        the mechanism's outputs, with derivatives. LaTeX has the constraints alone. Of a robot ``torque``, unless given:
-        ``torque(q)`` with q of shape (order + 1, joint); ``mass_matrix``; ``regressor``, by which inertial parameters
-        are multiplied; ``energies``, of acceleration and of velocity, with rates.
+        Quantities to write. For a mechanism: ``constraints``, the default; ``forces``, that is ``mass_matrix(t, q)``
+        and ``forces(t, q, velocities, multipliers)``, which with the constraints give accelerations and multipliers,
+        and their rates; ``outputs``, that is ``outputs(t, q, velocities)``, the outputs that follow from the motion of
+        bodies, with derivatives. LaTeX has the constraints only. For a robot: ``torque``, the default, with
+        ``torque(q)`` for q of shape (order + 1, joint); ``mass_matrix``; ``regressor``, the matrix that multiplies the
+        inertial parameters; ``energies``, of acceleration and of velocity, with rates.
     drives : bool, default True
-        Of a robot: whether armature, damping, friction and springs of its joints count.
+        Whether to include armature, damping, friction and springs of the joints of a robot.
 
     Returns
     -------
     str
-        The text of a file.
+        Text of a file.
 
     Raises
     ------
     MechanismError, RobotError
-        If there is no such joint; if a residual, a law or a force holds what is no operation on numbers, such as a loop
-        of unknown length, or a table of too many of them; or if the order takes more operations than the format holds.
+        If the joint does not exist; if a residual, law or force contains an operation that is not one on numbers, such
+        as a loop of unknown length, or too large a table; or if the order needs too many operations for the format.
 
     Examples
     --------
@@ -151,7 +151,7 @@ def equations(
 
 
 def _quantities(given: Sequence[str], known: tuple[str, ...], error: type[JounceError]) -> tuple[str, ...]:
-    """Return what is to be written, in its usual order: the first of what there is, unless given."""
+    """Return the quantities to write, in their usual order; the first known quantity unless given."""
     given = (given,) if isinstance(given, str) else tuple(given)
     for quantity in given:
         check_choice("quantities", quantity, known, error)
@@ -164,7 +164,7 @@ def _text(code: Code, format: str, name: str, error: type[JounceError]) -> str: 
     Raises
     ------
     MechanismError, RobotError
-        If it is too long, or SymPy has no expression for something in it.
+        If the code is too long, or SymPy has no expression for an operation.
     """
     language = LANGUAGES[format]
     if code.size > language.most:
@@ -177,7 +177,7 @@ def _text(code: Code, format: str, name: str, error: type[JounceError]) -> str: 
 
 
 def owner_of_table(code: Code) -> str:
-    """Return the joint or driver that reads a table of numbers, or the function that does; nothing where none does."""
+    """Return the joint, driver or function that reads a table of numbers, or an empty text."""
     for function in code.functions:
         for place in np.ndindex(*function.results.shape):
             reached = code.graph.reached([int(function.results[place])])

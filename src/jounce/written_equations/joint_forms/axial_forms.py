@@ -1,7 +1,7 @@
-"""Drivers of an angle about an axis, where their bodies turn about that alone: Sommer 2024, equations 101-103.
+"""Drivers of an angle about an axis, for bodies that turn about this axis only: Sommer 2024, equations 101-103.
 
-An angle about an axis does not depend on how frames are drawn. So its residual is read in a frame whose z is the axis,
-at rest on body i, as body j turns about it: what else the residual does when the axes tilt is zero there.
+An angle about an axis does not depend on the choice of frames. So the residual is read in a frame whose z is the axis,
+with body i at rest and body j turning about z: terms of the residual for tilting axes are zero there.
 """
 
 from typing import Any
@@ -33,14 +33,14 @@ _NAMES: dict[Atom, str] = {
 
 
 class _AxialWords(Words):
-    """Words for what is seen along the axis."""
+    """Words for a view along the axis."""
 
     def _coordinate(self, kind: str, body: str, n: int, *place: int) -> str:
         return _NAMES.get((kind, body, n, *place)) or super()._coordinate(kind, body, n, *place)
 
 
 def is_axial(group: Group) -> bool:
-    """Tell whether a group drives angles about axes, by what its class states and by its fields."""
+    """Tell whether a group drives angles about axes, from the facts of its class and its fields."""
     kind = type(group.element)
     vectors = {name for name in value_fields(kind) if field_kinds(kind)[name] == "vector"}
     return group.is_driver and group.element.periodic and "axis_i" in vectors <= {"axis_i", "vector_i", "vector_j"}
@@ -52,7 +52,7 @@ def axial_equations(group: Group, order: int) -> list[tuple[str, str]]:
     Raises
     ------
     UnwritableOperationError
-        If the residual is another function of more than the angle there.
+        If the residual is a function of more than the angle in this frame.
     """
     words = _AxialWords(planar=False)
     levels = _derivatives(group, order, turning=False)
@@ -74,7 +74,7 @@ def axial_equations(group: Group, order: int) -> list[tuple[str, str]]:
 
 
 def _derivatives(group: Group, order: int, *, turning: bool) -> list[Polynomial]:
-    """Return the residual and its derivatives; `turning` if both bodies have any angular velocity at that place."""
+    """Return the residual and its derivatives; with `turning`, both bodies have any angular velocity at the place."""
     graph = Graph()
     element = group.element
     law = [scaled(graph, ("f", n), n, (1, 1)) for n in range(order + 1)]
@@ -97,7 +97,7 @@ def _derivatives(group: Group, order: int, *, turning: bool) -> list[Polynomial]
 
 
 def _pose(graph: Graph, body: str, order: int, *, turning: bool) -> dict[str, list[Entries]]:
-    """Return the coefficients of a body at rest, i, or of one that turns about z, j."""
+    """Return the coefficients of body i, at rest, or of body j, which turns about z."""
     zero, one = graph.constant(0.0), graph.constant(1.0)
 
     def atom(kind: str, n: int, *place: int) -> int:

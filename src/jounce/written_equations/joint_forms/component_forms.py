@@ -1,4 +1,4 @@
-"""Equations of joints that are not of vectors alone, by coordinates: entries of attitude matrices, Euler parameters."""
+"""Equations of joints without a vector form, by coordinates: entries of attitude matrices, Euler parameters."""
 
 import math
 from fractions import Fraction
@@ -9,7 +9,7 @@ from jounce.written_equations.joint_forms.vector_forms import of_body, turning
 
 
 def in_coordinates(joint: SymbolicJoint, row: Polynomial) -> Polynomial:
-    """Return a polynomial without derivatives of attitudes: by angles, or by angular velocities."""
+    """Return a polynomial with derivatives of attitudes expressed by angles, or by angular velocities."""
     turned: dict[Atom, Polynomial] = {}
 
     def rule(monomial: Monomial) -> Polynomial | None:
@@ -32,7 +32,7 @@ def _planar(atom: Atom) -> Polynomial:
 
 
 def _spatial(atom: Atom, known: dict[Atom, Polynomial]) -> Polynomial:
-    """Return a derivative of an entry of an attitude matrix or of an Euler parameter, by lower ones."""
+    """Return a derivative of an entry of an attitude matrix or of an Euler parameter, by lower derivatives."""
     kind, body, n, *place = atom
     derivative = Polynomial({})
     for j in range(n):
@@ -44,7 +44,7 @@ def _spatial(atom: Atom, known: dict[Atom, Polynomial]) -> Polynomial:
 
 
 def _rates(kind: str, place: list[int]) -> list[tuple[Fraction, list[int], int]]:
-    """Return the terms of A' = A skew(w), p' = p o (0, w) / 2: a factor, an entry, a component of w."""
+    """Return the terms of A' = A skew(w) or p' = p o (0, w) / 2: a factor, an entry, a component of w."""
     if kind == "A":
         row, column = place
         i, j = {0: (1, 2), 1: (2, 0), 2: (0, 1)}[column]
@@ -56,7 +56,7 @@ def _rates(kind: str, place: list[int]) -> list[tuple[Fraction, list[int], int]]
 
 
 def without_unknown(row: Polynomial, order: int) -> Polynomial:
-    """Return a derivative of a residual without the derivatives of coordinates of its order."""
+    """Return a derivative of a residual without the derivatives of coordinates of the same order."""
 
     def unknown(atom: Atom) -> bool:
         return (atom[0] in ("r", "phi") and atom[2] == order) or (atom[0] == "w" and atom[2] == order - 1)

@@ -24,12 +24,12 @@ from jounce.written_equations.models.mechanism_equations import model_of_equatio
 from jounce.written_equations.operations.reading import UnwritableOperationError
 
 LONGEST_VALUE = 200  # characters of a value
-MOST_TERMS = 400  # of a right side that a person is to read
+MOST_TERMS = 400  # terms of a readable right side
 SOURCE = re.compile(r"Sommer 2024, ((?:equations?|section) [0-9][0-9 ,and-]*)")
 
 
 def source_of(kind: type) -> str:
-    """Return which equations of Sommer 2024 a joint is, as its class says; nothing for others."""
+    """Return the equations of Sommer 2024 that the docstring of a class cites, or an empty text."""
     for each in kind.__mro__:
         text = " ".join(inspect.cleandoc(vars(each).get("__doc__") or "").split())
         if match := SOURCE.search(text):
@@ -139,7 +139,7 @@ def _instance(element: object) -> str:
 
 
 def _shown(value: object) -> str:
-    """Return a value as a file has it."""
+    """Return a value as in a mechanism file."""
     if isinstance(value, tuple | list | np.ndarray):
         return f"[{', '.join(map(_shown, value))}]"
     return str(getattr(value, "text", value))
@@ -151,7 +151,7 @@ def joint_equations(joint: SymbolicJoint) -> list[tuple[str, str]]:
     Raises
     ------
     UnwritableOperationError
-        If a right side has more terms than a person reads.
+        If a right side has too many terms for a reader.
     """
     words, vector_rows = Words(joint.planar), recognized(joint)
     if vector_rows is None:
@@ -179,7 +179,7 @@ def joint_equations(joint: SymbolicJoint) -> list[tuple[str, str]]:
 
 
 def _of_points(joint: SymbolicJoint, words: Words, levels: int) -> list[tuple[str, str]]:
-    """Return what the right sides of a pin or a ball are."""
+    """Return the equations of the right sides of a pin or a ball."""
     points = {frame: field for field, frame in joint.vectors.items() if field.startswith("point")}
     equations = []
     for n in range(2, levels):
@@ -216,7 +216,7 @@ def _in_components(joint: SymbolicJoint, words: Words) -> list[tuple[str, str]]:
 
 
 def _jacobian(joint: SymbolicJoint, words: Words, rate: Polynomial, body: str) -> tuple[list, list]:
-    """Return the terms of the block of a body: by its position, and by its angle or its turn."""
+    """Return the terms of the block of a body: for its position, and for its angle or rotation."""
     shifts, turns = [], []
     points = {frame: field for field, frame in joint.vectors.items() if field.startswith("point")}
     for monomial, factor in rate.terms.items():
@@ -241,7 +241,7 @@ def _jacobian(joint: SymbolicJoint, words: Words, rate: Polynomial, body: str) -
 def _column(
     atom: Atom, k: int, rest: Polynomial, turned: tuple[str, str] | None, planar: bool
 ) -> tuple[Polynomial, str]:
-    """Return a term of a block: its factor, and the vector beside the moving one by how that moves."""
+    """Return a term of a block: its factor, and the other vector times the derivative of the moving vector."""
     kind, *vectors = atom
     unit = rf"\mathbf{{I}}_{2 if planar else 3}"
     if turned is None:

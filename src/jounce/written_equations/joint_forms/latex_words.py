@@ -1,4 +1,4 @@
-"""How atoms and polynomials of them are written in LaTeX, by the nomenclature of Sommer 2024."""
+"""LaTeX text of atoms and polynomials, in the nomenclature of Sommer 2024."""
 
 from collections import Counter
 from collections.abc import Sequence
@@ -16,14 +16,14 @@ _PRODUCTS = ("dot", "cross", "vector")
 
 
 def escaped(text: str) -> str:
-    """Return a text of a user in LaTeX: of ASCII, and no command."""
+    """Return the text of a user in LaTeX: ASCII, without commands."""
     plain = " ".join(text.encode("ascii", "replace").decode().split())
     special = {"\\": r"\textbackslash{}", "~": r"\textasciitilde{}", "^": r"\textasciicircum{}"}
     return "".join(special.get(c, f"\\{c}" if c in "&%$#_{}" else c) for c in plain)
 
 
 def dotted(symbol: str, index: str, n: int) -> str:
-    """Return a symbol with an index and the dots of its n-th derivative, or their number."""
+    """Return a symbol with an index and the dots of the n-th derivative, or the number n if it is high."""
     if n == 0:
         return symbol + index
     return f"{_DOTS[n]}{{{symbol}}}{index}" if n < len(_DOTS) else rf"\overset{{({n})}}{{{symbol}}}{index}"
@@ -62,7 +62,7 @@ def of_vector(vector: Atom, planar: bool) -> str:
 
 
 def _turned(body: str, n: int, *, known: bool) -> str:
-    """Return what the n-th derivative of an attitude matrix is that matrix times."""
+    """Return the factor of the attitude matrix in its n-th derivative."""
     if n == 0:
         return ""
     spin, last = (dotted(r"\tilde{\boldsymbol{\omega}}", f"_{body}'", k) for k in (0, n - 1))
@@ -80,12 +80,12 @@ def right_side_name(n: int, planar: bool) -> str:
 
 
 def in_brackets(text: str) -> str:
-    """Return a text that is more than one symbol in brackets."""
+    """Return a text, in brackets if it has more than one symbol."""
     return rf"\left( {text} \right)" if " " in text else text
 
 
 def total(terms: Sequence[tuple[int, str]]) -> str:
-    """Return the sum of terms, each a sign and a text; zero where there are none."""
+    """Return the sum of terms, each a sign and a text; zero without terms."""
     sum_text = ""
     for sign, text in terms:
         sum_text += (f" {'-' if sign < 0 else '+'} " if sum_text else "-" if sign < 0 else "") + text
@@ -93,19 +93,19 @@ def total(terms: Sequence[tuple[int, str]]) -> str:
 
 
 class Words:
-    """Writes polynomials of a joint."""
+    """The LaTeX text of polynomials of a joint."""
 
     def __init__(self, planar: bool):
         self.planar = planar
 
     def side(self, n: int, *, own: bool = False) -> str:
-        """Return the name of the right side of order n; `own` of a pin or a ball."""
+        """Return the name of the right side of order n; `own` for a pin or a ball."""
         if own:
             return right_side_name(n, self.planar)
         return SIDES[n - 1] if n <= len(SIDES) else rf"\boldsymbol{{\kappa}}_{{{n}}}"
 
     def polynomial(self, row: Polynomial) -> str:
-        """Return the text of a polynomial, its terms together by the product of vectors that they have."""
+        """Return the text of a polynomial, with terms grouped by their product of vectors."""
         groups: dict[Monomial, Polynomial] = {}
         for monomial, factor in row.terms.items():
             products = tuple(a for a in monomial if a[0] in _PRODUCTS)
@@ -115,7 +115,7 @@ class Words:
         return total(self.terms(sorted(parts, key=lambda part: part[1], reverse=True)))
 
     def terms(self, parts: Sequence[tuple[Polynomial, str]]) -> list[tuple[int, str]]:
-        """Return terms, each of a factor and a text, with the sign of each; those of one text together."""
+        """Return signed terms from pairs of a factor and a text; pairs with the same text are combined."""
         factors: dict[str, Polynomial] = {}
         for factor, text in parts:
             factors[text] = factors.get(text, Polynomial({})) + factor
@@ -201,6 +201,6 @@ def _base(text: str) -> str:
 
 
 def _by_size(term: tuple[Monomial, Fraction]) -> tuple:
-    """Return how terms stand in a sum: positive ones, then by the highest derivative."""
+    """Return the sort key of a term in a sum: positive terms first, then by the highest derivative."""
     monomial, factor = term
     return factor < 0, [-a[-1] if isinstance(a[-1], int) else 0 for a in monomial], repr(monomial)

@@ -1,4 +1,4 @@
-"""Polynomials with whole and rational coefficients, of atoms that are tuples."""
+"""Polynomials with rational coefficients in atoms, which are tuples."""
 
 from collections.abc import Callable, Mapping
 from fractions import Fraction
@@ -11,16 +11,16 @@ Monomial = tuple[Atom, ...]
 
 
 class TooManyTermsError(Exception):
-    """A polynomial has more terms than anybody reads."""
+    """A polynomial has too many terms for a reader."""
 
 
 class Polynomial:
-    """A polynomial.
+    """A polynomial in atoms.
 
     Parameters
     ----------
     terms : mapping of tuple of Atom to Fraction
-        The coefficient of each product of atoms, these in order; none is zero.
+        Nonzero coefficient of each product of atoms in order.
     """
 
     def __init__(self, terms: Mapping[Monomial, Fraction]):
@@ -55,7 +55,7 @@ class Polynomial:
         return Polynomial(terms)
 
     def inverse(self) -> "Polynomial":
-        """Return one over the polynomial: of a number a number, else an atom ("inverse", terms)."""
+        """Return one over the polynomial: a number for a number, otherwise an atom ("inverse", terms)."""
         if not self.terms:
             return Polynomial.atom(("inverse", ()))
         if set(self.terms) == {()}:
@@ -66,12 +66,12 @@ class Polynomial:
         return Polynomial.atom(("inverse", ("sum", self.frozen())))
 
     def frozen(self) -> tuple[tuple[Monomial, Fraction], ...]:
-        """Return the terms in their order, of which an atom is made.
+        """Return the ordered terms, as part of an atom.
 
         Raises
         ------
         TooManyTermsError
-            If the atom is too long to be read.
+            If the atom is too long for a reader.
         """
         rows = sorted((repr(term), term) for term in self.terms.items())
         if sum(len(text) for text, _ in rows) > LONGEST_ATOM:
@@ -79,7 +79,7 @@ class Polynomial:
         return tuple(term for _, term in rows)
 
     def replaced(self, rule: Callable[[Monomial], "Polynomial | None"]) -> "Polynomial":
-        """Return the polynomial with terms replaced until a rule has nothing to say of any."""
+        """Return the polynomial with terms replaced until a rule returns None for all terms."""
         waiting, done = dict(self.terms), Polynomial({})
         while waiting:
             if len(waiting) + len(done.terms) > MOST_TERMS:
@@ -97,7 +97,7 @@ class Polynomial:
 
 
 def joined(*monomials: Monomial) -> Monomial:
-    """Return the product of monomials: an atom and one over it are one."""
+    """Return the product of monomials; an atom and its inverse cancel."""
     atoms = sorted((atom for monomial in monomials for atom in monomial), key=repr)
     for atom in [a[1] for a in atoms if a[0] == "inverse"]:
         if atom in atoms and ("inverse", atom) in atoms:
@@ -107,7 +107,7 @@ def joined(*monomials: Monomial) -> Monomial:
 
 
 def without(monomial: Monomial, *atoms: Atom) -> Monomial:
-    """Return a product less some of its atoms."""
+    """Return a product without some of its atoms."""
     left = list(monomial)
     for atom in atoms:
         left.remove(atom)

@@ -1,4 +1,4 @@
-"""A joint on symbols: its residual on jets of the vectors that Sommer writes, as polynomials of their components."""
+"""A joint on symbols: its residual on jets of the vectors of Sommer 2024, as polynomials of their components."""
 
 import dataclasses
 import math
@@ -24,18 +24,18 @@ from jounce.written_equations.operations.graph import FUNCTIONS, Graph, Node
 from jounce.written_equations.operations.reading import Entries, GraphReader, UnwritableOperationError
 
 SLOTS = "ijmn"
-DERIVED = "fghbcke"  # letters of vectors that are made of fields
+DERIVED = "fghbcke"  # letters of vectors computed from fields
 MARK = "vector of body "
 
 
 class GivenLaw(AbstractMotion):
-    """A law of which only the Taylor coefficients are known."""
+    """A law with only its Taylor coefficients known."""
 
     coefficients: Any
     time: Any
 
     def __call__(self, time: Jet) -> Jet:
-        """Return the law at the time alone."""
+        """Return the law at its own time, the only one with known coefficients."""
         if time is not self.time:
             raise UnwritableOperationError("its law is one of a coordinate, not of time alone")
         return Jet(self.coefficients[: time.order + 1])
@@ -48,17 +48,17 @@ class SymbolicJoint:
     Parameters
     ----------
     rows : list of list of Polynomial
-        For each order, for each row: the derivative of the residual, of the atoms below.
+        Derivative of the residual, in the atoms below, for each order and row.
     vectors : dict of str to str
-        Fields that are vectors, and in which body's frame they are: i, j or m.
+        Body whose frame holds a vector (i, j or m), by the field of the vector.
     planar : bool
-        Whether it is in the plane.
+        Whether the joint is planar.
     slots : str
-        Its bodies.
+        Bodies of the joint.
     constants : list of list of float
-        What is computed of the values of the joint alone, for each joint of the group: ("c", k) is the k-th.
+        Numbers that depend on the values of the joint only, for each joint of the group: ("c", k) is the k-th.
     derived : list of dict of str to tuple of float
-        For each joint of the group, the vectors among `vectors` that are no fields, but made of them.
+        Vectors among `vectors` that are computed from fields, for each joint of the group.
     """
 
     rows: list[list[Polynomial]]
@@ -70,9 +70,9 @@ class SymbolicJoint:
 
 
 # Atoms, by kind: ("r", body, n, c) component of the n-th derivative of a position, ("A", body, n, row, column) entry of
-# that of the attitude matrix, ("phi", body, n), ("e", body, n, c) Euler parameter, ("w", body, n, c) angular velocity
-# about the body's axes, ("f", n) law, ("t",) the time, ("v", field, c) component of a vector of the joint, ("k", field)
-# number of it, ("c", k) what follows from these alone.
+# a derivative of the attitude matrix, ("phi", body, n) angle, ("e", body, n, c) Euler parameter, ("w", body, n, c)
+# angular velocity about body axes, ("f", n) law, ("t",) time, ("v", field, c) component of a vector of the joint,
+# ("k", field) number of the joint, ("c", k) constant that follows from vectors and numbers of the joint.
 
 
 def symbolic_joint(group: Group, pose_type: type, order: int) -> SymbolicJoint:
@@ -131,7 +131,7 @@ def _values(group: Group, fields: dict[str, Any], vectors: dict[str, str], insta
 
 
 def evaluated(graph: Graph, root: int, known: dict[Atom, float]) -> float:
-    """Return the number that an operation is for values of its inputs."""
+    """Return the value of an operation for values of its inputs."""
     values: dict[int, Any] = {}
     for number in graph.reached([root]):
         node = graph.nodes[number]
@@ -149,13 +149,13 @@ def _entries(graph: Graph, atoms: list[Atom], shape: tuple[int, ...]) -> Entries
 
 
 def scaled(graph: Graph, atom: Atom, n: int, shape: tuple[int, ...]) -> Entries:
-    """Return the Taylor coefficient of an atom that is an n-th derivative."""
+    """Return the Taylor coefficient of the n-th derivative that an atom stands for."""
     number = graph.apply("div", graph.input(atom), graph.constant(float(math.factorial(n))))
     return Entries(np.full(shape, number), float)
 
 
 def _coefficients(graph: Graph, body: str, order: int, *, planar: bool) -> dict[str, list[Entries]]:
-    """Return the Taylor coefficients of what a pose is made of."""
+    """Return the Taylor coefficients of the components of a pose."""
     count = 2 if planar else 3
 
     def jet(kind: str, tails: list[tuple], shape: tuple[int, ...], last: int = order) -> list[Entries]:
@@ -177,7 +177,7 @@ def _coefficients(graph: Graph, body: str, order: int, *, planar: bool) -> dict[
 @jax.tree_util.register_dataclass
 @dataclasses.dataclass(frozen=True)
 class _NamedPlanarPose(PlanarPose):
-    """A pose that tells which constant vectors of its body a residual uses."""
+    """A planar pose that marks the constant vectors of its body in a residual."""
 
     slot: str = dataclasses.field(default="i", metadata={"static": True})
 
@@ -188,7 +188,7 @@ class _NamedPlanarPose(PlanarPose):
 @jax.tree_util.register_dataclass
 @dataclasses.dataclass(frozen=True)
 class _NamedSpatialPose(SpatialPose):
-    """A pose that tells which constant vectors of its body a residual uses."""
+    """A spatial pose that marks the constant vectors of its body in a residual."""
 
     slot: str = dataclasses.field(default="i", metadata={"static": True})
 
@@ -201,14 +201,14 @@ def _marked(local: Any, slot: str) -> Any:
 
 
 class NamingReader(GraphReader):
-    """Reads constant vectors that are made of the fields of a joint as vectors of their own, angles without turns."""
+    """A reader that names constant vectors computed from fields of a joint, and drops whole turns of angles."""
 
     def __init__(self, graph: Graph):
         super().__init__(graph)
         self.derived: dict[tuple[int, ...], str] = {}
 
     def results(self, equation: JaxprEqn, operands: list[Any]) -> list[Any]:
-        """Return the results of one operation; how many whole turns an angle has is left out."""
+        """Return the results of one operation, without the whole turns of an angle."""
         called = equation.params.get("name") if inner_program(equation.params) is not None else None
         if called == ROUNDING_OF_TURNS:
             shape = equation.outvars[0].aval.shape  # pyright: ignore[reportAttributeAccessIssue] - of an array
@@ -219,7 +219,7 @@ class NamingReader(GraphReader):
         return [self._vector(given, str(equation.params["name"])[-1])]
 
     def _vector(self, given: Entries, slot: str) -> Entries:
-        """Return a constant vector of a body, under a name of its own where it is made of fields."""
+        """Return a constant vector of a body, with a name of its own if it is computed from fields."""
         numbers = tuple(int(x) for x in given.numbers.ravel())
         fixed = all(self._is_of_fields(x) for x in numbers)
         if not fixed or all(self.graph.nodes[x].operation in ("input", "constant") for x in numbers):
@@ -238,12 +238,12 @@ class NamingReader(GraphReader):
 
 
 def planar_pose(slot: str, pose: dict[str, Any]) -> PlanarPose:
-    """Return a pose of coefficients, which tells the vectors that are used of it."""
+    """Return a planar pose of coefficients that marks constant vectors of its body."""
     return _NamedPlanarPose(*(Jet(pose[name]) for name in ("position", "angle", "sine", "cosine")), slot=slot)
 
 
 def spatial_pose(slot: str, pose: dict[str, Any]) -> SpatialPose:
-    """Return a pose of coefficients, which tells the vectors that are used of it."""
+    """Return a spatial pose of coefficients that marks constant vectors of its body."""
     spins = zip(*map(quaternion_spins, pose["quaternion"]), strict=True)
     axes = tuple(Jet(pose[f"axis_{k}"]) for k in range(3))
     velocity = Jet(pose["angular_velocity"]) if pose["angular_velocity"] else None
@@ -252,16 +252,16 @@ def spatial_pose(slot: str, pose: dict[str, Any]) -> SpatialPose:
 
 
 class Expansion:
-    """Operations as polynomials; what is none is an atom of its own, ("function", name, polynomials)."""
+    """Operations as polynomials; other operations are atoms, ("function", name, polynomials)."""
 
     def __init__(self, graph: Graph):
         self._graph = graph
         self._known: dict[int, Polynomial] = {}
-        self._fixed: set[int] = set()  # what is computed of the values of the joint alone
+        self._fixed: set[int] = set()  # nodes that depend on the values of the joint only
         self.constants: list[int] = []
 
     def of(self, root: int) -> Polynomial:
-        """Return the polynomial that an operation is."""
+        """Return the polynomial of an operation."""
         for number in self._graph.reached([root]):
             if number not in self._known:
                 self._known[number] = self._expanded(number)
@@ -300,7 +300,7 @@ class Expansion:
 
 
 def _is_plain(atom: Atom) -> bool:
-    """Tell whether an atom is a value of a joint, or the length of one of its vectors, or one over that."""
+    """Tell whether an atom is a value of a joint, the length of a vector of the joint, or an inverse of these."""
     if atom[0] == "inverse":
         return _is_plain(atom[1])
     return atom[0] in ("v", "k", "c") or bool(
@@ -309,7 +309,7 @@ def _is_plain(atom: Atom) -> bool:
 
 
 def length_of(row: Polynomial) -> str:
-    """Return the vector of which a polynomial is the square of the length; nothing for another one."""
+    """Return the vector whose squared length a polynomial is; nothing for other polynomials."""
     names = {a[1] for m in row.terms for a in m if a[0] == "v"}
     if len(names) != 1 or any(len(m) != 2 or m[0] != m[1] or c != 1 for m, c in row.terms.items()):
         return ""
@@ -317,12 +317,12 @@ def length_of(row: Polynomial) -> str:
 
 
 def as_fraction(value: float) -> Fraction:
-    """Return the simple fraction that a number is the nearest double to, or the number itself.
+    """Return the simple fraction whose nearest double is a number, or the number itself.
 
     Raises
     ------
     UnwritableOperationError
-        If it is not finite.
+        If the number is not finite.
     """
     if not math.isfinite(value):
         raise UnwritableOperationError(f"it has the number {value}, or compares with it")

@@ -1,9 +1,9 @@
 """Polynomials of components as products of vectors: ``d = r_j^P - r_i^P``, ``a = A a'``, scalar and plane products.
 
-Vectors are tags: ("u", body, n, field), the n-th derivative of a vector of the joint in global components, ("d", n)
-that of d, ("r", body, n) that of an origin; and where an unknown derivative is left out, ("h", body, n, field), and
-("g", n), the right side of order n of a pin or a ball. Atoms made of them are ("dot", X, Y), ("cross", X, Y), which is
-X^T R^T Y, and ("vector", X) for a row of several.
+Vectors are tuples: ("u", body, n, field) is the n-th derivative of a vector of the joint in global components, ("d", n)
+the n-th derivative of d, and ("r", body, n) the n-th derivative of an origin. Without their unknown derivatives, these
+are ("h", body, n, field) and ("g", n), the right side of order n of a pin or a ball. Atoms of vectors are
+("dot", X, Y), ("cross", X, Y), which is X^T R^T Y, and ("vector", X) for an equation of several rows.
 """
 
 import math
@@ -16,9 +16,9 @@ _COMPONENTS = ("u", "d", "r")
 
 
 def recognized(joint: SymbolicJoint) -> list[tuple[int, list[Polynomial]]] | None:
-    """Return for each equation of a joint how many rows it has, and its derivatives, as products of vectors.
+    """Return the number of rows of each equation of a joint, and its derivatives as products of vectors.
 
-    None where it is not made of vectors alone.
+    The result is None if an equation has no form in vectors.
     """
     count = 2 if joint.planar else 3
     levels = [[_in_vectors(joint, row) for row in level] for level in joint.rows]
@@ -85,7 +85,7 @@ def _with_turned(joint: SymbolicJoint, monomial: Monomial) -> Polynomial | None:
 
 
 def _in_products(row: Polynomial, count: int) -> Polynomial:
-    """Return a polynomial of components with pairs of them as scalar and plane products."""
+    """Return a polynomial of components with scalar and plane products in the place of pairs of components."""
 
     def rule(monomial: Monomial) -> Polynomial | None:
         vectors = sorted((a for a in monomial if a[0] in _COMPONENTS), key=_rank)
@@ -104,7 +104,7 @@ def _in_products(row: Polynomial, count: int) -> Polynomial:
 
 
 def _rank(vector: Atom) -> tuple:
-    """Return how vectors stand in products: those of the joint, then d, the lower derivatives first."""
+    """Return the sort key of a vector in products: vectors of the joint, then d, lower derivatives first."""
     kind = _COMPONENTS.index(vector[0]) if vector[0] in _COMPONENTS else 3
     return kind, *(str(x) for x in vector[1:])
 
@@ -114,7 +114,7 @@ def _has_components(row: Polynomial) -> bool:
 
 
 def _of_one_vector(row: Polynomial, c: int) -> Polynomial | None:
-    """Return a row as that of a vector, by its component; None where it is none."""
+    """Return component c of a vector equation as the equation of the vector; None for other rows."""
     terms = {}
     for monomial, factor in row.terms.items():
         vectors = [a for a in monomial if a[0] in _COMPONENTS]
@@ -127,7 +127,7 @@ def _of_one_vector(row: Polynomial, c: int) -> Polynomial | None:
 def turning(order: int, *, known: bool = False) -> tuple[Polynomial, Polynomial]:
     """Return a and b in the derivative of the attitude matrix of a planar body, ``A^(n) = a A + b B``.
 
-    The atoms are ("phi", n). Each follows from those below by A' = phi' B, as poses do; `known` leaves phi^(n) out.
+    The atoms are ("phi", n). Each order follows from lower orders by A' = phi' B; `known` omits phi^(n).
     """
     factors = [(Polynomial.number(1), Polynomial.number(0))]
     for k in range(order):
@@ -142,12 +142,12 @@ def turning(order: int, *, known: bool = False) -> tuple[Polynomial, Polynomial]
 
 
 def of_body(row: Polynomial, body: str) -> Polynomial:
-    """Return a polynomial of ("phi", n) as one of the angle of a body."""
+    """Return a polynomial of ("phi", n) as a polynomial of the angle of a body."""
     return Polynomial({tuple(("phi", body, a[1]) for a in m): c for m, c in row.terms.items()})
 
 
 def right_side(derivative: Polynomial, order: int) -> Polynomial:
-    """Return minus a derivative of a residual without its unknown: the right side of that order."""
+    """Return the right side of an order: minus the derivative of the residual without its unknown."""
 
     def known(vector: Atom) -> tuple[int, Atom] | None:
         if vector[0] == "d" and vector[1] == order:
@@ -176,7 +176,7 @@ def right_side(derivative: Polynomial, order: int) -> Polynomial:
 
 
 def in_angles(row: Polynomial) -> Polynomial:
-    """Return a polynomial of a planar joint with the derivatives of its own vectors as those of angles."""
+    """Return a polynomial of a planar joint with derivatives of its vectors expressed by derivatives of angles."""
 
     def rule(monomial: Monomial) -> Polynomial | None:
         for atom in monomial:
@@ -195,7 +195,7 @@ def in_angles(row: Polynomial) -> Polynomial:
 
 
 def _split(atom: Atom, k: int, still: Atom) -> tuple[Polynomial, Polynomial]:
-    """Return a product with a vector in the place of its k-th, and with that turned by a right angle."""
+    """Return a product with a vector in the place of its k-th vector, and with that vector turned by a right angle."""
     kind, *vectors = atom
     vectors[k - 1] = still
     along = Polynomial.atom((kind, *vectors))

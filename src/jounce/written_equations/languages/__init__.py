@@ -1,1 +1,1 @@
-"""The languages that equations are written in."""
+"""The languages of written equations."""

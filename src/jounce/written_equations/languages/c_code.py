@@ -1,4 +1,4 @@
-"""Equations as a file of C99 that needs the mathematical library alone."""
+"""Equations as a C99 file that needs only the mathematical library."""
 
 import math
 import textwrap
@@ -34,7 +34,7 @@ _comment = partial(textwrap.wrap, width=110, initial_indent=" * ", subsequent_in
 
 
 def number(value: object) -> str:
-    """Return a number as C reads it back exactly."""
+    """Return the text of a number that C reads back exactly."""
     if isinstance(value, bool):
         return str(int(value))
     if isinstance(value, float) and not math.isfinite(value):
@@ -43,7 +43,7 @@ def number(value: object) -> str:
 
 
 class _File:
-    """Functions of C, each with statements of its own."""
+    """The functions of a C file, each with its own statements."""
 
     def __init__(self, code: Code, prefix: str):
         self.code, self.graph, self.prefix = code, code.graph, prefix
@@ -86,7 +86,7 @@ class _File:
         return f"void {self.prefix}_{function.name}({', '.join([*given, *orders, 'double *out'])})"
 
     def described(self, function: Function) -> list[str]:
-        """Return the lines of comment before a function."""
+        """Return the comment lines before a function."""
         text = f"{function.text}: out[{']['.join(x.upper() for x in function.axes)}], the last index running fastest."
         if function.by_order:
             text += f" orders: how many of them are requested, at most {len(function.results)}."
@@ -100,7 +100,7 @@ class _File:
         names, roots = Names(self.code.names), function.roots
         statements = Statements(self.graph, self.expression, names.of, _assignment)
         counts, needed = statements.shared(roots), used_inputs(self.graph, roots)
-        for argument in function.arguments:  # a number has the name of the argument
+        for argument in function.arguments:  # a scalar has the name of the argument
             if isinstance(argument.labels, str):
                 names.fix(argument.labels, argument.name)
         lines = [*self.described(function), self.head(function), "{"]
@@ -121,7 +121,7 @@ class _File:
 
 
 def _rows(argument: Argument) -> str:
-    """Return how many orders an argument by order has to have."""
+    """Return the number of orders that an argument by order needs."""
     shift = argument.lead - 1
     return "orders" if not shift else f"orders {'+-'[shift < 0]} {abs(shift)}"
 
@@ -131,7 +131,7 @@ def _assignment(name: str, text: str, kind: str) -> str:
 
 
 def c_file(code: Code, name: str) -> str:
-    """Return the text of a file with the functions of some code; `name` begins their names."""
+    """Return the text of a file with the functions of some code; `name` is the prefix of their names."""
     file = _File(code, name)
     functions = [file.function(function) for function in code.functions]
     lines = ["/*", f" * {one_line(code.title)}: {code.subject}, written by jounce {__version__}.", " *"]

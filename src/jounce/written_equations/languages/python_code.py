@@ -1,4 +1,4 @@
-"""Equations as a module of Python that needs NumPy alone, or as one that makes expressions of SymPy."""
+"""Equations as a Python module that needs only NumPy."""
 
 import math
 import textwrap
@@ -31,18 +31,18 @@ _CALLED = {
     "asin": "arcsin", "acos": "arccos", "atan": "arctan", "asinh": "arcsinh", "acosh": "arccosh", "atanh": "arctanh",
     "round": "rint", "not": "logical_not",
 }  # fmt: skip
-_LIBRARY = {"erf": "math.erf", "erfc": "math.erfc"}  # NumPy has none
+_LIBRARY = {"erf": "math.erf", "erfc": "math.erfc"}  # functions that NumPy lacks
 
 
 def number(value: object) -> str:
-    """Return a number as Python reads it back exactly."""
+    """Return the text of a number that Python reads back exactly."""
     if isinstance(value, float) and not math.isfinite(value):
         return "np.nan" if math.isnan(value) else "np.inf" if value > 0 else "-np.inf"
     return repr(value)
 
 
 class NumPyModule:
-    """Writes a module, functions with statements of their own."""
+    """The text of a NumPy module of functions, each with its own statements."""
 
     infix: ClassVar[dict[str, tuple[str, int]]] = INFIX | {"and": ("&", COMPARISON), "or": ("|", COMPARISON)}
     heading: ClassVar[tuple[str, ...]] = (
@@ -70,11 +70,11 @@ class NumPyModule:
         return "\n".join([*lines, *("\n\n" + function for function in functions)]) + "\n"
 
     def imports(self) -> list[str]:
-        """Return the lines that import something."""
+        """Return the import lines."""
         return [*(["import math", ""] if self._vectorized else []), "import numpy as np"]
 
     def constants(self) -> list[str]:
-        """Return the lines before the functions that define what they need."""
+        """Return the lines that define constants and helpers before the functions."""
         lines = [f"{name} = np.vectorize({_LIBRARY[name]})" for name in sorted(self._vectorized)]
         return lines + [line for table in self._tables.values() for line in table]
 
@@ -115,7 +115,7 @@ class NumPyModule:
         names, roots = Names(self.code.names), function.roots
         statements = Statements(self.graph, self.expression, names.of, _assignment)
         counts, needed = statements.shared(roots), used_inputs(self.graph, roots)
-        for argument in function.arguments:  # a number has the name of the argument
+        for argument in function.arguments:  # a scalar has the name of the argument
             if isinstance(argument.labels, str):
                 names.fix(argument.labels, argument.name)
         lines = [f"def {function.name}({', '.join(self.parameter(x) for x in function.arguments)}):"]
@@ -129,7 +129,7 @@ class NumPyModule:
         return "\n".join([*lines, "    return out"])
 
     def parameter(self, argument: Argument) -> str:
-        """Return an argument as a definition has it."""
+        """Return the text of an argument in a definition."""
         return argument.name
 
     def before(self, function: Function) -> list[str]:
@@ -147,7 +147,7 @@ class NumPyModule:
         return [f"    if orders < {k + 1}:", "        return out"]
 
     def put(self, function: Function, k: int, stage: Stage, statements: Statements) -> list[str]:
-        """Return the lines that keep results."""
+        """Return the lines that store results."""
         lines, first = [], (k,) if function.by_order else ()
         for place in np.ndindex(*stage.results.shape):
             root = int(stage.results[place])
@@ -175,7 +175,7 @@ def _documented(function: Function) -> Iterator[str]:
 
 
 def _orders(function: Function) -> list[str]:
-    """Return the line that tells for how many orders the arguments are enough."""
+    """Return the line that computes the number of orders for which the arguments suffice."""
     shift = {x.name: 1 - x.lead for x in function.arguments if x.by_order}
     known = [f"len({name})" + (f" {'+-'[n < 0]} {abs(n)}" if n else "") for name, n in shift.items()]
     return [f"    orders = max(0, min({', '.join([*known, str(len(function.results))])}))"]
@@ -195,5 +195,5 @@ def _unpacked(names: Names, stage: Stage, needed: set) -> list[str]:
 
 
 def python_module(code: Code) -> str:
-    """Return the text of a module of Python."""
+    """Return the text of a NumPy module."""
     return NumPyModule(code).text()

@@ -1,4 +1,4 @@
-"""Equations as a module of Python that makes expressions of SymPy; to write it, SymPy is not needed."""
+"""Equations as a Python module that makes SymPy expressions; writing the module does not need SymPy."""
 
 import math
 from collections.abc import Sequence
@@ -22,7 +22,7 @@ _CALLED = {
     "pow": "sp.Pow", "is_finite": "is_finite", "hypot": "hypot",
 }  # fmt: skip
 _HELPERS = {
-    # sp.Mod, where it is evaluated, seeks common divisors, which takes minutes in long expressions
+    # the evaluation of sp.Mod searches for common divisors, which takes minutes in long expressions
     "rem": (
         "x, y",
         "size, divisor = sp.Abs(x), sp.Abs(y)",
@@ -42,7 +42,7 @@ _HELPERS = {
 
 
 class SymPyModule(NumPyModule):
-    """Writes a module whose functions return matrices of expressions."""
+    """The text of a SymPy module, whose functions return matrices of expressions."""
 
     infix = {name: text for name, text in INFIX.items() if name not in ("eq", "ne")}
     heading = (
@@ -51,11 +51,11 @@ class SymPyModule(NumPyModule):
     )
 
     def imports(self) -> list[str]:
-        """Return the lines that import something."""
+        """Return the import lines."""
         return ["import sympy as sp"]
 
     def constants(self) -> list[str]:
-        """Return the lines that define the symbols, and functions that SymPy does not have."""
+        """Return the lines that define symbols, and functions that SymPy lacks."""
         lines, names = [], Names(self.code.names)
         for argument in {x.name: x for function in self.code.functions for x in function.arguments}.values():
             if isinstance(argument.labels, str):
@@ -70,11 +70,11 @@ class SymPyModule(NumPyModule):
         return lines
 
     def parameter(self, argument: Argument) -> str:
-        """Return an argument as a definition has it: a symbol unless given."""
+        """Return the text of an argument in a definition, a symbol by default."""
         return f"{argument.name}={argument.name}"
 
     def constant(self, value: Any) -> Text:
-        """Return the text of a number: whole numbers exactly, others as the double that they are."""
+        """Return the text of a number: whole numbers exactly, other numbers as doubles."""
         if isinstance(value, bool):
             return Text("sp.true" if value else "sp.false")
         if not math.isfinite(value):
@@ -104,7 +104,7 @@ class SymPyModule(NumPyModule):
         return []
 
     def put(self, function: Function, k: int, stage: Stage, statements: Statements) -> list[str]:
-        """Return the lines that keep results."""
+        """Return the lines that store results."""
         del k
         texts = [statements.text(int(x)) for x in stage.results.ravel()]
         shape = stage.results.shape
@@ -120,5 +120,5 @@ def _symbols(names: Names, labels: Sequence[str]) -> str:
 
 
 def sympy_module(code: Code) -> str:
-    """Return the text of a module of Python that makes expressions of SymPy."""
+    """Return the text of a SymPy module."""
     return SymPyModule(code).text()

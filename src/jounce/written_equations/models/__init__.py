@@ -1,1 +1,1 @@
-"""What is written: the equations of mechanisms and of robots, as operations on their coordinates."""
+"""The equations of mechanisms and robots, as operations on their coordinates."""

@@ -39,19 +39,19 @@ class Inputs:
         self._shifts, self._attitude = shifts, "quaternion" if spatial else "angle"
 
     def velocities(self, lead: int) -> Argument:
-        """Return the argument that holds derivatives of the coordinates, and how many the first result needs."""
+        """Return the argument of derivatives of the coordinates; the first result needs `lead` of them."""
         return Argument("velocities", self.derivatives, "q', q'', ..., (order, column)", lead)
 
     def place(self) -> dict[str, Entries]:
-        """Return the coordinates of a place, as `Motion.poses` has them: the ground first, one instant."""
+        """Return the coordinates at one instant, the ground first, as in `Motion.poses`."""
         position, attitude = self._place[:, : self._shifts], self._place[:, self._shifts :]
         arrays = {"position": position.T, self._attitude: attitude.T if attitude.shape[1] > 1 else attitude[:, 0]}
         return {name: Entries(x[None, ..., None], float) for name, x in arrays.items()}
 
     def series(self, unknown: Sequence[int], order: int | None = None) -> dict[str, Entries]:
-        """Return the coefficients of the coordinates, an instant for each order from which on they are zero there.
+        """Return the coefficients of the coordinates, one instant for each order from which they are zero.
 
-        They are those to an order, all that there are unless given.
+        The coefficients reach to an order, by default the highest.
         """
         graph, order = self.graph, self.order if order is None else order
         zero = graph.constant(0.0)
@@ -82,5 +82,5 @@ class Inputs:
         return {name: Entries(x, float) for name, x in elements.items()}
 
     def instants(self, count: int) -> Entries:
-        """Return the time, some times over."""
+        """Return the time, repeated for a number of instants."""
         return Entries(np.full(count, self.time), float)

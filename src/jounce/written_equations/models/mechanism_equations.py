@@ -24,7 +24,7 @@ from jounce.written_equations.operations.functions import Code, Function
 from jounce.written_equations.operations.graph import Graph
 from jounce.written_equations.operations.reading import GraphReader, UnwritableOperationError
 
-TOLERANCE = 1e-12  # of the assembly from which angles about axes are counted
+TOLERANCE = 1e-12  # tolerance of the assembly, the reference of angles about axes
 
 
 CONSTRAINTS, FORCES, OUTPUTS = "constraints", "forces", "outputs"
@@ -47,21 +47,21 @@ def mechanism_code(given: Mechanism | Motion, joint: str | None, order: int, qua
     Parameters
     ----------
     given : Mechanism or Motion
-        A mechanism, whose angles about axes are counted from where it is assembled, or as along a motion.
+        A mechanism, with angles about axes relative to its assembled position, or a motion, with its angles.
     joint : str, optional
-        Name of a joint or a driver.
+        Name of a joint or driver.
     order : int
-        Of the highest derivative, from 1.
+        Highest derivative, at least 1.
     quantities : sequence of str
-        Of `QUANTITIES`.
+        Names from `QUANTITIES`.
 
     Raises
     ------
     MechanismError
-        If there is no such joint, or it has an operation that cannot be written out; or, of forces, if there is
-        nothing that has mass or a force, or the order is below 2.
+        If the joint does not exist, or an operation cannot be written out; or, for forces, if the mechanism has no
+        mass or force, or the order is below 2.
     UnsupportedError
-        Of forces, if a joint has friction.
+        If forces are requested and a joint has friction.
     """
     mechanism = given.mechanism if isinstance(given, Motion) else given
     if joint is not None:
@@ -115,7 +115,7 @@ def _constraints(mechanism: Mechanism, model: Model, inputs: Inputs, own: tuple[
 
 
 def model_of_equations(mechanism: Mechanism) -> Model:
-    """Return the model of a mechanism, with angles about axes counted from where it is assembled."""
+    """Return the model of a mechanism, with angles about axes relative to its assembled position."""
     instant = first_instant(mechanism.time, mechanism.parameter_values)
     model = build(chosen(with_output_drivers(mechanism), instant))
     if not any(map(measures_angle, model.system.groups)):

@@ -1,4 +1,4 @@
-"""What moves a mechanism, and what is asked of it: mass matrix, forces with their rates, outputs, as operations."""
+"""The mass matrix, forces with their rates, and outputs of a mechanism, as operations."""
 
 import dataclasses
 import math
@@ -23,14 +23,14 @@ from jounce.written_equations.operations.reading import Entries, GraphReader, Un
 
 
 def check_forces(mechanism: Mechanism, order: int) -> None:
-    """Refuse forces as code where there are none, or where friction makes them depend on the unknowns.
+    """Check that a mechanism has forces that can be written as code.
 
     Raises
     ------
     MechanismError
-        If nothing has a mass or a force, or if the order is below 2.
+        If the mechanism has no mass or force, or if the order is below 2.
     UnsupportedError
-        If a joint has friction, which follows from the multipliers of the same instant.
+        If a joint has friction, which depends on the multipliers of the same instant.
     """
     check_loads(mechanism)
     check_no_friction(mechanism, "forces as code")
@@ -39,7 +39,7 @@ def check_forces(mechanism: Mechanism, order: int) -> None:
 
 
 def force_functions(mechanism: Mechanism, model: Model, inputs: Inputs) -> list[Function]:
-    """Return the mass matrix, and the forces and their rates, as far as they do not depend on the unknowns.
+    """Return the functions of the mass matrix, and of the forces and their rates without terms of the unknowns.
 
     Raises
     ------
@@ -80,7 +80,7 @@ def force_functions(mechanism: Mechanism, model: Model, inputs: Inputs) -> list[
 
 
 def _multipliers(mechanism: Mechanism, model: Model, inputs: Inputs, levels: int) -> tuple[Argument, Entries]:
-    """Return the multipliers as an argument, and their coefficients, an instant for each order without its own."""
+    """Return the multipliers as an argument, and their coefficients, one instant for each order, with lower orders."""
     rows, order = equation_labels(mechanism, model)["row"].tolist(), row_order(mechanism, model)
     labels = tuple(tuple(f"{row}_lambda{k}" for row in rows) for k in range(max(1, levels - 1)))
     graph, zero = inputs.graph, inputs.graph.constant(0.0)
@@ -100,12 +100,12 @@ def _times(inputs: Inputs, numbers: np.ndarray, factor: float | int) -> np.ndarr
 
 
 def output_function(mechanism: Mechanism, model: Model, inputs: Inputs) -> tuple[Function, tuple[str, ...]]:
-    """Return the outputs that places and motions of bodies determine, with their derivatives, and their labels.
+    """Return the function of outputs that follow from the motion of bodies, with derivatives, and their labels.
 
     Raises
     ------
     MechanismError
-        If there are none, or one cannot be written out.
+        If the mechanism has no such output, or an output cannot be written out.
     """
     columns: dict[str, list[int]] = {}
     lost = max((group.element.lost_orders for group in model.system.outputs), default=0)
@@ -140,12 +140,12 @@ def _output_labels(mechanism: Mechanism, name: str) -> list[str]:
 def _read(
     reader: GraphReader, model: Model, function: Callable[..., Any], *arguments: Any, names: Sequence[str] = ()
 ) -> list[Entries]:
-    """Return the nodes of what a function returns.
+    """Return the nodes of the results of a function.
 
     Raises
     ------
     MechanismError
-        If it has an operation that cannot be written out; with the names that it may be of.
+        If an operation cannot be written out; the message has the names of its possible owners.
     """
     try:
         return reader.function(function, *arguments)

@@ -1,4 +1,4 @@
-"""Torques of a robot with rates, its mass matrix, regressor and energies, as operations on coordinates."""
+"""Torques of a robot and their rates, mass matrix, regressor and energies, as operations on coordinates."""
 
 import dataclasses
 import math
@@ -41,16 +41,16 @@ def robot_code(robot: Robot, order: int, quantities: Sequence[str], *, drives: b
     ----------
     robot : Robot
     order : int
-        Of the highest derivative of the coordinates, from 2.
+        Highest derivative of the coordinates, at least 2.
     quantities : sequence of str
-        Of `QUANTITIES`.
+        Names from `QUANTITIES`.
     drives : bool
-        Whether armature, damping, friction and springs of the joints count.
+        Whether to include armature, damping, friction and springs of the joints.
 
     Raises
     ------
     RobotError
-        If the robot has nothing that moves, or something that is not written.
+        If the robot has no moving joint, or a feature that cannot be written out.
     """
     if not robot.joint_names:
         raise RobotError("no joint moves, so that there are no equations", name="robot", value=robot.name)
@@ -76,7 +76,7 @@ def robot_code(robot: Robot, order: int, quantities: Sequence[str], *, drives: b
 
 
 class _Reading:
-    """The coordinates of a robot as inputs of a graph, and programs read with them."""
+    """The coordinates of a robot as inputs of a graph, and a reader of programs."""
 
     def __init__(self, robot: Robot, order: int):
         self.robot, self.order, self.graph = robot, order, Graph()
@@ -89,17 +89,17 @@ class _Reading:
         self.q = Entries(np.array(levels, np.int64)[..., None], float)
 
     def argument(self, lead: int) -> Argument:
-        """Return the coordinates as an argument, of which the first result needs so many orders."""
+        """Return the coordinates as an argument; the first result needs `lead` of its orders."""
         return Argument("q", self.labels, "q, q', q'', ..., (order, joint)", lead)
 
     def read(self, function: Callable[[Any], Any], levels: int | None = None) -> np.ndarray:
-        """Return the plain derivatives of what a function of Taylor coefficients of the coordinates returns."""
+        """Return the derivatives of the result of a function of Taylor coefficients of the coordinates."""
         given = Entries(self.q.numbers[:levels], float)
         (coefficients,) = GraphReader(self.graph).function(function, given)
         return np.array([self.times(row[..., 0], math.factorial(k)) for k, row in enumerate(coefficients.numbers)])
 
     def times(self, numbers: np.ndarray, factor: float | int) -> np.ndarray:
-        """Return the nodes of a factor times some others."""
+        """Return the nodes of products of a factor with nodes."""
         constant = self.graph.constant(float(factor))
         return np.asarray(np.frompyfunc(lambda x: self.graph.apply("mul", constant, int(x)), 1, 1)(numbers), np.int64)
 
@@ -133,10 +133,10 @@ def _energy(reading: _Reading, p: int, *, drives: bool) -> Function:
 
 
 def _regressor(reading: _Reading, *, drives: bool) -> tuple[Function, dict[str, float]]:
-    """Return the regressor, and its parameters with their values.
+    """Return the function of the regressor, and its parameters with their values.
 
-    A column is the torque of a robot whose parameters are all zero but one: the same program as that of torques. First
-    moments alone have no center of mass; they are those of a unit mass at a distance, less those of one at the origin.
+    A column is the torque of a robot with one nonzero parameter, by the program of torques. First moments alone have no
+    center of mass; they are a unit mass at a distance minus a unit mass at the origin.
     """
     robot, tree = reading.robot, reading.robot.tree
     if tree.shape.lifted:
@@ -162,7 +162,7 @@ def _regressor(reading: _Reading, *, drives: bool) -> tuple[Function, dict[str, 
 
 
 def _parameters(robot: Robot, *, drives: bool) -> tuple[list[dict[str, Any]], dict[str, float]]:
-    """Return arrays of robots of which one parameter alone is not zero, a mass beside first moments; values."""
+    """Return arrays of robots with one nonzero parameter (first moments also have a mass), and the values."""
     tree, bodies, size = robot.tree, len(robot.moving_links), len(robot.joint_names)
     shapes = {"mass": (bodies,), "center": (bodies, 3), "inertia": (bodies, 3, 3)} | dict.fromkeys(OF_DRIVES, (size,))
     units: list[dict[str, Any]] = []
@@ -194,12 +194,12 @@ def _parameters(robot: Robot, *, drives: bool) -> tuple[list[dict[str, Any]], di
 
 
 def _unit(i: int, j: int) -> Float[np.ndarray, "3 3"]:
-    """Return the symmetric matrix with ones in a place, and in its mirror image."""
+    """Return the symmetric matrix with ones at a place and at its mirror image."""
     whole = np.zeros((3, 3))
     whole[i, j] = whole[j, i] = 1.0
     return whole
 
 
 def _about_origin(center: Float[np.ndarray, " 3"]) -> Float[np.ndarray, "3 3"]:
-    """Return the inertia of a unit mass at a point about the origin."""
+    """Return the inertia matrix about the origin of a unit mass at a point."""
     return center @ center * np.eye(3) - np.outer(center, center)

@@ -1,1 +1,1 @@
-"""Operations on numbers, read off programs of JAX, and written as statements."""
+"""Operations on numbers, read from JAX programs and written as statements."""

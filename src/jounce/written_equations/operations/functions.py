@@ -1,4 +1,4 @@
-"""What code is made of: functions of coordinates, their arguments and results as numbers of the nodes of a graph."""
+"""Functions of coordinates in code, with their arguments and results as node numbers of a graph."""
 
 import dataclasses
 from collections.abc import Iterator
@@ -10,7 +10,7 @@ from jaxtyping import Int
 from jounce.written_equations.operations.graph import Graph
 
 Row = tuple["Argument", int | None]
-"""An argument, and which of its rows, where it has one for each order."""
+"""An argument, and the order of a row if the argument has one for each order."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -20,13 +20,13 @@ class Argument:
     Parameters
     ----------
     name : str
-        In code.
+        Name in code.
     labels : str, tuple of str, or tuple of tuple of str
-        Of the inputs of the graph that it holds: of one, of several, or of several for each order.
+        Labels of the inputs of the graph in the argument: of one, of several, or of several for each order.
     text : str
-        What it is, for its readers.
+        Description for readers.
     lead : int, default 0
-        Of one by order: how many of its orders the first result needs; each further result needs one more.
+        Number of orders that the first result needs of an argument by order; each further result needs one more.
     """
 
     name: str
@@ -36,11 +36,11 @@ class Argument:
 
     @property
     def by_order(self) -> bool:
-        """Whether it has a row of labels for each order."""
+        """Whether the argument has a row of labels for each order."""
         return isinstance(self.labels, tuple) and isinstance(self.labels[0] if self.labels else "", tuple)
 
     def row(self, order: int | None) -> tuple[str, ...]:
-        """Return the labels of a row, or of the whole."""
+        """Return the labels of a row, or of the whole argument."""
         if order is not None:
             return self.labels[order]
         return (self.labels,) if isinstance(self.labels, str) else self.labels
@@ -53,14 +53,14 @@ class Function:
     Parameters
     ----------
     name : str
-        In code.
+        Name in code.
     arguments : tuple of Argument
     results : array of int
         Numbers of nodes.
     axes : tuple of str
-        What the axes of the result are; the first is ``order`` where there is a result for each.
+        Names of the axes of the result; the first is ``order`` if each order has a result.
     text : str
-        What it returns, one sentence.
+        Description of the result, one sentence.
     """
 
     name: str
@@ -71,24 +71,24 @@ class Function:
 
     @property
     def by_order(self) -> bool:
-        """Whether there is a result for each order, of which a caller may want the first ones alone."""
+        """Whether each order has a result; a caller may then request the first orders only."""
         return self.axes[0] == "order"
 
     @property
     def roots(self) -> list[int]:
-        """All results, one after the other."""
+        """All results as a list."""
         return [int(x) for x in self.results.ravel()]
 
 
 class Stage(NamedTuple):
-    """What a function computes together: the rows of its arguments that are read first here, and the results."""
+    """A stage of a function: the rows of arguments that the stage reads first, and its results."""
 
     rows: list[Row]
     results: Int[np.ndarray, "..."]
 
 
 def stages(function: Function) -> Iterator[Stage]:
-    """Return what a function computes, one order after the other, or all at once."""
+    """Return the stages of a function, one for each order, or a single one."""
     whole: list[Row] = [(argument, None) for argument in function.arguments if not argument.by_order]
     tables = [argument for argument in function.arguments if argument.by_order]
     if not function.by_order:
@@ -101,25 +101,25 @@ def stages(function: Function) -> Iterator[Stage]:
 
 @dataclasses.dataclass(frozen=True)
 class Code:
-    """What a file holds.
+    """The content of a file of equations.
 
     Parameters
     ----------
     title : str
-        Of the model.
+        Title of the model.
     subject : str
-        What the functions are of it.
+        Description of the functions.
     graph : Graph
-        Of all functions.
+        Operations of all functions.
     order : int
         Highest derivative of the coordinates.
     labels : dict of str to tuple of str
-        The labels of axes, by the name that they have in code.
+        Labels of axes, by their name in code.
     about : tuple of str
-        What a reader must know, in sentences.
+        Notes for readers, in sentences.
     functions : tuple of Function
     values : dict of str to tuple of float
-        Constants by the name that they have in code.
+        Constants, by their name in code.
     """
 
     title: str
@@ -133,10 +133,10 @@ class Code:
 
     @property
     def size(self) -> int:
-        """How many operations the functions take."""
+        """Number of operations of all functions."""
         return sum(len(self.graph.reached(function.roots)) for function in self.functions)
 
     @property
     def names(self) -> set[str]:
-        """What arguments and functions are called."""
+        """Names of arguments and functions."""
         return {f.name for f in self.functions} | {x.name for f in self.functions for x in f.arguments}

@@ -1,4 +1,4 @@
-"""A graph of operations on numbers: each one once, whatever is zero or known for certain left out."""
+"""A graph of operations on numbers, each operation once, without zero terms and with known values computed."""
 
 import math
 import operator
@@ -16,13 +16,13 @@ class Node(NamedTuple):
     Parameters
     ----------
     operation : str
-        Its name: ``constant``, ``input``, ``lookup`` or one of `FUNCTIONS`.
+        Name: ``constant``, ``input``, ``lookup`` or one of `FUNCTIONS`.
     operands : tuple of int
-        Numbers of the nodes that it reads.
+        Numbers of the operand nodes.
     detail : object
-        The value of a constant, the name of an input, the table of a lookup.
+        Value of a constant, name of an input, or table of a lookup.
     kind : str
-        ``real``, ``whole`` or ``truth``.
+        Kind of the result: ``real``, ``whole`` or ``truth``.
     """
 
     operation: str
@@ -68,27 +68,27 @@ FUNCTIONS: dict[str, tuple[Callable[..., Any], str]] = {
         "ceil": np.ceil, "round": np.rint,
     }.items()
 }  # fmt: skip
-"""Operations: what they do to numbers, and the kind of the result, that of the last operand where it is empty."""
+"""Functions of operations on numbers, and the kinds of their results; empty for the kind of the last operand."""
 
 SYMMETRIC = frozenset({"add", "mul", "max", "min", "hypot", "eq", "ne", "and", "or"})
 
 
 class Graph:
-    """Operations on numbers, each of which is there once.
+    """Operations on numbers, each operation once.
 
     Attributes
     ----------
     nodes : list of Node
-        Each reads those before it only.
+        Nodes in order: operands come before the node.
     ranges : dict of int to tuple of int
-        Between which whole numbers a node lies.
+        Lower and upper bounds of nodes of whole numbers.
     """
 
     def __init__(self) -> None:
         self.nodes: list[Node] = []
         self.ranges: dict[int, tuple[int, int]] = {}
         self._known: dict[Any, int] = {}
-        self._node(Node("nothing", (), None, REAL))  # so that the number of every other node counts as true
+        self._node(Node("nothing", (), None, REAL))  # so that the numbers of all other nodes are truthy
 
     def constant(self, value: Any) -> int:
         """Return the node of a number, a whole number or a truth value."""
@@ -99,7 +99,7 @@ class Graph:
             self.ranges[number] = (int(value), int(value))
             return number
         value = float(value)
-        key = "constant", value.hex() if value else "0"  # zero has no sign here
+        key = "constant", value.hex() if value else "0"  # without a sign of zero
         return self._node(Node("constant", (), value or 0.0, REAL), key)
 
     def input(self, name: str | tuple[Any, ...]) -> int:
@@ -119,15 +119,15 @@ class Graph:
         return number
 
     def is_constant(self, *numbers: int) -> bool:
-        """Tell whether nodes are all known numbers."""
+        """Tell whether all nodes are constants."""
         return all(self.nodes[number].operation == "constant" for number in numbers)
 
     def value(self, number: int) -> Any:
-        """Return the number that a constant is."""
+        """Return the value of a constant."""
         return self.nodes[number].detail
 
     def apply(self, name: str, *operands: int) -> int:
-        """Return the node of an operation, simplified."""
+        """Return the node of a simplified operation."""
         if (simpler := self._simplified(name, operands)) is not None:
             return simpler
         function, kind = FUNCTIONS[name]
@@ -144,7 +144,7 @@ class Graph:
         return number
 
     def total(self, numbers: Iterable[int]) -> int:
-        """Return the node of the sum of some nodes, which may be none."""
+        """Return the node of the sum of nodes, zero without nodes."""
         whole = list(numbers)
         if not whole:
             return self.constant(0.0)
@@ -154,7 +154,7 @@ class Graph:
         return result
 
     def reached(self, roots: Iterable[int]) -> list[int]:
-        """Return all nodes that some need, themselves among them, each after those that it reads."""
+        """Return all nodes that roots need, with the roots, operands first."""
         seen: set[int] = set()
         waiting = list(roots)
         while waiting:
@@ -176,7 +176,7 @@ class Graph:
         return node.operation == "constant" and node.kind != TRUTH and node.detail == value
 
     def _simplified(self, name: str, operands: tuple[int, ...]) -> int | None:
-        """Return what an operation is where that takes none: exact, as rounding goes."""
+        """Return an exact simplification of an operation, also under rounding, or None."""
         a, b = operands[0], operands[-1]
         if name in ("add", "sub"):
             return self._sum(name, a, b)
@@ -229,12 +229,12 @@ class Graph:
         return None
 
     def _is_factor(self, number: int) -> bool:
-        """Tell whether a node is a number that may be multiplied with others beforehand."""
+        """Tell whether a node is a finite real constant, which can be multiplied with others beforehand."""
         node = self.nodes[number]
         return node.operation == "constant" and node.kind == REAL and math.isfinite(node.detail)
 
     def _scaled(self, number: int) -> tuple[float, int] | None:
-        """Return the factor that an operation has, and what it is of; None where it has none."""
+        """Return the constant factor of an operation, and the node of the other factor; None without one."""
         node = self.nodes[number]
         if node.operation == "neg":
             return -1.0, node.operands[0]
@@ -254,7 +254,7 @@ class Graph:
         return self._length(condition, no) if self.nodes[yes].detail == math.inf else None
 
     def _length(self, condition: int, otherwise: int) -> int | None:
-        """Return the root of two squares that a choice is, as `jnp.hypot` makes it: the same nodes, made once more."""
+        """Return the ``hypot`` node for a choice with the nodes that `jnp.hypot` makes, or None."""
         either = [self.nodes[x] for x in self.nodes[condition].operands]
         if self.nodes[condition].operation != "or" or any(node.operation != "eq" for node in either):
             return None
@@ -275,7 +275,7 @@ class Graph:
         return other if self.value(known) == (name == "and") else known
 
     def _range(self, name: str, operands: Sequence[int]) -> tuple[int, int]:
-        """Return between which whole numbers the result of an operation on whole numbers lies."""
+        """Return the lower and upper bounds of an operation on whole numbers."""
         ranges = [self.ranges.get(number, (0, 0)) for number in operands]
         if name == "where":
             return min(r[0] for r in ranges[1:]), max(r[1] for r in ranges[1:])
@@ -289,4 +289,4 @@ class Graph:
             return min(ends), max(ends)
         if name == "whole" and self.nodes[operands[0]].kind == TRUTH:
             return 0, 1
-        raise KeyError(name)  # nothing is known of it
+        raise KeyError(name)  # unknown bounds

@@ -1,4 +1,4 @@
-"""Programs of JAX read into a graph of operations on single numbers."""
+"""JAX programs read into a graph of operations on single numbers."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -14,7 +14,7 @@ from jounce.jet.programs.operations import COMPOSED
 from jounce.jet.programs.reader import ProgramReader
 from jounce.written_equations.operations.graph import REAL, TRUTH, WHOLE, Graph
 
-MOST_ENTRIES = 200_000  # of a table
+MOST_ENTRIES = 200_000  # limit on the entries of a table
 _SAME = {
     "add": "add", "add_any": "add", "sub": "sub", "mul": "mul", "div": "div", "neg": "neg", "max": "max", "min": "min",
     "rem": "rem", "abs": "abs", "sign": "sign", "pow": "pow", "atan2": "atan2", "lt": "lt", "le": "le", "gt": "gt",
@@ -28,7 +28,7 @@ _MOVING = frozenset(
     "broadcast_in_dim concatenate copy expand_dims gather pad reshape rev slice split squeeze stack "
     "transpose dynamic_slice copy_p unstack".split()
 )
-_BY_NUMPY: dict[str, Callable[..., Any]] = {  # without compiling a program for each shape
+_BY_NUMPY: dict[str, Callable[..., Any]] = {  # without compilation of a program for each shape
     "broadcast_in_dim": lambda x, *, shape, broadcast_dimensions, **_: np.broadcast_to(
         x.reshape(
             [x.shape[broadcast_dimensions.index(k)] if k in broadcast_dimensions else 1 for k in range(len(shape))]
@@ -58,7 +58,7 @@ _COMPOSED = {name: COMPOSED[name] for name in ("dot_general", "integer_pow", "rs
 
 
 class UnwritableOperationError(Exception):
-    """An operation is none on numbers, and cannot be written out."""
+    """An operation is not one on numbers, and cannot be written out."""
 
 
 class Entries:
@@ -67,9 +67,9 @@ class Entries:
     Parameters
     ----------
     numbers : array of int
-        Of the nodes.
+        Numbers of the nodes.
     dtype : dtype
-        Of the numbers that they stand for.
+        Type of the values of the nodes.
     """
 
     def __init__(self, numbers: Any, dtype: Any):
@@ -83,12 +83,12 @@ class Entries:
 
 
 class GraphReader(ProgramReader):
-    """Reads programs into a graph.
+    """A reader of programs into a graph.
 
     Parameters
     ----------
     graph : Graph
-        To add to.
+        The graph, to which the reader adds nodes.
 
     Raises
     ------
@@ -102,7 +102,7 @@ class GraphReader(ProgramReader):
         self.graph = graph
 
     def function(self, function: Callable[..., Any], *arguments: Any) -> list[Entries]:
-        """Return the results of a function of pytrees whose leaves are `Entries` or arrays, one after another."""
+        """Return the results of a function of pytrees with `Entries` or arrays as leaves, as a list."""
         leaves, structure = jax.tree.flatten(arguments, is_leaf=lambda x: isinstance(x, Entries))
         shapes = [jax.ShapeDtypeStruct(np.shape(x), x.dtype) for x in map(self._array_or_entries, leaves)]
         program = jax.make_jaxpr(lambda *given: function(*jax.tree.unflatten(structure, given)))(*shapes)
@@ -110,14 +110,14 @@ class GraphReader(ProgramReader):
         return [self.entries(x) for x in results]
 
     def results(self, equation: JaxprEqn, operands: list[Any]) -> list[Any]:
-        """Return the results of one operation, which may hold programs of its own."""
+        """Return the results of one operation, which may contain programs."""
         name = equation.primitive.name
         if name in _BY_NUMPY and not any(isinstance(x, Entries) for x in operands):
             return [_BY_NUMPY[name](*map(np.asarray, operands), **equation.params)]
         return super().results(equation, operands)
 
     def value(self, x: Any) -> Any:
-        """Return the array that a constant is, the shape of another value."""
+        """Return the array of a constant, or the shape of another value."""
         return jax.ShapeDtypeStruct(x.shape, x.dtype) if isinstance(x, Entries) else x
 
     def entries(self, x: Any) -> Entries:
@@ -129,7 +129,7 @@ class GraphReader(ProgramReader):
         return Entries(np.array(numbers, np.int64).reshape(array.shape), array.dtype)
 
     def applied(self, equation: JaxprEqn, operands: list[Any]) -> list[Any]:
-        """Return what an operation makes of values."""
+        """Return the results of an operation on values."""
         name, parameters = equation.primitive.name, equation.params
         made: list[Any] = [v.aval for v in equation.outvars]
         dtypes = [aval.dtype for aval in made]
@@ -233,7 +233,7 @@ class GraphReader(ProgramReader):
         return Entries(numbers, target.dtype)
 
     def _scatter_entries(self, equation: JaxprEqn, given: list[Entries]) -> Entries:
-        """Return an array with entries replaced by others, or with others added to them, at places that are known."""
+        """Return an array with entries at known places replaced, or with values added to them."""
         target, indices, parts = given
         if not self.graph.is_constant(*indices.numbers.ravel().tolist()):
             raise UnwritableOperationError("it writes at an index that changes")
@@ -245,7 +245,7 @@ class GraphReader(ProgramReader):
             options = {word: equation.params[word] for word in words}
             return jax.lax.scatter_add(jnp.zeros(target.shape), known, updates, **options)
 
-        # the transpose reads at each place what would be added to it: the number of the place, 0 for none
+        # the transpose gives each update the number of the place to which it is added, 0 for none
         numbered = jnp.arange(1.0, target.numbers.size + 1).reshape(target.shape)
         (owners,) = jax.linear_transpose(added, jax.ShapeDtypeStruct(parts.shape, jnp.float64))(numbered)
         numbers = target.numbers.copy()
@@ -257,7 +257,7 @@ class GraphReader(ProgramReader):
         return Entries(numbers, target.dtype)
 
     def _moved(self, equation: JaxprEqn, operands: list[Any], given: list[Entries], dtypes: list[Any]) -> list[Any]:
-        """Return what an operation makes that gives numbers other places: it is done with those of the nodes."""
+        """Return the results of an operation that moves entries, by moving the numbers of nodes."""
         name = equation.primitive.name
         indices = {"gather": given[1:2], "dynamic_slice": given[1:]}.get(name, [])
         if not self.graph.is_constant(*(int(n) for x in indices for n in x.numbers.ravel())):
@@ -267,7 +267,7 @@ class GraphReader(ProgramReader):
         positions = [x.numbers for x in given[: len(given) - len(indices)]]
         if name in _BY_NUMPY:
             return [Entries(_BY_NUMPY[name](*positions, **equation.params), dtypes[0])]
-        filled = {"fill_value": 0} if name == "gather" else {}  # the number of no operation: beyond the ends
+        filled = {"fill_value": 0} if name == "gather" else {}  # beyond the ends: the number of no operation
         results = equation.primitive.bind(*map(jnp.asarray, [*positions, *known]), **(equation.params | filled))
         results = [np.asarray(x) for x in (results if equation.primitive.multiple_results else [results])]
         if name == "gather" and (results[0] == 0).any():
@@ -276,7 +276,7 @@ class GraphReader(ProgramReader):
         return [Entries(x, dtype) for x, dtype in zip(results, dtypes, strict=True)]
 
     def _looked_up(self, equation: JaxprEqn, table: Any, indices: list[Entries], dtype: Any) -> Entries:
-        """Return entries of a table at indices that are not known before."""
+        """Return entries of a table at indices unknown in advance."""
         if isinstance(table, Entries):
             if not self.graph.is_constant(*table.numbers.ravel().tolist()):
                 raise UnwritableOperationError("it reads a table whose entries change at an index that changes")
@@ -314,7 +314,7 @@ class GraphReader(ProgramReader):
         return Entries(numbers, dtype)
 
     def _owners(self, equation: JaxprEqn, indices: list[Entries], shape: tuple[int, ...]) -> np.ndarray:
-        """Return for each result by which indices it is looked up."""
+        """Return the indices by which each result is looked up."""
         owners = np.empty(shape, object)
         if equation.primitive.name == "dynamic_slice":
             every = [int(x.numbers) for x in indices]

@@ -1,4 +1,4 @@
-"""A graph as a sequence of statements: each operation that is used twice has a name, all others stand within others."""
+"""A graph as a sequence of statements: operations used more than once have names, others are nested."""
 
 import keyword
 import re
@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 from jounce.written_equations.operations.graph import Graph, Node
 
-LONGEST = 90  # characters of a statement, up to which operations stand within others
+LONGEST = 90  # characters of a statement with nested operations
 RESERVED = frozenset(keyword.kwlist) | frozenset(
     "auto break case char const continue default do double else enum extern float for goto if inline int long register "
     "restrict return short signed sizeof static struct switch typedef union unsigned void volatile while t q np "
@@ -16,19 +16,19 @@ RESERVED = frozenset(keyword.kwlist) | frozenset(
 
 
 class Names:
-    """Names for inputs in a language: as near to the labels as its rules allow, no two of them alike."""
+    """Unique names for inputs in a language, as close to the labels as its rules allow."""
 
     def __init__(self, taken: Iterable[str] = ()):
         self._taken = set(RESERVED) | set(taken)
         self._known: dict[str, str] = {}
 
     def fix(self, label: str, name: str) -> None:
-        """Let a label have a name."""
+        """Assign a name to a label."""
         self._taken.add(name)
         self._known[label] = name
 
     def of(self, label: str) -> str:
-        """Return the name that stands for a label."""
+        """Return the name of a label."""
         if label not in self._known:
             plain = re.sub(r"[^0-9a-zA-Z]+", "_", label.encode("ascii", "replace").decode()).strip("_") or "x"
             plain = f"b_{plain}" if plain[0].isdigit() or re.fullmatch(r"[sk]\d+|table\d+", plain) else plain
@@ -42,7 +42,7 @@ class Names:
 
 
 class Text(NamedTuple):
-    """A text of an operation, and how tightly it holds together: `ATOM` most."""
+    """The text of an operation, and its precedence, `ATOM` for the highest."""
 
     text: str
     tightness: int = 3
@@ -54,29 +54,29 @@ INFIX = {
     "le": ("<=", COMPARISON), "gt": (">", COMPARISON), "ge": (">=", COMPARISON), "eq": ("==", COMPARISON),
     "ne": ("!=", COMPARISON),
 }  # fmt: skip
-"""Operations between two others that Python and C write alike, and how tightly they hold."""
+"""Infix operators common to Python and C, and their precedences."""
 
 
 def infix(left: Text, sign: str, tightness: int, right: Text) -> Text:
-    """Return the text of an operation between two others, with the brackets that it needs."""
+    """Return the text of an infix operation, with the necessary brackets."""
     first = left.text if left.tightness >= max(tightness, SUM) else f"({left.text})"
     second = right.text if right.tightness > max(tightness, COMPARISON) else f"({right.text})"
     return Text(f"{first} {sign} {second}", tightness)
 
 
 class Statements:
-    """Writes the operations that some results need.
+    """Statements for the operations that results need.
 
     Parameters
     ----------
     graph : Graph
         The operations.
     expression : callable
-        Of a node and the texts of its operands: its text.
+        Function that returns the text of a node from the node and the texts of its operands.
     inputs : callable
-        Of the label of an input: its name.
+        Function that returns the name of an input from its label.
     assignment : callable
-        Of a name, a text and a kind of numbers: a line.
+        Function that returns a line from a name, a text and a kind of numbers.
     """
 
     def __init__(
@@ -88,12 +88,12 @@ class Statements:
     ):
         self._graph, self._expression, self._inputs, self._assignment = graph, expression, inputs, assignment
         self._texts: dict[int, Text] = {}
-        self._named: set[int] = set()  # what is an input, a number, or has a name
+        self._named: set[int] = set()  # inputs, constants, and operations with names
         self._count = 0
         self._lines: list[str] = []
 
     def shared(self, roots: Sequence[int]) -> dict[int, int]:
-        """Return how often each operation that results need is read."""
+        """Return the number of uses of each operation that results need."""
         counts: dict[int, int] = {}
         for number in self._graph.reached(roots):
             for operand in self._graph.nodes[number].operands:
@@ -103,7 +103,7 @@ class Statements:
         return counts
 
     def write(self, roots: Sequence[int], counts: dict[int, int]) -> list[str]:
-        """Return the lines that have to stand before some results are written, beside those written already."""
+        """Return the further lines that results need, besides lines from earlier calls."""
         self._lines = []
         for number in self._graph.reached(roots):
             if number in self._texts:
@@ -121,11 +121,11 @@ class Statements:
         return self._lines
 
     def text(self, number: int) -> str:
-        """Return how a result is read, once it was written."""
+        """Return the text of a result after `write`."""
         return self._texts[number].text
 
     def _written(self, node: Node) -> Text:
-        """Return the text of an operation; operands get names until it is short enough."""
+        """Return the text of an operation; operands get names until the text is short enough."""
         while True:
             text = self._expression(node, [self._texts[x] for x in node.operands])
             inner = [x for x in node.operands if x not in self._named]
@@ -147,7 +147,7 @@ def used_inputs(graph: Graph, roots: Iterable[int]) -> set[Any]:
 
 
 def wrapped(texts: Sequence[str], width: int = 110, indent: str = "    ") -> list[str]:
-    """Return texts with commas between them, in lines of at most a width."""
+    """Return texts separated by commas, in lines of a limited width."""
     lines, line = [], indent
     for text in texts:
         if len(line) + len(text) + 2 > width and line.strip():
@@ -158,6 +158,6 @@ def wrapped(texts: Sequence[str], width: int = 110, indent: str = "    ") -> lis
 
 
 def one_line(text: str) -> str:
-    """Return a title or a label for a comment: of ASCII, in one line, which ends no comment."""
+    """Return a title or a label for a comment: ASCII, in one line, without the end of a comment."""
     plain = " ".join((text or "A mechanism").encode("ascii", "replace").decode().split())
     return plain.replace("*/", "* /").replace("/*", "/ *").rstrip(".")
