@@ -74,7 +74,7 @@ def test_frames_are_those_of_the_joints_in_turn(robot, data):
     values = dict(zip(robot.joint_names, q[0, 0], strict=True))
     for joint in robot.joints.values():
         if joint.moving and joint.mimic is not None:
-            values[joint.name] = joint.mimic.multiplier * values[joint.mimic.joint] + joint.mimic.offset
+            values[joint.name] = sum(by * values[x] for x, by in joint.mimic.weights.items()) + joint.mimic.offset
     expected = poses(robot, values)
     for link in (robot.base, robot.link_names[-1], last_link(robot)):
         motion = jn.forward_kinematics(robot, q, link, [0.1, -0.2, 0.3])

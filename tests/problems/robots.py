@@ -7,7 +7,8 @@ from scipy.spatial.transform import Rotation
 
 from jounce.io.robots.loader import load_robot
 from jounce.rigid.inertia import Inertia
-from jounce.robot.model.links_and_joints import Joint, Limits, Link, Mimic
+from jounce.robot.model.links_and_joints import Joint, Limits, Link
+from jounce.robot.model.mimics import Mimic
 from jounce.robot.robot import Robot
 
 FILES = pathlib.Path(__file__).parents[2] / "examples" / "robots"
@@ -121,7 +122,7 @@ def coordinates(robot, seed=0):
     values = {name: generator.uniform(-1, 1) for name in robot.joint_names}
     for joint in robot.joints.values():
         if joint.moving and joint.mimic is not None:
-            values[joint.name] = joint.mimic.multiplier * values[joint.mimic.joint] + joint.mimic.offset
+            values[joint.name] = sum(by * values[x] for x, by in joint.mimic.weights.items()) + joint.mimic.offset
     return values
 
 
@@ -153,7 +154,7 @@ def body_poses(robot, values):
     q = np.array([values[name] for name in robot.joint_names])
     found = []
     for k, parent in enumerate(parents):
-        amount = tree.multiplier[k] * q[tree.coordinate[k]] + tree.offset[k]
+        amount = tree.multiplier[:, k] @ q[tree.coordinate[:, k]] + tree.offset[k]
         pose, move = np.eye(4), np.eye(4)
         pose[:3, :3], pose[:3, 3] = tree.rotation[k], tree.position[k]
         if tree.turning[k]:

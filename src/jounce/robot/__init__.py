@@ -35,8 +35,8 @@ from jounce.robot.model.links_and_joints import (
     Joint as Joint,
     Limits as Limits,
     Link as Link,
-    Mimic as Mimic,
 )
+from jounce.robot.model.mimics import Mimic as Mimic
 from jounce.robot.recursions.kinematics import (
     FrameMotion as FrameMotion,
     center_of_mass as center_of_mass,

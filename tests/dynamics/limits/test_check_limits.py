@@ -11,7 +11,7 @@ from scipy.optimize import minimize_scalar
 import jounce as jn
 from jounce.dynamics.limits.check_limits import check_limits
 from jounce.dynamics.limits.trajectories import BLOCK
-from jounce.robot.model.links_and_joints import leaders
+from jounce.robot.model.mimics import leaders
 from jounce.trajectory import JointTrajectory, motion_profile
 
 GRAVITY, LENGTH, MASS = 9.81, 0.5, 2.0

@@ -13,10 +13,11 @@ from jounce.dynamics.limits.limit_jumps import Infinite, infinite_quantities, ju
 from jounce.dynamics.limits.limit_report import LimitReport, LimitRow
 from jounce.dynamics.limits.local_maxima import local_maxima
 from jounce.dynamics.limits.motion_ends import TrajectoryEnd, end_jumps, ends_of_jumps
+from jounce.dynamics.limits.shared_followers import SharedFollowers
 from jounce.dynamics.limits.trajectories import FollowedTrajectory, reason_not_movable
 from jounce.errors import RobotError, SampleWarning, TrajectoryError, flag
 from jounce.robot.algorithms.carried_loads import CarriedLoad
-from jounce.robot.model.links_and_joints import Limits
+from jounce.robot.model.links_and_joints import Joint, Limits
 from jounce.robot.robot import Robot
 from jounce.trajectory.joint_trajectory import JointTrajectory
 from jounce.trajectory.law_checks.breaks import at_breaks, distinct_instants, law_breaks, with_sides
@@ -74,7 +75,8 @@ def check_limits(
         Joints that it does not name are at rest at zero, or at the end of their range nearest to zero; only their
         torques are compared.
     limits : dict of str to Limits, optional
-        Limits of some joints that replace those of the robot; the limits of joints that follow them still apply.
+        Limits of some joints that replace those of the robot; the limits of joints that follow them still apply, and
+        those of joints that follow several have rows of their own.
     times : array_like of shape (time,), optional
         Increasing instants at which to evaluate, s, instead of those above.
     drives : bool, default True
@@ -115,12 +117,16 @@ def check_limits(
     """
     drives, hand_over = flag("drives", drives, error=RobotError), flag("hand_over", hand_over, error=RobotError)
     followed = FollowedTrajectory(robot, trajectory, loads=loads)
-    resting = followed.resting_joints
+    resting, shared, count = followed.resting_joints, SharedFollowers.of(robot), len(robot.joint_names)
+    names = (*robot.joint_names, *shared.names)
 
     def curves(times: np.ndarray) -> np.ndarray:
-        """Return all quantities of all joints, shape (time, 6, joints)."""
+        """Return all quantities of all joints, shape (time, 6, columns)."""
         q = followed.coordinates(times, ORDER)
-        return np.concatenate([q, followed.torques(q, times, drives)], axis=1)
+        quantities = np.zeros((len(q), len(FIELDS), len(names)))
+        quantities[:, : ORDER + 1] = shared.beside(q)
+        quantities[:, list(EFFORTS), :count] = followed.torques(q, times, drives)
+        return quantities
 
     merged = _merged(robot, limits)
     grid = _grid(trajectory) if times is None else _checked_times(times)
@@ -129,21 +135,30 @@ def check_limits(
     breaks = distinct_instants(np.append(breaks, followed.loaded.changes), first, last)
     grid = with_sides(grid, breaks)
     values = curves(grid)
-    bounds = _Bounds(robot, merged, REST * np.abs(values[:, 1]).max(axis=0), trajectory.stop)
-    infinite = infinite_quantities(followed, jumps_of(followed, grid, values[:, : ORDER + 1]), drives)
+    every = [(merged | shared.limits)[name] for name in names]
+    bounds = _Bounds(every, REST * np.abs(values[:, 1]).max(axis=0), trajectory.stop)
+    jumps = jumps_of(followed, grid, values[:, : ORDER + 1, :count])
+    infinite = shared.infinite(infinite_quantities(followed, jumps, drives), jumps)
+    moved = {count + k for k in shared.moving(followed.columns)}
+    moved |= {k for k, name in enumerate(robot.joint_names) if name not in resting}
     limited = [
         (quantity, joint)
-        for joint, name in enumerate(robot.joint_names)
+        for joint in range(len(names))
         for quantity in range(len(FIELDS))
-        if quantity in EFFORTS or name not in resting
+        if (joint in moved if quantity not in EFFORTS else joint < count)
     ]
     at, values_there, shown = worst_instants(curves, bounds, grid, values, np.array(limited))
     at = at_breaks(at, breaks, first, last)
     rows = tuple(
-        _row(robot, bounds, quantity, joint, *bounds.or_infinite(infinite, quantity, joint, *worst))
+        _row(
+            robot.joints[names[joint]],
+            bounds,
+            (quantity, joint),
+            *bounds.or_infinite(infinite, quantity, joint, *worst),
+        )
         for (quantity, joint), *worst in zip(limited, at.tolist(), values_there.tolist(), shown.tolist(), strict=True)
     )
-    ends = _ends(followed, values[:, : ORDER + 1], bounds, drives)
+    ends = _ends(followed, shared, values[:, : ORDER + 1, :count], bounds, drives)
     for message in followed.doubts:
         warnings.warn(SampleWarning(message), stacklevel=2)
     shares = bounds.shares(values, grid)
@@ -153,8 +168,8 @@ def check_limits(
         rows,
         resting,
         grid,
-        values,
-        shares,
+        values[:, :, :count],
+        shares[:, :, :count],
         drives=drives,
         ends=ends,
         hand_over=hand_over,
@@ -169,9 +184,7 @@ class _Bounds:
     own. A joint at rest is about to speed up, except at the end of the trajectory, `stop`.
     """
 
-    def __init__(self, robot: Robot, limits: Mapping[str, Limits], rest: np.ndarray, stop: float):
-        every = [limits[name] for name in robot.joint_names]
-
+    def __init__(self, every: Sequence[Limits], rest: np.ndarray, stop: float):
         def table(*fields: str, missing: float = np.inf) -> np.ndarray:
             numbers = np.array([[getattr(x, field) for x in every] for field in fields], float)  # None becomes NaN
             return np.where(np.isnan(numbers), missing, numbers)
@@ -277,42 +290,44 @@ def worst_instants(
     return times, maxima, weight
 
 
-def _row(
-    robot: Robot, bounds: _Bounds, quantity: int, joint: int, time: float, value: float, weight: float
-) -> LimitRow:
-    name = robot.joint_names[joint]
-    word, unit = word_of(robot, quantity, joint)
-    if not bounds.limited[quantity, joint]:
-        return LimitRow(name, word, unit, value, time)
-    above, below = (float(x) for x in bounds.sides(np.array(value * weight), (quantity, joint)))
-    limit = (bounds.upper if above >= below else bounds.lower)[quantity, joint] / (weight or 1.0)
-    return LimitRow(name, word, unit, value, time, float(limit), max(above, below, 0.0))
+def _row(joint: Joint, bounds: _Bounds, at: tuple[int, int], time: float, value: float, weight: float) -> LimitRow:
+    word, unit = word_of(joint, at[0])
+    if not bounds.limited[at]:
+        return LimitRow(joint.name, word, unit, value, time)
+    above, below = (float(x) for x in bounds.sides(np.array(value * weight), at))
+    limit = (bounds.upper if above >= below else bounds.lower)[at] / (weight or 1.0)
+    return LimitRow(joint.name, word, unit, value, time, float(limit), max(above, below, 0.0))
 
 
 def _ends(
-    followed: FollowedTrajectory, values: Float[np.ndarray, "time derivative joint"], bounds: _Bounds, drives: bool
+    followed: FollowedTrajectory,
+    shared: SharedFollowers,
+    values: Float[np.ndarray, "time derivative joint"],
+    bounds: _Bounds,
+    drives: bool,
 ) -> tuple[TrajectoryEnd, ...]:
     """Return the jumps at both ends of the trajectory, and the limits that they exceed."""
     robot, jumps = followed.robot, end_jumps(followed, values)
     if np.array_equal(jumps.before, jumps.after):
         return ends_of_jumps(robot.joint_names, jumps)
-    infinite = infinite_quantities(followed, jumps, drives)
+    infinite = shared.infinite(infinite_quantities(followed, jumps, drives), jumps)
+    names = (*robot.joint_names, *shared.names)
     weights = bounds.weights(infinite.before, infinite.times)
     broken = (infinite.signs != 0) & (weights > 0) & bounds.limited
     return tuple(
         dataclasses.replace(
-            end, breaks=tuple((robot.joint_names[j], word_of(robot, q, j)[0]) for j, q in np.argwhere(own.T).tolist())
+            end,
+            breaks=tuple((names[j], word_of(robot.joints[names[j]], q)[0]) for j, q in np.argwhere(own.T).tolist()),
         )
         for end, own in zip(ends_of_jumps(robot.joint_names, jumps), broken, strict=True)
     )
 
 
-def word_of(robot: Robot, quantity: int, joint: int) -> tuple[str, str]:
+def word_of(joint: Joint, quantity: int) -> tuple[str, str]:
     """Return the name of a quantity of a joint, and its unit."""
-    turning = robot.joints[robot.joint_names[joint]].turning
     field = FIELDS[quantity]
-    word = field.replace("effort", "torque" if turning else "force").replace("_", " ")
-    return word, (TURNING if turning else SLIDING)[field]
+    word = field.replace("effort", "torque" if joint.turning else "force").replace("_", " ")
+    return word, (TURNING if joint.turning else SLIDING)[field]
 
 
 def _merged(robot: Robot, limits: Mapping[str, Limits] | None) -> dict[str, Limits]:

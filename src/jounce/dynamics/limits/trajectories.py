@@ -237,7 +237,7 @@ def reason_not_movable(robot: Robot, name: str) -> str:
     if joint is None:
         return no_such(f"moving joint of {robot.name}", name, robot.joint_names)
     if joint.mimic is not None:
-        return f"this joint follows {joint.mimic.joint}; leave it out"
+        return f"this joint follows {', '.join(joint.mimic.weights)}; leave it out"
     return "this joint is fixed; leave it out"
 
 

@@ -158,7 +158,7 @@ def with_file_names(robot: Robot) -> tuple[Robot, dict[str, str]]:
         return robot, {}
 
     def joint(given: Any) -> Any:
-        mimic = given.mimic and dataclasses.replace(given.mimic, joint=file_names[given.mimic.joint])
+        mimic = given.mimic and dataclasses.replace(given.mimic, joint=[file_names[x] for x in given.mimic.weights])
         ends = {"parent": links[given.parent], "child": links[given.child]}
         return dataclasses.replace(given, name=file_names[given.name], mimic=mimic, **ends)
 

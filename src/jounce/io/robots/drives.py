@@ -167,7 +167,8 @@ class _DrivesFile:
     def _why_not(self, name: str) -> str:
         joint = self.system.joints.get(name) if isinstance(self.system, Robot) else None
         if joint is not None and joint.mimic is not None:
-            return f"this joint follows {joint.mimic.joint}; give that one the drive"
+            those = "those" if joint.mimic.several else "that one"
+            return f"this joint follows {', '.join(joint.mimic.weights)}; give {those} the drive"
         if joint is not None:
             return "this joint is fixed and has no drive; leave it out"
         title = self.system.name if isinstance(self.system, Robot) else self.system.title or "the mechanism"

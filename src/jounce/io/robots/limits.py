@@ -313,7 +313,8 @@ class _LimitsFile:
     def _why_not(self, name: str) -> str:
         joint = self.robot.joints.get(name)
         if joint is not None and joint.mimic is not None:
-            return f"this joint follows {joint.mimic.joint}; give limits of that one"
+            those = "those" if joint.mimic.several else "that one"
+            return f"this joint follows {', '.join(joint.mimic.weights)}; give limits of {those}"
         if joint is not None:
             return "this joint is fixed and has no limits; leave it out"
         return no_such(f"moving joint of {self.robot.name}", name, self.robot.joint_names)

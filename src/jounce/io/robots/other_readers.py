@@ -163,8 +163,8 @@ def _single(reader: str, name: str, robot: Robot) -> ForeignJoint:
     if joint.mimic is None:
         return ForeignJoint(name, (name,), positions, factors=({name: 1.0},))
     follows = "a constraint holds it there" if reader in ("mujoco", "drake") else "nothing holds it there"
-    note = f"a coordinate of its own, where we have it follow {joint.mimic.joint}; {follows}"
-    factors = ({joint.mimic.joint: joint.mimic.multiplier},)
+    note = f"a coordinate of its own, where we have it follow {', '.join(joint.mimic.weights)}; {follows}"
+    factors = (joint.mimic.weights,)
     return ForeignJoint(name, (name,), positions, factors=factors, offset=joint.mimic.offset, note=note)
 
 

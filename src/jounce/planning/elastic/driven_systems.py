@@ -95,7 +95,7 @@ def robot_drives(robot: Robot, drives: object, losses: bool) -> DriveArrays:
         raise RobotError(message, name=robot.name, value=list(robot.closures))
     if not robot.joint_names:
         raise RobotError("the robot has no moving joint, and nothing to drive", name="joints")
-    followers = {joint.name: joint.mimic.joint for joint in robot.moving_joints if joint.mimic is not None}
+    followers = {joint.name: ", ".join(joint.mimic.weights) for joint in robot.moving_joints if joint.mimic is not None}
     for name in drives if isinstance(drives, dict) else ():
         if name in followers:
             message = f"this joint follows {followers[name]}; give that one the drive"

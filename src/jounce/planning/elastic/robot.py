@@ -70,7 +70,8 @@ def elastic_robot(robot: Robot, drives: Mapping[str, Drive], *, losses: bool = T
     for joint in robot.joints.values():
         armature, rubbing = joint.armature, joint.friction if rubs else 0.0
         damping = joint.damping if losses else 0.0
-        if joint.moving:  # the motor of a joint includes the armature and friction of joints that follow it
+        several = joint.mimic is not None and joint.mimic.several
+        if joint.moving and not several:  # armature and friction of what follows one are among those of its motor
             leader = joint.name if joint.mimic is None else joint.mimic.joint
             k = columns[leader]
             if arrays.elastic[k]:

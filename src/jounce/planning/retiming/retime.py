@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from jounce.base.shapes import ArrayLike
+from jounce.dynamics.limits.shared_followers import SharedFollowers
 from jounce.dynamics.limits.trajectories import FollowedTrajectory, warn_of_degrees
 from jounce.errors import SolveError, TrajectoryError, flag, whole_number
 from jounce.mechanism import Mechanism
@@ -345,7 +346,7 @@ def _of_mechanism(limits: GivenLimits | None) -> dict[str, Limits]:
 def _order(order: int | None, limits: MotionLimits, robot: Robot) -> int:
     """Return up to which derivative a motion must be continuous."""
     least = 1
-    given = [limits.joints[name] for name in robot.joint_names]
+    given = [*(limits.joints[name] for name in robot.joint_names), *SharedFollowers.of(robot).limits.values()]
     varying = {field for laws in limits.varying.values() for field in laws}
     if any(x.jerk is not None or x.effort_rate is not None for x in given) or varying & {"jerk", "effort_rate"}:
         least = 2

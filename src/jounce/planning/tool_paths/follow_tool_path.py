@@ -9,7 +9,13 @@ from jounce.base.shapes import ArrayLike
 from jounce.errors import JounceError, RobotError, SingularityError, check_name
 from jounce.jet.derivatives import taylor_coefficients
 from jounce.kinematics import Status
-from jounce.planning.tool_paths.inverse_kinematics import coordinate_scale, joint_ranges, middle, poses_within
+from jounce.planning.tool_paths.inverse_kinematics import (
+    check_shared_ranges,
+    coordinate_scale,
+    joint_ranges,
+    middle,
+    poses_within,
+)
 from jounce.planning.tool_paths.path_equations import PathEquations
 from jounce.planning.tool_paths.path_marching import Nodes, followed
 from jounce.planning.tool_paths.task_rank import CONFIGURATIONS, random_coordinates, reachable_rows, task_columns
@@ -105,6 +111,8 @@ def follow_tool_path(
         raise RobotError("must be a jn.planning.ToolPath", name="path", value=type(path).__name__)
     tool, n = tool_of(robot, link, point, axis), len(robot.joint_names)
     scale = coordinate_scale(robot, tool)
+    if limits:
+        check_shared_ranges(robot)
     ranges = joint_ranges(robot)
     laws = _fixed_joint_laws(robot, hold, path)
     fixed_joints = tuple(robot.joint_names.index(name) for name in laws.names) if laws else ()

@@ -108,6 +108,8 @@ def inverse_kinematics(
     """
     tool = tool_of(robot, link, point, axis)
     goal, lead = _checked_goal(position, orientation, direction)
+    if limits:
+        check_shared_ranges(robot)
     lower, upper = joint_ranges(robot) if limits else (np.full(len(robot.joint_names), x) for x in (-np.inf, np.inf))
     begin = middle(lower, upper) if start is None else np.asarray(checked_position(robot, start, "start"))[..., 0, :]
     if not np.isfinite(begin).all():
@@ -248,6 +250,15 @@ def _checked_goal(position: Any, orientation: Any, direction: Any) -> tuple[dict
     except ValueError:
         message = f"positions and orientations are not of the same number: {', '.join(map(str, leads.values()))}"
         raise RobotError(message, name="orientation") from None
+
+
+def check_shared_ranges(robot: AbstractRobot) -> None:
+    """Raise RobotError if a joint that follows several has a range, for which no ranges of these stand."""
+    for joint in robot.moving_joints:
+        ends = [joint.limits.lower, joint.limits.upper]
+        if joint.mimic is not None and joint.mimic.several and ends != [None, None]:
+            message = "the range of a joint that follows several cannot be kept here; remove it, or set limits=False"
+            raise RobotError(message, name=f"joints.{joint.name}.limits", value=ends)
 
 
 def joint_ranges(robot: AbstractRobot) -> tuple[Float[np.ndarray, " n"], Float[np.ndarray, " n"]]:

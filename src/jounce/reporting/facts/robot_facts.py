@@ -39,10 +39,10 @@ class LimitFacts(TypedDict):
 
 
 class MimicFacts(TypedDict):
-    """Which joint another one follows."""
+    """Which joint another one follows, or which several."""
 
-    joint: str
-    multiplier: float
+    joint: str | list[str]
+    multiplier: float | list[float]
     offset: float
 
 
@@ -248,7 +248,12 @@ def _link(robot: Robot, name: str) -> dict[str, Any]:
 
 
 def _joint(joint: Joint) -> dict[str, Any]:
-    mimic = None if joint.mimic is None else dataclasses.asdict(joint.mimic)
+    mimic: MimicFacts | None = None
+    if joint.mimic is not None:
+        leaders, multipliers = list(joint.mimic.weights), list(joint.mimic.weights.values())
+        mimic = {"joint": leaders, "multiplier": multipliers, "offset": joint.mimic.offset}
+        if not joint.mimic.several:
+            mimic |= {"joint": leaders[0], "multiplier": multipliers[0]}
     return {
         "name": joint.name,
         "type": joint.type,

@@ -93,7 +93,7 @@ def robot_tables(facts: Facts) -> list[Table]:
         limits, mimic = joint["limits"], joint["mimic"]
         free = limits["lower"] is None and limits["upper"] is None
         range_words = "-" if free else f"{number(limits['lower'])} to {number(limits['upper'])} {joint['unit']}"
-        follows = f"{mimic['joint']} x {mimic['multiplier']:g}" if mimic else ""
+        follows = _followed(mimic) if mimic else ""
         most = [number(limits[key]) for key in ("velocity", "effort")]
         moving.append([joint["name"], joint["type"], links, range_words, *most, follows])
     headings = ("joint", "type", "links", "range", "velocity", "effort", "follows")
@@ -112,6 +112,14 @@ def robot_tables(facts: Facts) -> list[Table]:
         table("Loops closed by", ("closure", "type", "links", "equations", "redundant"), closures, (3, 4)),
     ]
     return [each for each in tables if each.rows]
+
+
+def _followed(mimic: Facts) -> str:
+    """Return which joints one follows, and how fast."""
+    leaders, multipliers = mimic["joint"], mimic["multiplier"]
+    if isinstance(leaders, str):
+        leaders, multipliers = [leaders], [multipliers]
+    return ", ".join(f"{name} x {by:g}" for name, by in zip(leaders, multipliers, strict=True))
 
 
 def other_reader_table(facts: Facts) -> Table:

@@ -117,8 +117,7 @@ def mass_jet(tree: Tree, q: Series) -> Float[jax.Array, "order coordinate coordi
     matrix = half + jnp.swapaxes(half, 1, 2) * (1 - np.eye(tree.shape.bodies))[None, :, :, None]
     if tree.shape.direct:
         return matrix
-    weights = jnp.zeros((tree.shape.bodies, tree.shape.coordinates))
-    weights = weights.at[np.arange(tree.shape.bodies), jnp.asarray(tree.coordinate)].set(jnp.asarray(tree.multiplier))
+    weights = to_coordinates(tree, jnp.eye(tree.shape.bodies)[:, :, None])[:, :, 0]
     return jnp.einsum("lijs,ia,jb->labs", matrix, weights, weights)
 
 

@@ -13,7 +13,7 @@ from jounce.robot.model.arguments import checked_coordinates, stacked_arguments
 from jounce.robot.model.tree import Frame, Tree
 from jounce.robot.recursions.batches import Batched
 from jounce.robot.recursions.kinematics import body_frames, frame_at, link_frame
-from jounce.robot.recursions.tree_scan import Series
+from jounce.robot.recursions.tree_scan import Series, to_coordinates
 from jounce.robot.robot import Robot
 
 
@@ -24,13 +24,10 @@ def jacobian_jet(tree: Tree, q: Series, frame: Frame) -> Jet:
     bodies = frames.without_base()
     axis = bodies.axes[2]
     turning = jnp.asarray(tree.turning)[:, None]
-    moved = jnp.asarray(tree.ancestors)[frame.body][:, None] * jnp.asarray(tree.multiplier)[:, None]
+    moved = jnp.asarray(tree.ancestors)[frame.body][:, None]
     linear = cross(axis, target - bodies.position) * turning + axis * (1 - turning)
     columns = concatenate([linear, axis * turning]) * moved
-    if tree.shape.direct:
-        return columns
-    shape = (6, tree.shape.coordinates, q.shape[-1])
-    return columns.map(lambda c: jnp.zeros(shape).at[:, jnp.asarray(tree.coordinate)].add(c))
+    return columns.map(lambda c: to_coordinates(tree, c))
 
 
 @Batched

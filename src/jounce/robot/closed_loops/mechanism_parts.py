@@ -21,7 +21,8 @@ from jounce.robot.closed_loops.closures import LinkClosure
 from jounce.robot.closed_loops.coupling import JointPlacement, SlideOutput, coupled
 from jounce.robot.model.abstract_robot import AbstractRobot
 from jounce.robot.model.couplings import BallDrive, Tendon
-from jounce.robot.model.links_and_joints import Closure, Mimic
+from jounce.robot.model.links_and_joints import Closure
+from jounce.robot.model.mimics import Mimic
 from jounce.robot.model.tree import axes_with_z_along
 from jounce.robot.recursions.kinematics import forward_kinematics
 
@@ -40,6 +41,12 @@ def on_body(robot: AbstractRobot, link: str) -> tuple[str, np.ndarray, np.ndarra
         return name, np.zeros(3), np.eye(3)
     turned = robot.frames[name].rotation.T
     return name, turned @ position, turned @ rotation
+
+
+def rotor_on(base: str, rotor: str) -> JointPlacement:
+    """Return where a rotor turns on the ground, or on another rotor."""
+    origin, x, _, z = np.zeros(3), *np.eye(3)
+    return JointPlacement((base, rotor), True, origin, z, z, x, x)
 
 
 class RobotParts:
@@ -81,6 +88,17 @@ class RobotParts:
         for joint in self.driven:
             if joint.armature:
                 self.rotors[joint.name] = _unused(joint.name + ROTOR, {*robot.links, *self.rotors.values()})
+        self.sums: dict[
+            str, dict[str, str]
+        ] = {}  # rotors that add up what is followed, by joint and by what it follows
+        for joint in self.moving:
+            for leader in joint.mimic.weights if joint.mimic is not None and joint.mimic.several else ():
+                taken = {
+                    *robot.links,
+                    *self.rotors.values(),
+                    *(x for made in self.sums.values() for x in made.values()),
+                }
+                self.sums.setdefault(joint.name, {})[leader] = _unused(f"{joint.name}_{leader}{ROTOR}", taken)
         inner = self._inner()
         merged = {self.moving[k].name for k in inner.union(self.merged)}
         self.coordinates = tuple(name for name in robot.joint_names if name not in merged)
@@ -93,7 +111,7 @@ class RobotParts:
     def _is_free(self, first: int, count: int, needed: set[str], links: set[str]) -> bool:
         """Whether joints in a row let a body move freely (6), or turn freely (3), and nobody asks for one of them."""
         robot, tree, chain = self.robot, self.tree, self.moving[first : first + count]
-        following = {joint.mimic.joint for joint in self.moving if joint.mimic is not None}
+        following = {name for joint in self.moving if joint.mimic is not None for name in joint.mimic.weights}
         if any(joint.mimic is not None or joint.name in needed | following for joint in chain):
             return False
         for k, joint in enumerate(chain[:-1], first):
@@ -145,18 +163,35 @@ class RobotParts:
                 joints[joint.name] = spatial.Prismatic(at.bodies, *ends, at.vector_i, at.vector_j)
         for joint in self.moving:
             if joint.mimic is not None:
-                pair = (self._named(joint.mimic.joint), self._named(joint.name))
-                joints[self._unique_name(f"{joint.name}_mimic", joints)] = coupled(
-                    *pair, joint.mimic.multiplier, joint.mimic.offset
-                )
-        origin, x, _, z = np.zeros(3), *np.eye(3)
+                follower, offset = joint.name, joint.mimic.offset
+                base = GROUND
+                for leader, rotor in self.sums.get(follower, {}).items():  # each turns on the one before
+                    turning = self._add_rotor(rotor, base, joints)
+                    pair = (self._named(leader), turning)
+                    joints[self._unique_name(f"{follower}_{leader}{GEAR}", joints)] = coupled(
+                        *pair, joint.mimic.weights[leader], 0.0, in_space=base == GROUND
+                    )
+                    base = rotor
+                if joint.mimic.several:
+                    whole = (self._named(follower), rotor_on(GROUND, base))
+                    made = coupled(*whole, 1.0, -offset, in_space=True)
+                else:
+                    made = coupled(
+                        self._named(joint.mimic.joint), self._named(follower), joint.mimic.multiplier, offset
+                    )
+                joints[self._unique_name(f"{follower}_mimic", joints)] = made
         for name, rotor in self.rotors.items():
-            turning = JointPlacement((GROUND, rotor), True, origin, z, z, x, x)
-            joints[self._unique_name(name + ROTOR, joints)] = spatial.Revolute(turning.bodies, origin, origin, z, z)
+            turning = self._add_rotor(rotor, GROUND, joints)
             joints[self._unique_name(name + GEAR, joints)] = coupled(
                 self._named(name), turning, 1.0, 0.0, in_space=True
             )
         return joints
+
+    def _add_rotor(self, rotor: str, base: str, joints: dict[str, AbstractConstraint]) -> JointPlacement:
+        """Add the bearing of a rotor, and return its place."""
+        at = rotor_on(base, rotor)
+        joints[self._unique_name(rotor, joints)] = spatial.Revolute(at.bodies, at.point, at.point, at.axis_i, at.axis_j)
+        return at
 
     def _unique_name(self, name: str, taken: Any) -> str:
         return _unused(name, {*taken, *self.robot.joints, *self.robot.closures})
@@ -253,13 +288,21 @@ class RobotParts:
                 inertia=None if whole is None else whole.tensor,
                 center_of_mass=None if whole is None else whole.center_of_mass,
             )
+        values = dict(zip(robot.joint_names, q.tolist(), strict=True))
         for name, rotor in self.rotors.items():
-            mimic = robot.joints[name].mimic or Mimic(name)
-            angle = mimic.multiplier * q[robot.joint_names.index(mimic.joint)] + mimic.offset
-            attitude = {"axis": [0.0, 0.0, 1.0], "angle": float(angle)}
+            angle = values[name] if name in values else (robot.joints[name].mimic or Mimic(name)).held(values)
             inertia = [robot.joints[name].armature] * 3
-            bodies[rotor] = Body([0.0] * 3, orientation=attitude, mass=0.0, inertia=inertia)
+            bodies[rotor] = Body([0.0] * 3, orientation=_turned(angle), mass=0.0, inertia=inertia)
+        for name, rotors in self.sums.items():
+            mimic, angle = robot.joints[name].mimic or Mimic(name), 0.0
+            for leader, rotor in rotors.items():
+                angle += mimic.weights[leader] * values[leader]
+                bodies[rotor] = Body([0.0] * 3, orientation=_turned(angle))
         return bodies
+
+
+def _turned(angle: Any) -> dict[str, Any]:
+    return {"axis": [0.0, 0.0, 1.0], "angle": float(angle)}
 
 
 def friction_law(friction: Any) -> str:

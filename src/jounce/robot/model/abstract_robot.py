@@ -15,6 +15,7 @@ from jounce.rigid.inertia import Inertia, TracedInertia, finite_numbers, vector_
 from jounce.robot.model.couplings import BallDrive, Coupling, Tendon, check_coupling
 from jounce.robot.model.floating_base import floating_joints
 from jounce.robot.model.links_and_joints import Closure, Joint, Limits, Link, limits_with_followers
+from jounce.robot.model.mimics import Mimic
 from jounce.robot.model.tree import Tree, arrange, ordered, turn_about
 
 Made = TypeVar("Made", bound="AbstractRobot")
@@ -155,7 +156,7 @@ class AbstractRobot(Displayed, abc.ABC):
         """
         followers: dict[str, list[Joint]] = {name: [] for name in self.joint_names}
         for joint in self.moving_joints:
-            if joint.mimic is not None:
+            if joint.mimic is not None and not joint.mimic.several:
                 followers[joint.mimic.joint].append(joint)
         return {
             name: limits_with_followers(name, given.get(name, self.joints[name].limits), others)
@@ -272,8 +273,12 @@ class AbstractRobot(Displayed, abc.ABC):
         joints, held = [], {}
         for joint in self.joints.values():
             coordinate = positions.get(joint.name)
-            if joint.moving and joint.mimic is not None and joint.mimic.joint in positions:
-                coordinate = joint.mimic.multiplier * positions[joint.mimic.joint] + joint.mimic.offset
+            if joint.moving and joint.mimic is not None:
+                left = joint.mimic.held(positions)
+                if isinstance(left, Mimic):
+                    joint = dataclasses.replace(joint, mimic=left)
+                else:
+                    coordinate = left
             if coordinate is not None:
                 held[joint.name] = float(coordinate)
             joints.append(joint if coordinate is None else _fixed_at(joint, float(coordinate)))
@@ -336,11 +341,11 @@ class AbstractRobot(Displayed, abc.ABC):
         return dataclasses.replace(closure, points=points, rotation=rotation)
 
     def _check_mimic(self, joint: Joint) -> None:
-        if joint.mimic is not None and joint.mimic.joint not in self.joint_names:
-            message = (
-                f"must follow a moving joint that follows no other; {did_you_mean(joint.mimic.joint, self.joint_names)}"
-            )
-            raise RobotError(message, name=f"joints.{joint.name}.mimic", value=joint.mimic.joint)
+        for leader in joint.mimic.weights if joint.mimic is not None else ():
+            if leader not in self.joint_names:
+                others = did_you_mean(leader, self.joint_names)
+                message = f"must follow a moving joint that follows no other; {others}"
+                raise RobotError(message, name=f"joints.{joint.name}.mimic", value=leader)
 
 
 def _by_name(kind: str, parts: Sequence[Any], expected: type | tuple[type, ...]) -> dict[str, Any]:

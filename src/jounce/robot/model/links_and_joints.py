@@ -2,7 +2,7 @@
 
 import dataclasses
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
@@ -10,6 +10,7 @@ import numpy as np
 from jounce.base.shapes import ArrayLike, real_numbers
 from jounce.errors import RobotError, check_name
 from jounce.rigid.inertia import Inertia, finite_numbers, unchanging, vector_numbers
+from jounce.robot.model.mimics import Mimic
 
 MOVING = ("revolute", "continuous", "prismatic")
 TYPES = (*MOVING, "fixed")
@@ -67,56 +68,6 @@ UNLIMITED = Limits()
 POINT = 1e-4  # of the narrowest range: what ranges have in common, if it is as little, is meant to be one point
 
 
-@dataclasses.dataclass(frozen=True)
-class Mimic:
-    """A joint that follows another one: its coordinate is ``multiplier * q + offset``.
-
-    Parameters
-    ----------
-    joint : str
-        Name of the joint that is followed; it follows no other.
-    multiplier : float, default 1
-        By how much faster this one moves.
-    offset : float, default 0
-        Its coordinate where that of the other is zero, rad or m.
-
-    Raises
-    ------
-    RobotError
-        If a number is not finite.
-    """
-
-    joint: str
-    multiplier: float = 1.0
-    offset: float = 0.0
-
-    def __post_init__(self) -> None:
-        for field in ("multiplier", "offset"):
-            object.__setattr__(self, field, float(finite_numbers(f"mimic.{field}", getattr(self, field), ())))
-
-    def after(self, leader: "Mimic") -> "Mimic":
-        """Return how the joint follows the leader of the one that it follows."""
-        return Mimic(leader.joint, self.multiplier * leader.multiplier, self.multiplier * leader.offset + self.offset)
-
-
-def leaders(mimics: Mapping[str, Mimic]) -> dict[str, Mimic]:
-    """Return what joints follow, by name: those that follow a follower made to follow its leader.
-
-    Circles are left as they are, for the robot to refuse.
-    """
-    mimic_of: dict[str, Mimic] = {}
-    for name in mimics:
-        chain: dict[str, Mimic] = {}  # from a follower to the first joint that is known, or leads
-        while name in mimics and name not in mimic_of and name not in chain:
-            chain[name] = mimics[name]
-            name = mimics[name].joint
-        circle = name in chain
-        for follower, mimic in reversed(chain.items()):
-            leader = None if circle else mimic_of.get(mimic.joint)
-            mimic_of[follower] = mimic if leader is None else mimic.after(leader)
-    return mimic_of
-
-
 @dataclasses.dataclass(frozen=True, eq=False)
 class Link:
     """A rigid link; without inertia it is a frame, or a massless piece between two joints.
@@ -172,7 +123,7 @@ class Joint:
     limits : Limits, optional
         What the joint may do.
     mimic : Mimic, optional
-        The joint that this one follows.
+        What this joint follows.
     armature : float, default 0
         Inertia of the drive, seen at the joint, kg m^2 or kg. Of a joint that follows another, this and the next two
         count through the multiplier.

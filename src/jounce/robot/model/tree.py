@@ -13,7 +13,8 @@ from jaxtyping import Float
 from jounce.errors import RobotError, check_name
 from jounce.rigid.inertia import Inertia
 from jounce.robot.model.couplings import OF_BALL, OF_TENDON, BallDrive, Coupling, Tendon
-from jounce.robot.model.links_and_joints import Joint, Link, Mimic
+from jounce.robot.model.links_and_joints import Joint, Link
+from jounce.robot.model.mimics import Mimic
 
 MASSLESS = Inertia(0.0, strict=False)
 FORWARD_BACKWARD = np.array([[0.5, 0.5], [0.5, -0.5]])  # mean and half of the difference of two numbers
@@ -104,8 +105,10 @@ class Tree:
         Mass, center of mass and inertia about it, in the frame of the body.
     turning : array of shape (bodies,)
         1 where the joint turns, 0 where it slides.
-    coordinate, multiplier, offset : array of shape (bodies,)
-        The coordinate of the joint is ``multiplier * q[coordinate] + offset``.
+    coordinate, multiplier : array of shape (leaders, bodies)
+        The coordinate of the joint is ``offset`` and the sum of ``multiplier * q[coordinate]``, over as many leaders as
+        any joint follows.
+    offset : array of shape (bodies,)
     slot, parent_slot : array of int, shape (bodies,)
         Where the state of the body is kept, and where that of its parent is.
     ancestors : array of shape (bodies + 1, bodies)
@@ -227,17 +230,18 @@ def arrange(
     whole = [Inertia.total(parts) if parts else MASSLESS for parts in masses]
     slots, parent_slots, count = _slots(parents)
     bodies, order = len(moving), [joint.name for joint in moving if joint.mimic is None]
-    mimics = [joint.mimic or Mimic(joint.name) for joint in moving]  # each follows another, or itself
-    coordinate = np.array([order.index(mimic.joint) for mimic in mimics], int)
-    multiplier = np.array([mimic.multiplier for mimic in mimics], float)
+    mimics = [joint.mimic or Mimic(joint.name) for joint in moving]  # each follows others, or itself
+    coordinate, multiplier = _leaders(mimics, order)
     friction = np.array([np.broadcast_to(joint.friction, 2) for joint in moving]).reshape(-1, 2) @ FORWARD_BACKWARD
+    single = np.array([not mimic.several for mimic in mimics], float)  # drives of the others couple coordinates
+    factor = multiplier[0] * single
     parts = {  # by virtual work of those of each joint
-        "armature": multiplier**2 * [joint.armature for joint in moving],
-        "damping": multiplier**2 * [joint.damping for joint in moving],
-        "friction": np.abs(multiplier) * friction[:, 0],
-        "friction_skew": multiplier * friction[:, 1],
+        "armature": factor**2 * [joint.armature for joint in moving],
+        "damping": factor**2 * [joint.damping for joint in moving],
+        "friction": np.abs(factor) * friction[:, 0],
+        "friction_skew": factor * friction[:, 1],
     }
-    drives = {field: np.bincount(coordinate, part, len(order)).astype(float) for field, part in parts.items()}
+    drives = {field: np.bincount(coordinate[0], part, len(order)).astype(float) for field, part in parts.items()}
     tendons, balls = _tendons(moving, order, couplings), _balls(order, couplings)
     turning = np.array([joint.turning for joint in moving], float)
     tree = Tree(
@@ -276,6 +280,18 @@ def arrange(
     return tree, frames
 
 
+def _leaders(mimics: Sequence[Mimic], order: Sequence[str]) -> tuple[np.ndarray, np.ndarray]:
+    """Return which coordinates joints follow, and by how much: the first one again, by zero, where there are fewer."""
+    count = max((len(mimic.weights) for mimic in mimics), default=1)
+    coordinate, multiplier = np.zeros((count, len(mimics)), int), np.zeros((count, len(mimics)))
+    for body, mimic in enumerate(mimics):
+        leaders = [order.index(name) for name in mimic.weights]
+        coordinate[:, body] = leaders[0]
+        coordinate[: len(leaders), body] = leaders
+        multiplier[: len(leaders), body] = list(mimic.weights.values())
+    return coordinate, multiplier
+
+
 def _lift(lifted: dict[int, list[tuple[Any, Any]]], frame: Frame, link: Link) -> None:
     """Note mass and first moment of a link, in its body, as far as gravity does not pull at it."""
     if link.inertia is None or link.gravity == 1:
@@ -286,12 +302,17 @@ def _lift(lifted: dict[int, list[tuple[Any, Any]]], frame: Frame, link: Link) ->
 
 
 def _tendons(moving: Sequence[Joint], order: Sequence[str], couplings: Sequence[Coupling]) -> Tendons:
-    """Return springs of joints and tendons; a joint that follows counts through the one that it follows."""
-    rows = [
-        ({joint.name: 1.0}, joint.stiffness, joint.spring_reference, 0.0, 0.0, 0.0)
-        for joint in moving
-        if joint.stiffness
-    ]
+    """Return springs of joints, drives of those that follow several, and tendons, on the joints that are followed."""
+    rows = []
+    for joint in moving:
+        losses = (0.0, 0.0, 0.0)
+        if joint.mimic is not None and joint.mimic.several:
+            if isinstance(joint.friction, tuple):
+                message = "of a joint that follows several others, friction must be alike both ways; give one number"
+                raise RobotError(message, name=f"joints.{joint.name}.friction", value=joint.friction)
+            losses = (joint.damping, joint.friction, joint.armature)
+        if joint.stiffness or any(losses):
+            rows.append(({joint.name: 1.0}, joint.stiffness, joint.spring_reference, *losses))
     lines = [line for line in couplings if isinstance(line, Tendon)]
     rows += [(line.weights, *(getattr(line, field) for field in OF_TENDON)) for line in lines]
     by_name = {joint.name: joint for joint in moving}
@@ -299,7 +320,8 @@ def _tendons(moving: Sequence[Joint], order: Sequence[str], couplings: Sequence[
     for k, (given, stiffness, rest, *others) in enumerate(rows):
         for name, weight in given.items():
             mimic = by_name[name].mimic or Mimic(name)
-            weights[k, order.index(mimic.joint)] += weight * mimic.multiplier
+            for leader, factor in mimic.weights.items():
+                weights[k, order.index(leader)] += weight * factor
             rest -= weight * mimic.offset
         numbers.append((stiffness, rest, *others))
     return Tendons(weights, *np.array(numbers, float).reshape(-1, len(OF_TENDON)).T)

@@ -29,7 +29,7 @@ from jounce.robot.recursions.drive_forces import (
     tendon_energy,
 )
 from jounce.robot.recursions.newton_euler import Turn
-from jounce.robot.recursions.tree_scan import fill_slots, of_one_body, read_slot, to_coordinates, write_slot
+from jounce.robot.recursions.tree_scan import at_joints, fill_slots, of_one_body, read_slot, to_coordinates, write_slot
 from jounce.robot.recursions.tree_sums import sums_at_parents, totals
 
 Coordinates = Float[Numbers, "coordinate batch"]
@@ -126,7 +126,7 @@ class TreeEquations(Module):
     def motion(self, coordinates: Coordinates, rates: Coordinates, base: FreeBase | None = None) -> TreeState:
         """Return where all bodies are, from the coordinates."""
         tree, lanes = self.tree, coordinates.shape[-1]
-        joints = self._at_joints(coordinates) + (0.0 if tree.shape.direct else jnp.asarray(tree.offset)[:, None])
+        joints = at_joints(tree, coordinates) + (0.0 if tree.shape.direct else jnp.asarray(tree.offset)[:, None])
         turn = Turn.of(tree, Jet([joints[:, None]]))
 
         def outward(state: Any, entry: Any) -> tuple[Any, Any]:
@@ -179,7 +179,7 @@ class TreeEquations(Module):
         tree, lanes, base = self.tree, motion.axes.shape[-1], motion.base
         turning = jnp.asarray(tree.turning)[None, :, None]
         z, arm = motion.axes[:, 2], motion.arm
-        rates, accelerations = self._at_joints(motion.rates)[None], self._at_joints(unknowns.joints)[None]
+        rates, accelerations = at_joints(tree, motion.rates)[None], at_joints(tree, unknowns.joints)[None]
         shift0 = jnp.broadcast_to(-jnp.asarray(tree.gravity)[:, None], (3, lanes))
         spin0 = spin_rate0 = jnp.zeros((3, lanes))
         if base is not None and unknowns.base is not None:
@@ -225,7 +225,7 @@ class TreeEquations(Module):
         """Return how all that a motion consists of changes."""
         tree, base = self.tree, motion.base
         turning = jnp.asarray(tree.turning)[None, :, None]
-        z, rates = motion.axes[:, 2], self._at_joints(motion.rates)[None]
+        z, rates = motion.axes[:, 2], at_joints(tree, motion.rates)[None]
         moved, spin0 = None, jnp.zeros((3, motion.axes.shape[-1]))
         if base is not None and unknowns.base is not None:
             v, w = base.twist[:3], base.twist[3:]
@@ -248,7 +248,7 @@ class TreeEquations(Module):
         if base is not None:
             place0, spin0 = base.position, _combined(base.axes, base.twist[3:])
             velocity0 = _combined(base.axes, base.twist[:3])
-        z, rates = motion.axes[:, 2], self._at_joints(motion.rates)[None]
+        z, rates = motion.axes[:, 2], at_joints(tree, motion.rates)[None]
         turn = z * (turning * rates)
         before = sums_at_parents(tree, turn, spin0)
         shift = cross(before, motion.arm) + z * ((1 - turning) * rates)
@@ -276,11 +276,6 @@ class TreeEquations(Module):
                 potential = potential + spring_energy(tree, motion.coordinates)
                 kinetic = kinetic + jnp.sum(tendon_energy(tree, Jet([motion.rates])).coefficients[0], axis=0)
         return kinetic, potential
-
-    def _at_joints(self, values: Coordinates) -> Float[Numbers, "body batch"]:
-        if self.tree.shape.direct:
-            return values
-        return jnp.take(values, jnp.asarray(self.tree.coordinate), axis=0) * jnp.asarray(self.tree.multiplier)[:, None]
 
     def _pushed(self, motion: TreeState, wrenches: Wrenches) -> Any:
         """Return forces and moments from outside, what bears weight among them, on the bodies and, last, the base."""

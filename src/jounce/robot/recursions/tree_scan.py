@@ -1,6 +1,7 @@
 """How a tree of bodies is scanned: what is carried from parents to children, and from coordinates to joints."""
 
 import dataclasses
+from collections.abc import Iterator
 from typing import Any
 
 import jax
@@ -8,6 +9,7 @@ import jax.numpy as jnp
 from jaxtyping import Float
 
 from jounce.base.shapes import Numbers
+from jounce.jet.algebra import total
 from jounce.robot.model.tree import Tree
 
 Series = Float[Numbers, "order coordinate batch"]
@@ -21,23 +23,40 @@ def joint_coordinates(tree: Tree, q: Series) -> BodySeries:
     """Return the coordinates of the joints of the bodies."""
     if tree.shape.direct:
         return q
-    q = jnp.take(q, jnp.asarray(tree.coordinate), axis=1) * jnp.asarray(tree.multiplier)[None, :, None]
+    q = at_joints(tree, q)
     return jnp.concatenate([q[:1] + jnp.asarray(tree.offset)[None, :, None], q[1:]])
 
 
-def to_coordinates(tree: Tree, forces: BodySeries) -> Series:
+def at_joints(tree: Tree, values: Float[Numbers, "*leading coordinate batch"]) -> Float[Numbers, "*leading body batch"]:
+    """Return what changes of the coordinates are at the joints of the bodies, such as their rates."""
+    if tree.shape.direct:
+        return values
+    return total(jnp.take(values, at, axis=-2) * by for at, by in _followed(tree, values.ndim))
+
+
+def to_coordinates(
+    tree: Tree, forces: Float[Numbers, "*leading body batch"]
+) -> Float[Numbers, "*leading coordinate batch"]:
     """Return generalized forces from those at the joints of the bodies."""
     if tree.shape.direct:
         return forces
-    shape = (forces.shape[0], tree.shape.coordinates, forces.shape[2])
-    weighted = forces * jnp.asarray(tree.multiplier)[None, :, None]
-    return jnp.zeros(shape).at[:, jnp.asarray(tree.coordinate)].add(weighted)
+    whole = jnp.zeros((*forces.shape[:-2], tree.shape.coordinates, forces.shape[-1]))
+    for at, by in _followed(tree, forces.ndim):
+        whole = whole.at[..., at, :].add(forces * by)
+    return whole
+
+
+def _followed(tree: Tree, dimensions: int) -> Iterator[tuple[Any, Any]]:
+    """Give the coordinates that joints follow, the first of each and so on, and by how much."""
+    shape = (*(1,) * (dimensions - 2), -1, 1)
+    for at, by in zip(jnp.asarray(tree.coordinate), jnp.asarray(tree.multiplier), strict=True):
+        yield at, jnp.reshape(by, shape)
 
 
 def entries(tree: Tree) -> Tree:
     """Return the arrays that have one entry for each body, which a scan takes apart."""
     fields = ("armature", "damping", "friction", "friction_skew", "tendons", "balls", "gravity", "ancestors")
-    fields += ("lift", "lift_moment")
+    fields += ("lift", "lift_moment", "coordinate", "multiplier")
     return dataclasses.replace(jax.tree.map(jnp.asarray, tree), **dict.fromkeys(fields))
 
 

@@ -44,7 +44,7 @@ def with_room(
     following: dict[str, list[Joint]] = {}
     for joint in joints:
         ranged = (joint.limits.lower, joint.limits.upper) != (None, None)
-        if joint.moving and joint.mimic is not None and joint.mimic.multiplier and ranged:
+        if joint.moving and joint.mimic and ranged and not joint.mimic.several and joint.mimic.multiplier:
             following.setdefault(joint.mimic.joint, []).append(joint)
     for leader in joints:
         followers = following.get(leader.name, [])

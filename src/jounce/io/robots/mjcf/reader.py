@@ -24,7 +24,8 @@ from jounce.io.robots.mjcf.ties import NO_CLOSURE, JointRelations, linear_tendon
 from jounce.rigid.inertia import Inertia
 from jounce.robot.model.couplings import Coupling
 from jounce.robot.model.floating_base import floating_joints
-from jounce.robot.model.links_and_joints import Closure, Joint, Limits, Link, Mimic, leaders
+from jounce.robot.model.links_and_joints import Closure, Joint, Limits, Link
+from jounce.robot.model.mimics import Mimic
 from jounce.robot.model.tree import quaternion_matrix, turn_about
 from jounce.robot.robot import Robot
 
@@ -262,7 +263,7 @@ class _Reader:
             else:
                 word = kinds(int(kind)).name.removeprefix("mjEQ_").lower()
                 raise RobotFileError(f"an active equality of type {word} {NO_CLOSURE}", **location)
-        self.mimics = leaders(self.ties.mimics)
+        self.mimics = self.ties.mimics
 
     def _closure(self, k: Any, name: str) -> Closure:
         """Return a connect or weld equality as a closure, with the anchors and the relative pose in MuJoCo."""

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import Any
 
 from jounce.errors import RobotFileError
 from jounce.io.robots.mjcf.files import line_of
-from jounce.robot.model.links_and_joints import Mimic
+from jounce.robot.model.mimics import Mimic
 
 INACTIVE = "remove it, or set active='false'"
+ROUNDING = 1e-12  # of what is summed up: less than this is nothing
 NO_CLOSURE = f"has no equivalent joint or closure; {INACTIVE}"
 
 
@@ -46,7 +47,9 @@ def linear_tendons(spec: Any, mujoco: Any) -> set[str]:
 
 
 class JointRelations:
-    """Relations of joints by equalities: held joints, and joints that follow others.
+    """What joints have to do with one another: those that are held, and those that follow others.
+
+    Each equality is a linear equation of coordinates, and makes one more joint follow those that are left in it.
 
     Parameters
     ----------
@@ -59,65 +62,102 @@ class JointRelations:
     def __init__(self, model: Any, mujoco: Any, names: Sequence[str]):
         self.model, self.names = model, names
         self.single = {int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_SLIDE)}
-        self.fixed: dict[str, float] = {}
-        self.mimics: dict[str, Mimic] = {}
+        on_joints = model.actuator_trntype == int(mujoco.mjtTrn.mjTRN_JOINT)
+        self.actuated = set(model.actuator_trnid[on_joints, 0].tolist())
+        self.followers: dict[int, tuple[dict[int, float], float]] = {}  # away from the pose of the file
 
     def reference(self, joint: int) -> float:
         """Return the coordinate of a joint of one axis in the pose of the file."""
         return float(self.model.qpos0[self.model.jnt_qposadr[joint]])
 
+    @property
+    def fixed(self) -> dict[str, float]:
+        """The coordinates of joints that are held."""
+        return {
+            self.names[joint]: self.reference(joint) + start
+            for joint, (slopes, start) in self.followers.items()
+            if not slopes
+        }
+
+    @property
+    def mimics(self) -> dict[str, Mimic]:
+        """What joints follow, which follow no other."""
+        return {
+            self.names[joint]: Mimic(
+                [self.names[leader] for leader in slopes],
+                list(slopes.values()),
+                self.reference(joint) + start - sum(slope * self.reference(k) for k, slope in slopes.items()),
+            )
+            for joint, (slopes, start) in self.followers.items()
+            if slopes
+        }
+
     def add_joints(self, k: Any, location: Mapping[str, Any]) -> None:
         """Add an equality of one joint, or of two: ``q_1 - ref_1 = a_0 + a_1 (q_2 - ref_2)``."""
         first, second = int(self.model.eq_obj1id[k]), int(self.model.eq_obj2id[k])
-        coefficients = self.model.eq_data[k][:5]
-        self._check_free(first, (first,) if second < 0 else (first, second), location)
-        start = self.reference(first) + float(coefficients[0])
-        if second < 0:
-            self.fixed[self.names[first]] = start
-        elif any(coefficients[2:]):
-            message = "a joint can follow another linearly only; make the last three of polycoef zero"
-            raise RobotFileError(message, **location, value=coefficients.tolist())
-        else:
-            self._follow(first, second, float(coefficients[1]), start)
+        constant, slope = self._line(k, "joint", second >= 0, location)
+        self._tie({first: 1.0} if second < 0 else {first: 1.0, second: -slope}, constant, location, {first})
 
     def add_tendons(self, k: Any, location: Mapping[str, Any]) -> None:
         """Add an equality of one tendon, or of two, whose lengths are weighted sums of coordinates.
 
-        ``L_1 - ref_1 = a_0 + a_1 (L_2 - ref_2)``: of two joints, the second follows the first, unless it follows
-        another.
+        ``L_1 - ref_1 = a_0 + a_1 (L_2 - ref_2)``: the last joint follows the others, unless it follows some already; of
+        three or more, the last one without an actuator, if there is one.
         """
         model = self.model
         first, second = int(model.eq_obj1id[k]), int(model.eq_obj2id[k])
-        constant, slope, *curve = (float(number) for number in model.eq_data[k][:5])
-        if second >= 0 and any(curve):
-            message = "a tendon can follow another linearly only; make the last three of polycoef zero"
-            raise RobotFileError(message, **location, value=model.eq_data[k][:5].tolist())
+        constant, slope = self._line(k, "tendon", second >= 0, location)
         weights: dict[int, float] = {}
         for tendon, factor in ((first, 1.0), (second, -slope)):
             start = model.tendon_adr[tendon]
             for part in range(start, start + model.tendon_num[tendon]) if tendon >= 0 else ():
                 joint = int(model.wrap_objid[part])
                 weights[joint] = weights.get(joint, 0.0) + factor * float(model.wrap_prm[part])
-        tied = [joint for joint, weight in weights.items() if weight]
-        if len(tied) not in (1, 2):
-            message = f"a joint can follow one other only, and this ties another number of them; {INACTIVE}"
-            raise RobotFileError(message, **location, value=[self.names[joint] for joint in tied])
-        leader, follower = tied[0], tied[-1]
-        if self.names[follower] in self.mimics:
-            leader, follower = follower, leader
-        self._check_free(follower, tied, location)
-        start = self.reference(follower) + constant / weights[follower]
-        if len(tied) == 1:
-            self.fixed[self.names[follower]] = start
-        else:
-            self._follow(follower, leader, -weights[leader] / weights[follower], start)
+        self._tie(weights, constant, location)
 
-    def _follow(self, joint: int, leader: int, slope: float, start: float) -> None:
-        """Make a joint follow another; it is at `start` if the other is in the pose of the file."""
-        self.mimics[self.names[joint]] = Mimic(self.names[leader], slope, start - slope * self.reference(leader))
+    def _line(self, k: Any, kind: str, two: bool, location: Mapping[str, Any]) -> tuple[float, float]:
+        """Return the first two coefficients of an equality, of which only those count that it needs."""
+        constant, slope, *curve = (float(number) for number in self.model.eq_data[k][:5])
+        if two and any(curve):
+            message = f"a {kind} can follow another linearly only; make the last three of polycoef zero"
+            raise RobotFileError(message, **location, value=self.model.eq_data[k][:5].tolist())
+        return constant, slope
 
-    def _check_free(self, joint: int, tied: Sequence[int], location: Mapping[str, Any]) -> None:
-        name = self.names[joint]
-        if {int(self.model.jnt_type[j]) for j in tied} - self.single or name in self.mimics or name in self.fixed:
-            message = "ties a joint of several coordinates, or one that is tied already"
-            raise RobotFileError(message, **location, value=name)
+    def _tie(
+        self, weights: Mapping[int, float], constant: float, location: Mapping[str, Any], first: Collection[int] = ()
+    ) -> None:
+        """Take the equation that weighted coordinates, away from the pose of the file, sum up to a constant.
+
+        Of the joints that are left in it one follows: those of `first` go before those without an actuator, if there
+        are three or more, these before those of the equation itself, and the last ones before others.
+        """
+        for joint, weight in weights.items():
+            if weight and int(self.model.jnt_type[joint]) not in self.single:
+                message = "an equality cannot tie a joint of several coordinates; close a loop by connect or weld"
+                raise RobotFileError(f"{message}, or {INACTIVE}", **location, value=self.names[joint])
+        left, rest, sizes = dict[int, float](), constant, dict[int, float]()
+        for joint, weight in weights.items():
+            slopes, start = self.followers.get(joint, ({joint: 1.0}, 0.0))
+            rest -= weight * start
+            for leader, slope in slopes.items():
+                left[leader] = left.get(leader, 0.0) + weight * slope
+                sizes[leader] = sizes.get(leader, 0.0) + abs(weight * slope)
+        left = {joint: weight for joint, weight in left.items() if abs(weight) > ROUNDING * sizes[joint]}
+        if not left:
+            size = abs(constant) + sum(abs(w * self.followers[j][1]) for j, w in weights.items() if j in self.followers)
+            if abs(rest) > ROUNDING * size:
+                tied = [self.names[joint] for joint, weight in weights.items() if weight]
+                message = f"contradicts the equalities before it, by {rest:.6g}; {INACTIVE}"
+                raise RobotFileError(message, **location, value=tied)
+            return
+        passive = set(left) - self.actuated if len(left) > 2 else set[int]()
+        follower = max(left, key=lambda j: (j in first, j in passive, j in weights, list(left).index(j)))
+        whole = left.pop(follower)
+        made = ({joint: -weight / whole for joint, weight in left.items()}, rest / whole)
+        for joint, (slopes, start) in self.followers.items():
+            if follower in slopes:
+                factor = slopes.pop(follower)
+                for leader, slope in made[0].items():
+                    slopes[leader] = slopes.get(leader, 0.0) + factor * slope
+                self.followers[joint] = ({k: x for k, x in slopes.items() if x}, start + factor * made[1])
+        self.followers[follower] = made

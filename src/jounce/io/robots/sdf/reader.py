@@ -33,7 +33,8 @@ from jounce.io.robots.sdf.poses import (
 )
 from jounce.io.robots.sdf.scopes import named
 from jounce.robot.model.floating_base import floating_joints
-from jounce.robot.model.links_and_joints import Closure, Joint, Link, Mimic, leaders
+from jounce.robot.model.links_and_joints import Closure, Joint, Link
+from jounce.robot.model.mimics import Mimic, leaders
 from jounce.robot.robot import Robot
 
 TREE_FIRST = ("fixed", "screw", "revolute", "continuous", "prismatic", "universal", "revolute2", "ball")

@@ -31,7 +31,8 @@ from jounce.io.robots.urdf.extensions import Loop, joint_springs, shares_of_grav
 from jounce.io.robots.urdf.left_out import check_version, note_left_out, rotors
 from jounce.rigid.inertia import Inertia
 from jounce.robot.model.floating_base import floating_joints
-from jounce.robot.model.links_and_joints import Closure, Joint, Limits, Link, Mimic, leaders
+from jounce.robot.model.links_and_joints import Closure, Joint, Limits, Link
+from jounce.robot.model.mimics import Mimic, leaders
 from jounce.robot.model.tree import axes_with_z_along, ordered
 from jounce.robot.robot import Robot
 

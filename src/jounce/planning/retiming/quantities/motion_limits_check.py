@@ -100,7 +100,7 @@ def _ends(
     selected = []
     for k, end in enumerate(ends):
         more = [
-            (name, word_of(robot, quantity, joint)[0])
+            (name, word_of(robot.joints[name], quantity)[0])
             for joint, name in enumerate(robot.joint_names)
             for quantity, field in enumerate(FIELDS)
             if signs[k, quantity, joint] and {field, _PARTNERS.get(field, field)} & limits.own(name)

@@ -6,6 +6,7 @@ import numpy as np
 from jaxtyping import Float
 
 from jounce.dynamics.limits.check_limits import REST, SLIDING, TURNING
+from jounce.dynamics.limits.shared_followers import SharedFollowers
 from jounce.dynamics.limits.trajectories import FollowedTrajectory
 from jounce.errors import RobotError, TrajectoryError
 from jounce.planning.paths.path import Path
@@ -66,12 +67,15 @@ class RobotQuantities:
         self.changes = self.loaded.changes
         followed = FollowedTrajectory(robot, JointTrajectory(dict(path.laws), path.start, path.stop), given=False)
         self.columns, self.resting_joints = followed.columns, followed.resting_joints
-        names = robot.joint_names
-        self.moved = [k for k, name in enumerate(names) if name not in self.resting_joints]
+        self.shared, count = SharedFollowers.of(robot), len(robot.joint_names)
+        self.own_limits = {**self.limits.joints, **self.shared.limits}
+        self.names = names = (*robot.joint_names, *self.shared.names)
+        self.moved = [k for k, name in enumerate(robot.joint_names) if name not in self.resting_joints]
+        self.moved += [count + k for k in self.shared.moving(self.columns)]
         self.with_velocity = self._limited("velocity")
         self.with_acceleration = self._limited("acceleration", "deceleration", "jerk")
         self.with_jounce = [k for k in self.moved if self._has(names[k], "jounce")]
-        self.with_effort = [k for k in range(len(names)) if self._has(names[k], "effort", "effort_rate")]
+        self.with_effort = [k for k in range(count) if self._has(names[k], "effort", "effort_rate")]
         self.labels = self._labels()
 
     def __call__(self, s: _Points) -> PathQuantities:
@@ -92,13 +96,16 @@ class RobotQuantities:
         """Return the positions of all joints and their derivatives by s."""
         return self.whole(self.path.derivatives(s, ORDER))
 
-    def whole(self, motion: Float[np.ndarray, "point 5 own"]) -> Float[np.ndarray, "point 5 joint"]:
-        """Return positions and derivatives of all joints, of those of the joints of the path."""
-        q = np.zeros((len(motion), ORDER + 1, len(self.robot.joint_names)))
+    def whole(self, motion: Float[np.ndarray, "point level own"]) -> Float[np.ndarray, "point level joint"]:
+        """Return positions and derivatives of all joints, of those of the joints of the path.
+
+        Joints that follow several and have limits come last.
+        """
+        q = np.zeros((*motion.shape[:2], len(self.robot.joint_names)))
         for name, value in self.resting_joints.items():
             q[:, 0, self.robot.joint_names.index(name)] = value
         q[:, :, self.columns] = motion
-        return q
+        return self.shared.beside(q)
 
     def location(self, s: float) -> str:
         """Say where on the path a value of s is."""
@@ -143,6 +150,7 @@ class RobotQuantities:
     def _torques(self, q: np.ndarray, s: _Points) -> Float[np.ndarray, "point joint 8"]:
         """Return the coefficients of the torques: exact values for a few rates of s, and the polynomials they are."""
         first, second = (x[:, None, None] for x in CASES.T)
+        q = q[..., : len(self.robot.joint_names)]
         _, q1, q2, q3, _ = np.moveaxis(q, 1, 0)
         at = np.broadcast_to(q[:, 0], (len(CASES), *q[:, 0].shape))
         moving = (at, q1 * first, q1 * second + q2 * first**2, 3 * q2 * first * second + q3 * first**3)
@@ -164,11 +172,12 @@ class RobotQuantities:
 
     def point(self, q: np.ndarray, point: object) -> Float[np.ndarray, "point 3 3"]:
         """Return the position, velocity and acceleration of a point for coordinates with derivatives."""
-        return np.asarray(forward_kinematics(self.robot, q[:, :3], point.link, point.point).position)  # type: ignore[attr-defined]
+        q = q[:, :3, : len(self.robot.joint_names)]
+        return np.asarray(forward_kinematics(self.robot, q, point.link, point.point).position)  # type: ignore[attr-defined]
 
     def _has(self, name: str, *fields: str) -> bool:
         """Whether a joint has one of some limits."""
-        constant, varying = self.limits.joints[name], self.limits.varying.get(name, {})
+        constant, varying = self.own_limits[name], self.limits.varying.get(name, {})
         others, backward = {"jounce": self.limits.jounce.get(name)}, self.limits.backward.get(name, Limits())
         return any(
             f in varying
@@ -178,14 +187,14 @@ class RobotQuantities:
         )
 
     def _limited(self, *fields: str) -> list[int]:
-        return [k for k in self.moved if self._has(self.robot.joint_names[k], *fields)]
+        return [k for k in self.moved if self._has(self.names[k], *fields)]
 
     def both_ways(self, field: str, chosen: list[int], q: np.ndarray) -> tuple[_Table, _Table]:
         """Return the limits of some joints at points, above zero and below it."""
         forward = self._bounds(field, chosen, q)
         backward = forward.copy()
         for column, k in enumerate(chosen):
-            entry = self.limits.backward.get(self.robot.joint_names[k])
+            entry = self.limits.backward.get(self.names[k])
             if entry is not None and getattr(entry, field) is not None:
                 backward[:, column] = getattr(entry, field)
         return forward, backward
@@ -194,12 +203,12 @@ class RobotQuantities:
         """Return the limits of some joints at points, infinite where there is none."""
         bounds = np.full((len(q), len(chosen)), np.inf)
         for column, k in enumerate(chosen):
-            name = self.robot.joint_names[k]
+            name = self.names[k]
             law = self.limits.varying.get(name, {}).get(field)
             if law is not None:
                 bounds[:, column] = self._law_values(name, field, law, q[:, 0, k])
                 continue
-            constant = self.limits.jounce.get(name) if field == "jounce" else getattr(self.limits.joints[name], field)
+            constant = self.limits.jounce.get(name) if field == "jounce" else getattr(self.own_limits[name], field)
             if constant is not None:
                 bounds[:, column] = constant
         return bounds
@@ -215,7 +224,7 @@ class RobotQuantities:
         return values
 
     def _labels(self) -> Labels:
-        names = self.robot.joint_names
+        names = self.names
 
         def label(k: int, field: str) -> Quantity:
             turning = self.robot.joints[names[k]].turning
@@ -237,9 +246,10 @@ class RobotQuantities:
     def check_range(self) -> None:
         """Raise TrajectoryError where the path leaves the range of a joint: no time law can mend that."""
         s = np.linspace(self.path.start, self.path.stop, 2001)
-        q = self.path.derivatives(s, 0)[:, 0]
-        for column, name in enumerate(self.path.names):
-            limits = self.limits.joints[name]
+        q = self.whole(self.path.derivatives(s, 0))[:, 0]
+        for column in self.moved:
+            name = self.names[column]
+            limits = self.own_limits[name]
             for bound, sign, word in ((limits.upper, 1, "above"), (limits.lower, -1, "below")):
                 if bound is None:
                     continue
