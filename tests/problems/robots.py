@@ -12,7 +12,8 @@ from jounce.robot.model.mimics import Mimic
 from jounce.robot.robot import Robot
 
 FILES = pathlib.Path(__file__).parents[2] / "examples" / "robots"
-NAMES = ("panda", "ur5", "solo12", "scara", "planar_arm", "serial", "branched", "mimic", "floating_solo12")
+OF_FILES = ("panda", "ur5", "solo12", "scara", "planar_arm")
+NAMES = (*OF_FILES, "serial", "branched", "mimic", "several", "floating_solo12")
 """Names of `bank`: every one is a robot that `robot_named` makes."""
 
 
@@ -25,10 +26,11 @@ def random_inertia(generator):
     return Inertia(masses.sum(), generator.uniform(-0.15, 0.15, 3), tensor)
 
 
-def random_robot(seed, joints, tree=True, prismatic=0.25, mimic=0.0, fixed=0.2):
+def random_robot(seed, joints, tree=True, prismatic=0.25, mimic=0.0, fixed=0.2, several=False):
     """Return a robot of random joints, axes, poses and inertias; a chain unless `tree`.
 
-    `prismatic`, `mimic` and `fixed` are the shares of joints that slide, follow an earlier one, and carry a fixed link.
+    `prismatic`, `mimic` and `fixed` are the shares of joints that slide, follow an earlier one, or up to three if
+    `several`, and carry a fixed link.
     """
     generator = np.random.default_rng(seed)
     links, made, ends, masters = [Link("base")], [], ["base"], []
@@ -36,7 +38,12 @@ def random_robot(seed, joints, tree=True, prismatic=0.25, mimic=0.0, fixed=0.2):
         parent = ends[generator.integers(max(0, len(ends) - 3), len(ends))] if tree else ends[-1]
         slides = generator.random() < prismatic
         follows = None
-        if masters and generator.random() < mimic:
+        led = masters and generator.random() < mimic
+        if led and several and len(masters) > 1:
+            count = int(generator.integers(2, min(3, len(masters)) + 1))
+            leaders = generator.choice(masters, count, replace=False).tolist()
+            follows = Mimic(leaders, generator.uniform(-1.5, 1.5, count).tolist(), generator.uniform(-1, 1))
+        elif led:
             follows = Mimic(
                 masters[generator.integers(len(masters))], generator.uniform(-1.5, 1.5), generator.uniform(-1, 1)
             )
@@ -106,6 +113,7 @@ def robot_named(name):
         "serial": lambda: random_robot(5, 6, tree=False),
         "branched": lambda: random_robot(2, 9),
         "mimic": lambda: random_robot(3, 8, mimic=0.4),
+        "several": lambda: random_robot(13, 8, mimic=0.5, several=True),
         "humanoid": humanoid,
     }
     return made[name]()
