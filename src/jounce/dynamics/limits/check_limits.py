@@ -124,7 +124,7 @@ def check_limits(
         """Return all quantities of all joints, shape (time, 6, columns)."""
         q = followed.coordinates(times, ORDER)
         quantities = np.zeros((len(q), len(FIELDS), len(names)))
-        quantities[:, : ORDER + 1] = shared.beside(q)
+        quantities[:, : ORDER + 1] = shared.with_followers(q)
         quantities[:, list(EFFORTS), :count] = followed.torques(q, times, drives)
         return quantities
 

@@ -53,7 +53,9 @@ class SharedFollowers:
         """Return which of them move where some coordinates do."""
         return [k for k, row in enumerate(self.weights) if row[columns].any()]
 
-    def beside(self, q: Float[np.ndarray, "time derivative coordinate"]) -> Float[np.ndarray, "time derivative column"]:
+    def with_followers(
+        self, q: Float[np.ndarray, "time derivative coordinate"]
+    ) -> Float[np.ndarray, "time derivative column"]:
         """Return coordinates with derivatives, and theirs behind them."""
         own = q @ self.weights.T
         own[:, 0] += self.offset
@@ -61,7 +63,7 @@ class SharedFollowers:
 
     def infinite(self, infinite: Infinite, jumps: Jumps) -> Infinite:
         """Return which quantities are infinite where coordinates jump, and theirs behind them."""
-        before, after = (self.beside(x) for x in (jumps.before, jumps.after))
+        before, after = (self.with_followers(x) for x in (jumps.before, jumps.after))
         sizes = np.abs(jumps.after - jumps.before) @ np.abs(self.weights).T
         same = np.abs(after - before)[:, :, len(self.weights.T) :] <= SMALL * sizes  # jumps that cancel
         later = after[:, :, len(self.weights.T) :]

@@ -250,10 +250,10 @@ def _link(robot: Robot, name: str) -> dict[str, Any]:
 def _joint(joint: Joint) -> dict[str, Any]:
     mimic: MimicFacts | None = None
     if joint.mimic is not None:
-        leaders, multipliers = list(joint.mimic.weights), list(joint.mimic.weights.values())
+        leaders, multipliers = joint.mimic.joint, joint.mimic.multiplier
+        if joint.mimic.several:
+            leaders, multipliers = list(leaders), list(multipliers)
         mimic = {"joint": leaders, "multiplier": multipliers, "offset": joint.mimic.offset}
-        if not joint.mimic.several:
-            mimic |= {"joint": leaders[0], "multiplier": multipliers[0]}
     return {
         "name": joint.name,
         "type": joint.type,

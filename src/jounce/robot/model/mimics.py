@@ -40,12 +40,12 @@ class Mimic:
     offset: float = 0.0
 
     def __post_init__(self) -> None:
-        names = (self.joint,) if isinstance(self.joint, str) else tuple(self.joint)
+        names = [self.joint] if isinstance(self.joint, str) else list(self.joint)
         if not names or len(set(names)) < len(names):
             raise RobotError("must be a joint, or different ones", name="mimic.joint", value=self.joint)
         numbers = finite_numbers("mimic.multiplier", self.multiplier, (), (len(names),))
         multipliers = tuple(float(x) for x in np.broadcast_to(numbers, len(names)))
-        object.__setattr__(self, "joint", names if len(names) > 1 else names[0])
+        object.__setattr__(self, "joint", tuple(names) if len(names) > 1 else names[0])
         object.__setattr__(self, "multiplier", multipliers if len(names) > 1 else multipliers[0])
         object.__setattr__(self, "offset", float(finite_numbers("mimic.offset", self.offset, ())))
 

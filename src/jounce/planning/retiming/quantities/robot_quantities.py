@@ -105,7 +105,7 @@ class RobotQuantities:
         for name, value in self.resting_joints.items():
             q[:, 0, self.robot.joint_names.index(name)] = value
         q[:, :, self.columns] = motion
-        return self.shared.beside(q)
+        return self.shared.with_followers(q)
 
     def location(self, s: float) -> str:
         """Say where on the path a value of s is."""
