@@ -269,3 +269,50 @@ def test_other_words_for_the_keys_are_refused_with_the_key(refused):
         "line 1, joints.pin.torque: the key for that is 'effort'"
     )
     assert "the key for that is 'velocity'" in refused("default: {max_velocity: 5 rad/s}")
+
+
+MOVEIT = """
+default_velocity_scaling_factor: 0.1
+joint_limits:
+  slide:
+    has_velocity_limits: false
+    max_velocity: 1.5
+    has_position_limits: true
+    min_position: -0.5
+    max_position: 0.5
+    has_acceleration_limits: false
+    max_acceleration: 0
+  pin: {has_velocity_limits: true, max_velocity: !degrees 90, max_acceleration: 4, has_jerk_limits: true, max_jerk: 50}
+  finger: {has_velocity_limits: true, max_velocity: 1}
+"""
+
+
+def test_limits_of_moveit(read):
+    """A false flag takes a limit away, also the robot's own; without a flag a value counts, as MoveIt has it."""
+    with pytest.warns(jn.errors.RobotWarning) as caught:
+        limits = read(MOVEIT)
+    assert limits["slide"] == jn.Limits(lower=-0.5, upper=0.5)
+    assert limits["pin"] == jn.Limits(velocity=math.pi / 2, acceleration=4.0, jerk=50.0, effort=5.0)
+    words = str(caught[0].message)
+    assert "line 3, joint_limits: left out, as no coordinates of crane: finger; default_velocity" in words
+    assert "default_velocity_scaling_factor: 0.1 do not count" in words
+    alone = "/**:\n  ros__parameters:\n    robot_description_planning:\n      joint_limits: {pin: {max_effort: 7}}"
+    assert read(alone)["pin"] == jn.Limits(velocity=3.0, effort=7.0)
+
+
+@pytest.mark.parametrize(
+    "text, says",
+    [
+        (
+            "joint_limits: {pni: {max_velocity: 1}}",
+            "line 1, joint_limits.pni: no moving joint of crane has this name; did you mean 'pin'?",
+        ),
+        ("joint_limits: {pin: {max_speed: 1}}", "line 1, joint_limits.pin.max_speed: unknown key"),
+        ("joint_limits: {pin: {has_velocity_limits: 1}}", "line 1, joint_limits.pin.has_velocity_limits: must be true"),
+        ("joint_limits: {pin: {max_velocity: 0}}", "line 1, joint_limits.pin.max_velocity: must be greater than zero"),
+        ("joint_limits: {pin: {max_velocity: !deg 1}}", "line 1, joint_limits.pin.max_velocity: the YAML tag !deg is"),
+        ("joints: {pin: {velocity: !degrees fast}}", "line 1, joints.pin.velocity: the YAML tag !degrees is not"),
+    ],
+)
+def test_limits_of_moveit_that_are_wrong(refused, text, says):
+    assert refused(text).startswith(says)

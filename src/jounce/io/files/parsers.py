@@ -6,6 +6,7 @@ None of them recurses over the data: too deeply nested input is refused at a lim
 from __future__ import annotations
 
 import json
+import math
 import re
 from collections.abc import Iterator
 from typing import Any
@@ -29,6 +30,8 @@ _BOOLEANS = {"true": True, "True": True, "TRUE": True, "false": False, "False": 
 _INTEGER = re.compile(r"[-+]?[0-9]+")
 _BASED = re.compile(r"0o[0-7]+|0x[0-9a-fA-F]+")
 _FLOAT = re.compile(r"[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)([eE][-+]?[0-9]+)?")
+ANGLE_TAGS = {"!degrees": math.pi / 180, "!radians": 1.0}
+"""Tags of YAML for xacro, which say of numbers only that they are to be converted to SI units."""
 _SPECIAL = re.compile(r"[-+]?\.(inf|Inf|INF)|\.(nan|NaN|NAN)")
 
 
@@ -64,8 +67,7 @@ def read_yaml(path: str, text: str, *, many: bool = False) -> Source:
         for event in YAML(typ="safe", pure=True).parse(text):
             line = event.start_mark.line + 1
             if isinstance(event, kinds.ScalarEvent):
-                _refuse_tag(builder, event, line)
-                value = plain_scalar(event.value) if event.implicit[0] else event.value
+                value = _scalar(builder, event, line)
                 if builder.expects_key:
                     builder.key(value, line)
                 else:
@@ -97,6 +99,15 @@ def _builder(path: str, *, many: bool) -> Builder:
     if many:
         builder.open([], 1)
     return builder
+
+
+def _scalar(builder: Builder, event: Any, line: int) -> Any:
+    """Return what a scalar stands for, in SI units where a tag of xacro is before it, as in ``!degrees 120``."""
+    number, size = plain_scalar(event.value), ANGLE_TAGS.get(str(event.ctag))
+    if size is not None and isinstance(number, int | float) and not isinstance(number, bool):
+        return float(number * size)
+    _refuse_tag(builder, event, line)
+    return number if event.implicit[0] else event.value
 
 
 def _refuse_tag(builder: Builder, event: Any, line: int) -> None:

@@ -166,6 +166,12 @@ def check_named(table: Table) -> int:
     if line is None:
         message = "the first row holds the names of the columns: time, then the joints"
         raise table.error(message, line=table.rows[0][0], value=", ".join(table.rows[0][1]))
+    if len(header) > 3 and [_number(name) is None for name in header[:3]] == [False, False, True]:
+        message = (
+            "the first row holds the names of the columns, and this one has numbers; 'ros2 topic echo --csv' writes no "
+            "names: leave --csv out, and give the YAML"
+        )
+        raise table.error(message, line=line, value=", ".join(header[:3]))
     known: set[str] = set()
     for k, name in enumerate(header):
         if not name:
@@ -238,6 +244,7 @@ class Table:
         if not self.rows:
             raise self.error("the file of samples is empty")
         self._check_commas()
+        self.rows = _without_empty_end(self.rows)
         self.header_line: int | None = None
         self.header = [f"column {k + 1}" for k in range(len(self.rows[0][1]))]
         self.units: list[str | None] = [None] * len(self.header)
@@ -350,6 +357,13 @@ def _without_comments(rows: list[tuple[int, list[str]]]) -> list[tuple[int, list
     numbers = rows[first][1] if first < len(rows) else []
     named = first > 0 and len(rows[first - 1][1]) == len(numbers) and all(_number(x) is not None for x in numbers)
     return rows[first - named :]
+
+
+def _without_empty_end(rows: list[tuple[int, list[str]]]) -> list[tuple[int, list[str]]]:
+    """Return rows without their last entry where that is empty in all, as where each row ends with a comma."""
+    if any(len(row) < 2 or len(row) != len(rows[0][1]) or row[-1] for _, row in rows):
+        return rows
+    return [(line, row[:-1]) for line, row in rows]
 
 
 def _number(text: str) -> float | None:

@@ -14,6 +14,7 @@ import numpy as np
 from jounce.errors import RobotError, UnitWarning, no_such, warn_caller
 from jounce.io.files.located_data import Location, Source, dotted
 from jounce.io.files.source import read_source
+from jounce.io.robots.moveit_limits import moveit_limits
 from jounce.jet import Jet
 from jounce.mechanism.laws.angle_laws import IN_SI, number_doubt
 from jounce.planning.retiming.quantities.limits import VARYING, MotionLimits, PointLimits, PositionLaw
@@ -59,7 +60,8 @@ def load_limits(path: str | PathLike[str], robot: Robot) -> dict[str, Limits]:
     force) and ``effort_rate``. A value is a number in SI units or a number with a unit; ``null`` removes a limit. The
     entry of a joint precedes ``default``, which precedes the robot's own limits; limits of joints that follow others
     hold as well. A default with a unit of angle or torque holds for joints that turn, one with a unit of length or
-    force for joints that slide.
+    force for joints that slide. The ``joint_limits.yaml`` of MoveIt and ros2_control is read as it is, with the keys
+    ``max_velocity``, ``has_velocity_limits`` and so on.
 
     Parameters
     ----------
@@ -149,15 +151,14 @@ class _LimitsFile:
 
     def limits(self) -> dict[str, Limits]:
         """Return the limits of every joint."""
-        data = self.source.mapping((), ("title", "default", "joints", "points"))
-        if not data.keys() & {"default", "joints", "points"}:
-            raise self.source.error("a limits file has the keys 'joints', 'default' or 'points'", value=list(data))
-        default = self.source.mapping(("default",), KEYS, others=OTHER_WORDS) if "default" in data else {}
-        joints = self.source.mapping(("joints",)) if "joints" in data else {}
-        for name in joints:
-            if name not in self.robot.joint_names:
-                raise self.source.error(self._why_not(name), ("joints", name))
-            self.source.mapping(("joints", name), KEYS, others=OTHER_WORDS)
+        default: Mapping[str, Any] = {}
+        joints = moveit_limits(self.source, self.robot)
+        if joints is None:
+            data = self.source.mapping((), ("title", "default", "joints", "points"))
+            if not data.keys() & {"default", "joints", "points"}:
+                raise self.source.error("a limits file has the keys 'joints', 'default' or 'points'", value=list(data))
+            default = self.source.mapping(("default",), KEYS, others=OTHER_WORDS) if "default" in data else {}
+            joints = self._joints() if "joints" in data else {}
         for key in default:
             self._check_default(key)
         limits = {name: self._of(name, default, joints.get(name, {})) for name in self.robot.joint_names}
@@ -167,10 +168,21 @@ class _LimitsFile:
         try:
             return self.robot.limits_with(limits)
         except RobotError as error:
-            at: Location = ("joints", error.name) if error.name in joints else ("default",)
+            at: Location = next((at[:-1] for _, at in joints.get(error.name or "", {}).values()), ("default",))
             raise self.source.error(error.message, at, value=error.value) from None
 
-    def _of(self, name: str, default: Mapping[str, Any], own: Mapping[str, Any]) -> Limits:
+    def _joints(self) -> dict[str, dict[str, tuple[Any, Location]]]:
+        """Return the entries of joints by key, each with its place."""
+        entries = {}
+        for name in self.source.mapping(("joints",)):
+            at: Location = ("joints", name)
+            if name not in self.robot.joint_names:
+                raise self.source.error(self._why_not(name), at)
+            entry = self.source.mapping(at, KEYS, others=OTHER_WORDS)
+            entries[name] = {key: (raw, (*at, key)) for key, raw in entry.items()}
+        return entries
+
+    def _of(self, name: str, default: Mapping[str, Any], own: Mapping[str, tuple[Any, Location]]) -> Limits:
         joint = self.robot.joints[name]
         values = dataclasses.asdict(joint.limits) | {"jounce": None}
         locations: dict[str, Location] = {}
@@ -178,8 +190,8 @@ class _LimitsFile:
             if self._fits(raw, key, joint):
                 locations[key] = ("default", key)
                 values[key] = self._value(raw, key, locations[key], joint)
-        for key, raw in own.items():
-            locations[key] = ("joints", name, key)
+        for key, (raw, at) in own.items():
+            locations[key] = at
             if isinstance(raw, list) and key in VARYING and key != "jounce":
                 below, values[key] = self._range(raw, key, locations[key], joint)
                 self.backward.setdefault(name, {})[key] = below

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import dataclasses
+import re
 from collections.abc import Callable, Sequence
+from datetime import datetime
 from decimal import Decimal, InvalidOperation
 
 import numpy as np
@@ -21,6 +23,10 @@ MOST_REPEATED = 0.5  # largest share of repeated stamps
 BACK = 40  # number of steps by which a row may be late
 ROUGHER = 1.5  # largest ratio of the path lengths in the order of stamps and in that of the file
 GAP = 20  # times the median step, beyond which a spline says little about the motion between two samples
+_DATE = re.compile(
+    r"(?P<date>[0-9]{4}-[0-9]{2}-[0-9]{2})[T ](?P<time>[0-9]{2}:[0-9]{2}:[0-9]{2})(?P<part>[.,][0-9]+)?"
+    r"\s*(?P<zone>Z|[-+][0-9]{2}:?[0-9]{2})?"
+)
 SAME = 1.5  # times the largest neighboring step, within which positions at one stamp must agree
 
 
@@ -50,6 +56,7 @@ def relative(
     TrajectoryError
         If a stamp is no finite number.
     """
+    texts = [_seconds_of_date(text) or text for text in texts]
     values = np.empty(len(texts))
     for k, text in enumerate(texts):
         try:
@@ -69,6 +76,21 @@ def relative(
         return values, ""
     digits, words = epoch_unit
     return np.array([float((stamp - exact[0]).scaleb(-digits)) for stamp in exact]), words
+
+
+def _seconds_of_date(text: str) -> str | None:
+    """Return the seconds since 1970 of a date with a time, as ISO 8601 has it, without loss of digits; None if none.
+
+    Without a zone it is taken for Greenwich time: only differences count.
+    """
+    match = _DATE.fullmatch(text.strip())
+    if match is None:
+        return None
+    try:
+        date = datetime.fromisoformat(f"{match['date']}T{match['time']}{match['zone'] or '+00:00'}")
+    except ValueError:  # no such day
+        return None
+    return f"{int(date.timestamp())}{(match['part'] or '').replace(',', '.')}"
 
 
 def epoch(first: Decimal, per_second: int = 1, unit: str | None = None) -> tuple[int, str] | None:

@@ -5,9 +5,13 @@ from __future__ import annotations
 import dataclasses
 import re
 from collections.abc import Mapping, Sequence
+from decimal import Decimal
+
+import numpy as np
 
 from jounce.errors import TrajectoryError
 from jounce.io.files.column_units import name_and_last_word
+from jounce.io.files.long_tables import Numbers
 from jounce.io.files.samples import ROW_NUMBER, Table
 from jounce.io.trajectories.stamps import NANO
 from jounce.units.dimensions import NUMBER, TIME
@@ -34,6 +38,9 @@ OTHER_QUANTITIES = frozenset(
 """Words in the names of columns that hold no positions."""
 _BETWEEN_WORDS = re.compile(r"[^A-Za-z]+|(?<=[a-z])(?=[A-Z])")
 _WITH_NUMBER = re.compile(r"(?P<word>[A-Za-z_/.]*[A-Za-z])_?(?P<open>\[)?(?P<number>[0-9]+)(?(open)\])$")
+NANOSECONDS = ("nanosec", "nanosecs", "nsec", "nsecs")
+_SECONDS = re.compile(r"(?P<before>(?:.*[._/ ])?)secs?")
+_WHOLE = re.compile(r"\s*[-+]?[0-9]+(?:\.0*)?\s*")
 _SUFFIX = re.compile(rf"(?P<joint>.+)[_./ ](?P<word>{'|'.join(WORDS)})$")
 _RATE = re.compile(r"(?P<joint>.+)_d[0-9]+$")
 
@@ -102,6 +109,50 @@ def take_units(table: Table) -> None:
         if (other := table.header.index(name)) != k:
             message = f"two columns are of the same joint, {header[other]} and {header[k]}; leave one of them out"
             raise table.error(message, line=table.header_line, name=name)
+
+
+def join_stamps(table: Table) -> None:
+    """Join seconds and nanoseconds in columns of their own, as ``sec`` and ``nanosec``, to a column of times.
+
+    Nothing is done where another column is named after the time.
+    """
+    header = table.header
+    if _time(header) is not None:
+        return
+    for k, name in enumerate(header):
+        if (match := _SECONDS.fullmatch(name)) is None:
+            continue
+        others = [f"{match['before']}{word}" for word in NANOSECONDS if f"{match['before']}{word}" in header]
+        if len(others) != 1:
+            continue
+        part = header.index(others[0])
+        for line, row in table.rows:
+            if len(row) <= max(k, part) or not _WHOLE.fullmatch(row[k]) or not _WHOLE.fullmatch(row[part]):
+                message = "seconds beside nanoseconds, and these, must be whole numbers"
+                raise table.error(message, line=line, name=name)
+            row[k] = str(Decimal(row[k]) + Decimal(row[part]).scaleb(-9))
+        if table.numbers is not None:
+            table.numbers = _joined(table.numbers, k, part)
+        header[k] = TIMES[0]
+        for entries in (header, table.units, *(row for _, row in table.rows)):
+            del entries[part]
+        return
+
+
+def _joined(numbers: Numbers, seconds: int, nanoseconds: int) -> Numbers:
+    """Return numbers with nanoseconds added to the seconds, to which they belong, and without their column."""
+    values, offsets = numbers.values.copy(), dict(numbers.offsets)
+    parts = values[:, nanoseconds]
+    first = Decimal(int(parts[0])) if seconds in offsets else Decimal(0)
+    offset = (offsets.pop(nanoseconds, Decimal(0)) + first).scaleb(-9)
+    values[:, seconds] += (parts - float(first)) / NANO
+    if seconds in offsets:
+        offsets[seconds] += offset
+    else:
+        values[:, seconds] += float(offset)
+    offsets = {k - (k > nanoseconds): x for k, x in offsets.items()}
+    names = [name for k, name in enumerate(numbers.names) if k != nanoseconds]
+    return dataclasses.replace(numbers, names=names, values=np.delete(values, nanoseconds, axis=1), offsets=offsets)
 
 
 def columns_of(header: Sequence[str]) -> Columns | None:

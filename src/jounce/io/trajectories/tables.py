@@ -14,7 +14,14 @@ from jounce.io.trajectories.agreement import check_agreement
 from jounce.io.trajectories.controller_formats import ControllerFormat, format_of, joint_count
 from jounce.io.trajectories.recordings import Recording
 from jounce.io.trajectories.stamps import NANO, epoch, in_sequence, relative
-from jounce.io.trajectories.table_columns import POSITION, Columns, columns_of, other_quantity, take_units
+from jounce.io.trajectories.table_columns import (
+    POSITION,
+    Columns,
+    columns_of,
+    join_stamps,
+    other_quantity,
+    take_units,
+)
 from jounce.units.dimensions import TIME, Dimension
 
 NOTHING = ("", "nan", "NaN", "NAN")
@@ -38,6 +45,7 @@ def read_recording(path: str, joints: Iterable[str] | None = None) -> Recording:
     """
     table = Table(path, TrajectoryError)
     line = check_named(table)
+    join_stamps(table)
     take_units(table)
     known = format_of(table.header)
     try:
@@ -73,9 +81,12 @@ def _recording(table: Table, columns: Columns, *, points: bool) -> Recording:
     names = _names(table, columns)
     values = np.full((len(table), levels, len(names)), np.nan)
     dimensions: list[Dimension] = []
+    missing: list[str] = []
     for k, (joint, own) in enumerate(columns.joints.items()):
         for level, column in own.items():
-            values[:, level, k] = _numbers(table, column, level, empty=level > 0 or _is_series(table.header[column]))
+            values[:, level, k] = _numbers(table, column, level, empty=not points)
+        if np.isnan(values[:, POSITION, k]).all():
+            raise table.error("this column has no position; leave it out", line=table.header_line, name=joint)
         dimensions.append(table.unit(own[0])[1])
         if column := columns.checked.get(joint):
             _check_rate(table, columns, joint, values[:, :1, k], _numbers(table, column, 1, empty=False))
@@ -83,6 +94,13 @@ def _recording(table: Table, columns: Columns, *, points: bool) -> Recording:
     some = ~np.isnan(values[:, 0]).all(axis=1)
     empty = int((~some).sum())
     notes = [words] if words else []
+    for name, own in zip(names, columns.joints.values(), strict=True):
+        if not _is_series(table.header[own[POSITION]]):
+            absent = np.flatnonzero(np.isnan(values[:, POSITION, names.index(name)]) & some)
+            if len(absent):
+                missing.append(f"{len(absent)} of {name} (the first in line {table.line(int(absent[0]))})")
+    if missing:
+        notes.append(f"positions are missing, and left to the splines: {', '.join(missing)}")
     if empty:
         notes.append(f"{empty} rows without a position are left out")
     if not some.any():

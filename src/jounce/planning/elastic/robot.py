@@ -71,7 +71,7 @@ def elastic_robot(robot: Robot, drives: Mapping[str, Drive], *, losses: bool = T
         armature, rubbing = joint.armature, joint.friction if rubs else 0.0
         damping = joint.damping if losses else 0.0
         several = joint.mimic is not None and joint.mimic.several
-        if joint.moving and not several:  # armature and friction of what follows one are among those of its motor
+        if joint.moving and not several:  # the motor of a joint includes the armature and friction of its followers
             leader = joint.name if joint.mimic is None else joint.mimic.joint
             k = columns[leader]
             if arrays.elastic[k]:

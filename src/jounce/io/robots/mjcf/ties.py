@@ -47,7 +47,7 @@ def linear_tendons(spec: Any, mujoco: Any) -> set[str]:
 
 
 class JointRelations:
-    """What joints have to do with one another: those that are held, and those that follow others.
+    """Relations of joints by equalities: held joints, and joints that follow others.
 
     Each equality is a linear equation of coordinates, and makes one more joint follow those that are left in it.
 
