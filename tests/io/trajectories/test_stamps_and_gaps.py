@@ -93,3 +93,46 @@ def test_what_ros2_echoes_as_csv_has_no_names(path):
     path.write_text("".join(f"{1732686000 + k},0,base,a,b,0.1,0.2,,\n" for k in range(5)))
     with pytest.raises(TrajectoryError, match=r"line 1: the first row holds the names .* leave --csv out"):
         jn.load_trajectory(path)
+
+
+STATE = """header: {{stamp: {{sec: {sec}, nanosec: {nano}}}, frame_id: ''}}
+name: [a, b]
+position: [{a:.12g}, {b:.12g}]
+velocity: [{rates}]
+effort: [.nan, .nan]
+"""
+
+
+@pytest.mark.parametrize(
+    "rates, note", [(".nan, .nan", None), ("0.0, -0.0", "zero throughout, and left out as not mea")]
+)
+def test_joint_states_whose_velocities_are_not_measured(tmp_path, rates, note):
+    path, motion = tmp_path / "echo.yaml", angles(TIMES).tolist()
+    texts = [
+        STATE.format(sec=1732686000 + round(t * 100) // 100, nano=round(t * 100) % 100 * 10**7, a=a, b=b, rates=rates)
+        for t, (a, b) in zip(TIMES, motion, strict=True)
+    ]
+    with pytest.warns(RecordingWarning) as caught:
+        check(path, "---\n".join(texts))
+    words = str(caught[0].message)
+    assert note is None or f"{note}sured: a, b" in words
+    assert note or "velocities" not in words
+
+
+def test_velocities_of_zero_of_a_joint_that_stands_still_are_its_velocities(path):
+    path.write_text("time,a,b,a_vel,b_vel\n" + rows(TIMES, [[1.0, 2.0, 0.0, 0.0] for _ in TIMES]))
+    assert not jn.load_trajectory(path).derivatives(SEEN, 2)[:, 1:].any()
+
+
+TRAJECTORY = """{{joint_trajectory: {{joint_names: [a], points: [
+  {{positions: [0.0], time_from_start: 0}}, {{positions: [1.0], time_from_start: 1}}]}},
+  multi_dof_joint_trajectory: {{joint_names: [base], points: [{points}]}}}}"""
+
+
+def test_a_base_that_a_message_moves_is_named(tmp_path):
+    path = tmp_path / "plan.yaml"
+    path.write_text(TRAJECTORY.format(points="{transforms: [], time_from_start: 0}"))
+    with pytest.warns(RecordingWarning, match=r"is left out: base \(multi_dof_joint_trajectory, line 3\)"):
+        jn.load_trajectory(path)
+    path.write_text(TRAJECTORY.format(points=""))
+    assert jn.load_trajectory(path).names == ("a",)

@@ -60,6 +60,24 @@ def check_turns(recording: Recording) -> None:
             raise recording.error(message, int(rows[at + 1]), name=name)
 
 
+def without_idle_rates(recording: Recording) -> tuple[Recording, list[str]]:
+    """Return a recording without velocities, and what is above them, of joints that move and whose velocities are zero.
+
+    Drivers that do not measure velocities write zeros. Which joints these are is told in words.
+    """
+    values, names = recording.values.copy(), []
+    for k, name in enumerate(recording.names):
+        rows = ~np.isnan(values[:, :2, k]).any(axis=1)
+        if values.shape[1] < 2 or not rows.any() or values[rows, 1, k].any() or not np.ptp(values[rows, 0, k]):
+            continue
+        values[:, 1:, k] = np.nan
+        names.append(name)
+    if not names:
+        return recording, []
+    note = f"velocities that are zero throughout, and left out as not measured: {', '.join(names)}"
+    return dataclasses.replace(recording, values=values), [note]
+
+
 def check_agreement(recording: Recording) -> list[str]:
     """Return descriptions of small differences between derivatives and positions.
 

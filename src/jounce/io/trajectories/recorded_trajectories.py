@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from jounce.errors import JounceError, RecordingWarning, TrajectoryError
-from jounce.io.trajectories.agreement import check_agreement, check_turns
+from jounce.io.trajectories.agreement import check_agreement, check_turns, without_idle_rates
 from jounce.io.trajectories.recordings import Recording
 from jounce.io.trajectories.stamps import gaps
 from jounce.trajectory import (
@@ -59,6 +59,8 @@ def trajectory_of(
         raise error.located(path=recording.path) from None
     notes = list(recording.notes)
     if not recording.points:
+        recording, unmeasured = without_idle_rates(recording)
+        notes += unmeasured
         check_turns(recording)
         notes += check_agreement(recording)
         notes += [] if as_controller else gaps(recording)

@@ -18,6 +18,8 @@ NANO = 1_000_000_000
 STATES = ("position", "velocity")
 MEASURED = ("feedback", "actual")
 """Keys of the measured values in a controller state, in newer and older versions."""
+SEVERAL = ("multi_dof_joint_trajectory", "multi_dof_trajectory")
+"""Where RobotTrajectory and goals of controllers hold the motion of planar and floating joints."""
 CUT = "..."
 """Text that ``ros2 topic echo`` prints in place of omitted entries."""
 START = 1e-6  # rad or m, largest distance of the robot from the start of a trajectory
@@ -96,7 +98,7 @@ def _trajectories(source: Source) -> Recording:
     displayed = source.data.get("trajectory")
     if not isinstance(displayed, list):
         keys = next(keys for keys in _INSIDE if _is_trajectory(_inside(source.data, keys)))
-        return _points(source, keys)
+        return _without_base(source, keys[:-1], _points(source, keys))
     if not displayed:
         raise source.error("holds no trajectory", ("trajectory",))
     locations: list[Location] = [("trajectory", k, "joint_trajectory") for k in range(len(displayed))]
@@ -107,7 +109,21 @@ def _trajectories(source: Source) -> Recording:
     whole = parts[0]
     for location, part in zip(locations[1:], parts[1:], strict=True):
         whole = _joined(source, location, whole, part)
+    for location in locations:
+        whole = _without_base(source, location[:-1], whole)
     return _started(source, whole)
+
+
+def _without_base(source: Source, at: Location, recording: Recording) -> Recording:
+    """Return a recording with a note about joints of several coordinates that a message moves beside its joints."""
+    for key in SEVERAL:
+        moved = _at(source, (*at, key))
+        if isinstance(moved, dict) and moved.get("points"):
+            names = ", ".join(str(name) for name in moved.get("joint_names") or ())
+            place = f"{key}, line {source.line((*at, key))}"
+            note = f"the motion of joints of several coordinates is left out: {names} ({place})"
+            return dataclasses.replace(recording, notes=(*recording.notes, note))
+    return recording
 
 
 def _joined(source: Source, place: Location, first: Recording, then: Recording) -> Recording:
@@ -188,7 +204,7 @@ def _states(source: Source) -> Recording:
     states = []
     for k, state in enumerate(source.data):
         names = _names(source, (k, "name"), state["name"])
-        levels = [_row(source, (k, key), state[key], len(names)) for key in STATES if state.get(key)]
+        levels = [_row(source, (k, key), state[key], len(names), key != STATES[0]) for key in STATES if state.get(key)]
         if not state["position"]:
             raise source.error("positions are missing", (k, "position"))
         header = state.get("header")
@@ -205,7 +221,7 @@ def _controller_states(source: Source) -> Recording:
         names, part = _names(source, (k, "joint_names"), state["joint_names"]), state[key]
         if not part.get("positions"):
             raise source.error("positions are missing", (k, key))
-        levels = [_row(source, (k, key, x), part[x], len(names)) for x in LEVELS[:2] if part.get(x)]
+        levels = [_row(source, (k, key, x), part[x], len(names), x != LEVELS[0]) for x in LEVELS[:2] if part.get(x)]
         header = state.get("header")
         stamp = _stamp(source, (k, "header", "stamp"), header.get("stamp") if isinstance(header, dict) else None)
         states.append(State(stamp, names, levels, source.line((k,)) or 0))
@@ -230,10 +246,11 @@ def _check_whole(source: Source, at: Location, given: Any) -> None:
         raise source.error(message, at)
 
 
-def _row(source: Source, at: Location, given: Any, count: int) -> list[float]:
+def _row(source: Source, at: Location, given: Any, count: int, unknown: bool = False) -> list[float]:
+    """Return a number for each joint; NaN, of what is not measured, only where some may be unknown."""
     _check_whole(source, at, given)
     numbers = isinstance(given, list) and all(isinstance(x, int | float) and not isinstance(x, bool) for x in given)
-    if not numbers or len(given) != count or not np.isfinite(given).all():
+    if not numbers or len(given) != count or not (np.isfinite(given) | (unknown & np.isnan(given))).all():
         raise source.error(f"must be {count} finite numbers, one for each joint: {at[-1]}", at, value=given)
     return [float(x) for x in given]
 
