@@ -10,7 +10,7 @@ import numpy as np
 
 from jounce.jet.coefficients import total
 
-BLOCK = 8  # terms of a sum per iteration; the length of a row without constant entries is a multiple of it
+BLOCK = 8  # terms of a sum per iteration; a row with its constant entries left out is padded to a multiple
 LEAST_ROW = 40  # numbers of such a row: machine code adds shorter rows number by number
 
 

@@ -78,7 +78,7 @@ class Mobility:
     order : int, optional
         Order to which motions were continued; None if the equations are independent, so that all velocities continue.
     kind : str
-        ``"regular"``; ``"rigid"``, without any velocity; ``"shaky"``, with velocities that all are blocked; ``"cusp"``,
+        ``"regular"``; ``"rigid"``, without any velocity; ``"shaky"``, with velocities that are all blocked; ``"cusp"``,
         ``"singular"`` or ``"change point"``, where only some velocities continue, along one branch or several.
     blocked : int, optional
         Order at which the last of the blocked velocities is blocked.

@@ -42,7 +42,7 @@ NOWHERE = ExpansionPoint(*[np.full((), np.nan)] * 4)
 class StepState(NamedTuple):
     """State of a run between two batches."""
 
-    known: SolvedState  # data of the last anchor from which all lanes are predicted
+    source: SolvedState  # data of the last anchor from which all lanes are predicted
     control: StepControl  # of the step tried next
     step: Float[Numbers, " batch"]  # time from the last anchor to the instant of each lane, s
     instant: Float[Numbers, " batch"]  # of each lane, s
@@ -133,27 +133,27 @@ def take_steps(
     def arrived_at(run: StepState, search: Any) -> Any:
         if native is not None:
             first = np.arange(len(run.instant)) == 0
-            lanes = run.known, run.step, run.instant, None, search & first
+            lanes = run.source, run.step, run.instant, None, search & first
             arrival = called(native, (system, settings), lanes)
             arrival = arrival._replace(safe_step=arrival.safe_step[:1], radius=arrival.radius[:1])
             if finds_det_rate(system):
                 return arrival._replace(det_rate=arrival.det_rate[:1])
             find_det_rate = partial(det_rate_at, system, pose_type, arrival.coordinates, run.instant)
             return arrival._replace(det_rate=jax.lax.cond(search, find_det_rate, lambda: jnp.zeros(1)))
-        return _batch(system, settings, run.known, run.step, run.instant, search, pose_type=pose_type, order=order)
+        return _batch(system, settings, run.source, run.step, run.instant, search, pose_type=pose_type, order=order)
 
     def going(state: TakenSteps) -> Any:
         return (state.run.control.ending == int(StopReason.UNFINISHED)) & (state.count < most)
 
     def go_on(state: TakenSteps) -> TakenSteps:
         arrival = _typed(solved(state.run), blank)
-        known = predictor(system, pose_type, (arrival.coordinates, arrival.outputs, arrival.sign))
-        run, arrived, taken = _after(state.run, arrival, known, grid, limits)
+        arrival_source = predictor(system, pose_type, (arrival.coordinates, arrival.outputs, arrival.sign))
+        run, arrived, taken = _after(state.run, arrival, arrival_source, grid, limits)
         solved_now, (anchors, points, instants) = _solved(arrival), state.records
         anchors = put(anchors, jax.tree.map(lambda x: x[..., :1], solved_now), state.steps)
         points = put(points, jax.tree.map(lambda x: x[None], arrived), state.steps)
         instants = put(instants, jax.tree.map(lambda x: x[..., 1:], solved_now), state.run.next_up)
-        records = Records(anchors, points, instants)  # later batches overwrite what is no part of a step taken
+        records = Records(anchors, points, instants)  # later batches overwrite lanes that belong to no step
         return TakenSteps(_typed(run, state.run), records, arrival, state.count + 1, state.steps + jnp.sum(taken))
 
     def put(whole: Any, part: Any, index: Any) -> Any:
@@ -198,11 +198,11 @@ def _next_up(run: StepState, grid: Float[Numbers, " time"]) -> Float[Numbers, " 
 
 
 def _after(
-    run: StepState, arrival: StepResult, known: SolvedState, grid: Float[Numbers, " time"], limits: StepLimits
+    run: StepState, arrival: StepResult, arrival_source: SolvedState, grid: Float[Numbers, " time"], limits: StepLimits
 ) -> tuple[StepState, ExpansionPoint, Bool[Numbers, ""]]:
     """Return the state of a run after a batch, the end point of its first lane, and whether that is the next anchor.
 
-    `known` is the state of the arrival.
+    `arrival_source` has the data of the arrival for predictions.
     """
     control, status, lanes = run.control, arrival.status[0], len(run.instant) - 1
     target = control.target
@@ -212,7 +212,7 @@ def _after(
     run = run._replace(next_up=run.next_up + jnp.sum(within))
     behind = jnp.sum(_next_up(run, grid) <= target)  # a few are solved from the next anchor, which is near
     taken = good & (behind <= jnp.where(target < limits.stop, lanes // 2, 0))  # else repeat the step for the others
-    known = jax.tree.map(lambda new, old: jnp.where(taken, new[..., :1], old), known, run.known)
+    source = jax.tree.map(lambda new, old: jnp.where(taken, new[..., :1], old), arrival_source, run.source)
     again = jax.tree.map(lambda x: jnp.where(good & ~taken, x, jnp.nan), arrived)
     control = next_control(control, status, arrived, limits, good, taken)
-    return _aimed(run._replace(known=known, arrived=again), control, grid), arrived, taken
+    return _aimed(run._replace(source=source, arrived=again), control, grid), arrived, taken

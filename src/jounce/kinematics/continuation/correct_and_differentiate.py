@@ -59,10 +59,10 @@ class StepResult(NamedTuple):
     status: Int[Numbers, " batch"]  # see Status
     body: Int[Numbers, " batch"]  # index of the moving body that is farthest from its prediction
     safe_step: Lanes  # time over which the first lane can be predicted, s; 0 unless searched; (1,)
-    radius: Lanes  # the same by the first three Taylor terms, the least affected by rounding, s; likewise
+    radius: Lanes  # the same by the first three Taylor terms, the least affected by rounding, s; (1,)
     deviation: Lanes  # departure from the prediction, relative to the predicted travel
     sign: Lanes  # of the determinant of the Jacobian
-    det_rate: Lanes  # rate of approach (< 0) to, or departure from, a singular position, 1/s; likewise
+    det_rate: Lanes  # rate of approach (< 0) to, or departure from, a singular position, 1/s; (1,)
     pivot_ratio: Lanes  # smallest pivot of the Jacobian over the largest
     admissible: Bool[Numbers, "driver batch"]  # whether each driver has a permitted value
     finite: Bool[Numbers, "result batch"]  # of requested derivatives of the pose, and of each output
@@ -137,11 +137,11 @@ def safe_step_and_radius(system: System, coordinates: dict[str, Jet], predictor:
 
 def _outputs(system: System, pose: Pose, angles: Sequence[Numbers], step: Lanes) -> tuple[Numbers, ...]:
     """Return the jets of the outputs, with the turns of angles predicted by the jets of a neighbor."""
-    results, known = [], iter(angles)
+    results, predictions = [], iter(angles)
     for group in system.outputs:
         result = group.evaluate(pose)
         if predicts_turns(group):
-            expected = next(known)
+            expected = next(predictions)
             expected = Jet(tuple(jnp.where(jnp.isfinite(expected), expected, 0.0)))
             result = shifted_by_turns(result, expected.evaluate(step))
         results.append(stacked(result))
@@ -218,7 +218,7 @@ def _status(
 def advance(
     system: System,
     settings: Settings,
-    known: SolvedState,
+    source: SolvedState,
     step: Lanes,
     instant: Lanes,
     search: Bool[Numbers, ""],
@@ -236,7 +236,7 @@ def advance(
         The mechanism.
     settings : Settings
         Settings of all instants.
-    known : tuple
+    source : tuple
         State of the neighbors as returned by `predictor`, batch last: jets of the pose and of turning angles, and the
         sign of the determinant of the Jacobian, 0 where it does not matter.
     step, instant : array of shape (batch,)
@@ -250,7 +250,7 @@ def advance(
     with_det_rate : bool, default True
         Whether to compute the rate of the determinant; otherwise it is zero.
     """
-    arrival, factor, pose = solved_batch(system, settings, known, step, instant, pose_type=pose_type, order=order)
+    arrival, factor, pose = solved_batch(system, settings, source, step, instant, pose_type=pose_type, order=order)
     first = arrival.status[:searched]
 
     def search_result() -> Any:
@@ -268,7 +268,7 @@ def advance(
 def solved_batch(
     system: System,
     settings: Settings,
-    known: SolvedState,
+    source: SolvedState,
     step: Lanes,
     instant: Lanes,
     *,
@@ -276,7 +276,7 @@ def solved_batch(
     order: int,
 ) -> tuple[StepResult, Factor, Pose]:
     """Return the result of `advance` without the searched values, the factored Jacobian, and the pose."""
-    (jets, angles, sign), (tolerance, refine, finite_order) = known, settings
+    (jets, angles, sign), (tolerance, refine, finite_order) = source, settings
     # infinite derivatives of a law, such as the third one of t**2.5 at t = 0, are useless for predictions
     moving = {name: Jet(tuple(jnp.where(jnp.isfinite(c), c, 0.0))) for name, c in jets.items()}
     predicted = pose_type.predicted_from(moving, step)

@@ -33,8 +33,8 @@ def round_width(system: System) -> int:
 
 def _of_many(shared: Any, instants: Any, *, pose_type: type[Pose], order: int) -> StepResult:
     """Solve many instants as `advance_instant` does one; instants of one motion are not searched."""
-    (system, settings), (known, step, instant, own, search) = shared, instants
-    given = of_design(system, own), settings, known, step, instant
+    (system, settings), (source, step, instant, own, search) = shared, instants
+    given = of_design(system, own), settings, source, step, instant
     if own is None:
         return solved_batch(*given, pose_type=pose_type, order=order)[0]
     return advance(*given, jnp.any(search), pose_type=pose_type, order=order, searched=step.shape[-1])
@@ -54,10 +54,10 @@ def advance_instant(shared: Any, instants: Any, *, pose_type: type[Pose], order:
     pose_type, order
         As in `advance`.
     """
-    (system, settings), (known, step, instant, own, search) = shared, instants
+    (system, settings), (source, step, instant, own, search) = shared, instants
     reflected = with_fields(of_design(system, own), reflected=True)
     how: Any = {"pose_type": pose_type, "order": order, "with_det_rate": own is not None or finds_det_rate(system)}
-    return advance(reflected, settings, known, step, instant, search[0], **how)
+    return advance(reflected, settings, source, step, instant, search[0], **how)
 
 
 def of_design(values: Values, own: Mapping[int, Any] | None) -> Values:

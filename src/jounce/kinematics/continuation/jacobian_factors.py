@@ -30,15 +30,15 @@ def factored(system: System, pose: Pose, time: Jet) -> Factor:
     return ReflectedFactor.of(matrix, system.elimination_order) if system.reflected else DenseFactor.of(matrix)
 
 
-def refactored(system: System, pose: Pose, time: Jet, known: Factor, anew: Bool[Numbers, ""]) -> Factor:
+def refactored(system: System, pose: Pose, time: Jet, old: Factor, anew: Bool[Numbers, ""]) -> Factor:
     """Return the factored Jacobian at a pose of order zero, given factors at a pose nearby.
 
     Unless `anew` is set, the given factors are kept with the new matrices, if refinement makes their solutions exact to
     rounding.
     """
-    if not isinstance(known, DenseFactor | ReflectedFactor):
+    if not isinstance(old, DenseFactor | ReflectedFactor):
         return factored(system, pose, time)
-    reused = known.refining(system.jacobian(pose, time))
+    reused = old.refining(system.jacobian(pose, time))
     stale = jnp.any(~(reused.defect() <= STALE))
     return jax.lax.cond(anew | stale, reused.renewed, lambda: reused)
 

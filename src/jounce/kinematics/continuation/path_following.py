@@ -291,8 +291,8 @@ def _passed(solver: Solver, near_side: Anchor, stop: float) -> tuple[Anchor, Cha
         return None  # the motion stops before
     coordinates, outputs, sign = near_side.state
     shortened = jax.tree.map(_shortened, (coordinates, outputs))
-    known = (*shortened, np.zeros_like(sign))  # the sign may change
-    arrival = solver(solver.needed(known), np.array([target - near_side.instant]), np.array([target]), search=True)
+    source = (*shortened, np.zeros_like(sign))  # the sign may change
+    arrival = solver(solver.needed(source), np.array([target - near_side.instant]), np.array([target]), search=True)
     beyond = Anchor.of(arrival, target)
     if arrival.status[0] not in PASSABLE or not arrival.deviation[0] <= PASSAGE_DEVIATION:
         return None

@@ -65,8 +65,8 @@ class Solver:
         """
         lanes = len(instant)
         if lanes <= SMALL_BATCH:
-            known, step, instant = jax.tree.map(lambda x: padded(x, SMALL_BATCH), (needed, step, instant))
-            run = _run_from(known, (0.0,) * 4, step=step, instant=instant)
+            source, step, instant = jax.tree.map(lambda x: padded(x, SMALL_BATCH), (needed, step, instant))
+            run = _run_from(source, (0.0,) * 4, step=step, instant=instant)
             arrival = self._take_steps(run, NO_GRID, 1, search=search).last
         else:
             arrival = self.program((needed, step, instant, None, np.zeros(step.shape, bool)))
@@ -82,13 +82,13 @@ class Solver:
         outputs = tuple(np.zeros((levels, 1, group.instances, count)) for group in system.outputs)
         return still, outputs, np.zeros(count)
 
-    def needed(self, known: SolvedState) -> SolvedState:
+    def needed(self, solved: SolvedState) -> SolvedState:
         """Return the data of solved instants from which others are predicted, see `predictor`."""
-        return predictor(self.model.system, self.model.pose_type, known)
+        return predictor(self.model.system, self.model.pose_type, solved)
 
     def rounds(
         self,
-        known: SolvedState,
+        sources_data: SolvedState,
         state: tuple[Any, Any, Any],
         step: Float[np.ndarray, " time"],
         instant: Float[np.ndarray, " time"],
@@ -100,7 +100,7 @@ class Solver:
 
         Parameters
         ----------
-        known : tuple
+        sources_data : tuple
             Data of the source instants from which others are predicted, see `needed`.
         state : tuple
             Arrays for the jets of coordinates by name and of outputs, and for the sign, of all instants; None where not
@@ -110,7 +110,7 @@ class Solver:
         status : array of int, shape (time,)
             Array for the outcome of each instant.
         sources : array of int, shape (time,)
-            Index in `known` of the source of each instant; below zero for its lane in the round before.
+            Index in `sources_data` of the source of each instant; below zero for its lane in the round before.
         own : dict of int to array
             Values of the design of each instant (see `of_design`), or None for one design.
         """
@@ -121,7 +121,7 @@ class Solver:
         leaves, form = jax.tree.flatten(results, is_leaf=lambda x: x is None)
         numbered: Any = jax.tree.unflatten(form, np.arange(len(leaves))[:, None])
         links = [int(x[0]) for x in jax.tree.leaves(self.needed(numbered.state(slice(None))))]
-        return self.program.rounds((known, (step, instant, own), np.zeros(1, bool)), results, sources, links)
+        return self.program.rounds((sources_data, (step, instant, own), np.zeros(1, bool)), results, sources, links)
 
     def take_steps(self, run: StepState, grid: Float[np.ndarray, " time"], stop: float, smallest: float) -> TakenSteps:
         """Continue a run, and solve the next grid instants as far as they fit; see `continuation_steps`."""
@@ -137,13 +137,13 @@ class Solver:
         self, solved: SolvedState, expansion_point: Sequence[float], largest: float, crawled: int = 0
     ) -> StepState:
         """Return the run from a solved instant, an expansion point; the first step is at most `largest`, s."""
-        known = jax.tree.map(lambda x: padded(x, SMALL_BATCH), self.needed(solved))
-        return _run_from(known, expansion_point, largest=largest, crawled=crawled)
+        source = jax.tree.map(lambda x: padded(x, SMALL_BATCH), self.needed(solved))
+        return _run_from(source, expansion_point, largest=largest, crawled=crawled)
 
     def beginning(self, coordinates: Mapping[str, Any], instant: float) -> StepState:
         """Return the run that begins by solving an instant from a position assembled at it."""
-        known = self.needed(self.still(coordinates, SMALL_BATCH))
-        return _run_from(known, (instant, 0.0, 0.0, 0.0), instant=np.full(SMALL_BATCH, instant))
+        source = self.needed(self.still(coordinates, SMALL_BATCH))
+        return _run_from(source, (instant, 0.0, 0.0, 0.0), instant=np.full(SMALL_BATCH, instant))
 
     @property
     def backend(self) -> str:
@@ -244,7 +244,7 @@ class Solver:
 
 
 def _run_from(
-    known: SolvedState,
+    source: SolvedState,
     expansion_point: Sequence[float],
     *,
     step: Any = None,
@@ -258,4 +258,4 @@ def _run_from(
     control = initial_control(ExpansionPoint(*map(np.asarray, expansion_point)), np.asarray(instants[0]))
     control = control._replace(largest=np.asarray(largest), crawled=np.asarray(crawled))
     decided, first = np.asarray(instant is not None), np.zeros((), int)
-    return StepState(known, control, nothing if step is None else step, instants, decided, first, NOWHERE)
+    return StepState(source, control, nothing if step is None else step, instants, decided, first, NOWHERE)

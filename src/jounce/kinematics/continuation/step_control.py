@@ -19,7 +19,7 @@ from jounce.execution.mapped import mapped
 from jounce.kinematics.continuation.correct_and_differentiate import SAFE_FRACTION
 from jounce.kinematics.status import Status
 
-LARGEST_DET_RATE = 1.0  # times a step, from its end; from its start, SAFE_FRACTION
+LARGEST_DET_RATE = 1.0  # bound of a step times the rate at its end; at its start, SAFE_FRACTION
 # part of the radius of the series: this close to a singular position, it is clear whether the motion is smooth there
 PASSAGE = 3e-3
 CRAWLING = 1e-6  # part of the remaining motion: length of a step that is too short

@@ -63,7 +63,7 @@ class CurvePoints(NamedTuple):
 
 
 class _Curve:
-    """The equations of a curve: those of a system with a driver value in the place of time."""
+    """The equations of a curve: those of a system with a driver value in place of time."""
 
     def __init__(self, system: System, rows: Any, value_scale: Any, driven: bool):
         self.system, self.rows, self.value_scale, self.driven = system, rows, value_scale, driven
@@ -111,7 +111,7 @@ def curve_points(
     Parameters
     ----------
     system : System
-        The mechanism, with the driver value in the place of time.
+        The mechanism, with the driver value in place of time.
     coordinates, value
         Series at the previous points, shape (order + 1, ..., lanes).
     tangent : array of shape (columns, lanes)

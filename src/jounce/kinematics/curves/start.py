@@ -30,7 +30,7 @@ class Freed:
     Attributes
     ----------
     mechanism : Mechanism
-        The mechanism with the free value in the place of time, the other drivers held.
+        The mechanism with the free value in place of time, the other drivers held.
     driver : str or None
         The free driver; ``"time"`` if the instant is free and all drivers follow their laws, None if nothing is driven.
     value : float

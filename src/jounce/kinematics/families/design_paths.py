@@ -60,8 +60,8 @@ class Anchors(NamedTuple):
     instant : array of shape (anchors,)
         Time, s.
     order : array of shape (anchors,)
-        Index of each anchor in `known`.
-    known : tuple
+        Index of each anchor in `states`.
+    states : tuple
         Data from which predictions start, of all anchors of the group, in the order of its steps, anchors last.
     """
 
@@ -69,7 +69,7 @@ class Anchors(NamedTuple):
     begins: Int[np.ndarray, " design_and_one"]
     instant: Float[np.ndarray, " anchor"]
     order: Int[np.ndarray, " anchor"]
-    known: SolvedState
+    states: SolvedState
 
     @property
     def owner(self) -> Int[np.ndarray, " anchor"]:
@@ -81,7 +81,7 @@ class Anchors(NamedTuple):
         for k in range(0, len(self.designs), size):
             begins = self.begins[k : k + size + 1]
             some = slice(begins[0], begins[-1])
-            those = self.instant[some], self.order[some], self.known
+            those = self.instant[some], self.order[some], self.states
             yield Anchors(self.designs[k : k + size], begins - begins[0], *those)
 
 
@@ -130,7 +130,7 @@ class DesignPaths:
         solver, (first, last) = self.solver, self._ends
         steps: list[tuple[Indices, Lanes, SolvedState]] = []  # designs, instants and states of the anchors
         limits = StepLimits(np.asarray(last), np.asarray(SMALLEST_STEP * (last - first)))
-        known = solver.needed(solver.still({name: x[..., lanes] for name, x in coordinates.items()}))
+        source = solver.needed(solver.still({name: x[..., lanes] for name, x in coordinates.items()}))
         own = self.systems.own(lanes)
         start = np.full(len(lanes), first)
         control = initial_control(
@@ -143,7 +143,7 @@ class DesignPaths:
             if not lanes.size:
                 break
             step = control.target - control.expansion_point.instant
-            arrival = solver.program((known, step, control.target, own, np.ones(len(lanes), bool)))
+            arrival = solver.program((source, step, control.target, own, np.ones(len(lanes), bool)))
             self._arrival = arrival
             end_point: Any = ExpansionPoint(control.target, arrival.safe_step, arrival.radius, arrival.det_rate)
             begins: Any = control.step == 0
@@ -153,23 +153,23 @@ class DesignPaths:
             self.individual[lanes[unlike | ended & (control.ending != StopReason.ARRIVED)]] = True
             reached = solver.needed(arrival.state(slice(None) if taken.all() else taken))
             steps.append((lanes[taken], end_point.instant[taken], reached))
-            known = reached if taken.all() else _replaced(known, taken, reached)
+            source = reached if taken.all() else _replaced(source, taken, reached)
             if (left := ~(ended | unlike)).all():
                 continue
             lanes = lanes[left]
-            control, known, own = at_lanes((control, known, own), left)
+            control, source, own = at_lanes((control, source, own), left)
         self.individual[lanes] = True
         return self._sorted(steps)
 
     def _sorted(self, steps: Sequence[tuple[Indices, Lanes, SolvedState]]) -> Anchors:
         """Return the anchors of steps, without those of designs left to be solved individually."""
-        owners, instants, known = zip(*steps, strict=True)
+        owners, instants, states = zip(*steps, strict=True)
         owner = np.concatenate(owners)
         order = np.argsort(owner, kind="stable")  # the instants of a design ascend from step to step
         order = order[~self.individual[owner[order]]]
         designs, begins = np.unique(owner[order], return_index=True)
-        known = jax.tree.map(lambda *parts: np.concatenate(parts, axis=-1), *known)
-        return Anchors(designs, np.append(begins, len(order)), np.concatenate(instants)[order], order, known)
+        states = jax.tree.map(lambda *parts: np.concatenate(parts, axis=-1), *states)
+        return Anchors(designs, np.append(begins, len(order)), np.concatenate(instants)[order], order, states)
 
     def solved(self, threads: int) -> tuple[list[list[np.ndarray]], Int[np.ndarray, "design time"]]:
         """Return the outputs of all designs, and their status.
@@ -224,7 +224,7 @@ class DesignPaths:
         instants = self._instants[block.designs]
         count, times = instants.shape
         length = -(-times // max(1, buffer.width // count))  # of a piece of a motion, such that all lanes are used
-        buffer.put_anchors([[np.take(leaf, block.order, axis=-1)] for leaf in jax.tree.leaves(block.known)])
+        buffer.put_anchors([[np.take(leaf, block.order, axis=-1)] for leaf in jax.tree.leaves(block.states)])
         nearest = _nearest(block.owner, block.instant, instants, self._ends)
         to_anchor = instants - block.instant[nearest]
         to_one_before = np.empty(instants.shape)
@@ -243,7 +243,7 @@ class DesignPaths:
         designs, owner, at = anchors.designs, anchors.owner, anchors.instant
         system = self.systems.at(designs[owner])
         measuring = [(g, output) for g, output in zip(system.outputs, outputs, strict=True) if measures_angle(g)]
-        series = np.nan_to_num(anchors.known[0]["quaternion"][..., anchors.order], nan=0.0, posinf=0.0, neginf=0.0)
+        series = np.nan_to_num(anchors.states[0]["quaternion"][..., anchors.order], nan=0.0, posinf=0.0, neginf=0.0)
         index = np.arange(len(owner))
         following = np.where(np.append(owner[1:] != owner[:-1], True), index, index + 1)  # the last anchor: itself
 
