@@ -115,7 +115,7 @@ class Rolling(AbstractConstraint, type="rolling", space="spatial"):
     offset: Scalar = None  # m
     pressure_angle: Scalar = None  # rad
     friction: Nested = None
-    flank: Any = field(default=None, init=False)  # 1 or -1, the sign of the multiplier; zero if undecided
+    flank: Any = field(default=None, init=False)  # 1 or -1, the sign of the multiplier; zero if no flank is loaded
 
     dimensions = {"offset": "length", "pressure_angle": "angle"}
     signs = {"pressure_angle": "pressure angle"}
@@ -173,7 +173,7 @@ class Gear(AbstractConstraint, type="gear", space="spatial"):
     held_j: Datum | None = field(default=None, init=False)
     whole: Any = field(default=None, init=False)  # the smallest whole number whose product with the ratio is whole
 
-    flank: Any = field(default=None, init=False)  # 1 or -1, the sign of the multiplier; zero if undecided
+    flank: Any = field(default=None, init=False)  # 1 or -1, the sign of the multiplier; zero if no flank is loaded
 
     body_count = 3
     dimensions = {"ratio": "ratio", "offset": "angle", "pressure_angle": "angle", "helix_angle": "angle"}

@@ -222,7 +222,7 @@ class Gear(AbstractConstraint, type="gear", space="planar"):
     pressure_angle: Scalar = None  # rad
     friction: Nested = None
     arm: Any = field(default=None, init=False)  # rad, direction of the line of centers in the frame of their carrier
-    flank: Any = field(default=None, init=False)  # 1 or -1, the sign of the multiplier; zero if undecided
+    flank: Any = field(default=None, init=False)  # 1 or -1, the sign of the multiplier; zero if no flank is loaded
 
     body_counts = (2, 3)
     dimensions = {"ratio": "ratio", "offset": "angle", "pressure_angle": "angle"}
@@ -369,7 +369,7 @@ class Rolling(AbstractConstraint, type="rolling", space="planar"):
     offset: Scalar = None  # m
     pressure_angle: Scalar = None  # rad
     friction: Nested = None
-    flank: Any = field(default=None, init=False)  # 1 or -1, the sign of the multiplier; zero if undecided
+    flank: Any = field(default=None, init=False)  # 1 or -1, the sign of the multiplier; zero if no flank is loaded
 
     dimensions = {"offset": "length", "pressure_angle": "angle"}
     signs = {"pressure_angle": "pressure angle"}
