@@ -272,18 +272,18 @@ def components(vector: Jet | Numbers) -> list[Any]:
 def dot(a: Jet | Numbers, b: Jet | Numbers) -> Any:
     """Return the scalar product of two vectors, of shape (components, ...), as shape (...)."""
     product = symmetric(multiplied, a) if isinstance(a, Jet) and a is b else bilinear(of_components, a, b)
-    return _of_each(component_sum, product)
+    return _map_coefficients(component_sum, product)
 
 
 def cross(a: Jet | Numbers, b: Jet | Numbers) -> Any:
     """Return the vector product of two 3-vectors, or the scalar ``a_x b_y - a_y b_x`` of two plane vectors."""
     if a.shape[0] == 2:
-        return dot(a, _of_each(turned_back, b))
-    p, q = (_of_each(cycled, vector) for vector in (a, b))
-    return _of_each(cycled, bilinear(of_components, a, q) - bilinear(of_components, p, b))
+        return dot(a, _map_coefficients(turned_back, b))
+    p, q = (_map_coefficients(cycled, vector) for vector in (a, b))
+    return _map_coefficients(cycled, bilinear(of_components, a, q) - bilinear(of_components, p, b))
 
 
-def _of_each(function: Callable[[Any], Any], vector: Any) -> Any:
+def _map_coefficients(function: Callable[[Any], Any], vector: Any) -> Any:
     """Apply a linear function to an array, or to the coefficients of a jet."""
     return vector.map(function) if isinstance(vector, Jet) else function(vector)
 
@@ -295,10 +295,10 @@ def concatenate(parts: Sequence[Jet | Numbers]) -> Any:
     """
     jets = [part for part in parts if isinstance(part, Jet)]
     if not jets:
-        return jnp.concatenate(_alike(parts))
+        return jnp.concatenate(_broadcast_batch(parts))
     order = min(jet.order for jet in jets)
     whole = [part if isinstance(part, Jet) else Jet.constant(part, order) for part in parts]
-    first = _alike([jet.coefficients[0] for jet in whole])
+    first = _broadcast_batch([jet.coefficients[0] for jet in whole])
     shapes = [jnp.shape(value) for value in first]
 
     def level(coefficients: tuple[Any, ...]) -> Any:
@@ -311,7 +311,7 @@ def concatenate(parts: Sequence[Jet | Numbers]) -> Any:
     return Jet((jnp.concatenate(first), *map(level, rest)))
 
 
-def _alike(arrays: Sequence[Any]) -> list[Any]:
+def _broadcast_batch(arrays: Sequence[Any]) -> list[Any]:
     """Broadcast the batch axes, all but the first."""
     batch = jnp.broadcast_shapes(*(jnp.shape(a)[1:] for a in arrays))
     return [jnp.broadcast_to(a, (jnp.shape(a)[0], *batch)) for a in arrays]

@@ -85,7 +85,7 @@ def assemble(model: Model, instant: float, tolerance: float, *, free: bool = Fal
     model, attempt = find_assembly(model, instant, tolerance)
     check_assembled(model, attempt, instant, free=free)
     warn_of_parts_turned_over(model, attempt)
-    model, redundant = redundancy_of(model, _exact(model, attempt, instant, tolerance), instant)
+    model, redundant = redundancy_of(model, _assembled_to_rounding(model, attempt, instant, tolerance), instant)
     try:
         check_mobility(model, redundant, free=free)
     except MobilityError as error:
@@ -94,7 +94,7 @@ def assemble(model: Model, instant: float, tolerance: float, *, free: bool = Fal
     return model, attempt.coordinates
 
 
-def _exact(model: Model, attempt: AssemblyAttempt, instant: float, tolerance: float) -> AssemblyAttempt:
+def _assembled_to_rounding(model: Model, attempt: AssemblyAttempt, instant: float, tolerance: float) -> AssemblyAttempt:
     """Return an attempt near a singular position assembled again to rounding; others unchanged."""
     if tolerance <= TIGHT or not attempt.jacobian.smallest[1].size:
         return attempt
@@ -236,10 +236,10 @@ def check_assembled(model: Model, attempt: AssemblyAttempt, instant: float, *, f
     gaps = np.abs(gaps)
     worst = np.argsort(-gaps)
     open_rows = list(dict.fromkeys(model.rows[k] for k in worst if gaps[k] > 0.1 * gaps[worst[0]]))
-    wide = _widths(model, attempt, instant)
+    sizes = _gap_sizes(model, attempt, instant)
     message = (
         f"the mechanism cannot be assembled at t = {instant:g} s from its starting guess: {', '.join(open_rows[:4])} "
-        f"{'stays' if len(open_rows) == 1 else 'stay'} open, by {', '.join(wide[name] for name in open_rows[:4])}; "
+        f"{'stays' if len(open_rows) == 1 else 'stay'} open, by {', '.join(sizes[name] for name in open_rows[:4])}; "
         "check lengths and positions, or guess the pose of the bodies more closely"
     )
     if not free:
@@ -252,7 +252,7 @@ def check_assembled(model: Model, attempt: AssemblyAttempt, instant: float, *, f
             "tolerance if the numbers are no more exact"
         )
         shown, others = open_rows[:2], " and others" if len(open_rows) > 2 else ""
-        verb, gaps_of_shown = "stays" if len(open_rows) == 1 else "stay", ", ".join(wide[name] for name in shown)
+        verb, gaps_of_shown = "stays" if len(open_rows) == 1 else "stay", ", ".join(sizes[name] for name in shown)
         driver = " or a driver" if any(name.startswith("drivers.") for name in open_rows) else ""
         message = (
             f"over-constrained at t = {instant:g} s: {', '.join(shown)}{others} {verb} open, by {gaps_of_shown}, and "
@@ -275,7 +275,7 @@ def _structural_excess(model: Model, attempt: AssemblyAttempt, instant: float) -
     return len(model.rows) - jacobian.scaled(jacobian.row_scale).rank if jacobian.finite().all() else 0
 
 
-def _widths(model: Model, attempt: AssemblyAttempt, instant: float) -> dict[str, str]:
+def _gap_sizes(model: Model, attempt: AssemblyAttempt, instant: float) -> dict[str, str]:
     """Return the gap of each joint and driver in words, as a length or as an angle."""
     shifts, entries = model.pose_type.shifts, np.abs(attempt.jacobian.blocks)
     by_shift, by_turn = (np.max(part, axis=(1, 2)) for part in (entries[:, :, :shifts], entries[:, :, shifts:]))

@@ -206,13 +206,13 @@ def nearest_turns(
     turns = np.round(missing_turns)
     for members in clusters(counted @ counted.T):  # bodies that share a row that counts turns
         if counted[members].any():
-            turns[members] = _together(changes[members], missing_turns[members])
+            turns[members] = _coupled_turns(changes[members], missing_turns[members])
     if not turns.any() or np.max(np.abs(residual_at(shifted(turns)) - still)) > 1e-6:
         return coordinates
     return {**coordinates, "angle": shifted(turns)}
 
 
-def _together(
+def _coupled_turns(
     changes: Float[np.ndarray, "body row"], missing_turns: Float[np.ndarray, " body"]
 ) -> Float[np.ndarray, " body"]:
     """Return the whole turns nearest to `missing_turns` that change no row; `changes` are by one turn of each."""

@@ -148,7 +148,7 @@ def take_steps(
     def go_on(state: TakenSteps) -> TakenSteps:
         arrival = _typed(solved(state.run), blank)
         arrival_source = predictor(system, pose_type, (arrival.coordinates, arrival.outputs, arrival.sign))
-        run, arrived, taken = _after(state.run, arrival, arrival_source, grid, limits)
+        run, arrived, taken = _after_batch(state.run, arrival, arrival_source, grid, limits)
         solved_now, (anchors, points, instants) = _solved(arrival), state.records
         anchors = put(anchors, jax.tree.map(lambda x: x[..., :1], solved_now), state.steps)
         points = put(points, jax.tree.map(lambda x: x[None], arrived), state.steps)
@@ -183,10 +183,10 @@ def _typed(values: Any, like: Any) -> Any:
 
 def _planned(run: StepState, grid: Float[Numbers, " time"], limits: StepLimits) -> StepState:
     """Plan the next step of a run, or end it with a reason."""
-    return _aimed(run._replace(arrived=NOWHERE), plan_next_step(run.control, limits), grid)
+    return _with_step(run._replace(arrived=NOWHERE), plan_next_step(run.control, limits), grid)
 
 
-def _aimed(run: StepState, control: StepControl, grid: Float[Numbers, " time"]) -> StepState:
+def _with_step(run: StepState, control: StepControl, grid: Float[Numbers, " time"]) -> StepState:
     """Return the run with a step to try, and the next grid instants within it in the other lanes."""
     instant = jnp.concatenate([control.target[None], jnp.minimum(_next_up(run, grid), control.target)])
     step = instant - control.expansion_point.instant
@@ -197,7 +197,7 @@ def _next_up(run: StepState, grid: Float[Numbers, " time"]) -> Float[Numbers, " 
     return jax.lax.dynamic_slice_in_dim(grid, run.next_up, len(run.instant) - 1)
 
 
-def _after(
+def _after_batch(
     run: StepState, arrival: StepResult, arrival_source: SolvedState, grid: Float[Numbers, " time"], limits: StepLimits
 ) -> tuple[StepState, ExpansionPoint, Bool[Numbers, ""]]:
     """Return the state of a run after a batch, the end point of its first lane, and whether that is the next anchor.
@@ -215,4 +215,4 @@ def _after(
     source = jax.tree.map(lambda new, old: jnp.where(taken, new[..., :1], old), arrival_source, run.source)
     again = jax.tree.map(lambda x: jnp.where(good & ~taken, x, jnp.nan), arrived)
     control = next_control(control, status, arrived, limits, good, taken)
-    return _aimed(run._replace(source=source, arrived=again), control, grid), arrived, taken
+    return _with_step(run._replace(source=source, arrived=again), control, grid), arrived, taken

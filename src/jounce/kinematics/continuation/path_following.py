@@ -152,7 +152,7 @@ class FollowedPath:
         """Return singular positions just before the start or just after the end that the motion would pass smoothly."""
         first = self.anchors[0]
         points = self._just_ahead() if self.status == Status.OK else []
-        if _is_left(first):
+        if _is_just_behind(first):
             points.append(ChangePoint(first.instant - first.reach, first.radius))
         return points
 
@@ -179,7 +179,7 @@ def history_of(anchors: Sequence[Anchor]) -> AttitudeHistory | None:
     return AttitudeHistory(between(instants), instants, between=between)
 
 
-def _is_left(point: "Anchor | ExpansionPoint") -> Any:
+def _is_just_behind(point: "Anchor | ExpansionPoint") -> Any:
     """Return whether a singular position lies just behind an expansion point."""
     return (point.det_rate > 0) & (point.det_rate * point.radius > 1 / NEARBY)
 
@@ -198,7 +198,7 @@ def is_spoiled_outside(
     This test is conservative: `singular_positions_outside` finds nothing where it is False.
     """
     with np.errstate(over="ignore", invalid="ignore"):  # of failed steps
-        return begins & _is_left(point) | _is_just_beyond(point, end)
+        return begins & _is_just_behind(point) | _is_just_beyond(point, end)
 
 
 def follow(
@@ -243,7 +243,7 @@ def follow(
         ending = int(control.ending)
         first += int(run.next_up)
         if ending == StopReason.PASSAGE:
-            passed = _passed(solver, last, stop)
+            passed = _far_side(solver, last, stop)
             if passed is None:
                 no = np.zeros((), bool)
                 control = control._replace(may_pass=no, ending=np.asarray(int(StopReason.UNFINISHED)))
@@ -260,11 +260,11 @@ def follow(
             beyond = float(np.nextafter(last.instant, np.inf))
             return path.ended(Status.COLLAPSED, beyond, ", ".join(solver.model.drivers))
         elif ending == StopReason.REFUSED:
-            return _ended(solver, path, done, span)
+            return _end_path(solver, path, done, span)
     return path
 
 
-def _ended(solver: Solver, path: FollowedPath, done: TakenSteps, span: float) -> FollowedPath:
+def _end_path(solver: Solver, path: FollowedPath, done: TakenSteps, span: float) -> FollowedPath:
     """End a path that cannot be continued, at the instant where a law was first refused, if any."""
     last, refused = path.anchors[-1], float(done.run.control.refused)
     if np.isnan(refused):
@@ -278,7 +278,7 @@ def _ended(solver: Solver, path: FollowedPath, done: TakenSteps, span: float) ->
     return path.ended(status, target, solver.fault(arrival, 0))
 
 
-def _passed(solver: Solver, near_side: Anchor, stop: float) -> tuple[Anchor, ChangePoint] | None:
+def _far_side(solver: Solver, near_side: Anchor, stop: float) -> tuple[Anchor, ChangePoint] | None:
     """Return the anchor beyond a change point just ahead, and the change point; None if there is none to pass.
 
     The far anchor is as distant from the change point as this one. It must lie on the series to rounding, and the

@@ -130,7 +130,7 @@ class Solver:
 
     def prepare(self) -> None:
         """Compile the program of runs, unless it exists; nothing is solved."""
-        run = self.beginning(self.model.guess, 0.0)
+        run = self.run_at(self.model.guess, 0.0)
         self._take_steps(run, NO_GRID, 0, only_made=True)
 
     def run_from(
@@ -140,7 +140,7 @@ class Solver:
         source = jax.tree.map(lambda x: padded(x, SMALL_BATCH), self.needed(solved))
         return _run_from(source, expansion_point, largest=largest, crawled=crawled)
 
-    def beginning(self, coordinates: Mapping[str, Any], instant: float) -> StepState:
+    def run_at(self, coordinates: Mapping[str, Any], instant: float) -> StepState:
         """Return the run that begins by solving an instant from a position assembled at it."""
         source = self.needed(self.still(coordinates, SMALL_BATCH))
         return _run_from(source, (instant, 0.0, 0.0, 0.0), instant=np.full(SMALL_BATCH, instant))

@@ -83,7 +83,7 @@ def _assembled(
         )
         trial = {name: jet.coefficients[0] for name, jet in displaced(part).coordinates().items()}
         take = moving & good
-        coordinates = {name: jnp.where(_wide(take, x), trial[name], x) for name, x in coordinates.items()}
+        coordinates = {name: jnp.where(_per_lane(take, x), trial[name], x) for name, x in coordinates.items()}
         return coordinates, take & (size > tolerance), count + 1
 
     lag = jnp.where(driven, jnp.abs(unscaled.residual(pose_at(guess, pose_type), time).coefficients[0]), 0.0)
@@ -123,5 +123,5 @@ def assemble_from_guess(shared: Any, designs: Any, *, pose_type: type[Pose]) -> 
     return _assembled(system, guess, instant, tolerance, driven, pose_type)
 
 
-def _wide(lanes: Any, values: Any) -> Any:
+def _per_lane(lanes: Any, values: Any) -> Any:
     return lanes.reshape(*[1] * (values.ndim - 1), -1)

@@ -93,7 +93,7 @@ def cut_at_ends(path: FollowedPath, curves: Iterable[CurveEnds], grid: Float[np.
     `grid` has the instants that were solved on the way, s.
     """
     for ends in curves:
-        end = _leaves(path, ends)
+        end = _first_excess(path, ends)
         if end is None:
             continue
         instant, beyond_high = end
@@ -106,7 +106,7 @@ def cut_at_ends(path: FollowedPath, curves: Iterable[CurveEnds], grid: Float[np.
     return path
 
 
-def _leaves(path: FollowedPath, ends: CurveEnds) -> tuple[float, bool] | None:
+def _first_excess(path: FollowedPath, ends: CurveEnds) -> tuple[float, bool] | None:
     """Return the first instant beyond an end, s, and whether that end is the upper one."""
     times = np.array([anchor.instant for anchor in path.anchors])
     series = [np.asarray(anchor.state[0]["position"])[:, :, ends.body : ends.body + 1] for anchor in path.anchors]

@@ -238,7 +238,7 @@ def _followed(
     check_turns(mechanism, model, coordinates, first)
     solver = Solver(model, *settings)
     prepare_outputs(mechanism, model, solver.order)
-    start = solver.beginning(coordinates, first)
+    start = solver.run_at(coordinates, first)
     solved_instants = np.asarray(instants) if len(instants) <= LONG_GRID else NO_GRID
     path = follow(solver, start, last, last - first, grid=solved_instants)
     if path.anchors:
